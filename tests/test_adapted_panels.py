@@ -140,3 +140,10 @@ def test_arcs_follow_no_more_hits_than_the_tolerance_needs(half_angle, tolerance
 def test_a_rough_matrix_of_arcs_leaves_many_hits_out():
     fine, rough = (arc_matrix(1.2, ker.Legendre(2), tolerance) for tolerance in (0.0, 1e-2))
     assert 1e-11 < np.linalg.norm(rough[0] - fine[0]) <= rough[1]
+
+
+def test_the_panel_at_grazing_is_halved_as_often_as_its_residual_asks_for():
+    trial = adapted_trial_space(ker.WallLaw(geo.dispersing_arcs(1.0)), 3, 1e-9)
+    # halved once a level, it takes more than ten levels
+    assert len(trial.levels) <= 4 and trial.levels[-1][1] < 1e-5
+    assert len(trial.basis.edges) < 50

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,10 @@ from ..eigenvalues.parity import Parity
 DEGREE = 6
 # Number of the law's breakpoints that are edges of the first level, and width of its widest panel.
 FIRST_BREAKPOINTS, WIDEST = 40, np.pi / 10
-# Least distance of two edges.
-NARROWEST = 1e-7
+# Least distance of two edges, and limit on the halvings of a panel at grazing between two levels.
+NARROWEST, MOST_HALVINGS = 1e-7, 12
+# Largest fraction of the wanted squared residual that counts as that of the other panels.
+MOST_BESIDE = 0.9
 # Each level divides the worst panels, with this fraction of the squared residuals.
 FRACTION = 0.9
 # Limit on the levels, and limit on the panels for traced laws (True) and for others.
@@ -88,20 +90,21 @@ def _adapted(law: Law, k: int, tolerance: float, most_levels: int, bar: Any) -> 
     mirrored = bool(law.mirror_symmetric)
     edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[law.expectations(ONE_PANEL).is_traced]
     history: list[tuple[int, float]] = []
-    goal = np.sqrt(tolerance)
+    goal, before = float(np.sqrt(tolerance)), None
     while True:
         level = _Level(law, edges, mirrored, MEAN_FRACTION * goal)
         with one_blas_thread():
             values, vectors, parity = level.leading(k + EXTRA, CONVERGED * goal)
         squares = level.squared_residuals(values, vectors, parity)
-        goal = np.sqrt(tolerance * _room(values, k))
+        goal = float(np.sqrt(tolerance * _room(values, k)))
         joint = float(np.sqrt(squares[:, :k].sum()))
         history.append((level.panels.size, joint))
         bar.set_postfix_str(f"residual {joint:.1g}, asked for {goal:.1g}", refresh=False)
         bar.update()
         if joint <= goal or len(history) == most_levels or len(edges) > most_panels:
             break
-        edges = _divided(edges, squares[:, :k].sum(axis=1))
+        now = _Residuals(edges, squares[:, :k].sum(axis=1))
+        edges, before = _divided(now, before, goal, mirrored), now
     first = np.arange(1, k)[np.argsort(-values[1:k], kind="stable")]
     chosen = np.append(0, first)
     whole = level.extended(vectors, parity)
@@ -109,6 +112,13 @@ def _adapted(law: Law, k: int, tolerance: float, most_levels: int, bar: Any) -> 
         level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:],
         tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored, tuple(history),
     )  # fmt: skip
+
+
+class _Residuals(NamedTuple):
+    """The edges of panels and their squared residuals."""
+
+    edges: Floats
+    squares: Floats
 
 
 class _Level:
@@ -241,9 +251,30 @@ def _first_edges(law: Law, mirrored: bool) -> Floats:
     return np.append(np.concatenate(pieces), end)
 
 
-def _divided(edges: Floats, squares: Floats) -> Floats:
-    order = np.argsort(-squares)
+def _divided(now: _Residuals, before: _Residuals | None, goal: float, mirrored: bool) -> Floats:
+    """More edges: the middles of the panels with the largest residuals, and at grazing angles nearer to the end."""
+    edges, squares = now
+    width, order = np.diff(edges), np.argsort(-squares)
     enough = int(np.searchsorted(np.cumsum(squares[order]), FRACTION * squares.sum())) + 1
     chosen = order[:enough]
-    chosen = chosen[np.diff(edges)[chosen] > 2.0 * NARROWEST]
-    return np.union1d(edges, 0.5 * (edges[chosen] + edges[chosen + 1]))
+    chosen = chosen[width[chosen] > 2.0 * NARROWEST]
+    parts = [edges, 0.5 * (edges[chosen] + edges[chosen + 1])]
+    for panel, inward in ((0, 1.0),) if mirrored else ((0, 1.0), (-1, -1.0)):
+        if before is not None and panel % len(squares) in chosen:
+            distance = width[panel] * 0.5 ** np.arange(2, 1 + _halvings(now, before, panel, goal))
+            parts.append(edges[panel] + inward * distance[distance > NARROWEST])
+    return np.unique(np.concatenate(parts))
+
+
+def _halvings(now: _Residuals, before: _Residuals, panel: int, goal: float) -> int:
+    """How often to halve the panel at grazing, so that with its residual the joint one is about the goal.
+
+    Its squared residual is taken as a power of its width, whose exponent the level before tells.
+    """
+    width, width_before = (float(np.diff(level.edges)[panel]) for level in (now, before))
+    square, square_before = (float(level.squares[panel]) for level in (now, before))
+    allowed = goal**2 - min(float(now.squares.sum()) - square, MOST_BESIDE * goal**2)
+    if not (width < width_before and allowed < square < square_before):
+        return 1
+    exponent = math.log(square_before / square) / math.log(width_before / width)
+    return min(math.ceil(math.log2(square / allowed) / exponent), MOST_HALVINGS)
