@@ -245,6 +245,9 @@ def _rest(basis: Basis, half_angle: float, most_hits: int, mirrored: bool) -> tu
     sign, origin = (-1.0, np.pi) if mirrored else (1.0, 0.0)
     incoming = basis.evaluate(origin + sign * (half_angle + spread))
     outgoing = basis.evaluate(origin + sign * (np.pi - half_angle + 2.0 * spread))
-    middle = NOISE_PROBES // 2
-    centre = np.outer(incoming[middle], outgoing[middle])
-    return centre, max(float(np.linalg.norm(np.outer(e, f) - centre)) for e in incoming for f in outgoing)
+    e, f = incoming[NOISE_PROBES // 2], outgoing[NOISE_PROBES // 2]
+    # incoming outgoing^T - e f^T = from_e outgoing^T + e from_f^T, whose square is a sum of products of numbers
+    from_e, from_f = incoming - e, outgoing - f
+    square = np.outer((from_e**2).sum(axis=1), (outgoing**2).sum(axis=1)) + (e @ e) * (from_f**2).sum(axis=1)
+    square += 2.0 * np.outer(from_e @ e, (outgoing * from_f).sum(axis=1))
+    return np.outer(e, f), float(np.sqrt(max(square.max(), 0.0)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
 from ...kernels import Law
+from ...kernels.bases.assembly import one_blas_thread
 from ...kernels.bases.measure import SINE
 
 # Rays, and batches of them for the standard error.
@@ -44,6 +45,11 @@ def fast_top(law: Law) -> tuple[float, str] | None:
 
 def least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:
     """Frequency, value and standard error of the least quotient of 1 - P, for frequencies of at least ``least``."""
+    with one_blas_thread():
+        return _least_quotient(law, least)
+
+
+def _least_quotient(law: Law, least: float) -> tuple[float, float, float]:
     rng = np.random.default_rng(0)
     theta = SINE.quantile((np.arange(RAYS) + rng.random(RAYS)) / RAYS)
     out = law.sample(theta, rng)
