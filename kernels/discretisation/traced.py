@@ -15,7 +15,7 @@ from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..channels.grazing import GrazingIntegrals
-from ..expectations.angle_panels import NODES, NULL_RULES, AnglePanels
+from ..expectations.angle_panels import NODES, NORMAL, NULL_RULES, AnglePanels
 from ..expectations.basis_means import means_of_basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
@@ -42,10 +42,8 @@ ASYMMETRY_FACTOR, FEW_PAIRS = 1.25, 3.0
 # Error of Kronrod's rule as a fraction of its difference from Gauss's rule. Its root mean square over the positions of
 # a singularity is 0.38 for the square root at which a piece appears and 0.26 for a breakpoint; its mean is 0.
 KRONROD_FRACTION = 0.5
-# The same where neighbouring nodes share less than LEAST_SHARED of their itineraries: the nodes then sample noise, in
-# which error and null rules have the same size, and one panel may dominate. 95 % quantile of Student's t for four null
-# rules.
-ALIASED_FRACTION, LEAST_SHARED = 2.8, 0.8
+# Where neighbouring nodes share less than this fraction of their itineraries, the nodes sample noise.
+LEAST_SHARED = 0.8
 # Incoming angles computed at a time, so that their nodes fit into memory.
 ANGLES_AT_ONCE = 1500
 # The errors of all conditional expectations together may be this fraction of the tolerance.
@@ -129,10 +127,10 @@ def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, flo
     If the first sixteenth of the segments predicts an error above ``budget.fallback``, the computation ends with it.
 
     The error of a panel is half the size of the null rules, of which the difference of Kronrod's and Gauss's rule is
-    one, if the expectations have a kink there, and 2.8 times it if neighbouring nodes share few itineraries. If the
-    expectations are smooth, it is scaled by a ratio measured when the panel was divided. The errors of panels differ in
-    sign, so they are added in quadrature, together with a multiple of the asymmetry of the result, which shows other
-    errors. The errors of the expectations are bounded whatever their signs.
+    one, if the expectations have a kink there. If they are smooth, it is scaled by a ratio measured when the panel was
+    divided. If neighbouring nodes share few itineraries, the expectations are a sample, which tells its standard error.
+    `AnglePanels.total_error` adds the errors of panels; a multiple of the asymmetry of the result, which shows other
+    errors, is added in quadrature. The errors of the expectations are bounded whatever their signs.
     """
     inner, fraction = basis, 1.0
     if basis.is_polynomial and basis.size < FEWEST_FUNCTIONS:
@@ -364,7 +362,7 @@ class _Integrator:
     def _state(self) -> tuple[Floats, float, float, float]:
         """The matrix and its errors from the panels, from the expectations, and from the asymmetry."""
         matrix = self.panels.total(self.basis) + self.of_grazing[0]
-        panels = float(np.linalg.norm(self.panels.error))
+        panels = self.panels.total_error(self.basis)
         conditionals = self.panels.total_mean_error(self.basis) + self.of_grazing[1]
         if self.halved:
             flip = reflection_matrix(self.basis)
@@ -379,6 +377,7 @@ class _Integrator:
         able = (panels.high - panels.low > NARROWEST) & (panels.error > 0.5 * panels.mean_errors(self.basis))
         order = np.argsort(panels.error)
         together = np.sqrt(np.cumsum(panels.error[order] ** 2))
+        together *= panels.total_error(self.basis) / max(together[-1], np.finfo(np.float64).tiny)
         chosen = np.zeros(len(order), dtype=np.bool_)
         chosen[order[together > 0.5 * goal]] = True
         # A panel with a much smaller error than the worst waits for a later round.
@@ -410,9 +409,9 @@ class _Integrator:
         ratio = np.clip(RATIO_MARGIN * actual / before, LEAST_RATIO, 1.0)[owner]
         smooth = after < SMOOTH_SHRINKING * before[owner]
         # not where the nodes sample noise, and not for the errors of patches
-        smooth &= self.cells is None
-        smooth &= children.error < 2.0 * KRONROD_FRACTION * after
+        smooth &= (self.cells is None) & (children.factor > 0.0)
         self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, children.error)
+        self.panels.factor[-len(owner) :] = np.where(smooth, ratio, children.factor)
 
     def _cuts(self, low: float, high: float) -> Floats:
         """The angles at which a panel is divided: the critical angles inside it, or its middle if none is known."""
@@ -480,5 +479,10 @@ class _Integrator:
             # of the entry points outside patches, which share all their itineraries
             outside = np.sum(panels.image[touched] @ self.basis.constant, axis=1)
             least = np.minimum(least, 1.0 - np.sum(1.0 - shared, axis=1) / np.maximum(outside, EPS))
-        fraction = np.where(least < LEAST_SHARED, ALIASED_FRACTION, KRONROD_FRACTION)
-        panels.error[touched] = fraction * panels.selected(touched).differences(self.basis, NULL_RULES)
+        found, of_rules = panels.selected(touched), least >= LEAST_SHARED
+        panels.factor[touched] = np.where(of_rules, KRONROD_FRACTION, 0.0)
+        panels.error[touched] = np.where(
+            of_rules,
+            KRONROD_FRACTION * found.differences(self.basis, NULL_RULES),
+            NORMAL * found.standard_errors(self.basis),
+        )
