@@ -8,7 +8,10 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.cells.hollow_shape import distinct_hollows
 from asperity.geometry.polygons.beams import beams_of
+from asperity.kernels.discretisation.isometry_tables import table_matrix
+from asperity.kernels.walls.polygon import table_of_beams
 from interval_marching import exact_row
+from precise_polygon import precise_exit
 from random_hollows import random_hollow, wall_with
 
 RANDOM = 50
@@ -201,3 +204,48 @@ def test_the_tolerance_is_met_whatever_the_limit_on_beams():
     for tolerance in (1e-3, 1e-5):
         beams = beams_of(largest_hollow(3), tolerance=tolerance, max_beams=10**7)
         assert beams.complete and 0.2 * tolerance < beams.unresolved <= tolerance
+
+
+def test_a_hollow_symmetric_within_rounding_is_off_by_no_more_than_its_leaves_say():
+    # sides of Koch curves, and of their mirror images, differ by 3e-15 radians
+    given = min((shape.vertices for shape, _ in distinct_hollows(geo.koch(3)) if len(shape.vertices) > 3), key=len)
+    beams = beams_of(given, max_beams=20_000, mirror_symmetric=True)
+    worst = 0.0
+    long = np.flatnonzero((beams.bounces > 600) & (beams.flux() > 1e-12) & (beams.low > 0.5 * np.pi))
+    for k in np.random.default_rng(1).choice(long, 12, replace=False):
+        theta = 0.5 * (beams.low[k] + beams.high[k])
+        found = exact_row(given, theta, max_bounces=100_000)
+        apart = np.abs(found.offset - beams.offset[k])
+        apart[(found.bounces != beams.bounces[k]) | (found.sign != beams.sign[k])] = np.inf
+        nearest = np.argmin(apart)
+        angle, rest, bounces = precise_exit(given, found.edges[nearest : nearest + 2].mean(), theta)
+        difference = abs(beams.sign[k] * theta + beams.offset[k] - angle - rest)
+        assert bounces == beams.bounces[k] and difference <= beams.offset_error + 1e-14
+        worst = max(worst, difference)
+    # beyond the rounding of a few angles
+    assert worst > 1e-13
+
+
+def test_exact_mirror_symmetry_costs_no_error_and_a_departure_its_growth():
+    exact = np.array([(0, 0), (0.25, -1), (0.75, -1), (1, 0)])
+    moved = np.add(exact, [[0, 0], [2.0**-50, 0], [0, 0], [0, 0]])
+    plain, changed = (beams_of(chain, mirror_symmetric=True) for chain in (exact, moved))
+    assert plain.offset_error == 0.0
+    # twice the change of the direction of the floor, whose length is 1/2, for every bounce
+    assert changed.offset_error == pytest.approx(2.0 * changed.bounces.max() * 2.0**-49, rel=1e-12)
+    assert changed.rounding > plain.rounding
+    # the hollow is made symmetric, so that both have one law
+    assert np.array_equal(plain.offset, changed.offset) and np.array_equal(plain.sine, changed.sine)
+    with pytest.raises(InputError, match="own mirror image"):
+        beams_of([(0, 0), (0.3, -1), (1, 0)], mirror_symmetric=True)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4, 6, 8, 10])
+def test_half_of_the_rays_keep_their_error_where_the_mirror_image_departs(seed):
+    left = random_hollow(seed)
+    hollow = np.vstack([left[:-1], [1.0, -0.3], np.array([2.0, 0.0]) + left[-2::-1] * [-1.0, 1.0]])
+    hollow[1:-1] += 1e-10 * np.random.default_rng(seed).uniform(-1.0, 1.0, (len(hollow) - 2, 2))
+    whole, half = beams_of(hollow), beams_of(hollow, mirror_symmetric=True)
+    matrices = [table_matrix(table_of_beams(beams), ker.Bins(64)) for beams in (whole, half)]
+    difference = np.linalg.norm(matrices[0][0] - matrices[1][0])
+    assert 10.0 * matrices[0][1] < difference <= matrices[0][1] + matrices[1][1]

@@ -37,7 +37,8 @@ from .compiled.columns import (
     VERTEX_COLUMNS,
     WHOLE_COLUMNS,
 )
-from .triangulation import Triangulation, triangulated
+from .mirror_images import Symmetrised, symmetrised
+from .triangulation import Triangulation, checked_chain, triangulated
 
 if TYPE_CHECKING:
     from .compiled.store import Store
@@ -82,7 +83,10 @@ class Beams:
     defect : float
         Absolute difference between the total flux of all pieces and 1.
     rounding : float
-        Bound on the fraction of the flux that double precision may have put into the wrong leaf.
+        Bound on the fraction of the flux that double precision may have put into the wrong leaf, or a departure from
+        mirror symmetry.
+    offset_error : float
+        Bound on the change of offsets, radians, by a departure from mirror symmetry; 0 if there is none.
     complete : bool
         Whether ``unresolved`` met the tolerance; if not, the limit of beams was reached.
     """
@@ -102,6 +106,7 @@ class Beams:
     unresolved_cosine: Floats
     defect: float
     rounding: float
+    offset_error: float
     complete: bool
 
     def flux(self) -> Floats:
@@ -137,7 +142,8 @@ def beams_of(
         Limit on the number of beams, and on the triangles that they pass, 256 for each; cavities with narrow necks
         never resolve completely.
     mirror_symmetric : bool
-        Whether the hollow is its own mirror image: then only rays with theta < pi/2 are divided, and mirrored.
+        Whether the hollow is its own mirror image, within rounding: then it is made so exactly, and only rays with
+        theta < pi/2 are divided, and mirrored. ``rounding`` and ``offset_error`` bound what the change does.
     threads : int, optional
         By default one for each processor that this process may use. The result does not depend on it.
 
@@ -148,7 +154,7 @@ def beams_of(
     Raises
     ------
     InputError
-        If the chain is not a hollow; see `triangulated`.
+        If the chain is not a hollow, see `triangulated`, or not mirror-symmetric although said to be.
     WallError
         If the chain crosses itself.
 
@@ -169,7 +175,8 @@ def beams_of(
     number_between("tolerance", tolerance, 0.0, 1.0, closed="low")
     whole_number("max_beams", max_beams, 2)
     entrances = 1 if mirror_symmetric else 2
-    triangulation = triangulated(hollow_vertices)
+    exact = symmetrised(checked_chain(hollow_vertices)) if mirror_symmetric else None
+    triangulation = triangulated(hollow_vertices if exact is None else exact.vertices)
     division = interruptibly(lambda: _divided(triangulation, tolerance, max_beams * entrances // 2, entrances, threads))
     leaving = _mirrored(division.leaving) if mirror_symmetric else division.leaving
     rest = _mirrored(division.rest) if mirror_symmetric else division.rest
@@ -178,6 +185,7 @@ def beams_of(
         images * float(_flux(part.low, part.high, part.sine, part.cosine).sum())
         for part in (division.leaving, division.rest)
     )
+    moved, offset_error = (0.0, 0.0) if exact is None else _changed(leaving, exact)
     return Beams(
         sign=_fixed(leaving.sign.astype(np.int8)),
         offset=_fixed(leaving.offset),
@@ -193,7 +201,8 @@ def beams_of(
         unresolved_sine=_fixed(rest.sine),
         unresolved_cosine=_fixed(rest.cosine),
         defect=abs(flux + unresolved - 1.0),
-        rounding=0.5 * images * division.rounding / triangulation.width,
+        rounding=0.5 * images * division.rounding / triangulation.width + moved,
+        offset_error=offset_error,
         complete=division.complete,
     )
 
@@ -387,6 +396,18 @@ def _flux(low: Floats, high: Floats, sine: Floats, cosine: Floats) -> Floats:
     """Return half the integral of sine sin(theta) + cosine cos(theta), without cancellation on short intervals."""
     middle, half = 0.5 * (low + high), np.sin(0.5 * (high - low))
     return np.asarray(half * (sine * np.sin(middle) + cosine * np.cos(middle)))
+
+
+def _changed(leaving: _Pieces, exact: Symmetrised) -> tuple[float, float]:
+    """Return bounds on the flux that leaves lose, and on the change of offsets, between a hollow and the symmetric one.
+
+    The polygon of a leaf has two chains of edges over its angles, and each edge moves by as much as a vertex.
+    """
+    if exact.shift == 0.0:
+        return 0.0, 0.0
+    bounces = leaving.bounces.astype(np.float64)
+    lost = exact.moved(bounces) @ (leaving.high - leaving.low) / exact.vertices[-1, 0]
+    return float(lost), float(exact.turned(bounces.max(initial=0.0)))
 
 
 def _mirrored(pieces: _Pieces) -> _Pieces:

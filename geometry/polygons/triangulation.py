@@ -92,7 +92,7 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     >>> square.corners.tolist()
     [[2, 3, 0], [0, 1, 2]]
     """
-    points = _checked(hollow_vertices)
+    points = checked_chain(hollow_vertices)
     relative = points - points[0]
     unit = math.ldexp(1.0, math.frexp(float(np.abs(relative).max()))[1])
     corners, beyond = _clipped(ExactPoints(points / unit))
@@ -104,7 +104,8 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     return Triangulation(frozen(relative / unit), unit, corners, beyond, frozen(high), frozen(low), entrance)
 
 
-def _checked(hollow_vertices: ArrayLike) -> Floats:
+def checked_chain(hollow_vertices: ArrayLike) -> Floats:
+    """Return the different vertices of a chain from (left, 0) to (right, 0), none above height 0."""
     points = finite_array("hollow_vertices", hollow_vertices)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
         raise InputError(f"hollow_vertices: expected an array of shape (n, 2), n at least 3, got {points.shape}")

@@ -21,11 +21,11 @@ class Displacement:
 
     A cut that is displaced by h moves the mass h sin(theta)/2 p(theta) from one product e_i(theta) e_j(theta') to
     another. The changes of a row's interval are added; those of different intervals are orthogonal, so their squares
-    are added.
+    are added. ``offset_error`` bounds the displacement by other causes than rounding.
     """
 
-    def __init__(self, basis: Basis) -> None:
-        self._basis = basis
+    def __init__(self, basis: Basis, offset_error: float = 0.0) -> None:
+        self._basis, self._cut = basis, CUT + offset_error
         self._largest, self._weighted = basis.magnitudes()
         self._rows = np.zeros(self._largest.size)
 
@@ -38,7 +38,7 @@ class Displacement:
         target: NDArray[np.int64],
     ) -> None:
         """Add pieces between two cuts: an angle inside each, its image, p sin(theta), and the intervals of the two."""
-        change = CUT * density * self._size(source, incoming) * self._size(target, outgoing)
+        change = self._cut * density * self._size(source, incoming) * self._size(target, outgoing)
         self._rows += np.bincount(source, weights=change, minlength=self._rows.size)
 
     def bound(self) -> float:

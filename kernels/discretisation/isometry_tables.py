@@ -64,7 +64,7 @@ def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
     elementary; for other bases Gauss rules integrate between the cuts. If a measure m of unresolved rays is
     retroreflected by convention, the matrix has an error of at most 2 m sup |e|^2, as in `branch_matrix`.
     """
-    total, displacement = np.zeros((basis.size, basis.size)), Displacement(basis)
+    total, displacement = np.zeros((basis.size, basis.size)), Displacement(basis, table.offset_error)
     _add_table(table, basis, total, displacement)
     if basis.is_polynomial:
         # Polynomials are smooth, so only the ends of pieces are cuts.
@@ -89,6 +89,9 @@ def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
         # The probabilities of a crevice are continuous, so that only the images of the basis's edges are cuts.
         add_mirrored_edges(basis, displacement)
     error = rounding(basis) + displacement.bound()
+    if table.offset_error:
+        # the images of nodes are displaced
+        error += table.offset_error * basis.derivative_norm()
     return total, error + (moved * largest_square_sum(basis) if moved else 0.0)
 
 

@@ -66,6 +66,8 @@ class IsometryTable:
     crevices : tuple of Crevice
     unresolved : float
         Upper bound on the measure of unresolved rays, which the table retroreflects by convention.
+    offset_error : float
+        Bound on errors of offsets beyond rounding, radians.
 
     Examples
     --------
@@ -87,6 +89,7 @@ class IsometryTable:
     _: KW_ONLY
     crevices: tuple[Crevice, ...] = ()
     unresolved: float = 0.0
+    offset_error: float = 0.0
 
     def __post_init__(self) -> None:
         names = ("sign", "offset", "low", "high", "start", "end")
@@ -114,6 +117,7 @@ class IsometryTable:
         sine: ArrayLike,
         cosine: ArrayLike,
         unresolved: float = 0.0,
+        offset_error: float = 0.0,
     ) -> IsometryTable:
         """The table of pieces of any length with probability ``sine + cosine cot(theta)``; pieces are cut at pi/2."""
         columns = np.broadcast_arrays(*np.atleast_1d(sign, offset, low, high, sine, cosine))
@@ -129,7 +133,7 @@ class IsometryTable:
                 np.concatenate([column, column[cut]]) for column in (sign, offset, sine, cosine)
             )
         start, end = (sine * np.sin(at) + cosine * np.cos(at) for at in (low, high))
-        return cls(sign, offset, low, high, start, end, unresolved=unresolved)
+        return cls(sign, offset, low, high, start, end, unresolved=unresolved, offset_error=offset_error)
 
     @classmethod
     def flat(cls, fraction: float) -> IsometryTable:
@@ -158,25 +162,26 @@ class IsometryTable:
             key = crevice.height_to_width, crevice.exchanged
             crevices[key] = crevices.get(key, 0.0) + crevice.fraction
         merged = tuple(Crevice(fraction, *key) for key, fraction in crevices.items())
-        return cls(*columns, crevices=merged, unresolved=sum(table.unresolved for table in parts))
+        unresolved, offset_error = sum(table.unresolved for table in parts), max(table.offset_error for table in parts)
+        return cls(*columns, crevices=merged, unresolved=unresolved, offset_error=offset_error)
 
     def scaled(self, fraction: float) -> IsometryTable:
         """The table with every probability multiplied by ``fraction``."""
         crevices = tuple(replace(crevice, fraction=fraction * crevice.fraction) for crevice in self.crevices)
         columns = [*self._columns()[:4], fraction * self.start, fraction * self.end]
-        return IsometryTable(*columns, crevices=crevices, unresolved=fraction * self.unresolved)
+        return self._with(columns, crevices=crevices, unresolved=fraction * self.unresolved)
 
     def mirrored(self) -> IsometryTable:
         """The table of the mirror image of the wall: both angles theta become pi - theta."""
         offset = np.where(self.sign > 0.0, -self.offset, 2.0 * np.pi - self.offset)
         columns = (self.sign, offset, np.pi - self.high, np.pi - self.low, self.end, self.start)
-        return IsometryTable(*columns, crevices=self.crevices, unresolved=self.unresolved)
+        return self._with(columns, crevices=self.crevices, unresolved=self.unresolved)
 
     def in_specular_frame(self) -> IsometryTable:
         """The table with every outgoing angle theta' replaced by pi - theta'."""
         crevices = tuple(replace(crevice, exchanged=not crevice.exchanged) for crevice in self.crevices)
         columns = (-self.sign, np.pi - self.offset, *self._columns()[2:])
-        return IsometryTable(*columns, crevices=crevices, unresolved=self.unresolved)
+        return self._with(columns, crevices=crevices, unresolved=self.unresolved)
 
     # ---- queries -----------------------------------------------------------------------------------------------
     @cached_property
@@ -300,6 +305,9 @@ class IsometryTable:
         order = np.sort((bucket << 32) | np.arange(bucket.size)) & (2**32 - 1)
         first = np.concatenate([[0], np.cumsum(np.bincount(bucket, minlength=buckets))])
         return np.asarray(first, dtype=np.int64), np.asarray(piece[order], dtype=np.int64)
+
+    def _with(self, columns: Iterable[Floats], *, crevices: tuple[Crevice, ...], unresolved: float) -> IsometryTable:
+        return IsometryTable(*columns, crevices=crevices, unresolved=unresolved, offset_error=self.offset_error)
 
     def _columns(self) -> tuple[Floats, ...]:
         return self.sign, self.offset, self.low, self.high, self.start, self.end

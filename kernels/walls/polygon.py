@@ -171,7 +171,9 @@ class PolygonLaw(BranchLaw):
 def table_of_beams(beams: Beams) -> IsometryTable:
     """The table of one hollow, whose opening is the whole period; unresolved beams are retroreflected."""
     columns = beams.sign, beams.offset, beams.low, beams.high, beams.sine, beams.cosine
-    resolved = IsometryTable.of_pieces(*columns, unresolved=float(beams.rounding))
+    resolved = IsometryTable.of_pieces(
+        *columns, unresolved=float(beams.rounding), offset_error=float(beams.offset_error)
+    )
     parts = [resolved]
     if np.size(beams.unresolved_low):
         parts.append(
