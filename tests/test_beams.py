@@ -8,6 +8,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.cells.hollow_shape import distinct_hollows
 from asperity.geometry.polygons.beams import beams_of
+from asperity.geometry.polygons.compiled import splitting
 from asperity.kernels.discretisation.isometry_tables import table_matrix
 from asperity.kernels.walls.polygon import table_of_beams
 from interval_marching import exact_row
@@ -249,3 +250,11 @@ def test_half_of_the_rays_keep_their_error_where_the_mirror_image_departs(seed):
     matrices = [table_matrix(table_of_beams(beams), ker.Bins(64)) for beams in (whole, half)]
     difference = np.linalg.norm(matrices[0][0] - matrices[1][0])
     assert 10.0 * matrices[0][1] < difference <= matrices[0][1] + matrices[1][1]
+
+
+def test_polygons_of_few_sides_are_resolved_by_one_call(monkeypatch):
+    calls, divide = [], splitting.divide
+    monkeypatch.setattr(splitting, "divide", lambda *given: calls.append(given) or divide(*given))
+    for seed in (2, 3, 6, 8):
+        calls.clear()
+        assert beams_of(random_hollow(seed)).unresolved == 0.0 and len(calls) == 1

@@ -52,6 +52,9 @@ STEPS_A_BEAM = 256
 MANY, PARTS = 1024, 16
 # Factor between the thresholds of priority of two rounds: next to the tolerance, and at most.
 LEAST_STEP, MOST_STEP = 1.1, 64.0
+# Splits of a first call for chains of few vertices, which resolves most of them: of those allowed, this fraction at
+# most, because it takes beams in no order.
+FEW_VERTICES, FIRST_SPLITS, FIRST_FRACTION = 16, 512, 1.0 / 16.0
 # Stands for a tolerance of 0.
 TINY = float(np.finfo(np.float64).tiny)
 
@@ -177,7 +180,7 @@ def beams_of(
     entrances = 1 if mirror_symmetric else 2
     exact = symmetrised(checked_chain(hollow_vertices)) if mirror_symmetric else None
     triangulation = triangulated(hollow_vertices if exact is None else exact.vertices)
-    division = interruptibly(lambda: _divided(triangulation, tolerance, max_beams * entrances // 2, entrances, threads))
+    division = _divided(triangulation, tolerance, max_beams * entrances // 2, entrances, threads)
     leaving = _mirrored(division.leaving) if mirror_symmetric else division.leaving
     rest = _mirrored(division.rest) if mirror_symmetric else division.rest
     images = 2.0 if mirror_symmetric else 1.0
@@ -229,22 +232,69 @@ class _Division(NamedTuple):
     complete: bool
 
 
-class _Waiting:
-    """The beams that are not finished, in tables, and which of them have been taken."""
+class _Beams:
+    """The beams of a hollow: those that wait, in tables, with which of them have been taken, and pieces of the others.
 
-    def __init__(self, store: Store) -> None:
+    Attributes
+    ----------
+    leaves, steps : int
+        Number of beams that have left the hollow, and of triangles passed.
+    rounding : float
+        See `_Division`.
+    """
+
+    def __init__(self, hollow: Hollow, entrance: Store) -> None:
+        self._hollow = hollow
         self._tables: list[tuple[Store, NDArray[np.bool_]]] = []
-        self.put([store])
-
-    def put(self, stores: list[Store]) -> None:
-        """Add beams."""
-        self._tables += [(store, np.ones(len(store.real), bool)) for store in stores if len(store.real)]
+        self._rows: list[Floats] = []
+        self._tags: list[NDArray[np.int64]] = []
+        self.leaves, self.steps, self.rounding = 0, 0, 0.0
+        self._put(entrance)
 
     def column(self, number: int) -> Floats:
-        """Return the numbers in a column of ``real`` of all beams."""
+        """Return the numbers in a column of ``real`` of all beams that wait."""
         return np.concatenate([np.empty(0), *(store.real[here, number] for store, here in self._tables)])
 
-    def take(self, threshold: float) -> list[Store]:
+    def divide(self, threshold: float, most_splits: int, most_steps: int, parts: int, threads: int | None) -> None:
+        """Divide the beams above a threshold of priority, in parts.
+
+        What becomes of a beam does not depend on other beams, so parts may run on any number of threads.
+        """
+        from .compiled.splitting import LEAVES, STEPS, divide
+
+        store = _together(self._take(threshold))
+        rule = threshold, most_splits // parts, max(most_steps // parts, 1)
+        found: list[Any] = [None] * parts
+
+        def run(part: slice) -> None:
+            for k in range(part.start, part.stop):
+                found[k] = divide(self._hollow, store, k, parts, *rule)
+
+        in_blocks(run, parts, threads, block=1)
+        for rest, rows, tags, counts, rounding in found:
+            tags[:, TAG_LEAF] += self.leaves
+            self._rows.append(rows)
+            self._tags.append(tags)
+            self.leaves, self.steps = self.leaves + counts[LEAVES], self.steps + counts[STEPS]
+            self.rounding += rounding
+            self._put(rest)
+
+    def leaving(self) -> _Pieces:
+        """Return the pieces of the beams that have left the hollow."""
+        return _columns(self._rows, self._tags)
+
+    def rest(self) -> _Pieces:
+        """Remove all beams that wait; return their pieces."""
+        from .compiled.pieces import pieces_of
+
+        rest = [pieces_of(store, self._hollow.width) for store in self._take(-np.inf)]
+        return _columns([row for row, _ in rest], [tag for _, tag in rest])
+
+    def _put(self, store: Store) -> None:
+        if len(store.real):
+            self._tables.append((store, np.ones(len(store.real), bool)))
+
+    def _take(self, threshold: float) -> list[Store]:
         """Remove and return all beams above a threshold of priority."""
         taken = []
         for store, here in self._tables:
@@ -261,42 +311,32 @@ def _divided(
 ) -> _Division:
     """Divide all beams above a threshold of priority, lower the threshold, and so on.
 
-    What becomes of a beam does not depend on other beams. So the parts into which a round is cut, whose number depends
-    on the number of beams alone, may run on any number of threads.
+    Of a chain of few vertices some beams are divided in no order before, in one short call. The number of the parts
+    into which a round is cut depends on the number of beams alone.
     """
-    from .compiled.pieces import pieces_of
-    from .compiled.splitting import LEAVES, STEPS, divide
-
     hollow = _hollow(triangulation)
-    waiting = _Waiting(_entrance(triangulation.entrance, hollow.width, entrances))
-    total, rounding, steps, leaves = float(waiting.column(FLUX).sum()), 0.0, 0, 0
-    rows: list[Floats] = []
-    tags: list[NDArray[np.int64]] = []
+    beams = _Beams(hollow, _entrance(triangulation.entrance, hollow.width, entrances))
+    wanted = tolerance * float(beams.column(FLUX).sum())
+    splits = min(FIRST_SPLITS, int(FIRST_FRACTION * max_beams))
+    if splits and len(triangulation.vertices) <= FEW_VERTICES:
+        beams.divide(wanted / FIRST_SPLITS, splits, STEPS_A_BEAM * splits, 1, 1)
+    if float(beams.column(FLUX).sum()) > wanted:
+        interruptibly(lambda: _in_rounds(beams, wanted, max_beams, threads))
+    complete = float(beams.column(FLUX).sum()) <= wanted
+    return _Division(beams.leaving(), beams.rest(), beams.rounding, complete)
+
+
+def _in_rounds(beams: _Beams, wanted: float, max_beams: int, threads: int | None) -> None:
+    """Divide beams in rounds until the flux that is left is as wanted, or a limit is reached."""
     while True:
-        flux, best = waiting.column(FLUX), waiting.column(PRIORITY).max(initial=0.0)
-        room, spare = max_beams - leaves - flux.size, STEPS_A_BEAM * max_beams - steps
-        complete = float(flux.sum()) <= tolerance * total
-        if complete or room <= 0 or spare <= 0 or best <= 0.0:
-            break
+        flux, best = beams.column(FLUX), beams.column(PRIORITY).max(initial=0.0)
+        left, used = float(flux.sum()), beams.leaves + flux.size
+        room, spare = max_beams - used, STEPS_A_BEAM * max_beams - beams.steps
+        if left <= wanted or room <= 0 or spare <= 0 or best <= 0.0:
+            return
         parts = PARTS if min(flux.size, room) >= MANY else 1
-        threshold = best / _step(float(flux.sum()) / max(tolerance * total, TINY), 1.0 + room / (leaves + flux.size))
-        store, limits = _together(waiting.take(threshold)), (room // parts, max(spare // parts, 1))
-        found: list[Any] = [None] * parts
-
-        def run(part: slice, store: Any = store, rule: Any = (threshold, *limits), found: list[Any] = found) -> None:
-            for k in range(part.start, part.stop):
-                found[k] = divide(hollow, store, k, len(found), *rule)
-
-        in_blocks(run, parts, threads, block=1)
-        for _, part_rows, part_tags, counts, part_rounding in found:
-            part_tags[:, TAG_LEAF] += leaves
-            rows.append(part_rows)
-            tags.append(part_tags)
-            leaves, steps, rounding = leaves + counts[LEAVES], steps + counts[STEPS], rounding + part_rounding
-        waiting.put([part[0] for part in found])
-    rest = [pieces_of(store, hollow.width) for store in waiting.take(-np.inf)]
-    left = _columns([row for row, _ in rest], [tag for _, tag in rest])
-    return _Division(_columns(rows, tags), left, rounding, complete)
+        threshold = best / _step(left / max(wanted, TINY), 1.0 + room / used)
+        beams.divide(threshold, room, spare, parts, threads)
 
 
 def _step(excess: float, growth: float) -> float:

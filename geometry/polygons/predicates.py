@@ -46,9 +46,20 @@ class ExactPoints:
         whole = [numerator * (unit // denominator) for numerator, denominator in ratios]
         return list(zip(whole[::2], whole[1::2], strict=True))
 
+    @cached_property
+    def _plain(self) -> list[list[float]]:
+        """The coordinates as Python's numbers."""
+        found: list[list[float]] = self.points.tolist()
+        return found
+
     def turn(self, a: int, b: int, c: int) -> int:
         """Return 1 if the path a, b, c turns left, -1 if it turns right, 0 if the points are collinear."""
-        return int(self.sides(a, b, [c])[0])
+        (ax, ay), (bx, by), (cx, cy) = self._plain[a], self._plain[b], self._plain[c]
+        first, second = (bx - ax) * (cy - ay), (by - ay) * (cx - ax)
+        cross: float = first - second
+        if abs(cross) <= CROSS_ULPS * UNIT_ROUNDOFF * (abs(first) + abs(second)) and (first or second):
+            cross = self._cross(a, b, c)
+        return (cross > 0) - (cross < 0)
 
     def sides(self, a: int, b: int, others: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int8]:
         """Return the side of the line from a to b on which each other point lies: 1 left, -1 right, 0 on the line."""
