@@ -7,6 +7,7 @@ from asperity import InputError, WallError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.cells.hollow_shape import distinct_hollows
+from asperity.geometry.polygons import beams as beam_module
 from asperity.geometry.polygons.beams import beams_of
 from asperity.geometry.polygons.compiled import splitting
 from asperity.kernels.discretisation.isometry_tables import table_matrix
@@ -242,7 +243,8 @@ def test_exact_mirror_symmetry_costs_no_error_and_a_departure_its_growth():
 
 
 @pytest.mark.parametrize("seed", [0, 2, 4, 6, 8, 10])
-def test_half_of_the_rays_keep_their_error_where_the_mirror_image_departs(seed):
+def test_half_of_the_rays_keep_their_error_where_the_mirror_image_departs(seed, monkeypatch):
+    monkeypatch.setattr(beam_module, "MOST_TURNED", 1.0)
     left = random_hollow(seed)
     hollow = np.vstack([left[:-1], [1.0, -0.3], np.array([2.0, 0.0]) + left[-2::-1] * [-1.0, 1.0]])
     hollow[1:-1] += 1e-10 * np.random.default_rng(seed).uniform(-1.0, 1.0, (len(hollow) - 2, 2))
@@ -258,3 +260,13 @@ def test_polygons_of_few_sides_are_resolved_by_one_call(monkeypatch):
     for seed in (2, 3, 6, 8):
         calls.clear()
         assert beams_of(random_hollow(seed)).unresolved == 0.0 and len(calls) == 1
+
+
+def test_mirror_images_that_would_cost_accuracy_give_way_to_all_rays():
+    # a rough bottom of 40 sides, whose directions depart by 1e-13
+    left = np.column_stack([np.linspace(0.0, 0.475, 20), [0.0, *-0.3 - 0.1 * np.random.default_rng(3).random(19)]])
+    hollow = np.vstack([left, (left * [-1.0, 1.0] + [1.0, 0.0])[::-1]])
+    hollow[1:-1] += 1e-13 * np.random.default_rng(4).uniform(-1.0, 1.0, (len(hollow) - 2, 2))
+    whole, half = beams_of(hollow), beams_of(hollow, mirror_symmetric=True)
+    assert half.offset_error == 0.0 and half.rounding == whole.rounding < 1e-11
+    assert beams_of(hollow, mirror_symmetric=True, tolerance=1e-6).offset_error > 0.0

@@ -240,3 +240,13 @@ def test_signs_from_the_table_are_those_found_by_probing() -> None:
     wanted = ker.TriangularTeethLaw(0.7).in_specular_frame().apply(np.cos, theta)
     assert np.allclose((fraction * np.cos(outgoing)).sum(-1), wanted, atol=1e-13)
     assert ker.lambertian().isometry_table() is None
+
+
+def test_the_largest_hollow_tells_first_that_beams_do_not_resolve():
+    law = ker.PolygonLaw(geo.koch(4), max_beams=2_000)
+    assert not law.resolves(1e-4) and len(law._known) == 1
+    assert law.resolves(1.0) and len(law._known) == len(law._shapes) > 1
+    assert float(law.unresolved) > 1e-4
+    # the tables that are known are used
+    known = dict(law._known)
+    assert law.isometry_table() is law.isometry_table() and all(law._known[key] is known[key] for key in known)

@@ -97,11 +97,11 @@ class PolygonLaw(BranchLaw):
         object.__setattr__(self, "mirror_symmetric", True if wall.is_mirror_symmetric else None)
 
     @cached_property
-    def _table(self) -> IsometryTable:
+    def _shapes(self) -> list[tuple[HollowShape, list[float]]]:
+        """The shapes of the hollows, and the widths of each and of its mirror image, as fractions of the period."""
         from ...geometry.cells.hollow_shape import distinct_hollows
 
         wall = self.wall
-        # the widths of each shape and of its mirror image, as fractions of the period
         found: list[tuple[HollowShape, list[float]]] = []
         for shape, hollows in distinct_hollows(wall):
             width, image = math.fsum(hollow.width for hollow in hollows) / wall.period, shape.mirrored()
@@ -110,19 +110,44 @@ class PolygonLaw(BranchLaw):
                 found.append((shape, [width, 0.0]))
             else:
                 known[1] += width
-        size = sum(len(shape.vertices) for shape, _ in found)
-        parts = [IsometryTable.flat(wall.flat_top / wall.period)]
-        for shape, widths in found:
-            table = self._of_shape(shape, len(shape.vertices) / size / math.fsum(widths))
+        return found
+
+    @cached_property
+    def _known(self) -> dict[int, IsometryTable]:
+        """The tables of the shapes that have been computed."""
+        return {}
+
+    def _table_of(self, number: int) -> IsometryTable:
+        """The table of a shape, scaled so that its opening is the whole period.
+
+        Every hollow may leave a part of the tolerance unresolved, in proportion to its vertices.
+        """
+        if number not in self._known:
+            size = sum(len(shape.vertices) for shape, _ in self._shapes)
+            shape, widths = self._shapes[number]
+            self._known[number] = self._of_shape(shape, len(shape.vertices) / size / math.fsum(widths))
+        return self._known[number]
+
+    @cached_property
+    def _table(self) -> IsometryTable:
+        parts = [IsometryTable.flat(self.wall.flat_top / self.wall.period)]
+        for number, (_, widths) in enumerate(self._shapes):
+            table = self._table_of(number)
             images = (table, table.mirrored() if widths[1] else table)
             parts += [part.scaled(width) for part, width in zip(images, widths, strict=True) if width]
         return IsometryTable.joined(parts)
 
-    def _of_shape(self, shape: HollowShape, fraction: float) -> IsometryTable:
-        """The table of a hollow, scaled so that its opening is the whole period, with ``fraction`` times the tolerance.
+    def resolves(self, most: float) -> bool:
+        """Whether at most the fraction ``most`` of the flux stays unresolved; shapes of many vertices answer first."""
+        left = 0.0
+        for number in sorted(range(len(self._shapes)), key=lambda number: -len(self._shapes[number][0].vertices)):
+            left += math.fsum(self._shapes[number][1]) * self._table_of(number).unresolved
+            if left > most:
+                return False
+        return True
 
-        Every hollow may leave a part of the tolerance unresolved, in proportion to its vertices.
-        """
+    def _of_shape(self, shape: HollowShape, fraction: float) -> IsometryTable:
+        """The table of a hollow whose opening is the whole period, with ``fraction`` times the tolerance."""
         if shape.height_to_width is not None:
             return IsometryTable.of_crevice(1.0, shape.height_to_width)
         if shape.apex_angle is not None:

@@ -154,12 +154,12 @@ class WallLaw(DrivenLaw):
             # the other beams reduce the unresolved fraction at most by a factor of a hundred
             few = max(FEW_BEAMS, BEAMS_A_PIECE * len(wall.pieces))
             probe = PolygonLaw(wall, max_beams=min(few, MOST_BEAMS))
-            if float(probe.unresolved) > 100.0 * EXACT_ENOUGH:
+            if not probe.resolves(100.0 * EXACT_ENOUGH):
                 return None
-            if float(probe.unresolved) <= RESOLVED:
+            if probe.resolves(RESOLVED):
                 return probe
         law = PolygonLaw(wall, max_beams=MOST_BEAMS)
-        return law if float(law.unresolved) <= EXACT_ENOUGH else None
+        return law if law.resolves(EXACT_ENOUGH) else None
 
     def reflect_with_status(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
         """Outgoing angles by tracing, and the mask of the rays that escaped; the other rays count as retroreflected.
