@@ -11,9 +11,18 @@ from scipy.sparse import issparse
 from scipy.stats import binom, chi2, gamma, norm, t
 
 from asperity.errors import AccuracyError
-from asperity.kernels import Bins, Legendre
+from asperity.kernels import Bins, Legendre, Panels
+from asperity.kernels.bases.basis import Basis
+from asperity.kernels.bases.directions import Directions
 from asperity.kernels.sampling import counts as counting
-from asperity.kernels.sampling.counts import array_from_counts, array_from_sums, count_pairs, half_width, sum_products
+from asperity.kernels.sampling.counts import (
+    array_from_counts,
+    array_from_sums,
+    count_pairs,
+    half_width,
+    sum_products,
+    sums_of_rows,
+)
 
 UNEVEN = Bins([0.0, np.pi / 3, np.pi])  # of measures 1/4 and 3/4
 COUNTS = np.array([[30, 10], [20, 100]])
@@ -343,3 +352,22 @@ def test_empty_bins_are_named_and_weighed() -> None:
             with pytest.raises(AccuracyError, match=named) as caught:
                 array_from_counts([counts], Bins(size + 1), symmetrise=symmetrise, independent=True)
             assert caught.value.defect == pytest.approx(size / (size + 1.0))
+
+
+@pytest.mark.parametrize("rays", [50, 40_000])
+@pytest.mark.parametrize(
+    "basis", [UNEVEN, Bins(64), Legendre(6), Panels(np.linspace(0.0, np.pi, 5), 2), Directions()], ids=repr
+)
+def test_rows_of_pairs_have_the_sums_of_each_row(basis: Basis, rays: int) -> None:
+    incoming, outgoing = np.random.default_rng(1).uniform(0.0, np.pi, (2, 8, rays))
+    each = count_pairs if basis.is_partition else sum_products
+    expected = np.array([each(basis, *row) for row in zip(incoming, outgoing, strict=True)])
+    found = sums_of_rows(basis, incoming, outgoing)
+    assert found.dtype == expected.dtype and np.allclose(found, expected, rtol=1e-12, atol=1e-11 * rays**0.5)
+
+
+def test_short_rows_evaluate_the_basis_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls, evaluate = [], Legendre.evaluate
+    monkeypatch.setattr(Legendre, "evaluate", lambda basis, angle: calls.append(angle) or evaluate(basis, angle))
+    sums_of_rows(Legendre(3), *np.random.default_rng(2).uniform(0.0, np.pi, (2, 8, 10)))
+    assert len(calls) == 2

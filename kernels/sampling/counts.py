@@ -16,6 +16,7 @@ from ...core.estimates import LEVEL
 from ...core.rounding import EPS
 from ..bases.assembly import add_products
 from ..bases.basis import Basis
+from ..bases.panels import Panels
 from ..matrices.defects import SymmetryDefect, relative_asymmetry, replicate_z_score, reversibility_z_score
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ LARGEST_REPLICATES = 2**28
 # estimate is too large if a few dimensions dominate. For simulated normal parts with eleven spectra, the coverage is
 # 93.6 to 96.4 % with 8 parts and 94.6 to 95.8 % with 32.
 UNSURE_DIMENSIONS = 1.5
+# Pairs times functions of all rows that are added together.
+MOST_TOGETHER = 2**18
 # Entries of a part that are compared with those of the other parts; larger arrays are compared in some rows only.
 MOST_COMPARED = 2**20
 WORST_NAMED = 8
@@ -64,6 +67,22 @@ def sum_products(basis: Basis, incoming: Floats, outgoing: Floats, weight: Float
     total = np.zeros((basis.size, basis.size))
     add_products(total, basis, incoming, outgoing, np.ones(incoming.size) if weight is None else weight)
     return total
+
+
+def sums_of_rows(basis: Basis, incoming: Floats, outgoing: Floats) -> NDArray[Any]:
+    """Of each row of pairs the numbers from cell to cell, or the sums of e_i(theta) e_j(theta'), shape (rows, n, n).
+
+    Rows of few pairs are done together, because every call of numpy takes some microseconds.
+    """
+    rows, n = len(incoming), basis.size
+    if incoming.size * n > MOST_TOGETHER or isinstance(basis, Panels):
+        each = count_pairs if basis.is_partition else sum_products
+        return np.array([each(basis, *row) for row in zip(incoming, outgoing, strict=True)])
+    if basis.is_partition:
+        cell = (np.arange(rows)[:, None] * n + basis.index(incoming)) * n + basis.index(outgoing)
+        return np.bincount(cell.ravel(), minlength=rows * n * n).reshape(rows, n, n)
+    values, images = basis.evaluate(incoming), basis.evaluate(outgoing)
+    return np.array([value.T @ image for value, image in zip(values, images, strict=True)])
 
 
 def array_from_counts(
@@ -124,9 +143,9 @@ def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, 
     raw = np.mean(means, axis=0)
     scale = float(np.linalg.norm(raw)) or 1.0
     z_score = replicate_z_score([(mean - mean.T) / scale for mean in means])
-    fixed = [_with_constant(mean, basis.constant, keeps_measure or symmetrise) for mean in means]
+    fixed = _with_constant(np.asarray(means), basis.constant, keeps_measure or symmetrise)
     if symmetrise:
-        fixed = [0.5 * (mean + mean.T) for mean in fixed]
+        fixed = 0.5 * (fixed + fixed.transpose(0, 2, 1))
     symmetric = np.asarray(np.mean(fixed, axis=0))
     replicates = _Replicates(symmetric, len(means))
     for mean in fixed:
@@ -211,9 +230,10 @@ def _dimensions(differences: Floats) -> tuple[float, float]:
     return squared / of_square, of_square**3 / of_cube**2
 
 
-def _with_constant(array: Floats, constant: Floats, both: bool) -> Floats:
-    array = array - np.outer(array @ constant - constant, constant)
-    return array - np.outer(constant, constant @ array - constant) if both else array
+def _with_constant(arrays: Floats, constant: Floats, both: bool) -> Floats:
+    """Arrays, shape (parts, n, n), of which each keeps the constant function, on one side or on both."""
+    arrays = arrays - (arrays @ constant - constant)[..., None] * constant
+    return arrays - constant[:, None] * (constant @ arrays - constant)[:, None, :] if both else arrays
 
 
 def _summed(parts: Sequence[Counts | Floats]) -> Counts | Floats:

@@ -14,7 +14,7 @@ from ..bases.basis import Basis
 from ..bases.mirror import reflection_matrix
 from ..laws.law import Law
 from ..walls.traced_map import UNRESOLVED_TOLERANCE
-from .counts import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products
+from .counts import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products, sums_of_rows
 
 # Rays in a chunk: at least SMALLEST_CHUNK, and one for CELLS_A_RAY matrix entries, so that adding matrices is cheap.
 SMALLEST_CHUNK, CELLS_A_RAY = 2**16, 16
@@ -49,6 +49,10 @@ class RaySums:
         """Add rays to one of the tables."""
         found = (count_pairs if self.basis.is_partition else sum_products)(self.basis, incoming, outgoing)
         self.tables[table] += found
+
+    def add_rows(self, first: int, incoming: Floats, outgoing: Floats) -> None:
+        """Add rays, shape (rows, rays), row by row to the tables from ``first`` on."""
+        self.tables[first : first + len(incoming)] += sums_of_rows(self.basis, incoming, outgoing)
 
     def count_unresolved(self, escaped: NDArray[np.bool_] | None) -> None:
         """Count the rays that did not escape."""

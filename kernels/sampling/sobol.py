@@ -155,8 +155,7 @@ class SobolRays:
             theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
             outgoing, escaped = reflect(entry_inside(x), theta)
             sums.count_unresolved(escaped)
-            for part in range(PARTS):
-                sums.add(first + part, theta[part], outgoing[part])
+            sums.add_rows(first, theta, outgoing)
 
     def _blocks(self, low: int, high: int) -> Iterator[Digits]:
         """The points of a range, at most a chunk at a time."""
