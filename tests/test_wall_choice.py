@@ -6,8 +6,10 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.bench.quantities.walls import wall_of
+from asperity.kernels.channels.grazing import GrazingIntegrals
+from asperity.kernels.discretisation.auto_wall import RAYS_A_SEGMENT
 from asperity.kernels.discretisation.method import QUICK_SEGMENTS, Budget
-from asperity.kernels.discretisation.traced import traced_matrix
+from asperity.kernels.discretisation.traced import Traced, traced_matrix
 from asperity.kernels.sampling.sobol import SobolSampler
 from random_curved_walls import random_curved_wall
 
@@ -158,3 +160,24 @@ def test_where_few_rays_are_allowed_the_more_exact_of_rows_and_rays_is_returned(
     law, basis = ker.WallLaw(random_curved_wall(6)), ker.Legendre(4)
     chosen, rays = (ker.discretise(law, basis, method=how, tolerance=1e-6, samples=2**13) for how in ("auto", "qmc"))
     assert float(chosen.error) <= float(rays.error)
+
+
+def test_quadrature_is_tried_with_no_more_segments_than_take_the_time_of_the_rays(monkeypatch):
+    given, matrix = [], Traced.matrix
+    monkeypatch.setattr(Traced, "matrix", lambda *a: given.append(a[3].segments) or matrix(*a))
+    found = ker.discretise(ker.WallLaw(wall_of("random-19")), ker.Legendre(2), tolerance=1e-3, rng=0)
+    assert found.method == "qmc" and len(given) == 1
+    # rays are a power of two, less than twice those needed
+    assert 0.5 * found.samples < RAYS_A_SEGMENT * given[0] + 2 <= found.samples + 2
+
+
+def test_first_panels_that_take_all_segments_leave_the_work_to_rays():
+    budget = Budget(1e-3, segments=100_000, fallback=1e-3)
+    _, error, _ = traced_matrix(wall_of("cusps"), ker.Legendre(2), budget)
+    assert error == np.inf
+
+
+def test_few_rays_on_mushrooms_prepare_no_integrals_near_grazing(monkeypatch):
+    monkeypatch.setattr(GrazingIntegrals, "__init__", lambda *a: pytest.fail("prepared"))
+    found = ker.discretise(MUSHROOMS, ker.Legendre(2), tolerance=1e-3, rng=1)
+    assert found.method == "qmc" and float(found.error) <= 1e-3

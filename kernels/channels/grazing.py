@@ -18,7 +18,7 @@ from scipy.special import erfc
 
 from ...core.checks import Floats
 from ...geometry import Wall
-from ...geometry.cells.channel import channel_of
+from ...geometry.cells.channel import Channel, channel_of
 from ...geometry.itineraries.hollow import compiled_result
 from ...geometry.itineraries.patches import positions
 from ..bases.basis import Basis
@@ -218,17 +218,22 @@ class GrazingIntegrals:
     @classmethod
     def of(cls, wall: Wall, basis: Basis) -> GrazingIntegrals | None:
         """The integrals of a mirror-symmetric wall that is its own cell; None if its hollows have no channel."""
+        channel = cls.channel(wall, basis)
+        if channel is None:
+            return None
+        found = cls(channel.below, channel.height_to_width, basis)
+        return found if found.highest > 0.0 else None
+
+    @staticmethod
+    def channel(wall: Wall, basis: Basis) -> Channel[Wall] | None:
+        """The channel of a wall's hollows, if the functions are smooth."""
         from ...geometry.cells.hollow_shape import distinct_hollows
 
         smooth = basis.is_polynomial or len(basis.edges) == 2
         if not smooth or basis.size > MOST_FUNCTIONS or not wall.closes:
             return None
         shapes = distinct_hollows(wall)
-        channel = channel_of(wall, shapes[0][1][0]) if len(shapes) == 1 else None
-        if channel is None:
-            return None
-        found = cls(channel.below, channel.height_to_width, basis)
-        return found if found.highest > 0.0 else None
+        return channel_of(wall, shapes[0][1][0]) if len(shapes) == 1 else None
 
     @cached_property
     def flat(self) -> Floats:

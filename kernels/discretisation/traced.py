@@ -93,6 +93,9 @@ LEAST_CUT = 1e-7
 FEWEST_FUNCTIONS, SPREAD_MARGIN = 4, 1.5
 # Fraction of the tolerance for the angles near grazing of hollows with a channel.
 GRAZING_FRACTION = 0.5
+# Limit on segments below which quadrature does not begin on them, if another method can take over: to prepare these
+# angles takes .1 s on mushrooms, the time of half a million rays.
+SEGMENTS_FOR_GRAZING = 2**20
 # Limit on the rounds that recompute conditional expectations in which a piece was missed.
 MOST_MENDINGS = 8
 
@@ -197,7 +200,11 @@ class _Integrator:
         elif not basis.is_polynomial and math.isfinite(budget.fallback):
             least_segments = self._predicted(edges, self.first_tolerance)
         self.mean_tolerance = MEAN_FRACTION * self.first_tolerance
-        self.grazing = GrazingIntegrals.of(self.conditionals.wall, basis) if self.halved else None
+        self.grazing = None
+        if self.halved and (math.isinf(budget.fallback) or budget.segments >= SEGMENTS_FOR_GRAZING):
+            self.grazing = GrazingIntegrals.of(self.conditionals.wall, basis)
+        elif self.halved and GrazingIntegrals.channel(self.conditionals.wall, basis) is not None:
+            least_segments = math.inf
         self.of_grazing: tuple[Floats, float] = np.zeros((basis.size, basis.size)), 0.0
         if self.grazing is not None:
             edges = np.append(self.grazing.highest, edges[edges > self.grazing.highest])
@@ -208,10 +215,11 @@ class _Integrator:
     def run(self) -> tuple[Floats, float, int]:
         """Divide panels, in stages of decreasing tolerance, until the error is small enough or no segments are left.
 
-        The matrix with the least error is returned, because an interrupted stage may increase the error. Without panels
-        its error is inf.
+        The matrix with the least error is returned, because an interrupted stage may increase the error. Its error is
+        inf without panels, and where another method can take over and the first panels took all segments.
         """
-        if not len(self.panels.low):
+        spent = math.isfinite(self.budget.fallback) and self.segments >= self.budget.segments
+        if spent or not len(self.panels.low):
             return *self.best, self.rays
         tolerance = self.first_tolerance
         self._begin(tolerance)
