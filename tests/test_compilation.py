@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba import types
 
 import asperity
 from asperity.core import compilation
@@ -229,6 +230,18 @@ def test_a_linked_function_is_a_part_of_its_callers_and_its_errors_reach_python(
     assert both.stats.cache_path and root.stats.cache_path is None
     with pytest.raises(TypeError, match="py_func"):
         root(4.0)
+
+
+def test_the_type_of_an_operator_is_inferred_once_in_a_process(monkeypatch):
+    asked = []
+    infer = types.Function.get_call_type
+    monkeypatch.setattr(types.Function, "get_call_type", lambda self, *given: asked.append(self) or infer(self, *given))
+
+    @compilation.jit()
+    def power(x):
+        return x * x * x * x * x * x * x * x if x > 1.0 or x < 0.0 else x * x * x if x > 0.5 else x
+
+    assert power(2.0) == 256.0 and len(asked) <= 5
 
 
 def test_functions_with_equal_options_share_them():

@@ -7,9 +7,12 @@ written again.
 
 from __future__ import annotations
 
+import builtins
 import gc
 import hashlib
+import importlib
 import logging
+import math
 import multiprocessing
 import operator
 import os
@@ -27,18 +30,35 @@ from numba import njit, types
 from numba._dynfunc import make_function
 from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.caching import _SourceFileBackedLocatorMixin as SourceStamp
+from numba.core.cgutils import alloca_once
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import register_pass
+from numba.core.ir import UNDEFINED
+from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
 from numba.core.typing.context import Context
 from numba.core.untyped_passes import InlineClosureLikes
+from numba.np import linalg
 
 logger = logging.getLogger("asperity")
 
-OPERATORS = frozenset(value for value in vars(operator).values() if callable(value))
+
+def _skip_blas() -> None:
+    """Load numba's functions of arrays without scipy.linalg, which numba would import to learn that it is there."""
+    check, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = check
+
+
+_skip_blas()
+
+# Functions whose results have types that depend on the types of their arguments only.
+KNOWN = frozenset(value for module in (operator, builtins, math) for value in vars(module).values() if callable(value))
 
 
 class _Same(Flags):
@@ -83,13 +103,62 @@ class _Typing(Context):
 
     def resolve_function_type(self, function: Any, operands: Any, named: Any) -> Any:
         resolve = super().resolve_function_type
-        if not isinstance(function, types.Function) or function.typing_key not in OPERATORS or named:
+        if not isinstance(function, types.Function) or function.typing_key not in KNOWN or named:
             return resolve(function, operands, named)
         key = id(function), operands
         found = self.known.get(key)
         if found is None:
             found = self.known[key] = function, resolve(function, operands, named)
         return found[1]
+
+
+class _Lower(Lower):
+    """numba's translation of statements to LLVM, which takes the types of operators as they were inferred.
+
+    numba would infer them again.
+    """
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self._calls: dict[tuple[Any, Any], Any] = {}
+
+    def lower_binop(self, result: Any, expression: Any, function: Any) -> Any:
+        if not (expression.static_lhs is expression.static_rhs is UNDEFINED):
+            return super().lower_binop(result, expression, function)
+        operands = expression.lhs, expression.rhs
+        return self._called(result, function, operands, self.fndesc.calltypes[expression])
+
+    def lower_getitem(self, result: Any, expression: Any, value: Any, index: Any, signature: Any) -> Any:
+        return self._called(result, operator.getitem, (value, index), signature)
+
+    def alloca_lltype(self, name: str, kind: Any, datamodel: Any = None) -> Any:
+        # without the size, which only a debugger needs, and which LLVM finds from a module of its own
+        return alloca_once(self.builder, kind, name=name)
+
+    def _called(self, result: Any, function: Any, operands: Any, signature: Any) -> Any:
+        context, builder = self.context, self.builder
+        values = [
+            context.cast(builder, self.loadvar(operand.name), self.typeof(operand.name), kind)
+            for operand, kind in zip(operands, signature.args, strict=True)
+        ]
+        key = function, signature.args
+        call = self._calls.get(key)
+        if call is None:
+            typing = _Typing.of(context.typing_context)
+            kind = typing.resolve_value_type(function)
+            call = self._calls[key] = context.get_function(kind, typing.resolve_function_type(kind, signature.args, {}))
+        return context.cast(builder, call(builder, values), signature.return_type, result)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Lowering(NativeLowering):
+    """numba's translation to LLVM."""
+
+    _name = "own_lowering"
+
+    @property
+    def lowering_class(self) -> Any:
+        return _Lower
 
 
 class _Pipeline(CompilerBase):
@@ -99,7 +168,7 @@ class _Pipeline(CompilerBase):
     """
 
     unused = InlineClosureLikes, InlineOverloads, NopythonRewrites
-    lowering = NativeLowering
+    lowering = _Lowering
 
     def __init__(self, typing: Any, target: Any, library: Any, arguments: Any, result: Any, flags: Any, kinds: Any):
         super().__init__(_Typing.of(typing), target, library, arguments, result, _Same.of(flags), kinds)
@@ -124,6 +193,10 @@ class _Pipeline(CompilerBase):
 class _LinkedLibrary(JITCodeLibrary):
     """The code of a function that becomes machine code, and is optimised, within its callers only."""
 
+    def _optimize_functions(self, module: Any) -> None:
+        # the layout only, which numba sets here
+        module.data_layout = self._codegen._data_layout
+
     def _optimize_final_module(self) -> None:
         pass
 
@@ -132,7 +205,7 @@ class _LinkedLibrary(JITCodeLibrary):
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _LinkedLowering(NativeLowering):
+class _LinkedLowering(_Lowering):
     """numba's translation to LLVM, which stops before it loads a function."""
 
     _name = "linked_lowering"
