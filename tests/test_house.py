@@ -54,6 +54,25 @@ def test_a_plain_trace_loads_only_the_compiler_and_the_checker_of_crossings():
     assert modules_loaded_by(trace) & HEAVY <= {"numba", "shapely"}
 
 
+def test_a_first_trace_loads_no_linear_algebra():
+    # numba would, to learn whether it is there
+    trace = "from asperity import geometry as g; g.trace(g.triangular_teeth(1.0), [0.2], [1.0])"
+    assert "False" in run_python(f"{trace}\nprint('scipy.linalg' in sys.modules)")
+
+
+def test_a_trace_compiles_no_function_that_few_walls_need():
+    code = "from asperity.geometry.tracing.compiled.rays import LATE\nprint([bool(late._words[0]) for late in LATE])"
+    trace = "from asperity import geometry as g; g.trace(g.{}, [0.3, 0.4], [1.0, 2.0])\n"
+    assert run_python(trace.format("mushrooms(0.3)") + code).split() == ["[False,", *4 * ["False,"], "False]"]
+    assert run_python(trace.format("koch(4)") + code).split()[3] == "True,"
+
+
+def test_a_command_ends_without_a_search_for_garbage():
+    command = "import atexit, gc\natexit.register(lambda: print('frozen', gc.get_freeze_count()))\n"
+    command += "from asperity.cli import main\nmain(['walls'], standalone_mode=False)"
+    assert int(run_python(command).split("frozen ")[1]) > 1000
+
+
 def test_the_front_door_opens_within_three_tenths_of_a_second():
     clock = "import time; t = time.perf_counter(); import asperity; print(time.perf_counter() - t)"
     # the least of five, because other processes may hold the machine
