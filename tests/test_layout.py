@@ -19,7 +19,8 @@ MOST_MODULES = 14
 # Every folder once, from the ground up; a room's own names come after its folders.
 FLOORS = [
     *("core", "verification"),
-    *("geometry.curves", "geometry.disk", "geometry.tables", "geometry.cells", "geometry.scene", "geometry.walls"),
+    *("geometry.curves", "geometry.disk", "geometry.tables", "geometry.cells", "geometry.scene"),
+    *("geometry.scene.compiled", "geometry.walls"),
     *("geometry.tracing.double_double", "geometry.tracing.compiled", "geometry.tracing"),
     *("geometry.polygons.compiled", "geometry.polygons", "geometry.itineraries.compiled", "geometry.itineraries"),
     *("geometry.collisions.compiled", "geometry.collisions", "geometry.plotting", "geometry"),

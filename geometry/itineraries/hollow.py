@@ -15,8 +15,8 @@ from ..scene.columns import LEFT, RIGHT, RUN_SINE
 from .pieces import Pieces, samples_between
 
 if TYPE_CHECKING:
+    from ..scene.records import Record
     from ..scene.scene import Scene
-    from .compiled.changes import Setting
 
 Result = TypeVar("Result")
 
@@ -94,7 +94,7 @@ class HollowConditionals:
         return float(right - left)
 
     @property
-    def _setting(self) -> Setting:
+    def _setting(self) -> Record:
         """Data of the compiled functions, new for each call: an interrupted call continues to use its own."""
         from .compiled.changes import Limits, setting_of
 

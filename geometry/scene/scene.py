@@ -92,6 +92,7 @@ from .columns import (
     table_of,
 )
 from .facing import facing_pairs
+from .records import Record
 from .sky import sky_of
 from .tolerances import NEARBY_MARGIN, SMOOTH_JOINT
 
@@ -201,17 +202,19 @@ class Tables(NamedTuple):
 
 
 # Empty tables, with the types of all tables.
-NO_TABLES = Tables(
-    np.empty((0, HOLLOW_COLUMNS)),
-    np.empty((0, JOINT_COLUMNS)),
-    np.empty((0, LINE_COLUMNS)),
-    np.empty((0, ARC_COLUMNS)),
-    np.empty((0, ARC_COLUMNS)),
-    np.empty((0, BEZIER_COLUMNS)),
-    np.empty((0, PAIR_COLUMNS)),
-    np.empty((0, TREE_COLUMNS)),
-    1.0,
-    False,
+NO_TABLES = Record(
+    Tables(
+        np.empty((0, HOLLOW_COLUMNS)),
+        np.empty((0, JOINT_COLUMNS)),
+        np.empty((0, LINE_COLUMNS)),
+        np.empty((0, ARC_COLUMNS)),
+        np.empty((0, ARC_COLUMNS)),
+        np.empty((0, BEZIER_COLUMNS)),
+        np.empty((0, PAIR_COLUMNS)),
+        np.empty((0, TREE_COLUMNS)),
+        1.0,
+        False,
+    )
 )
 
 
@@ -232,21 +235,23 @@ class Scene:
     closed: Floats | None = None
 
     @cached_property
-    def tables(self) -> Tables:
+    def tables(self) -> Record:
         """The tables with types equal for all walls, so that each function is compiled once."""
-        return Tables(
-            hollows=_filled(self.hollows, HOLLOW_COLUMNS),
-            joints=_filled(self.joints, JOINT_COLUMNS),
-            lines=np.zeros((len(self.joints), LINE_COLUMNS))
-            if self.lines is None
-            else _filled(self.lines, LINE_COLUMNS),
-            circles=_filled(self.circles, ARC_COLUMNS),
-            ellipses=_filled(self.ellipses, ARC_COLUMNS),
-            beziers=_filled(self.beziers, BEZIER_COLUMNS),
-            pairs=_filled(self.pairs, PAIR_COLUMNS),
-            boxes=_filled(self.boxes, TREE_COLUMNS),
-            cell=float(self.cell),
-            is_open=bool(self.is_open),
+        return Record(
+            Tables(
+                hollows=_filled(self.hollows, HOLLOW_COLUMNS),
+                joints=_filled(self.joints, JOINT_COLUMNS),
+                lines=np.zeros((len(self.joints), LINE_COLUMNS))
+                if self.lines is None
+                else _filled(self.lines, LINE_COLUMNS),
+                circles=_filled(self.circles, ARC_COLUMNS),
+                ellipses=_filled(self.ellipses, ARC_COLUMNS),
+                beziers=_filled(self.beziers, BEZIER_COLUMNS),
+                pairs=_filled(self.pairs, PAIR_COLUMNS),
+                boxes=_filled(self.boxes, TREE_COLUMNS),
+                cell=float(self.cell),
+                is_open=bool(self.is_open),
+            )
         )
 
     @property

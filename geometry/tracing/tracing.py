@@ -277,13 +277,14 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
     """
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
+        from ..scene.records import Record
         from .compiled.pointers import checked
         from .compiled.rays import SLOTS, trace_rays
-        from .compiled.records import NOT_WANTED, Results
+        from .compiled.records import NO_DETAILS, Results
 
         _check_rays(x, theta)
         out_x, out_theta, collisions, status = results
-        wanted = Results(out_x, out_theta, collisions, status, *NOT_WANTED)
+        wanted = Record(Results(out_x, out_theta, collisions, status, NO_DETAILS))
         checked(lambda: trace_rays(x, theta, scene.tables, max_collisions, stop, wanted, SLOTS))
 
     rooms: list[Any] = []
@@ -359,7 +360,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     """
     from .compiled.pointers import checked
     from .compiled.rays import SLOTS, trace_rays
-    from .compiled.records import results_for
+    from .compiled.records import details_for, results_for
 
     _check_wall(wall)
     position = finite_number("x", x)
@@ -376,11 +377,12 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
         # a flat top: entry, hit and exit are one point
         points = np.array([[entry, 0.0]] * 3)
     else:
-        results = results_for(1, path=limit + 2)
+        results = results_for(1, details_for(path=limit + 2))
         start, angle = np.array([entry - base]), np.array([incoming])
         stop = new_flag()
         interruptibly(lambda: checked(lambda: trace_rays(start, angle, scene.tables, limit, stop, results, SLOTS)))
-        points = results.path[np.isfinite(results.path[:, 0])]
+        path = results.details.path
+        points = path[np.isfinite(path[:, 0])]
         points[:, 0] += base
     return points if wall.origin == (0.0, 0.0) else _in_coordinates_of(wall, points, position, incoming, limit)
 

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
-from ...scene.scene import NO_TABLES, Scene, Tables
+from ...scene.records import Record
+from ...scene.scene import NO_TABLES, Scene
 from ...tracing.compiled.options import inlined, inner, linked
 from ...tracing.compiled.pointers import address_of, call_at
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, trace_rays_address
-from ...tracing.compiled.records import Results, Slots, results_for
+from ...tracing.compiled.records import details_for, results_for
 
 # Start integers as np.int64(0): a literal 0 has its own type in numba, and each function that receives it would be
 # compiled twice.
@@ -64,9 +65,9 @@ class Tracer(NamedTuple):
 
     address: int
     halve: int
-    slots: Slots
+    slots: Record
     angles: Floats
-    results: Results
+    results: Record
     entries: Floats
     stop: NDArray[np.int64]
 
@@ -78,17 +79,17 @@ class Setting(NamedTuple):
     """
 
     hollow: Floats
-    tables: Tables
-    limits: Limits
+    tables: Record
+    limits: Record
     edges: Floats
     sizes: Floats
-    tracer: Tracer
+    tracer: Record
 
 
 class Task(NamedTuple):
     """One incoming angle: the setting, the angle, the degree of the functions to integrate, and segments spent."""
 
-    setting: Setting
+    setting: Record
     theta: float
     degree: int
     segments: NDArray[np.int64]
@@ -105,25 +106,19 @@ class Chain(NamedTuple):
     fresh: NDArray[np.int64]
 
 
-def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats, sizes: Floats) -> Setting:
+def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats, sizes: Floats) -> Record:
     """Return the setting of hollow number ``hollow``, for use by one thread at a time."""
-    results, angles, stop = results_for(BLOCK, BLOCK, BLOCK), np.empty(BLOCK), np.zeros(1, np.int64)
-    tracer = Tracer(trace_rays_address(), _halve_address(), SLOTS, angles, results, np.empty(BLOCK), stop)
+    results, angles, stop = results_for(BLOCK, details_for(BLOCK, BLOCK)), np.empty(BLOCK), np.zeros(1, np.int64)
+    tracer = Record(Tracer(trace_rays_address(), _halve_address(), SLOTS, angles, results, np.empty(BLOCK), stop))
     tables = scene.tables
     edges, sizes = (np.require(values, np.float64, ["C", "A", "W"]) for values in (edges, sizes))
-    return Setting(tables.hollows[hollow], tables, limits, edges, sizes, tracer)
+    return Record(Setting(tables.hollows[hollow], tables, Record(limits), edges, sizes, tracer))
 
 
-def empty_chain() -> Chain:
+def empty_chain() -> Record:
     """Return an empty chain for the samples of one angle; the last sample will have the successor -1."""
-    return Chain(
-        np.empty(MOST_SAMPLES),
-        np.empty(MOST_SAMPLES),
-        np.empty(MOST_SAMPLES, np.uint64),
-        np.empty(MOST_SAMPLES, np.int64),
-        np.empty(MOST_SAMPLES, np.int64),
-        np.empty(MOST_SAMPLES, np.int64),
-    )
+    counts = np.empty((3, MOST_SAMPLES), np.int64)
+    return Record(Chain(np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES, np.uint64), *counts))
 
 
 @linked
@@ -170,8 +165,9 @@ def outcome(k, x, task):
     if results.status[k] != ESCAPED:
         return task.theta, np.uint64(results.status[k])
     # clipped for a ray along y = 0 within rounding
-    out = min(max(math.atan2(results.velocity[k, POINT_Y], results.velocity[k, POINT_X]), 0.0), math.pi)
-    return out, HASH_FACTOR * (results.itinerary[k] + np.uint64(16)) + np.uint64(cell_of(out, edges))
+    velocity = results.details.velocity
+    out = min(max(math.atan2(velocity[k, POINT_Y], velocity[k, POINT_X]), 0.0), math.pi)
+    return out, HASH_FACTOR * (results.details.itinerary[k] + np.uint64(16)) + np.uint64(cell_of(out, edges))
 
 
 @inlined
@@ -218,7 +214,7 @@ def spread(first, second, task):
 @inlined
 def undecided(before, task, chain):
     """Return the contribution to the error of the gap after the sample ``before``."""
-    xs, outs, _, follow, _, _ = chain
+    xs, outs, follow = chain.entries, chain.angles, chain.successors
     after = follow[before]
     width, whole = xs[after] - xs[before], task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
     return (
@@ -229,7 +225,7 @@ def undecided(before, task, chain):
 @inlined
 def insert(x, before, count, task, chain):
     """Insert a sample at x after the sample ``before``."""
-    xs, outs, labels, follow, _, _ = chain
+    xs, outs, labels, follow = chain.entries, chain.angles, chain.labels, chain.successors
     xs[count] = x
     outs[count], labels[count] = probe(x, task)
     follow[count] = follow[before]
@@ -244,7 +240,7 @@ def division(i, j, number, task, chain):
     the edge by linear interpolation, moved towards the middle by more than its error, so that both ends of the gap
     approach the edge and the width falls quadratically. Every third round, and other gaps, are divided in the middle.
     """
-    xs, outs, labels, _, _, _ = chain
+    xs, outs, labels = chain.entries, chain.angles, chain.labels
     edges, hollow = task.setting.edges, task.setting.hollow
     width, middle = xs[j] - xs[i], 0.5 * (xs[i] + xs[j])
     step = np.int64(labels[j] - labels[i])
@@ -262,7 +258,7 @@ def division(i, j, number, task, chain):
 @inner
 def halve_gaps(task, chain, count, gap_count, goal, most):
     """Divide gaps until the sum of their errors is at most ``goal``; return the number of samples."""
-    xs, _, labels, follow, gaps, fresh = chain
+    xs, labels, follow, gaps, fresh = chain.entries, chain.labels, chain.successors, chain.gaps, chain.fresh
     for number in range(MOST_ROUNDS):
         total, worst = 0.0, 0.0
         for g in range(gap_count):
@@ -306,15 +302,15 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
 def example_task() -> Task:
     """Return a task of the types of all tasks, for which functions are compiled to be called by their address."""
     results, stop = results_for(0), np.zeros(1, np.int64)
-    tracer = Tracer(0, 0, SLOTS, np.empty(0), results, np.empty(0), stop)
-    setting = Setting(np.empty(0), NO_TABLES, Limits(1, 1, 1), np.empty(0), np.empty(0), tracer)
+    tracer = Record(Tracer(0, 0, SLOTS, np.empty(0), results, np.empty(0), stop))
+    setting = Record(Setting(np.empty(0), NO_TABLES, Record(Limits(1, 1, 1)), np.empty(0), np.empty(0), tracer))
     return Task(setting, 0.0, 0, stop)
 
 
-def example_chain() -> Chain:
+def example_chain() -> Record:
     """Return a chain of the types of all chains."""
     numbers, counts = np.empty(0), np.empty(0, np.int64)
-    return Chain(numbers, numbers, np.empty(0, np.uint64), counts, counts, counts)
+    return Record(Chain(numbers, numbers, np.empty(0, np.uint64), counts, counts, counts))
 
 
 @cache
@@ -334,7 +330,7 @@ def sample_entries(entries, task, chain, goal):
 
     Returns the number of samples, and the sample of largest position.
     """
-    xs, outs, labels, follow, gaps, _ = chain
+    xs, outs, labels, follow, gaps = chain.entries, chain.angles, chain.labels, chain.successors, chain.gaps
     left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
     count, gap_count = np.int64(0), np.int64(0)
     for x in entries:
@@ -359,7 +355,7 @@ def sample_entries(entries, task, chain, goal):
 @linked
 def add_change(x, first, task, chain, count, goal):
     """Insert a position x of another label into the piece that begins with ``first``, and find the changes around x."""
-    xs, _, _, follow, gaps, _ = chain
+    xs, follow, gaps = chain.entries, chain.successors, chain.gaps
     before = first
     while xs[follow[before]] <= x:
         before = follow[before]

@@ -15,16 +15,14 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT, SIZE
+from ...scene.records import Record
 from ...tracing.compiled.options import compiled, inner
 from ...tracing.compiled.pointers import address_of, call_at
 from .changes import (
     FIRST_LABEL,
     MOST_SAMPLES,
-    Chain,
-    Setting,
     add_change,
     empty_chain,
-    example_chain,
     example_task,
     is_spent,
     sample_entries,
@@ -32,7 +30,7 @@ from .changes import (
     task_of,
     undecided,
 )
-from .rules import MOST_NODES, NODE_ROOM, SPARE, Rules, integrate_piece, nested_rules
+from .rules import MOST_NODES, NODE_ROOM, SPARE, integrate_piece, nested_rules
 
 # Rounding error of a mean, as a fraction of the opening, and of the position of a change, as a fraction of the hollow's
 # size. Rays have errors of a few EPS times the derivative of the map, which is seldom above some hundreds except next
@@ -52,9 +50,9 @@ class Found(NamedTuple):
     unresolved rays, and the numbers of rays and of ray segments.
     """
 
-    nodes: tuple[Floats, ...]
+    nodes: Any
     node_starts: NDArray[np.int64]
-    pieces: tuple[NDArray[Any], ...]
+    pieces: Any
     piece_starts: NDArray[np.int64]
     errors: Floats
     unresolved: Floats
@@ -62,25 +60,42 @@ class Found(NamedTuple):
     segments: NDArray[np.int64]
 
 
+class Nodes(NamedTuple):
+    """Outgoing angles and masses of nodes."""
+
+    angles: Floats
+    masses: Floats
+
+
+class Pieces(NamedTuple):
+    """First and last positions, labels, and first outgoing angles of pieces."""
+
+    low: Floats
+    high: Floats
+    label: NDArray[np.uint64]
+    out: Floats
+
+
 class Room(NamedTuple):
     """Work space for one angle: its samples, nodes and pieces."""
 
-    chain: Chain
-    nodes: tuple[Floats, ...]
-    pieces: tuple[NDArray[Any], ...]
+    chain: Record
+    nodes: Record
+    pieces: Record
 
 
 @inner
-def march_angle(task, goal, rules, entries, chain, nodes, pieces):
+def march_angle(task, goal, rules, entries, room):
     """Compute the nodes and masses of the conditional distribution at one incoming angle.
 
     Returns the number of nodes, the error, the width of unresolved rays, and the numbers of pieces and of rays. If the
     limit of ray segments is reached, the error includes the gaps that remain. ``pieces`` receives the first and last
     position, the label and the first outgoing angle of every piece.
     """
-    xs, outs, labels, follow, _, _ = chain
-    node, mass = nodes
-    lows, highs, names, firsts = pieces
+    chain, nodes, pieces = room.chain, room.nodes, room.pieces
+    xs, outs, labels, follow = chain.entries, chain.angles, chain.labels, chain.successors
+    node, mass = nodes.angles, nodes.masses
+    lows, highs, names, firsts = pieces.low, pieces.high, pieces.label, pieces.out
     hollow = task.setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]
     whole = right - left
@@ -135,9 +150,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
 @cache
 def march_address() -> int:
     """Return the address of `march_angle`."""
-    pieces = np.empty(0), np.empty(0), np.empty(0, np.uint64), np.empty(0)
-    rules, entries, nodes = nested_rules(0), np.empty(0), (np.empty(0), np.empty(0))
-    return address_of(march_angle, (example_task(), 0.0, rules, entries, example_chain(), nodes, pieces))
+    return address_of(march_angle, (example_task(), 0.0, nested_rules(0), np.empty(0), _room(0, 0)))
 
 
 @compiled
@@ -147,10 +160,16 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts,
     Returns the number of the angle before which an array of ``found`` is too small, or the number of angles.
     ``march`` is `march_address`.
     """
-    chain, nodes, pieces = room
     node_starts, piece_starts = found.node_starts, found.piece_starts
-    (angles, masses), (lows, highs, labels, outs) = nodes, pieces
-    (all_angles, all_masses), (all_lows, all_highs, all_labels, all_outs) = found.nodes, found.pieces
+    angles, masses, all_angles, all_masses = (
+        room.nodes.angles,
+        room.nodes.masses,
+        found.nodes.angles,
+        found.nodes.masses,
+    )
+    own_pieces, pieces = room.pieces, found.pieces
+    lows, highs, labels, outs = own_pieces.low, own_pieces.high, own_pieces.label, own_pieces.out
+    all_lows, all_highs, all_labels, all_outs = pieces.low, pieces.high, pieces.label, pieces.out
     hollow = setting.hollow
     whole = hollow[RIGHT] - hollow[LEFT]
     for k in range(first, thetas.shape[0]):
@@ -161,7 +180,7 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts,
         goal = tolerances[k] * whole
         own = seeds[seed_starts[k] : seed_starts[k + 1]]
         filled, found.errors[k], found.unresolved[k], number, found.rays[k] = call_at(
-            march, (np.int64(0), 0.0, 0.0, np.int64(0), np.int64(0)), (task, goal, rules, own, chain, nodes, pieces)
+            march, (np.int64(0), 0.0, 0.0, np.int64(0), np.int64(0)), (task, goal, rules, own, room)
         )
         for i in range(filled):
             all_angles[begin + i], all_masses[begin + i] = angles[i], masses[i]
@@ -172,6 +191,15 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts,
     return np.int64(thetas.shape[0])
 
 
+def _room(nodes: int, pieces: int) -> Record:
+    arrays = _arrays(nodes, float, float), _arrays(pieces, float, float, np.uint64, float)
+    return Record(Room(empty_chain(), Record(Nodes(*arrays[0])), Record(Pieces(*arrays[1]))))
+
+
+def _record(found: Found) -> Record:
+    return Record(found._replace(nodes=Record(Nodes(*found.nodes)), pieces=Record(Pieces(*found.pieces))))
+
+
 def _arrays(size: int, *kinds: Any) -> tuple[NDArray[Any], ...]:
     return tuple(np.empty(size, kind) for kind in kinds)
 
@@ -179,16 +207,15 @@ def _arrays(size: int, *kinds: Any) -> tuple[NDArray[Any], ...]:
 def marched_angles(
     thetas: Floats,
     tolerances: Floats,
-    setting: Setting,
+    setting: Record,
     degree: int,
-    rules: Rules,
+    rules: Record,
     seeds: Floats,
     seed_starts: NDArray[np.int64],
 ) -> Found:
     """Compute the conditional distributions at incoming angles. The seeds are the first samples, which increase."""
     count = len(thetas)
-    nodes, pieces = (float, float), (float, float, np.uint64, float)
-    room = Room(empty_chain(), _arrays(NODE_ROOM, *nodes), _arrays(MOST_SAMPLES, *pieces))
+    room = _room(NODE_ROOM, MOST_SAMPLES)
     found = Found(
         (np.empty(0), np.empty(0)), np.zeros(count + 1, np.int64),
         (np.empty(0), np.empty(0), np.empty(0, np.uint64), np.empty(0)), np.zeros(count + 1, np.int64),
@@ -202,7 +229,7 @@ def marched_angles(
             pieces=_longer(found.pieces, number, 2 * number + MOST_SAMPLES),
         )
         done = march_angles(
-            thetas, tolerances, setting, degree, rules, seeds, seed_starts, march_address(), done, room, found
+            thetas, tolerances, setting, degree, rules, seeds, seed_starts, march_address(), done, room, _record(found)
         )
     used, number = int(found.node_starts[-1]), int(found.piece_starts[-1])
     return found._replace(nodes=_longer(found.nodes, used, used), pieces=_longer(found.pieces, number, number))

@@ -15,6 +15,7 @@ import numpy as np
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
+from ...scene.records import Record
 from ...tracing.compiled.options import linked
 from .changes import BLOCK, FIRST_LABEL, is_spent, outcome, probe, size_at, trace_block
 
@@ -50,7 +51,7 @@ class Rules(NamedTuple):
     least: int
 
 
-def nested_rules(least: int) -> Rules:
+def nested_rules(least: int) -> Record:
     """Return the rules after the substitution, to be used from number ``least`` on."""
     positions, weights = np.empty(0), np.zeros((LEVELS, MOST_POSITIONS))
     for level in range(LEVELS):
@@ -65,7 +66,7 @@ def nested_rules(least: int) -> Rules:
             2.0 / intervals * np.sin(angle) * np.sum(np.sin(np.outer(angle, odd)) / odd, axis=1)
         )
     s = np.sin(0.5 * np.pi * positions) ** 2
-    return Rules(s * s * (3.0 - 2.0 * s), 2.0 * weights * 3.0 * s * (1.0 - s), least)
+    return Record(Rules(s * s * (3.0 - 2.0 * s), 2.0 * weights * 3.0 * s * (1.0 - s), least))
 
 
 @linked
@@ -76,8 +77,8 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     rays. Without ``strict`` labels are ignored, and only the difference of the rules reveals a missed change.
     """
     low, high = ends
-    positions, weights, least = rules
-    node, mass = nodes
+    positions, weights, least = rules.positions, rules.weights, rules.least
+    node, mass = nodes.angles, nodes.masses
     degree = task.degree
     width = high - low
     old0, old1, old2, old_step = 0.0, 0.0, 0.0, 0.0
@@ -133,7 +134,7 @@ def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
     """
     whole = task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
     out, label = sample
-    node, mass = nodes
+    node, mass = nodes.angles, nodes.masses
     low_stack, high_stack = node[MOST_NODES + SPARE :], mass[MOST_NODES + SPARE :]
     low_stack[0], high_stack[0] = ends
     if task.degree == 0 and ends[1] - ends[0] < NARROW * whole and strict and MOST_NODES - filled > 2:

@@ -316,7 +316,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
 
 
 @inner
-def nearest_bezier(beziers, first, end, own_number, own_s, px, py, vx, vy, slack, time):
+def nearest_bezier(tables, first, end, own_number, own_s, px, py, vx, vy, slack, time):
     """-> (t, number, s, contact, near_s): the first hit before ``time`` on the pieces from ``first`` to ``end``.
 
     ``contact`` is the time to the first tangent hit, which is not counted, or inf. ``near_s`` is that of the last piece
@@ -325,7 +325,7 @@ def nearest_bezier(beziers, first, end, own_number, own_s, px, py, vx, vy, slack
     """
     number, hit_s, contact, near = -1, 0.0, np.inf, -1.0
     for k in range(first, end):
-        curve = beziers[k]
+        curve = tables.beziers[k]
         # whether the ray meets the circle about the piece before ``time``; if not, `hit_from_afar` finds nothing
         dx, dy = curve[MIDDLE_X] - px, curve[MIDDLE_Y] - py
         along, room = dx * vx + dy * vy, curve[REACH] + NEARBY_MARGIN * (abs(dx) + abs(dy))

@@ -15,6 +15,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, models, register_model
 
 from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, OTHER_X, OTHER_Y
+from ...scene.compiled.records import DATA, TableType
 from .arcs import NEARLY_TANGENT
 
 WORD, NUMBER, BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
@@ -137,18 +138,19 @@ class Table:
     """The vectors that begin at a place of an array of numbers: at ``row`` of a table, or at a column of work space."""
 
     def __init__(self, context: Any, builder: Any, kind: Any, table: Any, count: int = BOXES) -> None:
-        self._array = context.make_array(kind)(context, builder, table)
+        if isinstance(kind, TableType):
+            self._data, self._columns = builder.extract_value(table, DATA), WORD(kind.columns)
+        else:
+            self._data = context.make_array(kind)(context, builder, table).data
         self.builder, self._lanes = builder, ir.VectorType(NUMBER, count)
         self._features: str = context.codegen().magic_tuple()[-1]
 
     def row(self, number: Any) -> Table:
-        stride = cgutils.unpack_tuple(self.builder, self._array.strides)[0]
-        start = self.builder.add(self.builder.ptrtoint(self._array.data, WORD), self.builder.mul(number, stride))
-        self._start = self.builder.inttoptr(start, NUMBER.as_pointer())
+        self._start = self.builder.gep(self._data, [self.builder.mul(number, self._columns)])
         return self
 
     def column(self, number: Any) -> Table:
-        self._start = self.builder.gep(self._array.data, [number])
+        self._start = self.builder.gep(self._data, [number])
         return self
 
     def __getitem__(self, place: int) -> Lanes:

@@ -50,9 +50,11 @@ from .lanes import (
     lines_met,
     nearest_of_lines,
 )
-from .options import inlined
+from .options import inlined, inner
 from .records import LINE, OPENING, Own
 
+# No hit on a line, for `nearest_line`.
+NO_LINE_HIT = np.inf, -1, 0.0, np.inf, False
 # Mask of all boxes of a row.
 ALL_BOXES = (1 << BOXES) - 1
 # Mask that tells the compiler that an index is not negative, so that it need not count from the end. A longer mask is
@@ -168,7 +170,7 @@ def next_leaf(scope, walk, forward, px, py, vx, vy, least, most):
         mask = boxes_met(boxes, node, px, py, vx, vy, least, most)
 
 
-@inlined
+@inner
 def nearest_line_in_boxes(scope, own, px, py, vx, vy, time):
     """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the boxes along the ray."""
     tables, slack = scope.tables, scope.slack

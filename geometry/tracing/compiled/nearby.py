@@ -18,6 +18,7 @@ from ...scene.columns import (
     STARTS_LINE,
     STRETCH,
 )
+from ...scene.compiled.records import array_of
 from ...scene.tolerances import NEARBY_SLACKS
 from ..double_double.arcs import refined_arcs
 from ..double_double.sides import ARC, Arrival, Face, in_front_at, line_in_front_of_line
@@ -41,11 +42,12 @@ def face_of(tables, kind, number, s):
     """-> Face: a piece, given by kind, row and parameter, for double-double arithmetic."""
     arc, curve = np.empty(0), np.empty(0)
     form = STRAIGHT
-    if kind in (CIRCLE, ELLIPSE):
+    # numba would compile a function for the operator `in`
+    if kind == CIRCLE or kind == ELLIPSE:  # noqa: SIM109
         arcs = tables.circles if kind == CIRCLE else tables.ellipses
-        form, arc = ARC, refined_arcs(arcs[number : number + 1])[0]
+        form, arc = ARC, refined_arcs(array_of(arcs)[number : number + 1])[0]
     if kind == BEZIER:
-        form, curve = CURVE, tables.beziers[number]
+        form, curve = CURVE, array_of(tables.beziers)[number]
     return Face(form, number, arc, curve, (s, 0.0))
 
 
@@ -56,7 +58,7 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
     At least one of the pieces is a curve.
     """
     return in_front_at(
-        tables.joints,
+        array_of(tables.joints),
         face_of(tables, hit.kind, hit.number, hit.s),
         face_of(tables, own.kind, own.number, own.s),
         (px, 0.0), (py, 0.0), vx, vy, Arrival(own.flown, slack, slack),
@@ -64,10 +66,10 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
 
 
 @inner
-def line_starts_in_front(joints, line, own, px, py, vx, vy, slack):
+def line_starts_in_front(tables, line, own, px, py, vx, vy, slack):
     """-> bool: `starts_in_front` for a ray that left a line, and another line."""
     arrival = Arrival(own.flown, slack, slack)
-    return line_in_front_of_line(joints, line, own.number, (px, 0.0), (py, 0.0), vx, vy, arrival)
+    return line_in_front_of_line(array_of(tables.joints), line, own.number, (px, 0.0), (py, 0.0), vx, vy, arrival)
 
 
 @linked
@@ -112,7 +114,7 @@ def piece_nearby(scope, piece, own, px, py, vx, vy):
         address = address_at(scope.slots.bezier)
         if address != 0:
             own_number = number if is_own else -1
-            arguments = tables.beziers, number, number + 1, own_number, own.s, px, py, vx, vy, slack, np.inf
+            arguments = tables, number, number + 1, own_number, own.s, px, py, vx, vy, slack, np.inf
             _, _, _, _, near_s = call_at(address, NO_BEZIER_HIT, arguments)
             if near_s >= 0.0:
                 t, s = 0.0, near_s
@@ -132,7 +134,7 @@ def nearer(scope, found, piece, own, px, py, vx, vy):
     t, s, tangent, is_clear = piece_nearby(scope, piece, own, px, py, vx, vy)
     if not t < found.time:
         return found
-    from_piece = own.kind not in (OPENING, SIDE)
+    from_piece = own.kind != OPENING and own.kind != SIDE
     hit = Hit(max(t, 0.0), kind, number, s, tangent if is_clear or not from_piece else DOUBTFUL)
     # no piece lies above the opening or beyond a side, so a piece within rounding of them is hit there
     if is_clear or not from_piece:
@@ -142,7 +144,7 @@ def nearer(scope, found, piece, own, px, py, vx, vy):
     if address == 0:
         return Hit(0.0, kind, number, s, DOUBTFUL)
     if both_lines:
-        is_front = call_at(address, is_clear, (tables.joints, number, own, px, py, vx, vy, slack))
+        is_front = call_at(address, is_clear, (tables, number, own, px, py, vx, vy, slack))
     else:
         is_front = call_at(address, is_clear, (tables, hit, own, px, py, vx, vy, slack))
     return hit if is_front else found

@@ -21,6 +21,7 @@ from ...scene.columns import (
     BEZIERS_END,
     CIRCLES_END,
     CORNER_EDGE,
+    CURVATURE,
     EDGE_X,
     EDGE_Y,
     ELLIPSES_END,
@@ -39,6 +40,8 @@ from ...scene.columns import (
     LINE_NORMAL_X,
     LINE_NORMAL_Y,
     NO_EDGE,
+    NORMAL_X,
+    NORMAL_Y,
     PAIRS_END,
     PARTNER,
     POINT_X,
@@ -47,17 +50,21 @@ from ...scene.columns import (
     RIGHT_EDGE,
     RUN_SINE,
     SIZE,
+    START_X,
+    START_Y,
     STRETCH,
     TREE_LEVELS,
 )
+from ...scene.compiled.records import ROW, Typed
+from ...scene.records import Record
 from ...scene.scene import NO_TABLES
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
 from .arcs import arc_incidence, arc_reflect, arc_time, may_touch_arc, near_end, on_arc_after
 from .beziers import NO_BEZIER_HIT, bend_number, bezier_reflect, bezier_tangent, nearest_bezier
 from .lanes import LEAST_FRACTION
-from .lines import nearest_line, nearest_line_in_boxes
+from .lines import NO_LINE_HIT, nearest_line, nearest_line_in_boxes
 from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
-from .options import compiled, inlined
+from .options import compiled, inlined, inner
 from .pointers import Late, address_at, address_of, call_at, is_raised
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots, results_for
 from .runs import skip_chords, skip_crossings
@@ -70,6 +77,8 @@ ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
 MOST_STEPS = 1_000_000
 # An odd number without pattern, so that itineraries with the same pieces in another order differ.
 HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
+# What `skip_run` returns without a run.
+NO_RUN = 0.0, 0.0, 0.0, 0.0, 0
 # Shift to bits that the numbers of the pieces do not reach.
 BEND_SHIFT = 40
 
@@ -109,13 +118,19 @@ def scope_of(tables, h, slots):
         hollow[LEFT],
         hollow[RIGHT],
         JOINT_ULPS * EPS * hollow[SIZE],
-        (int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])),
-        (int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])),
-        (int(hollow[FIRST_ELLIPSE]), int(hollow[ELLIPSES_END])),
-        (int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])),
+        (np.int64(hollow[FIRST_JOINT]), np.int64(hollow[JOINTS_END])),
+        (np.int64(hollow[FIRST_CIRCLE]), np.int64(hollow[CIRCLES_END])),
+        (np.int64(hollow[FIRST_ELLIPSE]), np.int64(hollow[ELLIPSES_END])),
+        (np.int64(hollow[FIRST_BEZIER]), np.int64(hollow[BEZIERS_END])),
         hollow[TREE_LEVELS] > 0.0,
         slots,
     )
+
+
+@inlined
+def arc_of(tables, kind, number):
+    """-> row: an arc, given by kind and row of its table."""
+    return tables.circles[number] if kind == CIRCLE else tables.ellipses[number]
 
 
 @inlined
@@ -125,38 +140,32 @@ def nearest_curve(scope, own, px, py, vx, vy):
     Both times are inf if there is none. For ``nearby`` see `nearest_line`.
     """
     tables, slack = scope.tables, scope.slack
-    circles, ellipses, beziers = tables.circles, tables.ellipses, tables.beziers
     close = NEARBY_SLACKS * slack
     time, kind, number, hit_s, contact, nearby = np.inf, NO_PIECE, -1, 0.0, np.inf, False
-    first, end = scope.circles
-    for k in range(first, end):
-        is_own = own.kind == CIRCLE and own.number == k
-        t, tangent, _ = arc_time(circles[k], is_own, px, py, vx, vy, 1.0)
+    # one loop over the arcs of both kinds, because code for each would double the time of compilation
+    first_circle, circles_end = scope.circles
+    first_ellipse, ellipses_end = scope.ellipses
+    circles = circles_end - first_circle
+    for i in range(circles + ellipses_end - first_ellipse):
+        of_kind, k = (CIRCLE, first_circle + i) if i < circles else (ELLIPSE, first_ellipse + i - circles)
+        arc = arc_of(tables, of_kind, k)
+        stretch = arc[STRETCH]
+        is_own = own.kind == of_kind and own.number == k
+        t, tangent, _ = arc_time(arc, is_own, px, py, vx, vy, stretch)
         if abs(t) <= close and not is_own:
             nearby = True
         elif tangent != 0:
-            if may_touch_arc(circles[k], t, px, py, vx, vy, 1.0, slack):
+            if may_touch_arc(arc, t, px, py, vx, vy, stretch, slack):
                 contact = min(contact, t)
-        elif 0.0 <= t < time and on_arc_after(circles[k], t, px, py, vx, vy, 1.0, slack):
-            time, kind, number = t, CIRCLE, k
-    first, end = scope.ellipses
-    for k in range(first, end):
-        is_own = own.kind == ELLIPSE and own.number == k
-        t, tangent, _ = arc_time(ellipses[k], is_own, px, py, vx, vy, ellipses[k, STRETCH])
-        if abs(t) <= close and not is_own:
-            nearby = True
-        elif tangent != 0:
-            if may_touch_arc(ellipses[k], t, px, py, vx, vy, ellipses[k, STRETCH], slack):
-                contact = min(contact, t)
-        elif 0.0 <= t < time and on_arc_after(ellipses[k], t, px, py, vx, vy, ellipses[k, STRETCH], slack):
-            time, kind, number = t, ELLIPSE, k
+        elif 0.0 <= t < time and on_arc_after(arc, t, px, py, vx, vy, stretch, slack):
+            time, kind, number = t, of_kind, k
     first, end = scope.beziers
     if first < end:
         address = address_at(scope.slots.bezier)
         if address == 0:
             return Hit(0.0, BEZIER, first, 0.0, DOUBTFUL), np.inf, False
         own_number = own.number if own.kind == BEZIER else -1
-        arguments = beziers, first, end, own_number, own.s, px, py, vx, vy, slack, time
+        arguments = tables, first, end, own_number, own.s, px, py, vx, vy, slack, time
         t, k, s, touch, near_s = call_at(address, NO_BEZIER_HIT, arguments)
         contact = min(contact, touch)
         if k >= 0:
@@ -170,7 +179,11 @@ def nearest_piece(scope, own, px, py, vx, vy):
     """-> (Hit, corner): the first hit on a piece, and the time to the first corner within the slack of the ray."""
     hit, contact, nearby = nearest_curve(scope, own, px, py, vx, vy)
     if scope.has_tree:
-        t, line, fraction, corner, near = nearest_line_in_boxes(scope, own, px, py, vx, vy, hit.time)
+        address = address_at(scope.slots.boxes)
+        if address == 0:
+            return Hit(0.0, NO_PIECE, -1, 0.0, DOUBTFUL), np.inf
+        arguments = scope, own, px, py, vx, vy, hit.time
+        t, line, fraction, corner, near = call_at(address, NO_LINE_HIT, arguments)
     else:
         t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
     if t < hit.time:
@@ -206,11 +219,9 @@ def incidence(scope, hit, px, py, vx, vy):
     if hit.kind == LINE:
         lines = tables.lines
         return abs(vx * lines[hit.number, LINE_NORMAL_X] + vy * lines[hit.number, LINE_NORMAL_Y])
-    if hit.kind == CIRCLE:
-        return arc_incidence(tables.circles[hit.number], hit.time, px, py, vx, vy, 1.0)
-    if hit.kind == ELLIPSE:
-        stretch = tables.ellipses[hit.number, STRETCH]
-        return arc_incidence(tables.ellipses[hit.number], hit.time, px, py, vx, vy, stretch)
+    if hit.kind == CIRCLE or hit.kind == ELLIPSE:
+        arc = arc_of(tables, hit.kind, hit.number)
+        return arc_incidence(arc, hit.time, px, py, vx, vy, arc[STRETCH])
     if hit.kind == BEZIER:
         tx, ty = bezier_tangent(tables.beziers[hit.number], hit.s)
         return abs(tx * vy - ty * vx) / math.sqrt(tx * tx + ty * ty)
@@ -246,7 +257,7 @@ def meets_corner(scope, hit, corner, px, py, vx, vy):
     if corner <= time + slack:
         return True
     # at grazing incidence a corner within the slack of the ray may lie far beyond the hit
-    if hit.kind in (BEZIER, SIDE):
+    if hit.kind == BEZIER or hit.kind == SIDE:
         return False
     return (corner - time) * incidence(scope, hit, px, py, vx, vy) <= 2.0 * slack
 
@@ -273,32 +284,42 @@ def reflect(scope, hit, own, px, py, vx, vy):
     tables = scope.tables
     if hit.kind == LINE:
         px, py, wx, wy, at_corner = line_reflect(scope, hit, own, vx, vy)
-    elif hit.kind == CIRCLE:
-        px, py, wx, wy = arc_reflect(tables.circles[hit.number], hit.time, px, py, vx, vy, 1.0)
-        at_corner = near_end(tables.circles[hit.number], px, py, scope.slack)
-    elif hit.kind == ELLIPSE:
-        stretch = tables.ellipses[hit.number, STRETCH]
-        px, py, wx, wy = arc_reflect(tables.ellipses[hit.number], hit.time, px, py, vx, vy, stretch)
-        at_corner = near_end(tables.ellipses[hit.number], px, py, scope.slack)
     else:
-        px, py, wx, wy = bezier_reflect(tables.beziers[hit.number], hit.s, vx, vy)
-        at_corner = near_end(tables.beziers[hit.number], px, py, scope.slack)
+        if hit.kind == BEZIER:
+            curve = tables.beziers[hit.number]
+            px, py, wx, wy = bezier_reflect(curve, hit.s, vx, vy)
+        else:
+            curve = arc_of(tables, hit.kind, hit.number)
+            px, py, wx, wy = arc_reflect(curve, hit.time, px, py, vx, vy, curve[STRETCH])
+        at_corner = near_end(curve, px, py, scope.slack)
     if at_corner:
         return px, py, vx, vy, True
     return px, py, wx, wy, False
 
 
 @inlined
+def may_run(tables, hit, own, px, py, vx, vy):
+    """-> bool: whether a run of hits may follow a hit, so that `skip_run` is worth a call."""
+    if hit.kind == CIRCLE:
+        arc = tables.circles[hit.number]
+        qx, qy = px - arc[START_X], py - arc[START_Y]
+        nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
+        return vx * nx + vy * ny <= arc[RUN_SINE]
+    # the ray came from this line, hit the other one, and came back
+    came_back = hit.kind == LINE and own.kind == LINE and own.before == hit.number
+    return came_back and tables.lines[hit.number, PAIRS_END] > 0.0
+
+
+@inner
 def skip_run(scope, hit, own, px, py, vx, vy, most):
     """-> (px, py, vx, vy, hits): the ray after the run of hits that follows a hit; no hits if a run does not pay."""
     tables, number = scope.tables, hit.number
     if hit.kind == CIRCLE and tables.circles[number, RUN_SINE] > 0.0:
         return skip_chords(tables.circles[number], px, py, vx, vy, most)
-    # the ray came from this line, hit the other one, and came back
-    if hit.kind == LINE and own.kind == LINE and own.before == number:
+    if hit.kind == LINE:
         lines, pairs = tables.lines, tables.pairs
         normal = lines[number, LINE_NORMAL_X], lines[number, LINE_NORMAL_Y]
-        for row in range(int(lines[number, FIRST_PAIR]), int(lines[number, PAIRS_END])):
+        for row in range(np.int64(lines[number, FIRST_PAIR]), np.int64(lines[number, PAIRS_END])):
             if pairs[row, PARTNER] == own.number:
                 return skip_crossings(pairs[row], normal, px, py, vx, vy, scope.slack, most)
     return px, py, vx, vy, np.int64(0)
@@ -318,8 +339,8 @@ def piece_label(tables, hit, vx):
 def trace_ray(scope, entry, theta, limit, labelled, path):
     """-> (x, vx, vy, bounces, status, label): trace one ray through one hollow.
 
-    In an open wall x is unfolded. ``label`` is the hash of `Results.itinerary`, if ``labelled``; ``path`` is
-    `Results.path`.
+    In an open wall x is unfolded. ``label`` is the hash of `Details.itinerary`, if ``labelled``; ``path`` is
+    `Details.path`.
     """
     sine, cosine = sine_cosine(theta)
     px, py, vx, vy, shift = entry, 0.0, -cosine, -sine, 0.0
@@ -360,10 +381,16 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
             return shift + px, vx, vy, bounces, CORNER, label
         flown = hit.time
         if not with_path:
-            px, py, vx, vy, hits = skip_run(scope, hit, own, px, py, vx, vy, limit - bounces - 1)
-            bounces += hits
-            # no segment of a run passes a piece from behind
-            flown = 0.0 if hits > 0 else flown
+            hits = np.int64(0)
+            if may_run(scope.tables, hit, own, px, py, vx, vy):
+                address = address_at(scope.slots.run)
+                if address == 0:
+                    return shift + px, vx, vy, bounces, CORNER, label
+                arguments = scope, hit, own, px, py, vx, vy, limit - bounces - 1
+                px, py, vx, vy, hits = call_at(address, NO_RUN, arguments)
+                bounces += hits
+                # no segment of a run passes a piece from behind
+                flown = 0.0 if hits > 0 else flown
             if labelled:
                 label = HASH_FACTOR * label + np.uint64(hits)
         # one Newton step on |v| = 1, so that rounding errors of speed and position do not amplify each other
@@ -381,7 +408,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
 def trace_rays(x, theta, tables, limit, stop, results, slots):
     """Trace a block of rays into ``results``, until ``stop`` is raised; ``slots`` are `SLOTS`."""
     out_x, out_theta, collisions, status = results.x, results.theta, results.collisions, results.status
-    hollows, cell, labelled = tables.hollows, tables.cell, results.itinerary.shape[0] > 0
+    hollows, cell, labelled = tables.hollows, tables.cell, results.details.itinerary.shape[0] > 0
     for i in range(x.shape[0]):
         if is_raised(stop):
             break
@@ -395,31 +422,35 @@ def trace_rays(x, theta, tables, limit, stop, results, slots):
             continue
         scope = scope_of(tables, h, slots)
         end, vx, vy, collisions[i], status[i], label = trace_ray(
-            scope, x[i] - base, theta[i], limit, labelled, results.path
+            scope, x[i] - base, theta[i], limit, labelled, results.details.path
         )
         out_x[i] = base + end
         angle = direction_angle(vx, vy)
         out_theta[i] = min(angle, LAST_ANGLE) if status[i] == ESCAPED else angle
         if labelled:
-            results.itinerary[i] = label
-        if results.velocity.shape[0] > 0:
-            results.velocity[i, POINT_X], results.velocity[i, POINT_Y] = vx, vy
+            results.details.itinerary[i] = label
+        velocity = results.details.velocity
+        if velocity.shape[0] > 0:
+            velocity[i, POINT_X], velocity[i, POINT_Y] = vx, vy
 
 
 def _late_functions() -> tuple[Late, ...]:
     """Return the functions of `Slots`, for all walls."""
     own, numbers = Own(OPENING, -1, -1.0, 0.0, -1, 0), (0.0, 0.0, 0.0, 0.0)
-    scope = Scope(NO_TABLES, np.empty(0), 0.0, 0.0, 0.0, (0, 0), (0, 0), (0, 0), (0, 0), False, Slots(0, 0, 0, 0))
+    slots, hit = Record(Slots(0, 0, 0, 0, 0, 0)), Hit(0.0, LINE, 0, 0.0, 0)
+    scope = Scope(NO_TABLES, Typed(ROW), 0.0, 0.0, 0.0, (0, 0), (0, 0), (0, 0), (0, 0), False, slots)
     return (
         Late(hit_nearby, (scope, own, *numbers)),
-        Late(starts_in_front, (NO_TABLES, Hit(0.0, LINE, 0, 0.0, 0), own, *numbers, 0.0)),
-        Late(line_starts_in_front, (NO_TABLES.joints, 0, own, *numbers, 0.0)),
-        Late(nearest_bezier, (NO_TABLES.beziers, 0, 0, 0, 0.0, *numbers, 0.0, 0.0)),
+        Late(starts_in_front, (NO_TABLES, hit, own, *numbers, 0.0)),
+        Late(line_starts_in_front, (NO_TABLES, 0, own, *numbers, 0.0)),
+        Late(nearest_line_in_boxes, (scope, own, *numbers, 0.0)),
+        Late(skip_run, (scope, hit, own, *numbers, 0)),
+        Late(nearest_bezier, (NO_TABLES, 0, 0, 0, 0.0, *numbers, 0.0, 0.0)),
     )
 
 
 LATE = _late_functions()
-SLOTS = Slots(*(function.slot for function in LATE))
+SLOTS = Record(Slots(*(function.slot for function in LATE)))
 
 
 @cache

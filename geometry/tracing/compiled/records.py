@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
-from ...scene.scene import Tables
+from ...scene.records import Record
 
 # Kinds of obstacles; OPENING is the opening of the hollow, SIDE a side of an open wall.
 NO_PIECE, OPENING, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
@@ -17,12 +17,15 @@ NO_PIECE, OPENING, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 class Slots(NamedTuple):
     """The slots (`Late`) of functions that few rays or few walls need.
 
-    `hit_nearby`, `starts_in_front`, `line_starts_in_front` and `nearest_bezier`.
+    `hit_nearby`, `starts_in_front`, `line_starts_in_front`, `nearest_line_in_boxes`, `skip_run` and
+    `nearest_bezier`.
     """
 
     nearby: int
     in_front: int
     line_in_front: int
+    boxes: int
+    run: int
     bezier: int
 
 
@@ -34,8 +37,8 @@ class Scope(NamedTuple):
     its lines have a tree, and the slots of late functions.
     """
 
-    tables: Tables
-    hollow: Floats
+    tables: Record
+    hollow: Any
     left: float
     right: float
     slack: float
@@ -44,7 +47,7 @@ class Scope(NamedTuple):
     ellipses: tuple[int, int]
     beziers: tuple[int, int]
     has_tree: bool
-    slots: Slots
+    slots: Record
 
 
 class Own(NamedTuple):
@@ -78,29 +81,38 @@ class Hit(NamedTuple):
 
 
 class Results(NamedTuple):
-    """The arrays that `trace_rays` fills, one row for each ray; the last three are empty if they are not wanted.
+    """The arrays that `trace_rays` fills, one row for each ray; ``details`` are `Details`."""
+
+    x: Floats
+    theta: Floats
+    collisions: NDArray[np.int64]
+    status: NDArray[np.uint8]
+    details: Record
+
+
+class Details(NamedTuple):
+    """Further arrays to fill, empty if they are not wanted.
 
     ``velocity`` is the outgoing velocity, shape (n, 2). ``itinerary`` is a hash of the pieces hit, in order, of the
     lengths of runs, and of the sides passed. ``path``, shape (limit + 2, 2), for a single ray, has the points of the
     trajectory, with every hit of a run.
     """
 
-    x: Floats
-    theta: Floats
-    collisions: NDArray[np.int64]
-    status: NDArray[np.uint8]
     velocity: Floats
     itinerary: NDArray[np.uint64]
     path: Floats
 
 
-# The last three results, if only the ends of the rays are wanted.
-NOT_WANTED = np.empty((0, 2)), np.zeros(0, np.uint64), np.empty((0, 2))
+def details_for(velocity: int = 0, itinerary: int = 0, path: int = 0) -> Record:
+    """Return arrays with the given numbers of rows."""
+    return Record(Details(np.empty((velocity, 2)), np.zeros(itinerary, np.uint64), np.full((path, 2), np.nan)))
 
 
-def results_for(count: int, velocity: int = 0, itinerary: int = 0, path: int = 0) -> Results:
-    """Return results for ``count`` rays, with the given numbers of rows of the last three arrays."""
-    return Results(
-        np.empty(count), np.empty(count), np.empty(count, np.int64), np.empty(count, np.uint8),
-        np.empty((velocity, 2)), np.zeros(itinerary, np.uint64), np.full((path, 2), np.nan),
-    )  # fmt: skip
+# The details, if only the ends of the rays are wanted.
+NO_DETAILS = details_for()
+
+
+def results_for(count: int, details: Record = NO_DETAILS) -> Record:
+    """Return results for ``count`` rays."""
+    arrays = np.empty(count), np.empty(count), np.empty(count, np.int64), np.empty(count, np.uint8)
+    return Record(Results(*arrays, details))

@@ -97,10 +97,11 @@ from .lanes import (
 from .lines import nearest_lines_in_boxes
 from .options import inlined, inner, linked
 from .rays import scope_of
-from .records import Slots
 from .runs import skip_chords, skip_crossings
 from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
 
+# In place of the slots of late functions, which waves do not call.
+NO_SLOTS = np.int64(0)
 # Waves after the entry of the last ray, after which the rays that are left are traced one by one.
 MOST_WAVES = 64
 # Rays of a wave up to which the next rays come in.
@@ -324,7 +325,7 @@ def cross_simple(tables, h, limit, entry, angle, hits, work, walks):
     take the places of those that have left. Rays with more than ``limit`` or `MOST_HITS` hits, or with runs of hits,
     have no result.
     """
-    scope = scope_of(tables, h, Slots(0, 0, 0, 0))
+    scope = scope_of(tables, h, NO_SLOTS)
     rays = entry.shape[0]
     for i in range(rays):
         hits[i] = 0.0

@@ -1,0 +1,1 @@
+"""The types of records and tables in compiled functions."""
