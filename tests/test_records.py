@@ -10,7 +10,7 @@ from numba import typeof
 
 from asperity import geometry as geo
 from asperity.core.compilation import jit
-from asperity.geometry.scene.compiled.records import array_of
+from asperity.geometry.scene.compiled.records import RecordType, array_of, place_of
 from asperity.geometry.scene.records import Record
 
 
@@ -48,6 +48,32 @@ def test_compiled_functions_read_every_kind_of_field_and_write_to_arrays():
     values = fields()
     assert found(Record(values)) == (0.1, True, -7, 2**62, 255, 2, 5.0, 2.0, (3, 2), 9.0)
     assert values.table[2, 0] == 0.1 and values.counts[0] == 5
+
+
+record_at = place_of(Record(fields()))
+
+
+@jit()
+def table_found_from(address):
+    record = record_at(address)
+    return record.address, record.table[1, 1], record.inside.address
+
+
+def test_a_record_is_found_at_its_address():
+    record = Record(fields())
+    assert table_found_from(record.address) == (record.address, 3.0, record.inside.address)
+
+
+def test_a_trace_passes_no_records_from_python():
+    # each would take 4 us, a sixth of the time of a trace of one ray
+    from asperity.geometry.tracing.compiled.closed_forms import trace_closed
+    from asperity.geometry.tracing.compiled.rays import trace_rays
+
+    geo.trace(geo.mushrooms(0.3), 0.3, 1.0)
+    geo.trace(geo.triangular_teeth(0.7), 0.3, 1.0)
+    for function in (trace_rays, trace_closed):
+        assert function.signatures
+        assert not any(isinstance(kind, RecordType) for kinds in function.signatures for kind in kinds)
 
 
 def test_records_of_one_kind_have_one_type():

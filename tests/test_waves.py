@@ -130,7 +130,7 @@ def test_few_rays_are_left_to_the_loop(name):
     closed = np.empty((0, FORM_COLUMNS)) if wall.scene.closed is None else wall.scene.closed
     results = np.empty(RAYS), np.empty(RAYS), np.empty(RAYS, np.int64), np.empty(RAYS, np.uint8)
     room = closed_forms.room_for(wall.scene.hollows, RAYS)
-    closed_forms.trace_closed(x, theta, wall.scene.tables, closed, 2**62, results, room, closed_forms.CROSSINGS)
+    closed_forms.trace_closed(x, theta, wall.scene.tables.address, closed, 2**62, results, room, closed_forms.CROSSINGS)
     assert np.mean(results[-1] == closed_forms.UNDECIDED) < 0.01
 
 

@@ -14,9 +14,9 @@ import numpy as np
 class Record:
     """The fields of a named tuple, laid out in memory for compiled functions.
 
-    In Python the fields are attributes, as those of the tuple. In compiled functions, too; there a record has the type
-    that `compiled.records` gives it, and keeps in ``type``. Fields are numbers, contiguous arrays of one axis,
-    contiguous tables of float64, and records. The numbers in an array may change, the fields may not.
+    In Python the fields are attributes, as those of the tuple. In compiled functions, too, and ``address``; there a
+    record has the type that `compiled.records` gives it, and keeps in ``type``. Fields are numbers, contiguous arrays
+    of one axis, contiguous tables of float64, and records. The numbers in an array may change, the fields may not.
 
     Attributes
     ----------

@@ -277,15 +277,13 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
     """
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
-        from ..scene.records import Record
         from .compiled.pointers import checked
         from .compiled.rays import SLOTS, trace_rays
-        from .compiled.records import NO_DETAILS, Results
+        from .compiled.records import NO_DETAILS
 
         _check_rays(x, theta)
-        out_x, out_theta, collisions, status = results
-        wanted = Record(Results(out_x, out_theta, collisions, status, NO_DETAILS))
-        checked(lambda: trace_rays(x, theta, scene.tables, max_collisions, stop, wanted, SLOTS))
+        tables, places = scene.tables.address, (NO_DETAILS.address, SLOTS.address)
+        checked(lambda: trace_rays(x, theta, tables, max_collisions, stop, results, *places))
 
     rooms: list[Any] = []
 
@@ -293,7 +291,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
         from .compiled.closed_forms import CROSSINGS, RAYS, UNDECIDED, room_for, trace_closed
         from .compiled.pointers import checked
 
-        tables = scene.tables
+        tables = scene.tables.address
         # of an earlier block, if another thread does not use it
         room = rooms.pop() if rooms else room_for(scene.hollows, MANY_RAYS if in_waves else RAYS)
         closed = np.empty((0, FORM_COLUMNS)) if scene.closed is None else scene.closed
@@ -360,7 +358,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     """
     from .compiled.pointers import checked
     from .compiled.rays import SLOTS, trace_rays
-    from .compiled.records import details_for, results_for
+    from .compiled.records import details_for
 
     _check_wall(wall)
     position = finite_number("x", x)
@@ -377,12 +375,12 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
         # a flat top: entry, hit and exit are one point
         points = np.array([[entry, 0.0]] * 3)
     else:
-        results = results_for(1, details_for(path=limit + 2))
         start, angle = np.array([entry - base]), np.array([incoming])
-        stop = new_flag()
-        interruptibly(lambda: checked(lambda: trace_rays(start, angle, scene.tables, limit, stop, results, SLOTS)))
-        path = results.details.path
-        points = path[np.isfinite(path[:, 0])]
+        results = np.empty(1), np.empty(1), np.empty(1, np.int64), np.empty(1, np.uint8)
+        details, stop = details_for(path=limit + 2), new_flag()
+        given = start, angle, scene.tables.address, limit, stop, results, details.address, SLOTS.address
+        interruptibly(lambda: checked(lambda: trace_rays(*given)))
+        points = details.path[np.isfinite(details.path[:, 0])]
         points[:, 0] += base
     return points if wall.origin == (0.0, 0.0) else _in_coordinates_of(wall, points, position, incoming, limit)
 

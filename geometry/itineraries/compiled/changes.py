@@ -63,7 +63,7 @@ class Tracer(NamedTuple):
     The rays of a block have the same incoming angle. ``stop`` is never raised.
     """
 
-    address: int
+    trace: int
     halve: int
     slots: Record
     angles: Floats
@@ -134,8 +134,10 @@ def trace_block(entries, task):
     setting = task.setting
     tracer = setting.tracer
     rays = entries, tracer.angles[: entries.shape[0]]
-    limit = setting.limits.collisions
-    call_at(tracer.address, None, (*rays, setting.tables, limit, tracer.stop, tracer.results, tracer.slots))
+    limit, found = setting.limits.collisions, tracer.results
+    results = found.x, found.theta, found.collisions, found.status
+    places = found.details.address, tracer.slots.address
+    call_at(tracer.trace, None, (*rays, setting.tables.address, limit, tracer.stop, results, *places))
 
 
 @inlined

@@ -47,7 +47,7 @@ from .lanes import WALKS, WAVE, WORK
 from .lines import NATURAL
 from .options import compiled, inlined, inner
 from .pointers import Late, address_at, call_at
-from .rays import TOP_CORNER, last_hollow, opening_at
+from .rays import TOP_CORNER, last_hollow, opening_at, tables_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 from .waves import cross_simple
 
@@ -313,9 +313,10 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     """-> bool: trace a block of rays by flat tops and closed forms; all other rays get the status `UNDECIDED`.
 
     False if an angle is not in (0, pi) or an entry not finite; the results are then incomplete. ``closed`` are the
-    closed forms, empty if no hollow has one. ``results`` are four arrays to fill: x, theta, collisions, status.
-    ``room`` is `room_for`, ``crossings`` is `CROSSINGS`.
+    closed forms, empty if no hollow has one; of the tables the address is given. ``results`` are four arrays to fill:
+    x, theta, collisions, status. ``room`` is `room_for`, ``crossings`` is `CROSSINGS`.
     """
+    tables = tables_at(tables)
     hollows, cell = tables.hollows, tables.cell
     out_x, out_theta, bounces, status = results
     numbers, rays, others, met, heads, _, _ = room

@@ -55,7 +55,7 @@ from ...scene.columns import (
     STRETCH,
     TREE_LEVELS,
 )
-from ...scene.compiled.records import ROW, Typed
+from ...scene.compiled.records import ROW, Typed, place_of
 from ...scene.records import Record
 from ...scene.scene import NO_TABLES
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
@@ -66,7 +66,7 @@ from .lines import NO_LINE_HIT, nearest_line, nearest_line_in_boxes
 from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined, inner
 from .pointers import Late, address_at, address_of, call_at, is_raised
-from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots, results_for
+from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_DETAILS, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots
 from .runs import skip_chords, skip_crossings
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 
@@ -405,10 +405,15 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
 
 
 @compiled
-def trace_rays(x, theta, tables, limit, stop, results, slots):
-    """Trace a block of rays into ``results``, until ``stop`` is raised; ``slots`` are `SLOTS`."""
-    out_x, out_theta, collisions, status = results.x, results.theta, results.collisions, results.status
-    hollows, cell, labelled = tables.hollows, tables.cell, results.details.itinerary.shape[0] > 0
+def trace_rays(x, theta, tables, limit, stop, results, details, slots):
+    """Trace a block of rays until ``stop`` is raised.
+
+    ``results`` are four arrays to fill: x, theta, collisions, status. Of the tables, of the `Details` to fill and of
+    `SLOTS` the addresses are given.
+    """
+    out_x, out_theta, collisions, status = results
+    tables, details, slots = tables_at(tables), details_at(details), slots_at(slots)
+    hollows, cell, labelled = tables.hollows, tables.cell, details.itinerary.shape[0] > 0
     for i in range(x.shape[0]):
         if is_raised(stop):
             break
@@ -422,14 +427,14 @@ def trace_rays(x, theta, tables, limit, stop, results, slots):
             continue
         scope = scope_of(tables, h, slots)
         end, vx, vy, collisions[i], status[i], label = trace_ray(
-            scope, x[i] - base, theta[i], limit, labelled, results.details.path
+            scope, x[i] - base, theta[i], limit, labelled, details.path
         )
         out_x[i] = base + end
         angle = direction_angle(vx, vy)
         out_theta[i] = min(angle, LAST_ANGLE) if status[i] == ESCAPED else angle
         if labelled:
-            results.details.itinerary[i] = label
-        velocity = results.details.velocity
+            details.itinerary[i] = label
+        velocity = details.velocity
         if velocity.shape[0] > 0:
             velocity[i, POINT_X], velocity[i, POINT_Y] = vx, vy
 
@@ -451,10 +456,12 @@ def _late_functions() -> tuple[Late, ...]:
 
 LATE = _late_functions()
 SLOTS = Record(Slots(*(function.slot for function in LATE)))
+tables_at, details_at, slots_at = place_of(NO_TABLES), place_of(NO_DETAILS), place_of(SLOTS)
 
 
 @cache
 def trace_rays_address() -> int:
     """Return the address of `trace_rays`, for all walls, with or without velocities and itineraries."""
     numbers, stop = np.empty(0), np.zeros(1, np.int64)
-    return address_of(trace_rays, (numbers, numbers, NO_TABLES, 1, stop, results_for(0), SLOTS))
+    results = numbers, numbers, stop, np.empty(0, np.uint8)
+    return address_of(trace_rays, (numbers, numbers, 0, 1, stop, results, 0, 0))
