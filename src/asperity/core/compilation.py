@@ -22,12 +22,14 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
+from inspect import signature
 from pathlib import Path
 from tempfile import gettempdir, mkdtemp
 from typing import Any, ClassVar
 
 from numba import njit, types
 from numba._dynfunc import make_function
+from numba.core.base import BaseContext
 from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.caching import _SourceFileBackedLocatorMixin as SourceStamp
 from numba.core.cgutils import alloca_once
@@ -48,7 +50,8 @@ logger = logging.getLogger("asperity")
 
 def _skip_blas() -> None:
     """Load numba's functions of arrays without scipy.linalg, which numba would import to learn that it is there."""
-    check, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    check: Any = getattr(linalg, "ensure_blas", None)
+    linalg.ensure_blas = lambda: None
     try:
         importlib.import_module("numba.np.arraymath")
     finally:
@@ -112,6 +115,26 @@ class _Typing(Context):
         return found[1]
 
 
+# The methods of numba that `_Lower` and `_LinkedLibrary` replace, and those that they call: names of the arguments.
+PARTS: dict[tuple[Any, str], str] = {
+    (Lower, "lower_binop"): "self resty expr op",
+    (Lower, "lower_getitem"): "self resty expr value index signature",
+    (Lower, "alloca_lltype"): "self name lltype datamodel",
+    (Lower, "loadvar"): "self name",
+    (Lower, "typeof"): "self varname",
+    (BaseContext, "cast"): "self builder val fromty toty",
+    (BaseContext, "get_function"): "self fn sig _firstcall",
+    (JITCodeLibrary, "_optimize_functions"): "self ll_module",
+}
+
+
+@cache
+def knows_numba() -> bool:
+    """Return whether numba has the methods of `PARTS`; where it has others, they are called and not replaced."""
+    found = ((getattr(owner, name, None), expected) for (owner, name), expected in PARTS.items())
+    return all(method and " ".join(signature(method).parameters) == expected for method, expected in found)
+
+
 class _Lower(Lower):
     """numba's translation of statements to LLVM, which takes the types of operators as they were inferred.
 
@@ -158,7 +181,7 @@ class _Lowering(NativeLowering):
 
     @property
     def lowering_class(self) -> Any:
-        return _Lower
+        return _Lower if knows_numba() else Lower
 
 
 class _Pipeline(CompilerBase):
@@ -194,8 +217,11 @@ class _LinkedLibrary(JITCodeLibrary):
     """The code of a function that becomes machine code, and is optimised, within its callers only."""
 
     def _optimize_functions(self, module: Any) -> None:
-        # the layout only, which numba sets here
-        module.data_layout = self._codegen._data_layout
+        if knows_numba():
+            # the layout only, which numba sets here
+            module.data_layout = self._codegen._data_layout
+        else:
+            super()._optimize_functions(module)
 
     def _optimize_final_module(self) -> None:
         pass
