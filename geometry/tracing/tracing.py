@@ -185,10 +185,12 @@ def trace(
     0.750000000000 0.250000000000 2
     """
     _check_wall(wall)
-    x_all, theta_all = np.broadcast_arrays(numbers("x", x), numbers("theta", theta))
+    rays = numbers("x", x), numbers("theta", theta)
+    shape = np.broadcast_shapes(*(array.shape for array in rays))
     whole_number("max_collisions", max_collisions, 1)
     # the compiled functions take arrays of one kind: aligned, contiguous and writable
-    given, incoming = (np.require(array, requirements=["A", "C", "W"]).reshape(-1) for array in (x_all, theta_all))
+    full = (array if array.shape == shape else np.broadcast_to(array, shape) for array in rays)
+    given, incoming = (np.require(array, requirements=["A", "C", "W"]).reshape(-1) for array in full)
     starts = given if wall.origin == (0.0, 0.0) else np.empty_like(given)
     _keep_freed_memory(len(starts))
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
@@ -225,7 +227,6 @@ def trace(
 
     if starts is not given:
         in_blocks(move_back, len(starts), threads)
-    shape = x_all.shape
     results = (out_x.reshape(shape), out_theta.reshape(shape), collisions.reshape(shape), status.reshape(shape))
     for array in results:
         array.setflags(write=False)
