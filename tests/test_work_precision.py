@@ -10,6 +10,7 @@ import pytest
 
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
+from asperity.estimates import Estimate
 from asperity.spectral.work_diagrams.runs import measure
 
 EXACT = np.e - 1.0
@@ -269,3 +270,11 @@ def test_a_kernel_matrix_brings_its_reported_error():
 def test_what_makes_no_sense_is_refused(make):
     with pytest.raises((InputError, ValueError)):
         make()
+
+
+def test_errors_reported_by_a_random_method_are_a_root_mean_square_as_its_errors_are():
+    reports = iter([3.0, 4.0, 0.0])
+    method = spec.WorkMethod("any", lambda n, rng: Estimate(EXACT, next(reports), "estimate", "any"), is_random=True)
+    assert measure(problem(), method, 1, 3, 60.0).reported == pytest.approx((25.0 / 3.0) ** 0.5)
+    silent = spec.WorkMethod("silent", lambda n, rng: EXACT, is_random=True)
+    assert measure(problem(), silent, 1, 3, 60.0).reported is None

@@ -47,7 +47,7 @@ class WorkRow:
     seconds : tuple of float
         Wall time of every repeat.
     reported : float or None
-        The error reported by the method, if any.
+        The error reported by the method, if any; for a random method the root mean square over the repeats.
     note : str
         The method's description of the computation, or the reason for a missing value.
 

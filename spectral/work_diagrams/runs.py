@@ -34,6 +34,7 @@ def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: in
     """
     times: list[float] = []
     errors: list[dict[str, float]] = []
+    reports: list[float | None] = []
     spent = 0.0
     try:
         while len(times) < repeats and spent <= seconds:
@@ -43,11 +44,18 @@ def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: in
             spent += times[-1]
             value, reported, note = _parts(result)
             errors.append(problem.errors(value, method.name))
+            reports.append(reported)
     except (AsperityError, ArithmeticError, MemoryError, np.linalg.LinAlgError) as reason:
         words = " ".join(f"{type(reason).__name__}: {reason}".split())
         return WorkRow(method.name, budget, "failed", seconds=tuple(times), note=words)
-    norms = {name: float(np.sqrt(np.mean([one[name] ** 2 for one in errors]))) for name in problem.norms}
-    return WorkRow(method.name, budget, "done", norms, tuple(times), reported, note)
+    norms = {name: _root_mean_square([one[name] for one in errors]) for name in problem.norms}
+    known = [one for one in reports if one is not None]
+    together = _root_mean_square(known) if len(known) == len(reports) else None
+    return WorkRow(method.name, budget, "done", norms, tuple(times), together, note)
+
+
+def _root_mean_square(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _solve(method: WorkMethod, budget: float, repeat: int) -> Any:
