@@ -171,16 +171,20 @@ def next_leaf(scope, walk, forward, px, py, vx, vy, least, most):
 
 
 @inner
-def nearest_line_in_boxes(scope, own, px, py, vx, vy, time):
-    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the boxes along the ray."""
-    tables, slack = scope.tables, scope.slack
+def nearest_line_in_boxes(tree, own_line, bounces, px, py, vx, vy, time):
+    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the boxes along the ray.
+
+    ``own_line`` is the line that the ray leaves after so many bounces, or -1.
+    """
+    tables, slack = tree.tables, tree.slack
+    own = Own(LINE, own_line, -1.0, 0.0, -1, bounces)
     joints, boxes = tables.joints, tables.boxes
     close, most = NEARBY_SLACKS * slack, time + 2.0 * slack
     best, found, best_fraction = np.inf, -1, 0.0
     corner_time, nearby = np.inf, False
-    walk = first_boxes(scope, px, py, vx, vy, -close, most)
+    walk = first_boxes(tree, px, py, vx, vy, -close, most)
     while True:
-        leaf, walk = next_leaf(scope, walk, vx > 0.0, px, py, vx, vy, -close, most)
+        leaf, walk = next_leaf(tree, walk, vx > 0.0, px, py, vx, vy, -close, most)
         if leaf < 0:
             return best, found, best_fraction, corner_time, nearby
         met = lines_met(boxes, leaf, px, py, vx, vy, slack)
@@ -197,7 +201,7 @@ def nearest_line_in_boxes(scope, own, px, py, vx, vy, time):
         while met != 0:
             j = first + first_bit(met)
             met &= met - 1
-            if own.kind == LINE and j == own.number:
+            if j == own_line:
                 continue
             c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
             c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx

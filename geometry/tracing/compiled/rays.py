@@ -66,7 +66,7 @@ from .lines import NO_LINE_HIT, nearest_line, nearest_line_in_boxes
 from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined, inner
 from .pointers import Late, address_at, address_of, call_at, is_raised
-from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_DETAILS, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots
+from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_DETAILS, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots, Tree
 from .runs import skip_chords, skip_crossings
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 
@@ -182,7 +182,8 @@ def nearest_piece(scope, own, px, py, vx, vy):
         address = address_at(scope.slots.boxes)
         if address == 0:
             return Hit(0.0, NO_PIECE, -1, 0.0, DOUBTFUL), np.inf
-        arguments = scope, own, px, py, vx, vy, hit.time
+        tree = Tree(scope.tables, scope.hollow, scope.slack)
+        arguments = tree, own.number if own.kind == LINE else -1, own.bounces, px, py, vx, vy, hit.time
         t, line, fraction, corner, near = call_at(address, NO_LINE_HIT, arguments)
     else:
         t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
@@ -448,7 +449,7 @@ def _late_functions() -> tuple[Late, ...]:
         Late(hit_nearby, (scope, own, *numbers)),
         Late(starts_in_front, (NO_TABLES, hit, own, *numbers, 0.0)),
         Late(line_starts_in_front, (NO_TABLES, 0, own, *numbers, 0.0)),
-        Late(nearest_line_in_boxes, (scope, own, *numbers, 0.0)),
+        Late(nearest_line_in_boxes, (Tree(NO_TABLES, Typed(ROW), 0.0), 0, 0, *numbers, 0.0)),
         Late(skip_run, (scope, hit, own, *numbers, 0)),
         Late(nearest_bezier, (NO_TABLES, 0, 0, 0, 0.0, *numbers, 0.0, 0.0)),
     )

@@ -50,6 +50,14 @@ class Scope(NamedTuple):
     slots: Record
 
 
+class Tree(NamedTuple):
+    """What the search in a tree of boxes needs of a scope: few numbers to pass in a call by address."""
+
+    tables: Record
+    hollow: Any
+    slack: float
+
+
 class Own(NamedTuple):
     """The start of a ray segment.
 
