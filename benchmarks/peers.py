@@ -23,7 +23,7 @@ from .pieces import PICTURE, draw_pieces, measure_pieces, pieces_table
 
 WORKER = Path(__file__).with_name("peer_worker.py")
 # Name in `peer_worker`: precision and requirement. Embree is a system package, such as libembree-dev in Debian; its
-# program needs numpy only.
+# program needs numpy only. Mitsuba finds LLVM by itself or by DRJIT_LIBLLVM_PATH; on AMD Zen 4 19 works, 16 fails.
 TRACERS = {"embree": ("single", "numpy"), "mitsuba": ("single", "mitsuba")}
 CHAINS = {"deeptime": "deeptime", "pydtmc": "PyDTMC"}
 INTRODUCTION = (
