@@ -396,8 +396,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
                 label = HASH_FACTOR * label + np.uint64(hits)
         # one Newton step on |v| = 1, so that rounding errors of speed and position do not amplify each other
         scale = 1.5 - 0.5 * (vx * vx + vy * vy)
-        vx *= scale
-        vy *= scale
+        vx, vy = scale * vx, scale * vy
         bounces += 1
         before = own.number if own.kind == LINE else -1
         own = Own(hit.kind, hit.number, hit.s if hit.kind == BEZIER else -1.0, flown, before, bounces)
