@@ -54,7 +54,10 @@ class TensorBasis(Basis):
             part for factor in factors for part in (factor.factors if isinstance(factor, TensorBasis) else (factor,))
         )
         if len(flat) < 2 or not all(isinstance(factor, Basis) for factor in flat):
-            raise InputError(f"factors: expected two bases or more, got {factors!r}")
+            raise InputError(
+                "factors: expected two bases or more, as in TensorBasis((Bins(16), Bins(8, weight='sin2'))), "
+                f"got {factors!r}"
+            )
         object.__setattr__(self, "factors", flat)
 
     @property

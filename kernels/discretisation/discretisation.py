@@ -16,10 +16,12 @@ from ...core.estimates import Estimate
 from ...core.kinds import explained
 from ...core.long_runs import Engine
 from ..bases.basis import Basis
+from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..bases.mirror import reflection_matrix
 from ..bases.tensor import TensorBasis
 from ..laws.law import IsometryLaw, Law
+from ..laws.matrix_law import finite_action, not_a_law
 from ..laws.structure import Rules, fold
 from ..laws.tensor_law import TensorLaw
 from ..matrices.matrix import KernelMatrix
@@ -157,7 +159,7 @@ def discretise(
             ),
         )
     if not isinstance(law, Law):
-        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+        raise not_a_law("law", "a law such as WallLaw(wall)", law)
     if not isinstance(basis, Basis):
         raise InputError(f"basis: expected a basis such as Bins(64), got {basis!r}")
     if isinstance(basis, TensorBasis):
@@ -178,8 +180,14 @@ def discretise(
     # Quadrature requested by name may take some seconds.
     segments = MOST_SEGMENTS if method == "quadrature" else QUICK_SEGMENTS
     budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)
+    action = finite_action(law, edges=basis.edges) if isinstance(basis, Bins) else None
+    if action is not None and action.states > 1 and method == "auto":
+        found = replace(action.matrix_of(law), basis=basis)
+    else:
+        found = recipe(law, method)(basis, budget)
     return replace(
-        recipe(law, method)(basis, budget),
+        found,
+        beyond=None if action is None or found.samples else (action.even, action.odd),
         law=repr(law),
         reversible=law.reversible,
         mirror_symmetric=law.mirror_symmetric,

@@ -11,6 +11,7 @@ from ...core.estimates import Estimate
 from ...core.kinds import explained
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
+from ..laws.matrix_law import not_a_law
 from ..matrices.matrix import KernelMatrix
 from .joint import joint_law_distance, joint_matrix_distance
 from .pseudometric import moment_distance
@@ -113,7 +114,7 @@ def distance(
     positive_number("tolerance", tolerance)
     for law in (first, second):
         if not isinstance(law, (Law, KernelMatrix)):
-            raise InputError(f"distance: expected laws or kernel matrices, got {law!r}")
+            raise not_a_law("distance", "laws or kernel matrices", law)
     if first.frame != second.frame:
         raise InputError(
             f"distance: expected laws in the same frame, got {first.frame!r} and {second.frame!r}; use "

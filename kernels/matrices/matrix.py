@@ -7,7 +7,8 @@ errors are normal.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import operator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -40,7 +41,7 @@ BEYOND_CHANCE, ENTRY_ROUNDING = 10.0, 64.0 * EPS
 # What a file holds as it is.
 PLAIN_FIELDS = (
     "symmetrised", "samples", "method", "law", "reversible", "mirror_symmetric", "frame", "requested_tolerance",
-    "unresolved", "norm_bound",
+    "unresolved", "norm_bound", "beyond",
 )  # fmt: skip
 
 
@@ -77,6 +78,7 @@ def scaled(matrix: KernelMatrix, factor: float) -> KernelMatrix:
     return replace(
         _derived(matrix, factor * matrix.symmetric, error, f"{factor:g}*{_name(matrix)}"),
         replicates=tuple(factor * part for part in matrix.replicates),
+        beyond=_beyond(lambda number: factor * number, matrix),
         reversible=matrix.reversible,
         mirror_symmetric=matrix.mirror_symmetric,
         norm_bound=abs(factor) * matrix.norm_bound,
@@ -100,6 +102,7 @@ def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
         reversible=_both(first.reversible, second.reversible),
         mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
         norm_bound=first.norm_bound + second.norm_bound,
+        beyond=_beyond(operator.add, first, second),
     )
 
 
@@ -115,6 +118,7 @@ def multiplied(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
         reversible=first.reversible if first is second else None,
         mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
         norm_bound=first.norm_bound * second.norm_bound,
+        beyond=_beyond(operator.mul, first, second),
     )
 
 
@@ -133,6 +137,7 @@ def to_power(matrix: KernelMatrix, exponent: int) -> KernelMatrix:
         reversible=True if exponent == 0 else matrix.reversible,
         mirror_symmetric=True if exponent == 0 else matrix.mirror_symmetric,
         norm_bound=bound**exponent,
+        beyond=_beyond(lambda number: number**exponent, matrix),
     )
 
 
@@ -176,7 +181,15 @@ def in_other_frame(matrix: KernelMatrix) -> KernelMatrix:
         reversible=matrix.reversible if matrix.mirror_symmetric else None,
         mirror_symmetric=matrix.mirror_symmetric,
         norm_bound=matrix.norm_bound,
+        beyond=None if matrix.beyond is None else (matrix.beyond[0], -matrix.beyond[1]),
     )
+
+
+def _beyond(combined: Callable[..., float], *matrices: KernelMatrix) -> tuple[float, float] | None:
+    """``beyond`` of a matrix computed from others; None unless all of them have it."""
+    pairs = [matrix.beyond for matrix in matrices if matrix.beyond is not None]
+    even, odd = zip(*pairs, strict=True) if len(pairs) == len(matrices) else ((), ())
+    return (combined(*even), combined(*odd)) if even else None
 
 
 def _derived(
@@ -246,6 +259,9 @@ class KernelMatrix:
         Upper bound of the operator norm of the exact matrix: 1 for Markov kernels that keep the measure.
     raw_defect : SymmetryDefect, optional
         The symmetry defect of the raw sample, with its z-score.
+    beyond : pair of floats, optional
+        The numbers by which the law multiplies even and odd functions orthogonal to the basis, if it maps the span of
+        the basis to itself and is such a multiple there. The spectrum of the matrix and these are then the law's.
     metadata : mapping
         Anything else that belongs to the record, as plain JSON values.
 
@@ -259,7 +275,7 @@ class KernelMatrix:
 
     symmetric: Floats
     basis: Basis
-    error: Estimate
+    error: Estimate = None  # type: ignore[assignment]
     counts: NDArray[np.int64] | None = field(default=None, kw_only=True)
     replicates: tuple[Replicate, ...] = field(default=(), kw_only=True)
     symmetrised: bool = field(default=False, kw_only=True)
@@ -273,6 +289,7 @@ class KernelMatrix:
     unresolved: float = field(default=0.0, kw_only=True)
     norm_bound: float = field(default=1.0, kw_only=True)
     raw_defect: SymmetryDefect | None = field(default=None, kw_only=True)
+    beyond: tuple[float, float] | None = field(default=None, kw_only=True)
     metadata: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
 
     # numpy must leave ``mu @ P`` and ``np.float64(2) * P`` to this class
@@ -286,7 +303,10 @@ class KernelMatrix:
         if symmetric.shape != (n, n):
             raise InputError(f"symmetric: expected shape {(n, n)} for {self.basis!r}, got {symmetric.shape}")
         if not isinstance(self.error, Estimate):
-            raise InputError(f"error: expected an Estimate, got {self.error!r}")
+            raise InputError(
+                f"error: expected an Estimate such as Estimate(0.0, 0.0, 'bound', 'given'), got {self.error!r}; the "
+                "law of transition probabilities between bins, ker.MatrixLaw(array), needs none"
+            )
         object.__setattr__(self, "symmetric", frozen(symmetric))
         if self.counts is not None:
             counts = np.array(self.counts, dtype=np.int64)
@@ -553,11 +573,21 @@ def _restored(record: Record, arrays: Stored, basis: Basis) -> KernelMatrix:
         replicates=tuple(load_array(kind, arrays, f"replicate{k}") for k, kind in enumerate(record["replicates"])),
         raw_defect=None if defect is None else SymmetryDefect(*defect),
         metadata=record["metadata"],
-        **{name: record[name] for name in PLAIN_FIELDS},
+        # files from before this field was introduced have no "beyond"
+        **{name: record[name] for name in PLAIN_FIELDS if name in record and name != "beyond"},
+        beyond=None if record.get("beyond") is None else _pair(record["beyond"]),
     )
     _check_record(matrix)
     _check_entries(matrix)
     return matrix
+
+
+def _pair(value: Any) -> tuple[float, float]:
+    even, odd = value
+    return (
+        number_between("beyond", even, -1.0, 1.0, closed="low high"),
+        number_between("beyond", odd, -1.0, 1.0, closed="low high"),
+    )
 
 
 def _check_record(matrix: KernelMatrix) -> None:

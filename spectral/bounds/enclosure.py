@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats, whole_number
-from ...core.errors import InputError
 from ...core.estimates import ErrorKind
 from ...core.frames import data_frame
 from ...core.html import html_table
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
-from ...kernels import Basis, Bins, CollisionLaw, Composition, DensityLaw, Law, Legendre, MatrixLaw, Power, discretise
+from ...kernels import Basis, CollisionLaw, Composition, DensityLaw, Law, Legendre, MatrixLaw, Power, discretise
 from ...kernels.bases.measure import SINE
 from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.matrix_law import finite_action, not_a_law
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import made_of_isometries
 from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
-from ..eigenvalues.spectra import check_reversible
+from ..eigenvalues.spectra import Spectrum, check_reversible, matrix_spectrum
 from .contraction import refuse_unless_self_adjoint
 from .operator_residuals import Residuals, image_rule, residuals
 from .scattered import ScatteredSpectrum, scattered_spectrum, scattered_words
@@ -191,8 +191,11 @@ def enclosures(
     if isinstance(law, CollisionLaw):
         law = law.law
     if not isinstance(law, Law):
-        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+        raise not_a_law("law", "a law such as WallLaw(wall)", law)
     refuse_unless_self_adjoint(law)
+    action = finite_action(law, k + 1) if basis is None else None
+    if action is not None:
+        return _of_matrix(matrix_spectrum(action.matrix_of(law), k + 1), k)
     words = None if isinstance(law, DensityLaw) else scattered_words(law)
     if words is not None:
         if [len(word) for word in words] == [1]:
@@ -244,7 +247,7 @@ def enclosed_trial_space(
         next_value = _reach(after)
     else:
         if basis is None:
-            basis = Bins(law.edges) if isinstance(law, MatrixLaw) else Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
+            basis = Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
         values, vectors, names, next_value = _trial(law, basis, k, tolerance)
         found = residuals(law, basis, vectors, values)
     order = np.argsort(-np.abs(found.quotients), kind="stable")
@@ -316,6 +319,24 @@ def _raised(found: Enclosures, exponent: int) -> Enclosures:
     )
     items.sort(key=lambda item: (item.index != 0, -item.value))
     return replace(found, items=tuple(items), separation=apart, method=f"power {exponent}; {found.method}")
+
+
+def _of_matrix(found: Spectrum, k: int) -> Enclosures:
+    """Enclosures from a matrix that has the k + 1 eigenvalues of largest modulus of the law."""
+    errors, moduli = found.errors.total(), np.abs(found.values)
+    reason = f"the law is a matrix on {found.basis.size} bins and known beyond them; {found.completeness}"
+    order = np.append(0, 1 + np.argsort(-moduli[1:], kind="stable"))
+    items = [
+        Enclosure(
+            float(found.values[i]), float(found.values[i] - errors[i]), float(min(found.values[i] + errors[i], 1.0)),
+            "indexed", index, float(found.residuals[i]), "bound", reason, found.parity[i],
+        )
+        for index, i in enumerate(order[:k].tolist())
+    ]  # fmt: skip
+    items.sort(key=lambda item: (item.index != 0, -item.value))
+    radius = float(moduli[order[k]] + errors[order[k]]) if order.size > k else 0.0
+    apart = Separation(radius, "bound", f"the next eigenvalue; {reason}")
+    return Enclosures(_with_ties(items), apart, found.convention, f"eigenvalues of a matrix in {found.basis!r}")
 
 
 def _of_scattered(found: ScatteredSpectrum, convention: str) -> Enclosures:

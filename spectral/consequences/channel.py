@@ -16,6 +16,7 @@ from ...core.long_runs import Engine, all_parts
 from ...core.version import __version__
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
+from ...kernels.laws.matrix_law import not_a_law
 from ...kernels.walls.identity import law_digest
 from .diffusion import Arrangement, check_arrangement
 
@@ -128,7 +129,7 @@ def exit_times(
     True
     """
     if not isinstance(law, Law):
-        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+        raise not_a_law("law", "a law such as WallLaw(wall)", law)
     levels = finite_array("lengths", lengths).ravel()
     if levels.size < 3 or levels[0] <= 0.0 or np.any(np.diff(levels) <= 0.0):
         raise InputError(f"lengths: expected at least three increasing positive lengths, got {lengths!r}")

@@ -1,4 +1,4 @@
-"""The diffusivity of a rarefied gas in a channel with rough walls (Knudsen diffusion)."""
+"""The slope by which diffusion in a channel with rough walls grows with its length (Knudsen diffusion)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.laws.law import IsometryLaw
+from ...kernels.laws.matrix_law import not_a_law
 from ...kernels.laws.structure import holds_of_all
 from ...kernels.walls.repeated_teeth import RepeatedTeethLaw
 from ..essential.edge import grazing_symbol
-from ..essential.exact import ideal_spectrum
 
 Arrangement = Literal["mirror", "half-turn"]
 ARRANGEMENTS: tuple[Arrangement, ...] = ("mirror", "half-turn")
@@ -29,16 +29,25 @@ BALLISTIC = 1e-12
 # With a larger error of the persistence it is not known whether the particle reverses its direction.
 LARGEST_DOUBT = 1e-3
 
+# Incoming angles, and rays at each, for the length from which on the limit holds within this distance of zeta.
+ONSET_ANGLES, ONSET_RAYS, NEAR_LIMIT = 10.0 ** -np.arange(0.25, 3.1, 0.25), 2000, 0.1
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Diffusivity(Estimate):
-    r"""The diffusivity D of a rarefied gas in a channel with two parallel rough walls.
+    r"""The slope D of L^2/tau(L) against ln(L/r) in a channel with two parallel rough walls, for long channels.
 
-    The mean time to leave -L < x < L is asymptotically L^2 / (D ln(L/r)). The displacements between collisions have
-    infinite variance, and the tails of their distribution determine D.
+    tau(L) is the mean time to leave -L < x < L. The displacements between collisions have infinite variance, and the
+    tails of their distribution determine D, the limit of the slope. D is not L^2/tau of a channel: to D ln(L/r) this
+    adds a constant, which for shallow or nearly smooth walls is many times larger at any length of use. `exit_times`
+    gives L^2/tau at a length. The unit is that of radius x speed.
 
     Attributes
     ----------
+    onset : float
+        The length from which on flights are turned as in the limit, in the unit of ``radius``; D is the slope for
+        L well above it. At incoming angles theta with 2 r cot(theta) above it, the persistence is within 0.1 of zeta,
+        by 2000 rays at each of some angles down to 1e-3. ``inf`` if it is not reached there, at 2000 r.
     eta : float
         D / D_0, where D_0 = 4 r s / pi is the diffusivity for diffuse walls.
     zeta : float
@@ -54,11 +63,19 @@ class Diffusivity(Estimate):
     zeta: float
     zeta_error: float
     arrangement: Arrangement
+    onset: float
+
+    def __str__(self) -> str:
+        digits = f"{self.value:.4g}" if self.error <= 1e-4 * abs(self.value) else super().__str__()
+        return f"{digits}, the slope of L^2/tau against ln(L/r) for L well above {self.onset:.2g}"
+
+    def __repr__(self) -> str:
+        return f"Diffusivity({self}; eta={self.eta:.6g}, zeta={self.zeta:.6g}, kind={self.kind!r})"
 
 
 @explained
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
-    r"""The diffusivity D of a channel, from the law's action on grazing rays.
+    r"""The slope D of L^2/tau(L) against ln(L/r) for the mean exit time tau of a long channel: see `Diffusivity`.
 
     Parameters
     ----------
@@ -105,7 +122,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     (3.0, 12.0)
     """
     if not isinstance(law, Law):
-        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+        raise not_a_law("law", "a law such as WallLaw(wall)", law)
     scale = 4.0 * positive_number("radius", radius) * positive_number("speed", speed) / np.pi
     check_arrangement(arrangement)
     symbol = grazing_symbol(law.in_specular_frame() if law.frame == "specular" else law)
@@ -124,7 +141,8 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
             f"particles have no common diffusivity; got {law!r}, expected a law that changes angles, as a mixture with "
             "lambertian() does"
         )
-    exact = ideal_spectrum(law) is not None
+    # the limit follows from the structure of the law, or from the shape of the wall at y = 0
+    exact = symbol.entry_error == 0.0
     if not exact and zeta + doubt >= 1.0 - BALLISTIC:
         raise AccuracyError(
             f"law: the limit of grazing rays under {law!r} is known to {doubt:.2g} only (zeta = {zeta:.3g}), which "
@@ -138,8 +156,22 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     kind: ErrorKind = "bound" if exact else "estimate"
     if exact:
         eta_error = 8.0 * EPS * (1.0 + eta) / (1.0 - zeta)
-    method = f"persistence of grazing flights, upper wall as {arrangement}"
-    return Diffusivity(eta * scale, eta_error * scale, kind, method, eta, eta_error, zeta, doubt, arrangement)
+        doubt = 4.0 * EPS
+    method = f"limit of the persistence of grazing flights, upper wall as {arrangement}"
+    method += ", by the law's structure or the shape of the wall at y = 0" if exact else ", at decreasing angles"
+    onset = 2.0 * radius * _onset(law, zeta)
+    return Diffusivity(eta * scale, eta_error * scale, kind, method, eta, eta_error, zeta, doubt, arrangement, onset)
+
+
+def _onset(law: Law, zeta: float) -> float:
+    """The cotangent of the largest of some angles below which the persistence is near its limit zeta."""
+    paper = law.in_specular_frame() if law.frame == "specular" else law
+    angle = np.concatenate((ONSET_ANGLES, np.pi - ONSET_ANGLES))
+    outgoing = paper.sample(np.broadcast_to(angle, (ONSET_RAYS, angle.size)), np.random.default_rng(0))
+    means = (np.tan(angle) / np.tan(outgoing)).mean(axis=0).reshape(2, -1).mean(axis=0)
+    far = np.abs(means + zeta) > NEAR_LIMIT
+    first = int(np.flatnonzero(far)[-1]) + 1 if far.any() else 0
+    return float(1.0 / np.tan(ONSET_ANGLES[first])) if first < ONSET_ANGLES.size else np.inf
 
 
 def _keeps_sines(law: Law) -> bool:

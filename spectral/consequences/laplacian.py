@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.checks import Floats, frozen, whole_number
-from ...core.errors import InputError
 from ...core.kinds import explained
 from ...kernels import Law, Legendre, discretise
+from ...kernels.laws.matrix_law import not_a_law
 
 if TYPE_CHECKING:
     from ...geometry import Wall
@@ -77,7 +77,7 @@ def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) ->
     """
     whole_number("degrees", degrees, 1)
     if not isinstance(law, Law):
-        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+        raise not_a_law("law", "a law such as WallLaw(wall)", law)
     specular = law if law.frame == "specular" else law.in_specular_frame()
     matrix = discretise(specular, Legendre(2 * degrees + 2), tolerance=tolerance)
     order = np.arange(1, degrees + 1)

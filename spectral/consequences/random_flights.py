@@ -15,6 +15,7 @@ from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...core.kinds import explained, explained_class
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
+from ...kernels.laws.matrix_law import not_a_law
 from .channel import MOST_CROSSINGS, SMALLEST
 from .diffusion import Arrangement, check_arrangement
 
@@ -212,7 +213,7 @@ def channel_paths(
     True
     """
     if not isinstance(law, Law):
-        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+        raise not_a_law("law", "a law such as WallLaw(wall)", law)
     moments = finite_array("times", times).ravel()
     if moments.size < FEWEST_TIMES or moments[0] <= 0.0 or np.any(np.diff(moments) <= 0.0):
         raise InputError(f"times: expected at least {FEWEST_TIMES} increasing positive times, got {times!r}")

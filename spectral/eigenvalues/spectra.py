@@ -29,6 +29,7 @@ EARLIER_FRACTION = 0.25
 # On one matrix the distance from the law's eigenvalue is at most this many times the change from the coarser basis for
 # 97 % of 156 gaps of walls and scatterings in Legendre polynomials and bins; at most the change itself for 81 %.
 ONE_MATRIX = 3.0
+UNREFINED = "one matrix: its basis was not refined, and the error estimates the distance from the law's eigenvalue"
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 # A sampled matrix is rejected as irreversible if its antisymmetric part has a z-score above this. Under reversibility
 # the score is standard normal and exceeds 5 once in 3.5 million matrices.
@@ -93,7 +94,9 @@ class SpectrumErrors:
         (``Spectrum.completeness``) and of the norm of S v - lambda v.
     discretisation : array
         Three times the change of the eigenvalue from the basis of half the size, or a quarter of the previous change if
-        that is larger (``inf`` without a coarser basis), plus the Frobenius error of an unsampled matrix.
+        that is larger (``inf`` without a coarser basis), plus the Frobenius error of an unsampled matrix. It estimates
+        the distance from the law's eigenvalue; the distance from the matrix's own is ``algebraic``. The change is left
+        out of a matrix that has the law's eigenvalues (``KernelMatrix.beyond``).
     sampling : array
         One standard error from the randomness of the rays, an estimate; 0 for unsampled matrices.
     quantile : float
@@ -260,7 +263,9 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
     # the pair of the constants, then the others
     values, vectors = np.append(first, rest.values), np.column_stack([constant, rest.vectors])
     residuals, algebraic = np.append(defect, rest.residuals), np.append(defect, rest.errors)
-    changes = margin * np.append(0.0, two_grid_changes(matrix, rest))
+    # a matrix of a law that is known beyond the basis has the law's eigenvalues
+    exact = matrix.beyond is not None
+    changes = np.zeros(len(values)) if exact else margin * np.append(0.0, two_grid_changes(matrix, rest))
 
     total = _errors(matrix, values, vectors, algebraic, changes)
 
@@ -276,6 +281,9 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
     if len(rest.values):
         gap_errors = errors_of(np.array([1]))
         gap, slem = float(1.0 - rest.values[0]), float(np.abs(rest.values).max())
+    if matrix.beyond is not None:
+        gap_errors = errors_of(np.array([1 if len(rest.values) else 0]))
+        gap, slem = min(gap, 1.0 - max(matrix.beyond)), max(slem, *np.abs(matrix.beyond).tolist())
     indices = np.append(0, 1 + chosen)
     return Spectrum(
         values=frozen(values[indices]),
@@ -291,7 +299,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
         matrix_error=0.0 if matrix.samples else float(matrix.error),
         parity=("none" if "none" in names or not names else "even", *(names[i] for i in chosen)),
         completeness=rest.method,
-        evidence=("one matrix: its basis was not refined",),
+        evidence=("the matrix of a law in bins beyond which the law is known",) if exact else (UNREFINED,),
     )
 
 

@@ -12,18 +12,20 @@ from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
 from ...kernels.bases.panels import ONE_PANEL
+from ...kernels.laws.matrix_law import finite_action, not_a_law
+from ...kernels.laws.structure import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import adapted_trial_space
-from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, matrix_spectrum
+from ..eigenvalues.spectra import ONE_MATRIX, UNREFINED, Spectrum, matrix_spectrum
 from ..essential.edge import EssentialEdge, essential_edge
-from ..essential.exact import ideal_spectrum, without_identity
+from ..essential.exact import without_identity
 from .methods import gap_of_power, law_eigenvalues
 from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
 from .shallow import shallow_gap
-from .theorems import gap_by_theorem
+from .theorems import gap_by_theorem, gap_of_exact, split_gap
 from .verdict import SpectralGap, isolated, made_from
 
 # Number of enclosed eigenvalues for densities; limit on this number for walls, and accuracy and levels of the pilot run
@@ -101,7 +103,10 @@ def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6
     Parameters
     ----------
     law : Law, CollisionLaw or KernelMatrix
-        A law in its own convention; for a collision law its P~. A matrix is not refined.
+        A law in its own convention; for a collision law its P~. A matrix is not refined: the error is then an estimate
+        of the distance from the gap of its law, and ``evidence`` has the gap of the matrix itself with its error. They
+        are the same for a law of finitely many states in bins that refine its own. An array of transition
+        probabilities is a law: ``MatrixLaw(array)``.
     tolerance : float
         Wanted error. If it is not reached with the largest basis and number of rays, ``error`` is larger.
     rng : None, int or numpy.random.Generator
@@ -146,7 +151,7 @@ def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6
     if isinstance(law, KernelMatrix):
         return _of_matrix(law)
     if not isinstance(law, Law):
-        raise InputError(f"law: expected a Law, a CollisionLaw or a KernelMatrix, got {law!r}")
+        raise not_a_law("law", "a Law, a CollisionLaw or a KernelMatrix", law)
     other = self_adjoint_elsewhere(law)
     if other is not None:
         return _contraction(law, other, tolerance, generator(rng, 0))
@@ -182,10 +187,16 @@ def gaps_in_both_conventions(law: Law, tolerance: float = 1e-6, rng: Rng = None)
 
 
 def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
+    if matrix.beyond is not None:
+        return gap_of_exact(matrix)
     found = matrix_spectrum(matrix, EIGENVALUES)
     method = made_from(found, f"algebraic + {ONE_MATRIX:.0f} x two-grid + 1.96 x sampling error")
-    evidence = ("one matrix: its basis was not refined, and its gap is an upper bound of the law's but for its noise",)
-    return SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
+    evidence = (
+        f"{UNREFINED}; the gap of the matrix itself is {found.gap:.15g} +- {found.gap_errors.algebraic[0]:.2g}, an "
+        "upper bound of the law's but for noise and the errors of entries",
+    )
+    gap = SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
+    return split_gap(matrix, gap) or (gap.cut_at_zero() if matrix.norm_bound == 1.0 else gap)
 
 
 def _of_power(law: Law, base: Law, exponent: int, tolerance: float, rng: np.random.Generator) -> SpectralGap:
@@ -207,10 +218,10 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> SpectralG
     >>> round(float(modulus_gap(ker.henyey_greenstein(-0.5))), 9)
     0.5
     """
-    ideal = ideal_spectrum(law)
-    if ideal is not None and ideal.top < 1.0:
-        found = spectral_gap(law, tolerance, rng)
-        return replace(found, value=1.0 - max(abs(ideal.even), abs(ideal.odd)))
+    action = None if made_of_isometries(law) else finite_action(law)
+    if action is not None:
+        refuse_unless_self_adjoint(law)
+        return gap_of_exact(action.matrix_of(law), modulus=True)
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small

@@ -11,6 +11,7 @@ from ...core.checks import Rng, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
+from ...kernels.laws.matrix_law import not_a_law
 from ..bounds.contraction import refuse_unless_self_adjoint
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
 from ..essential.edge import essential_edge
@@ -93,7 +94,7 @@ def spectrum(
             raise InputError(f"{', '.join(how)}: only for laws; a KernelMatrix is discretised already")
         return matrix_spectrum(kernel, k)
     if not isinstance(kernel, Law):
-        raise InputError(f"kernel: expected a KernelMatrix, a Law or a CollisionLaw, got {kernel!r}")
+        raise not_a_law("kernel", "a KernelMatrix, a Law or a CollisionLaw", kernel)
     refuse_unless_self_adjoint(kernel)
     if discretisation:
         basis = how.pop("basis", None) or Legendre(DEGREES[0])

@@ -8,12 +8,12 @@ import numpy as np
 
 from ...core.checks import Floats, Rng, frozen
 from ...core.rounding import EPS
-from ...kernels import DensityLaw, Law, Legendre, MatrixLaw, discretise
+from ...kernels import DensityLaw, Law, Legendre, discretise
 from ...kernels.bases.panels import ONE_PANEL
+from ...kernels.laws.matrix_law import finite_action
 from ...kernels.laws.structure import made_of_isometries
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
-from ..essential.exact import ideal_spectrum
 
 # Sizes of Legendre bases for laws without known errors of expectations; the first suffices for ten eigenvalues of most.
 DEGREES = (48, 96)
@@ -34,11 +34,14 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng) -> Spectrum:
         # an even power needs the largest modulus off the constants
         found = law_eigenvalues(base, max(k, 2), tolerance / exponent, rng)
         return _raised(found, exponent, k)
-    if not made_of_isometries(law) and ideal_spectrum(law) is None:
+    action = None if made_of_isometries(law) else finite_action(law, k)
+    if action is not None:
+        return matrix_spectrum(action.matrix_of(law), k)
+    if not made_of_isometries(law):
         if isinstance(law, DensityLaw):
             return _of_density(law, k, tolerance)
         known = law.expectations(ONE_PANEL)
-        if isinstance(law, MatrixLaw) or (known.has_errors and not known.are_costly()):
+        if known.has_errors and not known.are_costly():
             return _enclosed(law, k, tolerance)
     return _by_matrices(law, k, tolerance, rng)
 

@@ -120,6 +120,7 @@ def _quantity(asked: str | UserQuantity) -> Quantity:
         if asked not in QUANTITIES:
             raise InputError(
                 f"quantities: expected one of {', '.join(QUANTITIES)} or a function of a law, got {asked!r}"
+                + "; the diffusivity in a channel is eta times 4 radius speed / pi" * (asked == "diffusivity")
             )
         return QUANTITIES[asked]
     if not callable(asked):

@@ -205,7 +205,10 @@ def with_engine(command: Callable[..., None]) -> Callable[..., None]:
         ),
         click.option("--tolerance", default=1e-6, show_default=True, help="Error asked of each quantity."),
         click.option(
-            "--quantity", default="gap", show_default=True, help="gap, gap_specular, slem, ..., joined by commas."
+            "--quantity",
+            default="gap",
+            show_default=True,
+            help="Of gap, gap_specular, slem, relaxation_time, resistance, eta, accommodation, joined by commas.",
         ),
     ):
         command = option(command)

@@ -28,7 +28,8 @@ class Consequences:
     relaxation_time : Estimate or None
         -1/ln(slem) in steps; its error is ``inf`` where slem may be 1.
     diffusion : Diffusivity or None
-        Of a channel of half-width 1 and speed 1, the upper wall the mirror image of the lower.
+        The slope of L^2/tau against ln L for a long channel of half-width 1 and speed 1, tau the mean time to leave
+        |x| < L, the upper wall the mirror image of the lower.
     flatness : float
         The mean squared slope h; ``inf`` for walls with vertical pieces or overhangs.
     refusal : str
@@ -55,6 +56,7 @@ class Consequences:
             "diffusivity": found and {
                 **estimate_as_dict(found), "eta": found.eta, "eta_error": finite(found.eta_error), "zeta": found.zeta,
                 "zeta_error": finite(found.zeta_error), "arrangement": found.arrangement,
+                "onset": finite(found.onset),
             },
             "mean_squared_slope": finite(self.flatness),
         }  # fmt: skip
@@ -72,8 +74,8 @@ class Consequences:
             found = self.diffusion
             eta = Estimate(found.eta, found.eta_error, found.kind, "")
             lines.append(
-                f"channel of half-width 1, speed 1: D = {rounded(found)}, eta = {rounded(eta)}, "
-                f"zeta = {found.zeta:.6g} ({found.kind}: {found.method})"
+                f"channel of half-width 1, speed 1: D = {found}, not L^2/tau itself, which has a constant besides; "
+                f"eta = {rounded(eta)}, zeta = {found.zeta:.6g} ({found.kind}: {found.method})"
             )
         else:
             lines.append(f"diffusivity refused: {self.refusal}")
