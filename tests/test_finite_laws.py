@@ -247,3 +247,9 @@ def test_the_diffusivity_of_a_sweep_is_called_eta():
         spec.sweep(lambda a: ker.maxwell(a), {"a": [0.5]}, quantities=["diffusivity"])
     found = spec.sweep(lambda a: ker.maxwell(a), {"a": [0.5]}, quantities=["eta"])
     assert found.rows[0].value * 4.0 / np.pi == pytest.approx(float(spec.diffusivity(ker.maxwell(0.5))))
+
+
+def test_the_gap_in_the_specular_convention_of_a_law_that_is_in_it_is_its_own():
+    law = (0.5 * ker.MatrixLaw(ARRAY) + 0.5 * ker.specular()).in_specular_frame()
+    found = spec.sweep(lambda a: law, {"a": [1.0]}, quantities=["gap_specular"])
+    assert found.rows[0].value == pytest.approx(float(spec.spectral_gap(law)), abs=1e-14)

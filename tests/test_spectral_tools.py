@@ -153,6 +153,43 @@ def test_specular_channels_are_refused():
         spec.diffusivity(ker.lambertian(), arrangement="glide")
 
 
+@pytest.mark.parametrize(
+    ("law", "eta"),
+    [
+        (ker.lambertian(), 1.0),
+        (ker.CircularArcLaw(0.05), 1.0),
+        (ker.WallLaw(geo.dispersing_arcs(1.0)), 1.0),
+        (ker.WallLaw(geo.koch(2)), 2.6),
+        (ker.MatrixLaw([[0.75, 0.25], [0.25, 0.75]]), 1.0),
+        (0.5 * ker.MatrixLaw([[0.75, 0.25], [0.25, 0.75]]) + 0.5 * ker.specular(), 3.0),
+    ],
+    ids=repr,
+)
+def test_a_limit_by_theorem_has_a_bound_that_is_not_zero_and_its_reason(law, eta):
+    found = spec.diffusivity(law)
+    assert found.kind == "bound" and "by the law's structure or the shape of the wall" in found.method
+    assert abs(found.eta - eta) <= found.eta_error and 0.0 < found.eta_error < 1e-12
+    assert 0.0 < found.zeta_error < 1e-12 and 0.0 < found.error < 1e-12
+
+
+def test_a_limit_at_decreasing_angles_is_an_estimate_with_an_error():
+    found = spec.diffusivity(ker.TriangularTeethLaw(1.0))
+    assert found.kind == "estimate" and "at decreasing angles" in found.method
+    assert abs(found.eta - 1.0) <= found.eta_error < 1e-4
+
+
+def test_the_text_of_a_diffusivity_says_that_it_is_a_slope_and_from_where_on():
+    """At L = 160 r the constant beside the slope of shallow arcs, whose L^2/(D_0 tau) is 45, is the larger part."""
+    shallow, deep = spec.diffusivity(ker.CircularArcLaw(0.05), radius=2.0), spec.diffusivity(ker.CircularArcLaw(1.2))
+    for text in (str(shallow), repr(shallow), f"{shallow}", shallow._repr_html_()):
+        assert "2.546, the slope of L^2/tau against ln(L/r) for L well above" in text
+    assert shallow.onset > 2.0 * 160.0 > 10.0 * deep.onset
+    # of all flights beyond the onset the persistence is near its limit, by rays of another seed
+    angle = 0.5 * np.arctan(2.0 * 2.0 / shallow.onset)
+    outgoing = ker.CircularArcLaw(0.05).sample(np.full(20_000, angle), np.random.default_rng(8))
+    assert abs(np.mean(np.tan(angle) / np.tan(outgoing))) < 0.1
+
+
 # without a closed form
 TWO_DEPTHS = geo.Wall.from_vertices([(0, 0), (0, -0.3), (0.4, -0.3), (0.4, -0.7), (0.9, -0.7), (0.9, 0), (1, 0)])
 

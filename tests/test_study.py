@@ -113,6 +113,8 @@ def test_the_consequences_are_those_of_the_library(arcs, teeth):
     # a grazing ray leaves an arc at a finite angle: D is that of diffuse walls
     assert found.diffusion.eta == pytest.approx(1.0, abs=1e-5)
     assert "relaxation time" in arcs.summary(verbose=True) and "D = 1.27" in arcs.summary(verbose=True)
+    for text in (arcs.summary(), arcs.summary(verbose=True)):
+        assert "the slope of L^2/tau against ln(L/r) for L well above" in text
     assert not math.isfinite(teeth.consequences.relaxation_time.error)
     assert "no relaxation time" in teeth.summary(verbose=True)
 

@@ -14,7 +14,8 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 
 # %%
-# The ratio :math:`\eta` of the diffusivity to :math:`D_0 = 4rs/\pi`, its value for diffuse walls. Walls without flat
+# The ratio :math:`\eta` of the diffusivity :math:`D`, a slope in the logarithm of the length, to
+# :math:`D_0 = 4rs/\pi`, its value for diffuse walls. Walls without flat
 # tops and vertical sides turn all grazing flights, and have :math:`\eta = 1`, whatever their shape. The page about
 # :doc:`Knudsen diffusion </theory/knudsen-diffusion>` explains the limit.
 
@@ -27,7 +28,7 @@ laws = {
 }
 found = {name: spec.diffusivity(law) for name, law in laws.items()}
 for name, diffusivity in found.items():
-    print(f"{name:22} eta = {diffusivity.eta:.6f}")
+    print(f"{name:22} eta = {diffusivity.eta:.6f}, D = {diffusivity}")
 
 # %%
 # The mean time :math:`\tau` in which particles leave :math:`|x| < L` is :math:`L^2/(D\ln(L/r))` in the limit of large

@@ -21,8 +21,8 @@ from ..bases.measure import SINE
 from ..bases.mirror import reflection_matrix
 from ..bases.tensor import TensorBasis
 from ..laws.law import IsometryLaw, Law
-from ..laws.matrix_law import finite_action, not_a_law
-from ..laws.structure import Rules, fold
+from ..laws.matrix_law import MatrixLaw, finite_matrix, not_a_law
+from ..laws.structure import Rules, fold, holds_of_all
 from ..laws.tensor_law import TensorLaw
 from ..matrices.matrix import KernelMatrix
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
@@ -180,14 +180,14 @@ def discretise(
     # Quadrature requested by name may take some seconds.
     segments = MOST_SEGMENTS if method == "quadrature" else QUICK_SEGMENTS
     budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)
-    action = finite_action(law, edges=basis.edges) if isinstance(basis, Bins) else None
-    if action is not None and action.states > 1 and method == "auto":
-        found = replace(action.matrix_of(law), basis=basis)
+    exact = finite_matrix(law, edges=basis.edges) if isinstance(basis, Bins) else None
+    if exact is not None and method == "auto" and not holds_of_all(law, lambda part: not isinstance(part, MatrixLaw)):
+        found = replace(exact, basis=basis)
     else:
         found = recipe(law, method)(basis, budget)
     return replace(
         found,
-        beyond=None if action is None or found.samples else (action.even, action.odd),
+        beyond=None if exact is None or found.samples else exact.beyond,
         law=repr(law),
         reversible=law.reversible,
         mirror_symmetric=law.mirror_symmetric,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
@@ -23,7 +22,7 @@ from .density import GAUSS_NODES, NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, Densit
 from .ideal import LambertianLaw
 from .law import IsometryLaw, Law, set_properties
 from .phase_function import HenyeyGreensteinLaw
-from .structure import Rules, fold
+from .structure import Rules, fold, holds_of_all
 
 # Rows divided by their sums add up to 1 within a few roundings. Rows of a matrix with symmetrised flux may not; such a
 # matrix is not a law.
@@ -155,142 +154,96 @@ class MatrixLaw(DensityLaw):
         return f"MatrixLaw({self.array.shape[0]} bins)"
 
 
-@dataclass(frozen=True)
-class FiniteAction:
-    """The action of a law on step functions on bins, and on functions whose mean on every bin is 0.
+def finite_matrix(law: Law, functions: int = 0, edges: Floats | None = None) -> KernelMatrix | None:
+    """The matrix of a law composed of matrices, Lambertian reflection and ideal isometries; None for other laws.
 
-    Attributes
-    ----------
-    edges : array of shape (n + 1,)
-        Edges of bins, symmetric about pi/2 if theta -> pi - theta occurs in the law.
-    array : array of shape (n, n)
-        Transition probabilities between the bins, which map step functions to step functions.
-    even, odd : float
-        The law multiplies even and odd functions of cos(theta) by these, if their mean on every bin is 0.
-    rounding : float
-        Bound of the relative rounding of the entries, and of the rounding of ``even`` and ``odd``.
-    states : int
-        The least number of bins on which the law acts like this.
-    """
-
-    edges: Floats
-    array: Floats
-    even: float
-    odd: float
-    rounding: float
-    states: int = 1
-
-    def matrix_of(self, law: Law) -> KernelMatrix:
-        """The matrix of the law on the bins, with ``beyond``; entries are symmetrised within their error."""
-        root = np.sqrt(SINE.mass(self.edges[:-1], self.edges[1:]))
-        symmetric = root[:, None] * self.array / root
-        skew = float(np.linalg.norm(symmetric - symmetric.T))
-        lopsided = float(np.linalg.norm(symmetric - symmetric[::-1, ::-1]))
-        size = float(np.linalg.norm(symmetric))
-        mirrored, reversible = (
-            known is True or (known is None and defect <= 8.0 * max(self.rounding, EPS) * size)
-            for known, defect in ((law.mirror_symmetric, lopsided), (law.reversible, skew))
-        )
-        error = (self.rounding * size) + (skew if reversible else 0.0) + (lopsided if mirrored else 0.0)
-        return KernelMatrix(
-            symmetric, Bins(self.edges), frobenius_error(error, "bound", "rounding, and defects of symmetry"),
-            method="exact", law=repr(law), reversible=reversible or law.reversible, frame=law.frame,
-            mirror_symmetric=mirrored or law.mirror_symmetric, beyond=(self.even, self.odd),
-        )  # fmt: skip
-
-
-def finite_action(law: Law, functions: int = 0, edges: Floats | None = None) -> FiniteAction | None:
-    """The action of a law composed of matrices, Lambertian reflection and ideal isometries; None for other laws.
-
-    On their common bins such laws are matrices, because bins symmetric about pi/2 are kept by theta -> pi - theta.
-    Functions of mean 0 on every bin are annihilated by matrices and by Lambertian reflection. If ``functions`` is given
-    and the others are not annihilated, the bins are divided until they show at least so many of them of each parity. If
-    ``edges`` are given, the action is that on these bins, and None unless they refine the common ones.
+    Such laws map step functions on their common bins to step functions, because bins symmetric about pi/2 are kept by
+    theta -> pi - theta. Functions of mean 0 on every bin are annihilated by matrices and by Lambertian reflection;
+    isometries multiply the even and the odd ones (``KernelMatrix.beyond``). If ``functions`` is given and they are not
+    annihilated, the bins are divided until they show at least so many of them of each parity. If ``edges`` are given,
+    the matrix is that on these bins, and None unless they refine the common ones.
 
     Examples
     --------
     >>> from asperity.kernels import maxwell
-    >>> found = finite_action(maxwell(0.25))
-    >>> found.even, found.odd, found.array.tolist()
-    (0.75, -0.75, [[1.0]])
+    >>> found = finite_matrix(maxwell(0.25))
+    >>> found.beyond, found.array.tolist()
+    ((0.75, -0.75), [[1.0]])
     """
-    inner = fold(
-        law, Rules(_inner_edges, lambda terms: _joined([part for _, part in terms]), _joined, lambda part: part)
-    )
-    if inner is None:
+    if not holds_of_all(law, _is_finite):
         return None
+
+    def joined(parts: Sequence[Floats]) -> Floats:
+        return np.concatenate([np.zeros(1), *parts])
+
+    rules = Rules(_inner_edges, lambda terms: joined([part for _, part in terms]), joined, lambda part: part)
+    found = fold(law, rules)
     reflects = fold(law, Rules(_reflects, lambda terms: any(part for _, part in terms), any, lambda _: True))
-    common = _merged_edges(np.concatenate([inner, np.pi - inner]) if reflects else inner)
-    missed = 0.0 if edges is None else np.abs(common[:, None] - edges).min(axis=1).max()
-    lopsided = 0.0 if edges is None or not reflects else np.abs(edges + edges[::-1] - np.pi).max()
-    if max(missed, lopsided) > SAME_EDGE:
-        return None
-    found = _action_on(law, common if edges is None else edges)
-    if functions and (found.even or found.odd):
-        found = _action_on(law, split_panels(common, 2 + 2 * functions // (common.size - 1)))
-    return replace(found, states=common.size - 1)
+    found = np.sort(joined([found, np.pi - found[found > 0.0]] if reflects else [found]))
+    common = np.append(found[np.diff(found, prepend=-1.0) > SAME_EDGE], np.pi)
+    if edges is not None:
+        missed = np.abs(common[:, None] - edges).min(axis=1).max()
+        lopsided = np.abs(edges + edges[::-1] - np.pi).max() if reflects else 0.0
+        return _matrix_on(law, edges) if max(missed, lopsided) <= SAME_EDGE else None
+    matrix = _matrix_on(law, common)
+    if functions and any(matrix.beyond or ()):
+        return _matrix_on(law, split_panels(common, 2 + 2 * functions // matrix.size))
+    return matrix
 
 
-def _inner_edges(law: Law) -> Floats | None:
-    """The edges inside (0, pi) of the bins of a law that is not compound; None if it has none."""
+def _is_finite(law: Law) -> bool:
     if isinstance(law, MatrixLaw):
-        return law.edges[1:-1] if np.diff(law.edges).min() > SAME_EDGE else None
-    return np.empty(0) if isinstance(law, (IsometryLaw, LambertianLaw)) or _is_isotropic(law) else None
+        return bool(np.diff(law.edges).min() > SAME_EDGE)
+    isotropic = isinstance(law, HenyeyGreensteinLaw) and law.g == 0.0
+    return isotropic or isinstance(law, (IsometryLaw, LambertianLaw))
 
 
-def _is_isotropic(law: Law) -> bool:
-    return isinstance(law, HenyeyGreensteinLaw) and law.g == 0.0
+def _inner_edges(law: Law) -> Floats:
+    return law.edges[1:-1] if isinstance(law, MatrixLaw) else np.empty(0)
 
 
 def _reflects(law: Law) -> bool:
     return isinstance(law, IsometryLaw) and not law.retro
 
 
-def _joined(parts: Sequence[Floats | None]) -> Floats | None:
-    known = [part for part in parts if part is not None]
-    return np.concatenate([np.empty(0), *known]) if len(known) == len(parts) else None
-
-
-def _merged_edges(inner: Floats) -> Floats:
-    """The edges from 0 to pi, of which those within `SAME_EDGE` of each other are one."""
-    found = np.sort(np.append(inner, 0.0))
-    return np.append(found[np.diff(found, prepend=-1.0) > SAME_EDGE], np.pi)
-
-
-def _action_on(law: Law, edges: Floats) -> FiniteAction:
-    """The action of a law on bins that refine its own."""
+def _matrix_on(law: Law, edges: Floats) -> KernelMatrix:
+    """The matrix of a law on bins that refine its own, by matrices with two more rows for the functions beyond."""
     masses = SINE.mass(edges[:-1], edges[1:])
     size, middles = masses.size, 0.5 * (edges[:-1] + edges[1:])
+    identity = np.eye(size + 2)
+    reflection = identity.copy()
+    reflection[:size, :size] = identity[:size, :size][::-1]
+    reflection[-1, -1] = -1.0
 
-    def leaf(part: Law) -> FiniteAction:
+    def leaf(part: Law) -> Floats:
         if isinstance(part, IsometryLaw):
-            identity = np.eye(size)
-            array = identity if part.retro else identity[:, ::-1]
-            return FiniteAction(edges, array, 1.0, 1.0 if part.retro else -1.0, 0.0)
+            return identity if part.retro else reflection
         cell, given = np.zeros(size, dtype=np.intp), np.ones((1, 1))
         if isinstance(part, MatrixLaw):
             cell, given = cell_among(part.edges, middles), part.array
-        fraction = masses / np.bincount(cell, masses)[cell]
-        return FiniteAction(edges, given[cell][:, cell] * fraction, 0.0, 0.0, ENTRY_ROUNDING if size > 1 else 0.0)
+        array = np.zeros((size + 2, size + 2))
+        array[:size, :size] = given[cell][:, cell] * (masses / np.bincount(cell, masses)[cell])
+        return array
 
-    def mixture(terms: Sequence[tuple[float, FiniteAction]]) -> FiniteAction:
-        def mean(of: Callable[[FiniteAction], float]) -> float:
-            return sum(weight * of(part) for weight, part in terms)
+    def mixture(terms: Sequence[tuple[float, Floats]]) -> Floats:
+        return sum((weight * part for weight, part in terms), np.zeros((size + 2, size + 2)))
 
-        array = sum((weight * part.array for weight, part in terms), np.zeros((size, size)))
-        rounding = max(part.rounding for _, part in terms) + len(terms) * EPS
-        return FiniteAction(edges, array, mean(lambda part: part.even), mean(lambda part: part.odd), rounding)
-
-    def product(one: FiniteAction, other: FiniteAction) -> FiniteAction:
-        # all entries are nonnegative, so their relative roundings add up
-        rounding = one.rounding + other.rounding + size * EPS
-        return FiniteAction(edges, one.array @ other.array, one.even * other.even, one.odd * other.odd, rounding)
-
-    def mirrored(part: FiniteAction) -> FiniteAction:
-        return FiniteAction(edges, part.array[:, ::-1], part.even, -part.odd, part.rounding)
-
-    identity = leaf(IsometryLaw(True))
-    return fold(law, Rules(leaf, mixture, lambda parts: reduce(product, parts, identity), mirrored))
+    rules = Rules(leaf, mixture, lambda parts: reduce(np.matmul, parts, identity), lambda part: part @ reflection)
+    whole = fold(law, rules)
+    # all entries on the bins are nonnegative, so their relative roundings add up
+    leaves = fold(law, Rules(lambda _: 1, lambda terms: sum(number for _, number in terms), sum, lambda number: number))
+    rounding = leaves * ((ENTRY_ROUNDING if size > 1 else 0.0) + size * EPS)
+    root = np.sqrt(masses)
+    symmetric = root[:, None] * whole[:size, :size] / root
+    norm, skew = np.linalg.norm(symmetric), np.linalg.norm(symmetric - symmetric.T)
+    # symmetries that the law is known to have are enforced when eigenvalues are computed
+    lopsided = np.linalg.norm(symmetric - symmetric[::-1, ::-1]) if law.mirror_symmetric else 0.0
+    error = rounding * norm + (skew if law.reversible else min(skew, ENTRY_ROUNDING * norm)) + lopsided
+    return KernelMatrix(
+        symmetric, Bins(edges), frobenius_error(float(error), "bound", "rounding, and defects of symmetry"),
+        method="exact", law=repr(law), reversible=law.reversible, mirror_symmetric=law.mirror_symmetric,
+        frame=law.frame, beyond=(whole[-2, -2], whole[-1, -1]),
+    )  # fmt: skip
 
 
 def not_a_law(name: str, expected: str, value: object) -> InputError:

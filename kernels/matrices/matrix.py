@@ -308,6 +308,9 @@ class KernelMatrix:
                 "law of transition probabilities between bins, ker.MatrixLaw(array), needs none"
             )
         object.__setattr__(self, "symmetric", frozen(symmetric))
+        if self.beyond is not None:
+            even, odd = (number_between("beyond", part, -np.inf, np.inf) for part in self.beyond)
+            object.__setattr__(self, "beyond", (even, odd))
         if self.counts is not None:
             counts = np.array(self.counts, dtype=np.int64)
             if counts.shape != (n, n):
@@ -574,20 +577,11 @@ def _restored(record: Record, arrays: Stored, basis: Basis) -> KernelMatrix:
         raw_defect=None if defect is None else SymmetryDefect(*defect),
         metadata=record["metadata"],
         # files from before this field was introduced have no "beyond"
-        **{name: record[name] for name in PLAIN_FIELDS if name in record and name != "beyond"},
-        beyond=None if record.get("beyond") is None else _pair(record["beyond"]),
+        **{name: record.get(name) if name == "beyond" else record[name] for name in PLAIN_FIELDS},
     )
     _check_record(matrix)
     _check_entries(matrix)
     return matrix
-
-
-def _pair(value: Any) -> tuple[float, float]:
-    even, odd = value
-    return (
-        number_between("beyond", even, -1.0, 1.0, closed="low high"),
-        number_between("beyond", odd, -1.0, 1.0, closed="low high"),
-    )
 
 
 def _check_record(matrix: KernelMatrix) -> None:
@@ -597,6 +591,8 @@ def _check_record(matrix: KernelMatrix) -> None:
     whole_number("samples", matrix.samples, 0)
     number_between("unresolved", matrix.unresolved, 0.0, 1.0, closed="low high")
     number_between("norm_bound", matrix.norm_bound, 0.0, np.inf, closed="low")
+    for part in matrix.beyond or ():
+        number_between("beyond", part, -matrix.norm_bound, matrix.norm_bound, closed="low high")
     for name in ("symmetrised", "reversible", "mirror_symmetric"):
         value = getattr(matrix, name)  # names of fields of this class
         if value not in (True, False) and (value is not None or name == "symmetrised"):

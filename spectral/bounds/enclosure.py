@@ -15,11 +15,11 @@ from ...core.frames import data_frame
 from ...core.html import html_table
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
-from ...kernels import Basis, CollisionLaw, Composition, DensityLaw, Law, Legendre, MatrixLaw, Power, discretise
+from ...kernels import Basis, CollisionLaw, Composition, DensityLaw, Law, Legendre, Power, discretise
 from ...kernels.bases.measure import SINE
 from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.matrix_law import finite_action, not_a_law
+from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import made_of_isometries
 from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
@@ -149,7 +149,8 @@ def enclosures(
         Number of eigenvalues, including the eigenvalue 1 of the constants.
     basis : Basis, optional
         Basis of the trial functions. The default is panels that adapt to the law for walls, arcs, Lambertian reflection
-        and sums of these, and Legendre polynomials for other laws.
+        and sums of these, and Legendre polynomials for other laws. Laws of finitely many states, also in sums and
+        products with Lambertian reflection and isometries, need no trial functions: they are matrices.
     tolerance : float
         Wanted half width of the enclosures on adaptive panels, otherwise the wanted Frobenius error of the matrix that
         yields the trial functions. It affects the width of the enclosures, not their validity.
@@ -193,9 +194,9 @@ def enclosures(
     if not isinstance(law, Law):
         raise not_a_law("law", "a law such as WallLaw(wall)", law)
     refuse_unless_self_adjoint(law)
-    action = finite_action(law, k + 1) if basis is None else None
-    if action is not None:
-        return _of_matrix(matrix_spectrum(action.matrix_of(law), k + 1), k)
+    matrix = finite_matrix(law, k + 1)
+    if matrix is not None:
+        return _of_matrix(matrix_spectrum(matrix, k + 1), k)
     words = None if isinstance(law, DensityLaw) else scattered_words(law)
     if words is not None:
         if [len(word) for word in words] == [1]:
@@ -253,8 +254,8 @@ def enclosed_trial_space(
     order = np.argsort(-np.abs(found.quotients), kind="stable")
     apart = _first_that_separates(law, found, order, next_value)
     method = f"trial functions in {basis!r}, residuals by adaptive quadrature at {found.angles_used} angles"
-    # exact if images are computed to rounding or by sums; otherwise the difference of two rules estimates their errors
-    exact = isinstance(law, ROUNDED if isinstance(basis, Legendre) else MatrixLaw)
+    # exact if images are computed to rounding; otherwise the difference of two rules estimates their errors
+    exact = isinstance(law, ROUNDED) and isinstance(basis, Legendre)
     items = [_enclosed(found, apart, order, position, names, exact) for position in range(len(values))]
     return EnclosedTrialSpace(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors)
 

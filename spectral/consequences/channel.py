@@ -54,14 +54,15 @@ class ExitTimes:
 
     @property
     def scaled(self) -> Floats:
-        """The ratio L^2/(D_0 tau(L)), which grows like eta ln(L/r)."""
+        """The ratio L^2/(D_0 tau(L)), which is eta ln(L/r) plus a constant for L well above ``Diffusivity.onset``."""
         return self.lengths**2 / (4.0 * self.radius * self.speed / np.pi * self.means)
 
     def eta(self) -> Estimate:
         """The ratio eta of D to its value D_0 for diffuse walls, from the slope of L^2/(D_0 tau) in ln L.
 
         The value is the slope over the upper half of the lengths. The error is the half width of its 95 % interval, by
-        the delta method over particles, plus the difference from the slope over the lower half.
+        the delta method over particles, plus the difference from the slope over the lower half. It is the limit only if
+        the lengths are well above ``Diffusivity.onset``.
         """
         log = np.log(self.lengths)
         middle = len(log) // 2

@@ -12,7 +12,7 @@ from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
 from ...kernels.bases.panels import ONE_PANEL
-from ...kernels.laws.matrix_law import finite_action, not_a_law
+from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.laws.structure import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
@@ -218,10 +218,10 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> SpectralG
     >>> round(float(modulus_gap(ker.henyey_greenstein(-0.5))), 9)
     0.5
     """
-    action = None if made_of_isometries(law) else finite_action(law)
-    if action is not None:
+    matrix = None if made_of_isometries(law) else finite_matrix(law)
+    if matrix is not None:
         refuse_unless_self_adjoint(law)
-        return gap_of_exact(action.matrix_of(law), modulus=True)
+        return gap_of_exact(matrix, modulus=True)
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small

@@ -10,7 +10,7 @@ from ...core.checks import Floats, Rng, frozen
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, Legendre, discretise
 from ...kernels.bases.panels import ONE_PANEL
-from ...kernels.laws.matrix_law import finite_action
+from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.structure import made_of_isometries
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
@@ -34,9 +34,9 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng) -> Spectrum:
         # an even power needs the largest modulus off the constants
         found = law_eigenvalues(base, max(k, 2), tolerance / exponent, rng)
         return _raised(found, exponent, k)
-    action = None if made_of_isometries(law) else finite_action(law, k)
-    if action is not None:
-        return matrix_spectrum(action.matrix_of(law), k)
+    matrix = None if made_of_isometries(law) else finite_matrix(law, k)
+    if matrix is not None:
+        return matrix_spectrum(matrix, k)
     if not made_of_isometries(law):
         if isinstance(law, DensityLaw):
             return _of_density(law, k, tolerance)

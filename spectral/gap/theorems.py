@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.rounding import EPS
 from ...kernels import InvolutionLaw, KernelMatrix, Law
-from ...kernels.laws.matrix_law import finite_action
+from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.structure import made_of_isometries
 from ..bounds.separation import lambertian_fraction
 from ..eigenvalues.spectra import Verdict, matrix_spectrum
@@ -40,9 +40,9 @@ def gap_by_theorem(law: Law) -> SpectralGap | None:
     if isinstance(law, InvolutionLaw):
         reason = "the law is an involution T: f + f o T is kept for every f, so 1 has infinite multiplicity"
         return _stated(law, 0.0, 0.0, "no gap", reason)
-    action = finite_action(law)
-    if action is not None:
-        return gap_of_exact(action.matrix_of(law))
+    matrix = finite_matrix(law)
+    if matrix is not None:
+        return gap_of_exact(matrix)
     fraction = lambertian_fraction(law)
     if fraction > 0.0:
         edge = essential_edge(law)
@@ -94,8 +94,8 @@ def split_gap(matrix: KernelMatrix, found: SpectralGap) -> SpectralGap | None:
     """The gap of a matrix without transitions between sets of its bins; None for other matrices.
 
     The indicator of a set of measure m, with the flux f to the other bins, shows that the gap of the law is at most
-    f / (m (1 - m)). If n rays show no such flux, f is at most 3 / n in 95 of 100 cases; else it is at most the error of
-    the matrix times the square root of m (1 - m).
+    f / (m (1 - m)). If n rays show no such flux, f is at most 3 / n in 95 of 100 cases. The error of a matrix without
+    rays bounds the quotient of a unit vector, hence the gap.
     """
     parts, label = _separate_parts(matrix.symmetric)
     if parts == 1 or not matrix.basis.is_partition or matrix.norm_bound != 1.0:

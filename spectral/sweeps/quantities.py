@@ -42,8 +42,8 @@ def _gap(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
     return [found], found.verdict
 
 
-def _gap_in_the_other_frame(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
-    return _gap(law.in_specular_frame(), tolerance)
+def _gap_in_the_specular_frame(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
+    return _gap(law if law.frame == "specular" else law.in_specular_frame(), tolerance)
 
 
 def _slem(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
@@ -74,7 +74,7 @@ _ACCOMMODATION = ("tangential_accommodation", "normal_accommodation", "maxwell_f
 QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
         "gap": Quantity(("gap",), _gap),
-        "gap_specular": Quantity(("gap_specular",), _gap_in_the_other_frame),
+        "gap_specular": Quantity(("gap_specular",), _gap_in_the_specular_frame),
         "slem": Quantity(("slem",), _slem),
         "relaxation_time": Quantity(("relaxation_time",), _relaxation_time),
         "resistance": Quantity(("resistance",), _resistance),

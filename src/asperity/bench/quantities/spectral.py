@@ -1,4 +1,4 @@
-"""The largest spectral value off the constants, and the diffusivity of a channel between two walls."""
+"""The largest spectral value off the constants, and the slope of diffusion in a long channel between two walls."""
 
 from __future__ import annotations
 
@@ -69,5 +69,8 @@ def eta_at(wall: Wall, angle: float) -> float:
 
 EIGENVALUE = Quantity("lambda2", "the largest spectral value off the constants", _eigenvalue_methods, standard_names())
 DIFFUSIVITY = Quantity(
-    "eta", "the diffusivity in a channel over that between diffuse walls", _diffusivity_methods, ETA_SCENES
+    "eta",
+    "the slope of L^2/tau against ln L in a long channel, over that between diffuse walls",
+    _diffusivity_methods,
+    ETA_SCENES,
 )
