@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from asperity import kernels as ker
-from asperity.spectral import enclosures
 from asperity.spectral.bounds import separation
 from asperity.spectral.bounds.separation import lambertian_fraction, rest_of_spectrum
 
@@ -95,10 +94,11 @@ def test_a_density_that_jumps_is_integrated_from_jump_to_jump(cut):
 def test_laws_of_finite_rank_leave_nothing():
     matrix = ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]])
     uniform = ker.henyey_greenstein(0.0)
-    for apart in (rest_of_spectrum(uniform, CONSTANTS, 0.0, 0.4), enclosures(matrix, 2).separation):
+    for law, listed in ((matrix, np.array([1.0, 0.4])), (uniform, CONSTANTS)):
+        apart = rest_of_spectrum(law, listed, 0.0, 0.4)
         assert apart.radius == 0.0 and apart.kind == "bound"
     # an eigenvalue that is not listed is not left out
-    apart = enclosures(matrix, 1).separation
+    apart = rest_of_spectrum(matrix, CONSTANTS, 0.0, 0.0)
     assert abs(apart.radius - 0.4) < 1e-14 and apart.kind == "bound"
 
 
@@ -150,5 +150,5 @@ def test_the_bound_for_a_matrix_is_beyond_the_rounding_and_the_asymmetry_of_its_
     skew = 1e-9
     for excess, least in ((0.0, 0.4), (skew, 0.4 + skew)):
         law = ker.MatrixLaw([[0.7 + excess, 0.3 - excess], [0.3, 0.7]])
-        radius = enclosures(law, 1).separation.radius
+        radius = rest_of_spectrum(law, np.array([1.0]), 0.0, 0.0).radius
         assert least < radius < least + 2.0 * excess + 1e-14

@@ -194,9 +194,10 @@ def enclosures(
     if not isinstance(law, Law):
         raise not_a_law("law", "a law such as WallLaw(wall)", law)
     refuse_unless_self_adjoint(law)
-    matrix = finite_matrix(law, k + 1)
+    own = finite_matrix(law)
+    matrix = finite_matrix(law, k + 1) if own is not None and own.size > 1 else None
     if matrix is not None:
-        return _of_matrix(matrix_spectrum(matrix, k + 1), k)
+        return _of_matrix(matrix_spectrum(matrix, k + 1), k, float(np.abs(matrix.beyond or ()).max()))
     words = None if isinstance(law, DensityLaw) else scattered_words(law)
     if words is not None:
         if [len(word) for word in words] == [1]:
@@ -322,18 +323,25 @@ def _raised(found: Enclosures, exponent: int) -> Enclosures:
     return replace(found, items=tuple(items), separation=apart, method=f"power {exponent}; {found.method}")
 
 
-def _of_matrix(found: Spectrum, k: int) -> Enclosures:
-    """Enclosures from a matrix that has the k + 1 eigenvalues of largest modulus of the law."""
+def _of_matrix(found: Spectrum, k: int, beyond: float) -> Enclosures:
+    """Enclosures from a matrix that has the k + 1 eigenvalues of largest modulus of the law.
+
+    Eigenvalues are indexed if they exceed the modulus ``beyond`` of the eigenvalues of infinite multiplicity.
+    """
     errors, moduli = found.errors.total(), np.abs(found.values)
     reason = f"the law is a matrix on {found.basis.size} bins and known beyond them; {found.completeness}"
     order = np.append(0, 1 + np.argsort(-moduli[1:], kind="stable"))
-    items = [
-        Enclosure(
-            float(found.values[i]), float(found.values[i] - errors[i]), float(min(found.values[i] + errors[i], 1.0)),
-            "indexed", index, float(found.residuals[i]), "bound", reason, found.parity[i],
-        )
-        for index, i in enumerate(order[:k].tolist())
-    ]  # fmt: skip
+    items = []
+    for index, i in enumerate(order[:k].tolist()):
+        value, error, certain = float(found.values[i]), float(errors[i]), moduli[i] - errors[i] > beyond
+        why = reason if certain else f"not indexed: infinitely many have the modulus {beyond:.6g}; {reason}"
+        label: Label = "indexed" if certain else "contains-spectrum"
+        items.append(
+            Enclosure(
+                value, value - error, min(value + error, 1.0), label, index if certain else None,
+                float(found.residuals[i]), "bound", why, found.parity[i],
+            )
+        )  # fmt: skip
     items.sort(key=lambda item: (item.index != 0, -item.value))
     radius = float(moduli[order[k]] + errors[order[k]]) if order.size > k else 0.0
     apart = Separation(radius, "bound", f"the next eigenvalue; {reason}")
