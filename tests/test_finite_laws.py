@@ -255,3 +255,19 @@ def test_the_gap_in_the_specular_convention_of_a_law_that_is_in_it_is_its_own():
     law = (0.5 * ker.MatrixLaw(ARRAY) + 0.5 * ker.specular()).in_specular_frame()
     found = spec.sweep(lambda a: law, {"a": [1.0]}, quantities=["gap_specular"])
     assert found.rows[0].value == pytest.approx(float(spec.spectral_gap(law)), abs=1e-14)
+
+
+@pytest.mark.parametrize("kind", ["rows", "sup"])
+def test_distances_of_finite_laws_have_small_true_errors(kind):
+    """By integrals of the difference of distribution functions, which are linear in cos(theta) on every bin."""
+    rng = np.random.default_rng(3)
+    one, other = random_chain(rng, 4)[0], random_chain(rng, 4)[0]
+    angle = np.linspace(0.0, np.pi, 200_001)
+    jumps = np.concatenate([np.zeros((4, 1)), np.cumsum(one - other, axis=1)], axis=1)
+    areas = [np.trapezoid(np.abs(np.interp(-np.cos(angle), np.linspace(-1.0, 1.0, 5), row)), angle) for row in jumps]
+    exact = np.mean(areas) if kind == "rows" else max(areas)
+    laws = [ker.MatrixLaw(array) for array in (one, other)]
+    mixed = [0.5 * law + 0.2 * ker.lambertian() + 0.3 * ker.specular() for law in laws]
+    for (first, second), part in ((laws, 1.0), (mixed, 0.5)):
+        found = ker.distance(first, second, kind=kind, tolerance=1e-9)
+        assert abs(found.value - part * exact) <= found.error + 1e-10 and found.error <= 1e-8, found
