@@ -577,7 +577,7 @@ def _restored(record: Record, arrays: Stored, basis: Basis) -> KernelMatrix:
         raw_defect=None if defect is None else SymmetryDefect(*defect),
         metadata=record["metadata"],
         # files from before this field was introduced have no "beyond"
-        **{name: record.get(name) if name == "beyond" else record[name] for name in PLAIN_FIELDS},
+        **{name: record[name] for name in PLAIN_FIELDS if name != "beyond" or name in record},
     )
     _check_record(matrix)
     _check_entries(matrix)

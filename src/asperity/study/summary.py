@@ -33,7 +33,7 @@ def summary_of(study: StudyResult) -> str:
         "relaxation": _relaxation(found.relaxation_time, found.without_gap),
         "diffusion": _refused(found.refusal)
         if found.diffusion is None
-        else f"D = {found.diffusion}; channel of half-width 1, speed 1, tau the mean time to leave |x| < L",
+        else f"D = {found.diffusion}; half-width 1, speed 1, tau the exit time",
         "disk": f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
         "as deep",
         "collision": f"gap of that wall {_gap(study.collision_gap, refused('collision_gap', 'not asked for'))}",
