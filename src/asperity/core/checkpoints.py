@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 
 from .checks import shortened
 from .errors import FileExistsRefusal, InputError
-from .version import __version__
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -341,6 +340,8 @@ WRAPPERS: dict[type, tuple[str, ...]] = {
 # Of a code object everything but where it stands.
 CODE = ("co_code", "co_argcount", "co_posonlyargcount", "co_kwonlyargcount", "co_flags", "co_consts", "co_names",
         "co_varnames", "co_freevars", "co_cellvars", "co_exceptiontable")  # fmt: skip
+# Members by which a class finds the slots and the dictionary of an object.
+HIDDEN = types.MemberDescriptorType, types.GetSetDescriptorType
 # Methods that the decorator of dataclasses writes.
 WRITTEN = {"__init__", "__repr__", "__eq__", "__hash__", "__setattr__", "__delattr__", "__lt__", "__le__", "__gt__",
            "__ge__", "__replace__"}  # fmt: skip
@@ -394,17 +395,13 @@ class _Contents:
         if kind in (dict, types.MappingProxyType):
             return ["dict", *(self.of(one) for item in value.items() for one in item)]
         if isinstance(value, np.generic) or kind in (np.ndarray, np.memmap):
-            entries = [self.of(value.tolist())] if value.dtype.hasobject else [np.asarray(value).tobytes()]
-            return [
-                "scalar" if isinstance(value, np.generic) else "array",
-                repr(value.dtype.descr),
-                repr(value.shape),
-                *entries,
-            ]
+            words = f"{'array' if isinstance(value, np.ndarray) else 'scalar'} {value.dtype.descr} {value.shape}"
+            return [words, self.of(value.tolist()) if value.dtype.hasobject else np.asarray(value).tobytes()]
         if isinstance(value, types.CodeType):
             return ["code", repr(sys.version_info[:2]), *(self.of(getattr(value, name, None)) for name in CODE)]
         if isinstance(value, types.CellType):
-            return ["cell", *self._cell(value, names)]
+            # reading an empty one is an error
+            return ["cell", *([] if value == types.CellType() else [self.of(value.cell_contents, names)])]
         return self._rest(value, kind)
 
     def _rest(self, value: Any, kind: type) -> Iterable[bytes | str]:
@@ -425,20 +422,13 @@ class _Contents:
         for name in sorted(values):
             yield from (name, self.of(values[name], names))
 
-    def _cell(self, cell: Any, names: tuple[str, ...]) -> Iterator[bytes]:
-        try:
-            yield self.of(cell.cell_contents, names)
-        except ValueError:
-            # it is empty
-            return
-
     def _function(self, function: Any) -> Iterator[bytes | str]:
         reached = dict(_reached(function.__code__, function.__globals__))
         names = tuple(sorted(_names(function.__code__)))
         yield from ("function", function.__qualname__, self.of(function.__code__))
         yield from map(self.of, (function.__defaults__, function.__kwdefaults__, function.__dict__))
-        for cell in function.__closure__ or ():
-            yield _hashed(["cell", *self._cell(cell, names)])
+        # outside of `known`, because of a module in it only what this code names is read
+        yield from (_hashed(self._parts(cell, names)) for cell in function.__closure__ or ())
         yield from self._named(reached, names)
 
     def _class(self, kind: type) -> Iterator[bytes | str]:
@@ -448,15 +438,11 @@ class _Contents:
         if issubclass(kind, Enum):
             yield from self._named({one.name: one.value for one in kind})
             members = {name: member for name, member in members.items() if isfunction(member)}
-        hidden = types.MemberDescriptorType, types.GetSetDescriptorType
-        yield from self._named(
-            {
-                name: member
-                for name, member in members.items()
-                if not isinstance(member, hidden)
-                and (not name.startswith("__") or isfunction(member) or type(member) in WRAPPERS)
-            }
-        )
+        for name in sorted(members):
+            member = members[name]
+            plain = not name.startswith("__") and not isinstance(member, HIDDEN)
+            if plain or isfunction(member) or type(member) in WRAPPERS:
+                yield from (name, self.of(member))
 
     def _object(self, value: Any) -> Iterable[bytes | str]:
         """By what pickle would make it of, which is what the class says or all its attributes."""
@@ -490,14 +476,11 @@ def _hashed(parts: Iterable[bytes | str]) -> bytes:
 def _version(module: str | None) -> str | None:
     """The version of a module of Python or of an installed package; None of the user's own."""
     top = sys.modules.get((module or "").partition(".")[0])
-    file = Path(getattr(top, "__file__", None) or "/")
-    installed = {"site-packages", "dist-packages"} & set(file.parts)
     if top is None or top.__name__ == "__main__":
         return None
-    if installed:
+    file = Path(getattr(top, "__file__", None) or "/")
+    if {"site-packages", "dist-packages"} & set(file.parts) or top.__name__ == __name__.partition(".")[0]:
         return getattr(top, "__version__", None)
-    if top.__name__ == __name__.partition(".")[0]:
-        return __version__
     of_python = top.__name__ in sys.builtin_module_names or file.is_relative_to(sysconfig.get_path("stdlib"))
     return repr(sys.version_info[:2]) if of_python else None
 
