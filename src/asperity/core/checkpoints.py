@@ -132,11 +132,11 @@ class Checkpoint:
             there = json.loads(text)
         except (ValueError, TypeError, RecursionError) as reason:
             raise self._damage("its description", reason) from reason
-        found = list(differences(there, identity))
-        if found:
+        others = list(differences(there, identity))
+        if others:
             raise InputError(
                 f"{self.path} is the checkpoint of something else; name another file or delete this one. "
-                f"Differences: {'; '.join(found)}"
+                f"Differences: {'; '.join(others)}"
             )
 
     def parts(self, read: Callable[[str, Any], Any] = lambda _, value: value) -> Iterator[tuple[str, Any]]:
@@ -432,7 +432,8 @@ class _Contents:
         yield from self._named(reached, names)
 
     def _class(self, kind: type) -> Iterator[bytes | str]:
-        yield from ("class", kind.__qualname__, *map(self.of, kind.__bases__), self.of(type(kind)))
+        yield from ("class", kind.__qualname__)
+        yield from map(self.of, (*kind.__bases__, type(kind)))
         written = WRITTEN if "__dataclass_params__" in vars(kind) else set()
         members = {name: member for name, member in vars(kind).items() if name not in written and name != "_abc_impl"}
         if issubclass(kind, Enum):
