@@ -16,6 +16,7 @@ from numba import types
 from numba.core import config
 
 import asperity
+from asperity import InputError
 from asperity.core import compilation
 
 TWICE = "from asperity.core.compilation import jit\n@jit()\ndef twice(x):\n    return 2.0 * x\n"
@@ -116,6 +117,58 @@ def test_a_folder_of_another_user_or_open_to_others_is_not_used(tmp_path, monkey
         other.rmdir()
     finally:
         compilation.temporary_folder.cache_clear()
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o1777, 0o775, 0o757, 0o700])
+def test_a_named_folder_that_others_can_write_is_refused(module, tmp_path, monkeypatch, mode):
+    folder = tmp_path / "named"
+    folder.mkdir()
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", str(folder))
+    # no group is the user's own
+    monkeypatch.setattr(compilation, "_is_private", lambda state: False)
+    folder.chmod(mode)
+    # numba's folder in one with the sticky bit is nobody else's
+    if mode in (0o700, 0o1777):
+        assert [hits_after_a_call(module) for _ in range(2)] == [0, 1]
+        return
+    with pytest.raises(InputError, match=rf"NUMBA_CACHE_DIR: .*may write {folder}: .*\(chmod go-w\)"):
+        loaded(module)
+    folder.chmod(mode & ~0o022)
+    assert [hits_after_a_call(module) for _ in range(2)] == [0, 1]
+
+
+def test_code_in_a_folder_that_others_can_write_is_not_loaded(module, tmp_path, monkeypatch, caplog):
+    user = tmp_path / "user"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(user))
+    assert [hits_after_a_call(module) for _ in range(2)] == [0, 1]
+    beside = module.parent / "__pycache__"
+    beside.chmod(0o777)
+    compilation.why_unsafe.cache_clear()
+    with caplog.at_level(logging.INFO, "asperity"):
+        assert [hits_after_a_call(module) for _ in range(2)] == [0, 1]
+    assert f"not stored in {beside}: everybody may write" in caplog.text and list(user.rglob("*.nbc"))
+
+
+def test_a_folder_of_another_user_is_unsafe_and_so_is_one_below_it(tmp_path):
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "a")
+    mine = frozenset({os.getuid()})
+    for folder in (tmp_path / "a" / "b", tmp_path / "link" / "b"):
+        compilation.why_unsafe.cache_clear()
+        assert compilation.why_unsafe(folder, mine) == ""
+    (tmp_path / "a").chmod(0o777)
+    for folder in (tmp_path / "a" / "b", tmp_path / "link" / "b"):
+        compilation.why_unsafe.cache_clear()
+        assert (
+            compilation.why_unsafe(folder, mine) == f"everybody may write {tmp_path / 'a'}"
+            or folder.parent.is_symlink()
+        )
+        assert compilation.why_unsafe(folder, mine)
+    if os.getuid() == 0:
+        os.chown(tmp_path / "a", 12345, -1)
+        compilation.why_unsafe.cache_clear()
+        assert "belongs to another user" in compilation.why_unsafe(tmp_path / "a" / "b", mine)
+        assert compilation.why_unsafe(tmp_path / "a" / "b", mine | {12345}) == f"everybody may write {tmp_path / 'a'}"
 
 
 @pytest.fixture

@@ -151,11 +151,11 @@ def test_a_stopped_mean_law_goes_on_to_the_same_bits(tmp_path):
 
     stops.__module__, stops.__qualname__ = half_diffuse.__module__, half_diffuse.__qualname__
     with pytest.raises(KeyboardInterrupt, match="the same call goes on"):
-        spec.mean_law(stops, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a")
-    again = spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a")
+        spec.mean_law(stops, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a", key="half diffuse")
+    again = spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a", key="half diffuse")
     assert again.symmetric.tobytes() == whole.symmetric.tobytes() and again.error == whole.error
     with pytest.raises(InputError, match="seed"):
-        spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=2, checkpoint=tmp_path / "a")
+        spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=2, checkpoint=tmp_path / "a", key="half diffuse")
 
 
 def test_the_deficit_of_gentle_gaussian_walls_is_four_times_their_mean_squared_slope():

@@ -16,7 +16,7 @@ from asperity import AsperityError, InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.core.long_runs import all_parts, digest
+from asperity.core.long_runs import all_parts
 from asperity.kernels.billiards import billiard
 from asperity.spectral.consequences import channel
 
@@ -130,11 +130,6 @@ def test_an_error_of_a_part_is_that_of_the_run(tmp_path):
         all_parts(fails, 1, {}, {})
     with pytest.raises(InputError, match="too late"):
         all_parts(lambda number: fails(1), 1, {}, {"checkpoint": tmp_path / "a"})
-
-
-def test_digests_tell_arrays_by_shape_kind_and_bytes():
-    ones = [np.ones(4), np.ones((2, 2)), np.ones(4, dtype=np.float32), np.zeros(4), (1.0, 1.0, 1.0, 1.0)]
-    assert len({digest(one) for one in ones}) == len(ones)
 
 
 RUN = """

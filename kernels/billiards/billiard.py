@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any, Protocol, Unpack, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...core.checkpoints import Stored
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
-from ...core.long_runs import Engine, all_parts, digest
+from ...core.long_runs import Engine, all_parts
 from ...core.version import __version__
-from ..collisions.collision_law import CollisionLaw
-from ..collisions.satellite_law import SatelliteLaw
 from ..laws.law import Law
-from ..walls.identity import law_digest, wall_digest
 from .along_walls import CollisionAlongWall, Located
 
 if TYPE_CHECKING:
@@ -125,6 +123,8 @@ def play(
         A file to which the states of every 1024 disks are added; the same call goes on with it.
     client : int, str or distributed.Client, optional
         As of `asperity.spectral.sweep`. The record is the same to the last bit without checkpoint and workers.
+    key : str, optional
+        As of `asperity.spectral.sweep`.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def play(
     disk = each[0].disk
     located, moving = _starts(container, position, velocity)
     job = _Disks(container, tuple(each), located, moving, collisions, root)
-    parts = all_parts(job.states, -(-len(located) // TOGETHER), job.identity(), engine)
+    parts = all_parts(job.states, -(-len(located) // TOGETHER), job.identity(), engine, job.stored)
     columns = {
         name: np.concatenate([part[name] for part in parts], axis=0 if name == "collisions" else 1) for name in parts[0]
     }
@@ -186,11 +186,19 @@ class _Disks:
 
     def identity(self) -> dict[str, Any]:
         """What tells these disks from others."""
-        container = self.container
         return {
-            "computation": "disks between walls", "version": __version__, "laws": [*map(_told, self.laws)],
-            "container": digest(container.points, container.normals, container.curves), "collisions": self.collisions,
-            "start": digest(self.position, self.velocity), "seed": list(self.root),
+            "computation": "disks between walls", "version": __version__, "laws": self.laws,
+            "container": self.container, "collisions": self.collisions, "seed": self.root,
+            "start": np.hstack([self.position, self.velocity]),
+        }  # fmt: skip
+
+    def stored(self, part: int) -> dict[str, Stored]:
+        """What the columns of a part must be."""
+        shape = self.collisions + 1, min(TOGETHER, len(self.position) - part * TOGETHER)
+        return {
+            "time": Stored("f", shape, 0.0), "position": Stored("f", (*shape, 2)), "angle": Stored("f", shape),
+            "velocity": Stored("f", (*shape, 3)), "wall": Stored("i", shape, -1, len(self.laws) - 1),
+            "collisions": Stored("i", shape[1:], 0, self.collisions),
         }  # fmt: skip
 
     def states(self, part: int) -> dict[str, NDArray[Any]]:
@@ -224,17 +232,6 @@ class _Disks:
             "time": columns[0], "position": columns[1], "angle": columns[2], "velocity": columns[3],
             "wall": columns[4].astype(np.int64), "collisions": made,
         }  # fmt: skip
-
-
-def _told(law: Reflector | CollisionAlongWall) -> str:
-    """What tells a collision law from others."""
-    if isinstance(law, CollisionAlongWall):
-        return digest(law.disk, law.law.edges, [law_digest(part) for part in law.law.laws])
-    if isinstance(law, CollisionLaw):
-        return digest(law.disk, law_digest(law.law))
-    if isinstance(law, SatelliteLaw):
-        return digest(law.disk, wall_digest(law.wall), law.scale, law.spacing)
-    return repr(law)
 
 
 def _laws_at_positions(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...core.checkpoints import Stored
 from ...core.checks import Floats, Rng, angles, check_memory, finite_array, frozen, generator, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
@@ -19,7 +20,6 @@ from ...core.kinds import explained, explained_class
 from ...core.long_runs import Engine, all_parts
 from ...core.rounding import EPS
 from ...core.version import __version__
-from ..walls.identity import wall_digest
 
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall
@@ -175,6 +175,8 @@ def limit_study(
     client : int, str or distributed.Client, optional
         As of `asperity.spectral.sweep`. But for its ``seconds`` the study is the same to the last bit without
         checkpoint and workers.
+    key : str, optional
+        As of `asperity.spectral.sweep`.
 
     Returns
     -------
@@ -216,7 +218,7 @@ def limit_study(
     target = (wall if limit is None else limit).foreshorten(disk)
     sizes = tuple((space.scale, space.spacing) for space in spaces)
     job = _Repetitions(disk, wall, target, sizes, tuple(map(float, rolls)), samples, repetitions, root)
-    parts = all_parts(job.measured, len(eps) * repetitions, job.identity(), engine)
+    parts = all_parts(job.measured, len(eps) * repetitions, job.identity(), engine, job.stored)
     each = np.reshape([part["columns"] for part in parts], (len(eps), repetitions, len(rolls), len(COLUMNS)))
     seconds = np.reshape([part["seconds"] for part in parts], (len(eps), repetitions)).sum(axis=1)
     runs = each.mean(axis=2)
@@ -251,11 +253,14 @@ class _Repetitions:
     def identity(self) -> dict[str, Any]:
         """What tells this study from others."""
         return {
-            "computation": "limit of small scales", "version": __version__, "disk": repr(self.disk),
-            "wall": wall_digest(self.wall), "limit": wall_digest(self.target), "sizes": list(map(list, self.sizes)),
-            "psi": list(self.psi), "samples": list(self.samples), "repetitions": self.repetitions,
-            "seed": list(self.root),
+            "computation": "limit of small scales", "version": __version__, "disk": self.disk,
+            "wall": self.wall, "limit": self.target, "sizes": self.sizes, "psi": self.psi, "samples": self.samples,
+            "repetitions": self.repetitions, "seed": self.root,
         }  # fmt: skip
+
+    def stored(self, _: int) -> dict[str, Stored]:
+        """What the arrays of a part must be."""
+        return {"columns": Stored("f", (len(self.psi), len(COLUMNS))), "seconds": Stored("f", (), 0.0)}
 
     def measured(self, part: int) -> dict[str, Any]:
         """Columns and processor seconds of one repetition, whose random numbers depend on its number alone."""

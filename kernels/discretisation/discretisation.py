@@ -78,6 +78,9 @@ def discretise(
         A file in which the sums are stored every few seconds, for ``"monte-carlo"``, and for ``"qmc"`` of a law driven
         by one uniform number. The same call with the same file continues the run; the file of other rays is refused,
         and the message names the difference.
+    key : str, optional
+        A name of one's own for the computation, for a law whose content a checkpoint cannot compare; as of
+        `asperity.spectral.sweep`.
     client : int, str or distributed.Client, optional
         For the same: a number of workers on this machine, the address of a scheduler, or a client of dask.distributed.
         The matrix is the same to the last bit without checkpoint and workers, for any number of workers and any number

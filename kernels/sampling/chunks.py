@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 import time
 from collections.abc import Iterable
@@ -14,15 +13,15 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checkpoints import Checkpoint
+from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
 from ...core.checks import Floats
+from ...core.errors import InputError
 from ...core.long_runs import Engine, progress_bar
 from ...core.version import __version__
 from ...core.workers import BACKLOG, connected, in_order, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import DrivenLaw, Law, entry_inside
-from ..walls.identity import law_digest
 from .rays import RaySums
 
 # Rays of a task for a worker, a second of work or a few. Counts in cells do not depend on it; sums of real numbers are
@@ -71,7 +70,7 @@ class Job(Protocol):
         """Add the rays of a task to the tables from ``first`` on."""
 
     def identity(self) -> dict[str, Any]:
-        """What tells the rays from others of this law and basis, in plain JSON values."""
+        """What tells the rays from others of this law and basis."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +189,9 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
     run = _Run(job, _State(np.zeros(job.tasks, dtype=bool), sums.tables, sums.unresolved))
     try:
         with ExitStack() as stack:
-            store = None if path is None else stack.enter_context(Checkpoint(path, _identity(job)))
+            store = (
+                None if path is None else stack.enter_context(Checkpoint(path, _identity(job), key=engine.get("key")))
+            )
             bar = stack.enter_context(progress_bar(job.total, "ray"))
             run.all_tasks(store, stack.enter_context(connected(client)), bar)
     except KeyboardInterrupt as stop:
@@ -202,8 +203,7 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
 
 def _identity(job: Job) -> dict[str, Any]:
     # task by task the checkpoint says what is done: so their size belongs to it
-    told = {"version": __version__, "law": law_digest(job.law), "basis": repr(job.basis)}
-    return {**told, **job.identity()}
+    return {"version": __version__, "law": job.law, "basis": job.basis, **job.identity()}
 
 
 class _State(NamedTuple):
@@ -220,18 +220,6 @@ class _State(NamedTuple):
         tables[first : first + len(found[0])] += found[0]
         return _State(done, tables, self.unresolved + found[1])
 
-    def packed(self) -> bytes:
-        """As a file of numpy's, without pickle."""
-        file = io.BytesIO()
-        np.savez(file, **self._asdict())
-        return file.getvalue()
-
-    @staticmethod
-    def unpacked(content: bytes) -> _State:
-        """The state that `packed` gave."""
-        with np.load(io.BytesIO(content), allow_pickle=False) as known:
-            return _State(known["done"], known["tables"], int(known["unresolved"]))
-
 
 @dataclass
 class _Run:
@@ -244,14 +232,24 @@ class _Run:
     def rays_done(self) -> int:
         return sum(map(self.job.rays_of, np.flatnonzero(self.state.done).tolist()))
 
+    def _read(self, _: str, content: bytes) -> _State:
+        """A stored state, with arrays as the present one has."""
+        most, tables = self.job.total, self.state.tables
+        counts = Stored("i", tables.shape, 0, most) if self.job.basis.is_partition else Stored("f", tables.shape)
+        expected = {"done": Stored("b", (self.job.tasks,)), "tables": counts, "unresolved": Stored("i", (), 0, most)}
+        found = unpacked_arrays(content, expected)
+        return _State(found["done"], found["tables"], int(found["unresolved"]))
+
     def _backlog(self, workers: Any) -> int:
         """Tasks at a time: results are matrices, and can come faster than they are added."""
         size = 8 * self.job.tables * self.job.basis.size**2
         return min(BACKLOG, MOST_WAITING // size + 2 * (0 if workers is None else len(workers.nthreads())))
 
     def all_tasks(self, store: Checkpoint | None, workers: Any, bar: Any) -> None:
-        for _, content in () if store is None else store.parts():
-            self.state = _State.unpacked(content)
+        for _, state in () if store is None else store.parts(self._read):
+            self.state = state
+            if self.job.basis.is_partition and int(state.tables.sum()) != self.rays_done:
+                raise InputError(f"checkpoint: its counts are not of the {self.rays_done} rays that it has; delete it")
         bar.update(self.rays_done)
         rest = np.flatnonzero(~self.state.done).tolist()
         found: Iterable[tuple[int, Sums]] = results(_Task(self.job).sums, rest, workers, self._backlog(workers))
@@ -261,8 +259,8 @@ class _Run:
                 self.state = self.state.after(task, self.job.first_table(task), own)
                 bar.update(self.job.rays_of(task))
                 if store is not None and time.monotonic() - stored > STORED_EVERY:
-                    store.put(STATE, self.state.packed(), now=True)
+                    store.put(STATE, packed_arrays(self.state._asdict()), now=True)
                     stored = time.monotonic()
         finally:
             if store is not None:
-                store.put(STATE, self.state.packed(), now=True)
+                store.put(STATE, packed_arrays(self.state._asdict()), now=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,11 +12,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checkpoints import Checkpoint
+from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
 from ...core.checks import Floats, angles, check_memory, instance, shortened
 from ...core.errors import InputError
 from ...core.kinds import explained
-from ...core.long_runs import digest
 from ...core.version import __version__
 from ...core.workers import connected, in_order, results
 from ..bases.basis import Basis
@@ -47,6 +45,7 @@ def estimate_stream(
     *,
     invariant: bool = True,
     checkpoint: str | Path | None = None,
+    key: str | None = None,
     client: Any = None,
 ) -> KernelMatrix:
     """Estimate the matrix of a law from more pairs (theta, theta') than memory holds.
@@ -65,6 +64,8 @@ def estimate_stream(
     checkpoint : path, optional
         A file in which the sums are stored every few seconds. The same call, with the same pairs from the first on,
         goes on with it: arrays are read from where they were, an iterable is advanced to there.
+    key : str, optional
+        A name for the computation, needed for a basis of one's own that a checkpoint cannot compare.
     client : int, str or distributed.Client, optional
         As of `discretise`: this process reads the stream, and workers count or add up its blocks. That is of use where
         this takes longer than to send a block, so for many functions of a basis without cells.
@@ -101,12 +102,12 @@ def estimate_stream(
         if checkpoint is None:
             sums.add_all(source, basis, None, client)
         else:
-            first = source.first()
             identity = {
-                "computation": "stream of pairs", "version": __version__, "basis": repr(basis),
-                "invariant": sums.invariant, "pairs": source.size, "block": BLOCK, "first pairs": digest(*first),
+                "computation": "stream of pairs", "version": __version__, "basis": basis,
+                "invariant": sums.invariant, "pairs": source.size, "block": BLOCK,
+                "first pairs": np.stack(source.first()),
             }  # fmt: skip
-            with Checkpoint(checkpoint, identity) as store:
+            with Checkpoint(checkpoint, identity, key=key) as store:
                 sums.add_all(source, basis, store, client)
     except KeyboardInterrupt as stop:
         lost = "without a checkpoint their sums are lost"
@@ -141,8 +142,11 @@ class _Sums:
     def add_all(self, source: _Source, basis: Basis, store: Checkpoint | None, client: Any) -> None:
         """Add all pairs of a source, or those that the checkpoint does not have; block by block."""
         if store is not None:
-            for _, content in store.parts():
-                self._set(content)
+            for _, known in store.parts(self._read):
+                self.number, self.stored = (int(known["number"]),) * 2
+                self.totals, self.counts, self.tables, self.masses = (
+                    known[name] for name in ("totals", "counts", "tables", "masses")
+                )
         blocks = (
             (number, angles("theta_in", theta), angles("theta_out", image))
             for number, (theta, image) in enumerate(source.blocks(self.number))
@@ -190,11 +194,8 @@ class _Sums:
         self.number += theta.size
 
     def _store(self, store: Checkpoint) -> None:
-        file = io.BytesIO()
-        np.savez(
-            file, number=self.number, totals=self.totals, counts=self.counts, tables=self.tables, masses=self.masses
-        )
-        store.put(STATE, file.getvalue(), now=True)
+        kept = {name: value for name, value in vars(self).items() if name not in ("invariant", "stored")}
+        store.put(STATE, packed_arrays(kept), now=True)
         self.stored = self.number
 
     def matrix(self, basis: Basis, symmetrise: bool) -> KernelMatrix:
@@ -210,10 +211,24 @@ class _Sums:
         counts = self.counts if basis.is_partition else None
         return matrix_of_pairs(basis, counts, means, self.invariant, self.number, symmetrise)
 
-    def _set(self, content: bytes) -> None:
-        with np.load(io.BytesIO(content), allow_pickle=False) as known:
-            self.number, self.totals, self.counts = int(known["number"]), known["totals"], known["counts"]
-            self.tables, self.masses, self.stored = known["tables"], known["masses"], self.number
+    def _read(self, _: str, content: bytes) -> dict[str, NDArray[Any]]:
+        """The stored arrays, of the shapes of those here."""
+        found = unpacked_arrays(
+            content,
+            {
+                "number": Stored("i", (), 0), "totals": Stored("i", self.totals.shape, 0),
+                "counts": Stored("i", self.counts.shape, 0), "tables": Stored("f", self.tables.shape),
+                "masses": Stored("f", self.masses.shape, 0.0),
+            },
+        )  # fmt: skip
+        sums = [
+            found["totals"].sum(),
+            *([found["counts"].sum()] if self.counts.size else []),
+            *([found["masses"].sum()] if self.masses.size else []),
+        ]
+        if any(one != found["number"] for one in sums):
+            raise ValueError("its sums are not of the number of pairs that it has")
+        return found
 
 
 @dataclass(frozen=True)

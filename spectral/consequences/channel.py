@@ -8,6 +8,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...core.checkpoints import Stored
 from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
@@ -17,7 +18,6 @@ from ...core.version import __version__
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.matrix_law import not_a_law
-from ...kernels.walls.identity import law_digest
 from .diffusion import Arrangement, check_arrangement
 
 # Smallest angle; below half of it, pi - theta would round to pi.
@@ -111,6 +111,8 @@ def exit_times(
         A file to which the times of every 4096 particles are added; the same call goes on with it.
     client : int, str or distributed.Client, optional
         As of `sweep`. The times are the same to the last bit without checkpoint and workers.
+    key : str, optional
+        As of `sweep`.
 
     Returns
     -------
@@ -141,7 +143,7 @@ def exit_times(
     paper = law.in_specular_frame() if law.frame == "specular" else law
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     job = _Particles(paper, levels, particles, root, width, pace, arrangement)
-    parts = all_parts(job.times, -(-particles // TOGETHER), job.identity(), engine)
+    parts = all_parts(job.times, -(-particles // TOGETHER), job.identity(), engine, job.stored)
     return ExitTimes(frozen(levels), frozen(np.concatenate([part["times"] for part in parts])), 0.5 * width, pace)
 
 
@@ -160,10 +162,15 @@ class _Particles:
     def identity(self) -> dict[str, Any]:
         """What tells these particles from others."""
         return {
-            "computation": "exit times", "version": __version__, "law": law_digest(self.law),
-            "lengths": self.levels.tolist(), "particles": self.particles, "seed": list(self.root),
+            "computation": "exit times", "version": __version__, "law": self.law,
+            "lengths": self.levels, "particles": self.particles, "seed": self.root,
             "width": self.width, "speed": self.speed, "arrangement": self.arrangement,
         }  # fmt: skip
+
+    def stored(self, part: int) -> dict[str, Stored]:
+        """What the arrays of a part must be."""
+        shape = min(TOGETHER, self.particles - part * TOGETHER), self.levels.size
+        return {"times": Stored("f", shape, 0.0)}
 
     def times(self, part: int) -> dict[str, Floats]:
         """Exit times of the particles of one part, which depend on its number alone."""

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import io
 import math
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from ...core.checkpoints import Checkpoint
+from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
 from ...core.checks import Floats, Rng, check_memory, generator, instance, positive_number, whole_number
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate
@@ -22,6 +21,7 @@ from ...core.kinds import explained, explained_class
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...kernels import Basis, KernelMatrix, discretise
+from ...kernels.bases.basis import Frame
 from ...kernels.sampling.counts import half_width
 from .quantities import UserQuantity, name_of
 from .running import Family, law_of, sweep
@@ -122,6 +122,7 @@ def ensemble(
     *,
     rng: Rng = None,
     checkpoint: str | Path | None = None,
+    key: str | None = None,
     client: Any = None,
     progress: bool = False,
 ) -> Ensemble:
@@ -134,7 +135,7 @@ def ensemble(
         geo.HeightCorrelation(0.1), 64, rms_slope=0.1)``, or a function of one's own.
     realisations : int
         Number of walls, at least 4.
-    quantities, tolerance, checkpoint, client, progress
+    quantities, tolerance, checkpoint, key, client, progress
         As of `sweep`, which computes the realisations.
     rng : None, int or numpy.random.Generator
         Source of the seeds. None stands for a fixed one.
@@ -168,8 +169,8 @@ def ensemble(
     """
     number = whole_number("realisations", realisations, FEWEST)
     table = sweep(
-        family, {SEED: _seeds(rng, number)}, quantities, tolerance, checkpoint=checkpoint, client=client,
-        progress=progress,
+        family, {SEED: _seeds(rng, number)}, quantities, tolerance, checkpoint=checkpoint, key=key,
+        client=client, progress=progress,
     )  # fmt: skip
     rows = tuple(_row(table, name) for name in table.quantities)
     most = max(rows, key=lambda row: row.refused)
@@ -222,12 +223,29 @@ class _Matrices:
             found = discretise(law_of(self.family(**{SEED: seed})), self.basis, tolerance=self.tolerance)
         except Exception as reason:  # a task must not raise
             return str(reason) if isinstance(reason, AsperityError) else f"{type(reason).__name__}: {reason}"
-        file = io.BytesIO()
-        np.savez(
-            file, symmetric=found.symmetric, error=float(found.error), unresolved=found.unresolved,
-            reversible=found.reversible is True, mirror_symmetric=found.mirror_symmetric is True, frame=found.frame,
+        return packed_arrays(
+            {
+                "symmetric": found.symmetric, "error": float(found.error), "unresolved": float(found.unresolved),
+                "reversible": found.reversible is True, "mirror_symmetric": found.mirror_symmetric is True,
+                "frame": found.frame,
+            }
         )  # fmt: skip
-        return file.getvalue()
+
+    def read(self, _: str, content: bytes | str) -> bytes | str:
+        """What `packed` gave, checked."""
+        if isinstance(content, bytes):
+            shape = self.basis.size, self.basis.size
+            found = unpacked_arrays(
+                content,
+                {
+                    "symmetric": Stored("f", shape), "error": Stored("f", (), 0.0, math.inf),
+                    "unresolved": Stored("f", (), 0.0, 1.0), "reversible": Stored("b", ()),
+                    "mirror_symmetric": Stored("b", ()), "frame": Stored("U", ()),
+                },
+            )  # fmt: skip
+            if found["frame"].item() not in get_args(Frame):
+                raise ValueError(f"frame: expected one of {', '.join(get_args(Frame))}, got {found['frame'].item()!r}")
+        return content
 
 
 @explained
@@ -239,6 +257,7 @@ def mean_law(
     *,
     rng: Rng = None,
     checkpoint: str | Path | None = None,
+    key: str | None = None,
     client: Any = None,
 ) -> KernelMatrix:
     """The matrix of the mean law of random walls: of reflection from a surface of patches of many of them.
@@ -250,7 +269,7 @@ def mean_law(
     basis : Basis
     tolerance : float
         Frobenius error asked of each matrix.
-    checkpoint, client
+    checkpoint, key, client
         As of `sweep`.
 
     Returns
@@ -293,7 +312,7 @@ def mean_law(
         with ExitStack() as stack:
             store = None
             if checkpoint is not None:
-                store = stack.enter_context(Checkpoint(checkpoint, _identity(job, seeds)))
+                store = stack.enter_context(Checkpoint(checkpoint, _identity(job, seeds), key=key))
             packed = _all_matrices(job, seeds, store, client)
     except KeyboardInterrupt as stop:
         stored = f"{checkpoint} has what was finished; the same call goes on from there"
@@ -310,8 +329,8 @@ def mean_law(
 
 def _identity(job: _Matrices, seeds: Sequence[int]) -> dict[str, Any]:
     return {
-        "computation": "mean law", "version": __version__, "family": name_of(job.family), "basis": repr(job.basis),
-        "tolerance": job.tolerance, "realisations": len(seeds), "first seed": seeds[0], "last seed": seeds[-1],
+        "computation": "mean law", "version": __version__, "family": job.family, "basis": job.basis,
+        "tolerance": job.tolerance, "realisations": len(seeds), "seeds": np.array(seeds),
     }  # fmt: skip
 
 
@@ -319,7 +338,7 @@ def _all_matrices(
     job: _Matrices, seeds: Sequence[int], store: Checkpoint | None, client: Any
 ) -> Mapping[int, bytes | str]:
     """The packed matrix of each seed, those that the checkpoint has first."""
-    found = {} if store is None else {int(key): value for key, value in store.parts()}
+    found = {} if store is None else {int(key): value for key, value in store.parts(job.read)}
     with connected(client) as workers:
         for seed, packed in results(job.packed, [seed for seed in seeds if seed not in found], workers):
             found[seed] = packed
@@ -336,9 +355,9 @@ def _mean(job: _Matrices, packed: Mapping[int, bytes | str], seeds: Sequence[int
         content = packed[seed]
         if isinstance(content, str):
             continue
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            arrays.append(file["symmetric"])
-            properties.append({name: file[name].item() for name in file.files if name != "symmetric"})
+        found = unpacked_arrays(content)
+        arrays.append(found.pop("symmetric"))
+        properties.append({name: value.item() for name, value in found.items()})
     of = f"{len(arrays)} of {len(seeds)} not refused" if len(arrays) < len(seeds) else f"{len(arrays)}"
     frames = {one["frame"] for one in properties}
     if len(frames) > 1:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...core.checks import finite_number, number_between
 from ...core.estimates import Estimate, finite
 from ...core.kinds import explained_class
 from .points import Point, Value
@@ -70,6 +71,26 @@ class SweepRow:
         values, quantity, value, error, *rest = cells
         known = math.inf if value is not None and error is None else error
         return SweepRow(dict(zip(names, values, strict=True)), quantity, value, known, *rest)
+
+    def check(self, quantity: str) -> None:
+        """Refuse what is not a row of this quantity.
+
+        Raises
+        ------
+        ValueError
+            InputErrors among them.
+        """
+        number_between("seconds", self.seconds, 0.0, math.inf, closed="low")
+        texts = self.kind, self.verdict, self.method, self.version, self.message
+        if self.quantity != quantity or not all(isinstance(text, str) for text in texts):
+            raise ValueError(f"expected a row of {quantity!r}, got {self!r}")
+        if self.value is not None:
+            finite_number("value", self.value)
+            if not isinstance(self.error, float):
+                raise ValueError(f"error: expected a number, got {self.error!r}")
+            Estimate(self.value, self.error, self.kind, self.method)  # type: ignore[arg-type]
+        elif self.error is not None or not self.message:
+            raise ValueError(f"expected a reason why {quantity!r} has no value")
 
 
 def _plain(cell: Any) -> Any:

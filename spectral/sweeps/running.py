@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import inspect
 import json
 import time
@@ -12,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from ...core.checkpoints import Checkpoint
+from ...core.checkpoints import Checkpoint, content, told
 from ...core.checks import finite_number, positive_number
 from ...core.errors import AsperityError, InputError
 from ...core.kinds import explained
@@ -21,7 +20,6 @@ from ...core.version import __version__
 from ...core.workers import connected, results
 from ...geometry import Wall
 from ...kernels import CollisionLaw, Law, WallLaw
-from ...kernels.walls.identity import law_digest
 from .points import Grid, Point, key_of
 from .quantities import Quantity, UserQuantity, listed_quantities, name_of, quantities_from
 from .row import SweepRow
@@ -80,6 +78,7 @@ def sweep(
     tolerance: float = 1e-6,
     *,
     checkpoint: str | Path | None = None,
+    key: str | None = None,
     client: Any = None,
     progress: bool = False,
     zipped: bool = False,
@@ -104,8 +103,11 @@ def sweep(
         Error asked of each quantity; what was reached stands in the rows.
     checkpoint : path, optional
         A file to which finished points are added. The same call with the same file goes on where it was; of other
-        walls, quantities, grids, tolerances or versions of asperity a file is refused. Functions are told apart by
-        module and name, families besides by their walls, as laws are printed, at a thousand points.
+        families, quantities, grids, tolerances or versions of asperity a file is refused. Functions are told apart by
+        their code and all that it reaches in memory, families besides by their laws at a thousand points.
+    key : str, optional
+        A name of one's own for the computation. With it functions, and objects of one's own classes, are told apart by
+        their names alone: for those whose content cannot be compared, or changes while they run.
     client : int, str or distributed.Client, optional
         So many workers on this machine, the address of a scheduler, or a client of dask.distributed; by default this
         process. The table does not depend on it, but for the seconds.
@@ -147,7 +149,7 @@ def sweep(
     _check_names(family, points.ends[0])
     study = _Study(family, listed, wanted)
     run = _Run(study, points, found[0].names[0])
-    rows = run.all_rows(checkpoint, client, progress)
+    rows = run.all_rows(checkpoint, key, client, progress)
     return SweepTable(points.names, rows, not points.is_product, study.rows)
 
 
@@ -158,20 +160,24 @@ class _Run:
         self.study, self.grid, self.leading = study, grid, leading
         self.found: dict[str, list[SweepRow]] = {}
 
-    def all_rows(self, checkpoint: str | Path | None, client: Any, progress: bool) -> tuple[SweepRow, ...]:
+    def all_rows(
+        self, checkpoint: str | Path | None, key: str | None, client: Any, progress: bool
+    ) -> tuple[SweepRow, ...]:
         """The rows of all points, in the order of the grid."""
         try:
-            points = self._points(checkpoint, client, progress)
+            points = self._points(checkpoint, key, client, progress)
         except KeyboardInterrupt as stop:
             raise KeyboardInterrupt(self._where_to_go_on(checkpoint)) from stop
         return tuple(row for point in self.grid.in_order(points) for row in self.found[key_of(point)])
 
-    def _points(self, checkpoint: str | Path | None, client: Any, progress: bool) -> list[Point]:
+    def _points(self, checkpoint: str | Path | None, key: str | None, client: Any, progress: bool) -> list[Point]:
         """All points of the plan, whose rows are then found."""
         points: list[Point] = []
         with ExitStack() as stack:
-            store = None if checkpoint is None else stack.enter_context(Checkpoint(checkpoint, self.identity()))
-            known = {} if store is None else {key: json.loads(text) for key, text in store.parts()}
+            store = None
+            if checkpoint is not None:
+                store = stack.enter_context(Checkpoint(checkpoint, self.identity(key is not None), key=key))
+            known = {} if store is None else dict(store.parts(self._read))
             workers = stack.enter_context(connected(client))
             bar = stack.enter_context(progress_bar(self.grid.size, "point", shown=progress))
             plan = self.grid.plan()
@@ -215,19 +221,29 @@ class _Run:
             return f"{done}; without a checkpoint they are lost"
         return f"{done}, which are in {checkpoint}; the same call goes on from there"
 
-    def identity(self) -> dict[str, Any]:
-        """What tells this sweep from others."""
-        first, *between, last = (_fingerprint(self.study.family, point) for point in self.grid.some(TOLD_APART))
+    def _read(self, key: str, text: str) -> list[list[Any]]:
+        """The rows of a point as they are stored, each checked."""
+        names = [name for one in quantities_from(self.study.asked) for name in one.names]
+        rows: list[list[Any]] = json.loads(text)
+        for row, name in zip(rows, names, strict=True):
+            if key_of(dict(enumerate(row[0]))) != key:
+                raise ValueError(f"rows of the point {row[0]}")
+            SweepRow.of_list(self.grid.names, row).check(name)
+        return rows
+
+    def identity(self, by_name: bool) -> dict[str, Any]:
+        """What tells this sweep from others; ``by_name`` of the user's functions and classes only their names."""
+        first, *between, last = (_made(self.study.family, point, by_name) for point in self.grid.some(TOLD_APART))
         return {
             "computation": "sweep",
             "version": __version__,
-            "family": name_of(self.study.family),
+            "family": self.study.family,
             "first wall": first,
             "last wall": last,
-            "walls between": _digest(between),
+            "walls between": content(between),
             "grid": self.grid.as_dict(),
             "zipped": self.grid.zipped,
-            "quantities": [one if isinstance(one, str) else name_of(one) for one in self.study.asked],
+            "quantities": self.study.asked,
             "tolerance": self.study.tolerance,
         }
 
@@ -263,13 +279,10 @@ def _check_names(family: Family, point: Point) -> None:
         ) from None
 
 
-def _fingerprint(family: Family, point: Point) -> str:
-    """A short text that tells what a family makes from what others make."""
+def _made(family: Family, point: Point, by_name: bool) -> str:
+    """What tells what a family makes at a point from what others make."""
     try:
-        return law_digest(law_of(family(**point)))
+        law = law_of(family(**point))
     except Exception as reason:  # a refused wall is a row of the table
         return f"refused: {reason}"
-
-
-def _digest(told: object) -> str:
-    return hashlib.sha256(repr(told).encode()).hexdigest()[:16]
+    return told("family", law, by_name=by_name)

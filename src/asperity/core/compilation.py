@@ -1,14 +1,15 @@
 """The decorator of compiled functions, and the cache that stores them on disk. Loads numba.
 
 numba compiles a function when it is first called, and stores the result beside the module, else in the user's cache
-folder. If both are read-only, as in containers, it is stored in a temporary folder. A damaged file is ignored, and
-written again.
+folder. If both are read-only, as in containers, or others can write them, it is stored in a temporary folder. A damaged
+file is ignored, and written again.
 """
 
 from __future__ import annotations
 
 import builtins
 import gc
+import grp
 import hashlib
 import importlib
 import logging
@@ -17,6 +18,7 @@ import multiprocessing
 import operator
 import os
 import pickle
+import pwd
 import stat
 import sys
 from collections.abc import Callable
@@ -30,7 +32,7 @@ from typing import Any, ClassVar
 from numba import njit, types
 from numba._dynfunc import make_function
 from numba.core.base import BaseContext
-from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator, _CacheLocator
 from numba.core.caching import _SourceFileBackedLocatorMixin as SourceStamp
 from numba.core.cgutils import alloca_once
 from numba.core.codegen import JITCodeLibrary
@@ -44,6 +46,8 @@ from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRew
 from numba.core.typing.context import Context
 from numba.core.untyped_passes import InlineClosureLikes
 from numba.np import linalg
+
+from .errors import InputError
 
 logger = logging.getLogger("asperity")
 
@@ -312,6 +316,62 @@ def temporary_folder() -> Path:
     return Path(mkdtemp(prefix="asperity-"))
 
 
+@cache
+def why_unsafe(folder: Path, owners: frozenset[int]) -> str:
+    """Return who else can put files into a folder, or replace it; empty if nobody but root and these owners can.
+
+    A group is the owner's alone if it has the owner's name and no other member.
+    """
+    for path in dict.fromkeys([*(folder, *folder.parents), *(folder.resolve(), *folder.resolve().parents)]):
+        for state in (path.lstat(), path.stat()):
+            if state.st_uid not in owners | {0}:
+                return f"{path} belongs to another user"
+            # in a folder with the sticky bit, such as /tmp, nobody replaces what is another's
+            if stat.S_ISLNK(state.st_mode) or (path not in (folder, folder.resolve()) and state.st_mode & stat.S_ISVTX):
+                continue
+            if state.st_mode & stat.S_IWOTH:
+                return f"everybody may write {path}"
+            if state.st_mode & stat.S_IWGRP and not _is_private(state):
+                return f"a group may write {path}"
+    return ""
+
+
+def _is_private(state: os.stat_result) -> bool:
+    try:
+        group, user = grp.getgrgid(state.st_gid), pwd.getpwuid(state.st_uid)
+    except KeyError:
+        return False
+    return group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name}
+
+
+def _guarded(kind: Any) -> Any:
+    """A way of numba to find a folder; it passes over one that others can write, because what is there is executed."""
+
+    class Guarded(kind):  # type: ignore[misc]
+        @classmethod
+        def from_function(cls, function: Any, file: str) -> Any:
+            found = super().from_function(function, file)
+            if found is None:
+                return None
+            # who owns the source can have anything executed
+            source = Path(file)
+            owners = {os.getuid(), *([source.stat().st_uid] if source.exists() else [])}
+            folder = Path(found.get_cache_path()).absolute()
+            reason = why_unsafe(folder, frozenset(owners))
+            if reason:
+                why_unsafe.cache_clear()
+            if reason and issubclass(kind, UserProvidedCacheLocator):
+                raise InputError(
+                    f"NUMBA_CACHE_DIR: expected a folder that only you can write, because what is in it is executed; "
+                    f"{reason}: remove that permission (chmod go-w) or name another folder"
+                )
+            if reason:
+                logger.info("compiled functions are not stored in %s: %s", folder, reason)
+            return None if reason else found
+
+    return Guarded
+
+
 class _Temporary(SourceStamp, _CacheLocator):
     """The last folder that is tried."""
 
@@ -333,7 +393,7 @@ class _Temporary(SourceStamp, _CacheLocator):
 class _Checked(CompileResultCacheImpl):
     """Stores a function with its sha256, because damaged machine code would end the process."""
 
-    _locator_classes = [*CacheImpl._locator_classes, _Temporary]  # noqa: RUF012 - numba's base class says how
+    _locator_classes = [*map(_guarded, CacheImpl._locator_classes), _Temporary]  # noqa: RUF012 - numba's base class says how
 
     def reduce(self, result: Any) -> tuple[bytes, bytes]:
         whole = dumps(super().reduce(result))

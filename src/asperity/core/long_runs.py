@@ -5,8 +5,6 @@ The progress bar of everything that takes long is here too.
 
 from __future__ import annotations
 
-import hashlib
-import io
 import multiprocessing
 import sys
 import threading
@@ -16,14 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypedDict, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from .checkpoints import Checkpoint
+from .checkpoints import Arrays, Checkpoint, Stored, packed_arrays, unpacked_arrays
 from .errors import AsperityError, InputError
 from .workers import connected, results
 
-Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
 
 # Before that no progress bar appears.
@@ -41,11 +35,14 @@ class Engine(TypedDict, total=False):
     ----------
     checkpoint : path
         A file to which finished parts are added; the same call goes on with it.
+    key : str
+        A name of the user's own for the computation, as of `asperity.spectral.sweep`.
     client : int, str or distributed.Client
         As of `asperity.spectral.sweep`.
     """
 
     checkpoint: str | Path | None
+    key: str | None
     client: Any
 
 
@@ -61,13 +58,15 @@ class _Packed:
             found = self.function(number)
         except AsperityError as reason:  # a task must not raise
             return type(reason).__name__, str(reason)
-        file = io.BytesIO()
-        np.savez(file, **found)
-        return file.getvalue()
+        return packed_arrays(found)
 
 
 def all_parts(
-    function: Callable[[int], Mapping[str, Any]], number: int, identity: Mapping[str, Any], engine: Engine
+    function: Callable[[int], Mapping[str, Any]],
+    number: int,
+    identity: Mapping[str, Any],
+    engine: Engine,
+    expected: Callable[[int], Mapping[str, Stored] | None] = lambda part: None,
 ) -> list[Arrays]:
     """The arrays of the parts 0, ..., number - 1, in this order.
 
@@ -77,8 +76,10 @@ def all_parts(
         From the number of a part to its arrays by name. It is sent to workers.
     number : int
     identity : mapping
-        Plain JSON values that tell this run from others, for the checkpoint.
+        What tells this run from others, for the checkpoint.
     engine : Engine
+    expected : callable
+        From the number of a part to what its arrays must be, by which those of a checkpoint are checked.
 
     Raises
     ------
@@ -94,11 +95,18 @@ def all_parts(
     """
     path = engine.get("checkpoint")
     packed: dict[int, bytes] = {}
+
+    def read(key: str, content: bytes) -> bytes:
+        if int(key) not in range(number):
+            raise ValueError(f"expected the number of a part below {number}")
+        unpacked_arrays(content, expected(int(key)))
+        return content
+
     try:
         with ExitStack() as stack:
-            store = None if path is None else stack.enter_context(Checkpoint(path, identity))
+            store = None if path is None else stack.enter_context(Checkpoint(path, identity, key=engine.get("key")))
             if store is not None:
-                packed |= {int(key): content for key, content in store.parts()}
+                packed |= {int(key): content for key, content in store.parts(read)}
             workers = stack.enter_context(connected(engine.get("client")))
             rest = [part for part in range(number) if part not in packed]
             for part, content in results(_Packed(function).part, rest, workers):
@@ -111,7 +119,7 @@ def all_parts(
         done = f"stopped after {len(packed)} of {number} parts"
         lost = "without a checkpoint they are lost"
         raise KeyboardInterrupt(f"{done}; {lost if path is None else f'{path} has them: give the same call'}") from stop
-    return [_unpacked(packed[part]) for part in range(number)]
+    return [unpacked_arrays(packed[part]) for part in range(number)]
 
 
 def progress_bar(total: int | None, unit: str, text: str | None = None, *, shown: bool = True) -> Any:
@@ -170,25 +178,3 @@ def counted(items: Sequence[T], unit: str, text: str) -> Iterator[T]:
             part = items[start : start + MANY]
             yield from part
             bar.update(len(part))
-
-
-def digest(*values: Any) -> str:
-    """Sixteen hexadecimal digits that tell values from others: arrays by their bytes, others by their repr.
-
-    Examples
-    --------
-    >>> digest(np.zeros(2), "a") == digest(np.zeros(2), "a") != digest(np.zeros(3), "a")
-    True
-    """
-    told = hashlib.sha256()
-    for value in values:
-        if isinstance(value, np.ndarray):
-            told.update(repr((value.shape, value.dtype.str)).encode() + np.ascontiguousarray(value).tobytes())
-        else:
-            told.update(repr(value).encode())
-    return told.hexdigest()[:16]
-
-
-def _unpacked(content: bytes) -> Arrays:
-    with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        return {name: file[name] for name in file.files}
