@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, finite_array, finite_number, frozen, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
+from ..curves.curve import LARGEST_COORDINATE
 
 # Metres of the units that headers of profiles have; micro is written in three ways.
 METRES = {
@@ -55,6 +56,9 @@ class Profile:
             )
         if not isinstance(self.unit, str):
             raise InputError(f"unit: expected the name of a unit such as 'µm', got {self.unit!r}")
+        largest = max(float(np.abs(x).max()), float(np.nanmax(np.abs(height), initial=0.0)))
+        if largest > LARGEST_COORDINATE:
+            raise InputError(f"x and height: expected numbers of at most {LARGEST_COORDINATE:g}, got {largest:g}")
         object.__setattr__(self, "x", frozen(x))
         object.__setattr__(self, "height", frozen(height))
 

@@ -23,7 +23,7 @@ from ..cells.mirror_symmetry import has_mirror_axis
 from ..cells.profile import Seam, vertices_of_profile
 from ..cells.toml import read_wall, save_wall
 from ..cells.validity import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
-from ..curves.curve import Curve
+from ..curves.curve import LARGEST_COORDINATE, Curve
 from ..curves.segment import Segment
 from ..disk.disk import Disk
 from ..scene.plan import TracePlan, plan_of
@@ -123,10 +123,13 @@ class Wall(Cell):
             raise WallError(f"vertices: expected points (x, y), got {vertices!r}") from reason
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
             raise WallError(f"vertices: expected an array of shape (n, 2) with n >= 2, got shape {points.shape}")
-        bad = ~np.isfinite(points).all(axis=1)
+        bad = ~(np.abs(points) <= LARGEST_COORDINATE).all(axis=1)
         if bad.any():
             i = int(bad.argmax())
-            raise WallError(f"vertices: expected finite coordinates, got {tuple(points[i].tolist())} at vertex {i}")
+            most = f"of at most {LARGEST_COORDINATE:g}"
+            raise WallError(
+                f"vertices: expected finite coordinates {most}, got {tuple(points[i].tolist())} at vertex {i}"
+            )
         same = np.all(points[1:] == points[:-1], axis=1)
         if same.any():
             i = int(same.argmax())

@@ -7,6 +7,7 @@ errors are normal.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, number_between, whole_number
+from ...core.checks import Floats, finite_array, finite_number, frozen, instance, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.frames import data_array, data_frame
@@ -37,6 +38,8 @@ GRID = 240
 # A file is refused if its entries are wrong by more than this many times the stated error, which is that of 95 of 100
 # matrices, and the rounding of an entry.
 BEYOND_CHANCE, ENTRY_ROUNDING = 10.0, 64.0 * EPS
+# Of samples, and of counts: they are held as int64.
+MOST = 2**63 - 1
 # What a file holds as it is.
 PLAIN_FIELDS = (
     "symmetrised", "samples", "method", "law", "reversible", "mirror_symmetric", "frame", "requested_tolerance",
@@ -285,15 +288,49 @@ class KernelMatrix:
         n = self.basis.size
         if symmetric.shape != (n, n):
             raise InputError(f"symmetric: expected shape {(n, n)} for {self.basis!r}, got {symmetric.shape}")
-        if not isinstance(self.error, Estimate):
-            raise InputError(f"error: expected an Estimate, got {self.error!r}")
+        if not isinstance(self.error, Estimate) or not self.error.value >= 0.0:
+            raise InputError(f"error: expected an Estimate of at least 0, got {self.error!r}")
         object.__setattr__(self, "symmetric", frozen(symmetric))
         if self.counts is not None:
-            counts = np.array(self.counts, dtype=np.int64)
-            if counts.shape != (n, n):
-                raise InputError(f"counts: expected shape {(n, n)}, got {counts.shape}")
+            counts = np.array(self.counts)
+            if counts.shape != (n, n) or counts.dtype.kind not in "iu" or counts.min() < 0 or counts.max() > MOST:
+                raise InputError(
+                    f"counts: expected whole numbers of at least 0, shape {(n, n)}, got {counts.dtype} of shape "
+                    f"{counts.shape}"
+                )
+            counts = counts.astype(np.int64)
             counts.setflags(write=False)
             object.__setattr__(self, "counts", counts)
+        self._check_fields()
+
+    def _check_fields(self) -> None:
+        """Refuse plain fields that no matrix has."""
+        plain: dict[str, Any] = {"samples": whole_number("samples", self.samples, 0, most=MOST)}
+        plain["unresolved"] = number_between("unresolved", self.unresolved, 0.0, 1.0, closed="low high")
+        plain["norm_bound"] = number_between("norm_bound", self.norm_bound, 0.0, np.inf, closed="low")
+        if self.requested_tolerance is not None:
+            plain["requested_tolerance"] = number_between(
+                "requested_tolerance", self.requested_tolerance, 0.0, np.inf, closed="low"
+            )
+        for name in ("symmetrised", "reversible", "mirror_symmetric"):
+            value = getattr(self, name)  # names of fields of this class
+            if not isinstance(value, (bool, np.bool_)) and (value is not None or name == "symmetrised"):
+                raise InputError(f"{name}: expected True or False, got {value!r}")
+            plain[name] = None if value is None else bool(value)
+        instance("method", self.method, str, "'exact'")
+        instance("law", self.law, str, "'a smooth wall'")
+        instance("metadata", self.metadata, Mapping, "{'made': 'by hand'}")
+        if self.frame not in ("paper", "specular"):
+            raise InputError(f"frame: expected 'paper' or 'specular', got {self.frame!r}")
+        defect = self.raw_defect
+        if defect is not None:
+            instance("raw_defect", defect, SymmetryDefect, "SymmetryDefect(0.1)")
+            instance("norm of raw_defect", defect.norm, str, "'Frobenius'")
+            number_between("raw_defect", float(defect), 0.0, np.inf, closed="low")
+            if defect.z_score is not None and not -np.inf <= defect.z_score <= np.inf:
+                raise InputError(f"z_score: expected a number or None, got {defect.z_score!r}")
+        for name, value in plain.items():
+            object.__setattr__(self, name, value)
 
     # ---- the arrays ------------------------------------------------------------------------------------------
     @property
@@ -426,16 +463,7 @@ class KernelMatrix:
     @explained
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write everything to an .npz file that `load_matrix` reads; an existing file only with ``overwrite``."""
-        arrays: Arrays = {"symmetric": self.symmetric}
-        if self.counts is not None:
-            arrays["counts"] = self.counts
-        record = {name: getattr(self, name) for name in PLAIN_FIELDS}  # names of fields of this class, in one list
-        error, defect = self.error, self.raw_defect
-        record["error"] = [error.value, error.error, error.kind, error.method]
-        record["raw_defect"] = None if defect is None else [float(defect), defect.norm, defect.z_score]
-        record["metadata"] = dict(self.metadata)
-        record["replicates"] = [store_array(part, arrays, f"replicate{k}") for k, part in enumerate(self.replicates)]
-        return archive.write(path, record, arrays, self.basis, overwrite=overwrite)
+        return archive.write(path, *self._packed(), self.basis, overwrite=overwrite)
 
     def to_frame(self) -> Any:
         """P[i, j] as a pandas.DataFrame (extra ``studies``): a row for each incoming, a column for each outgoing bin.
@@ -515,6 +543,19 @@ class KernelMatrix:
             parts.append(f"tolerance {self.requested_tolerance:g} not met")
         return f"KernelMatrix({', '.join(part for part in parts if part)})"
 
+    def _packed(self) -> tuple[Record, Arrays]:
+        """The record of plain values and the arrays of a file, all but the basis."""
+        arrays: Arrays = {"symmetric": self.symmetric}
+        if self.counts is not None:
+            arrays["counts"] = self.counts
+        record = {name: getattr(self, name) for name in PLAIN_FIELDS}  # names of fields of this class, in one list
+        error, defect = self.error, self.raw_defect
+        record["error"] = [error.value, error.error, error.kind, error.method]
+        record["raw_defect"] = None if defect is None else [float(defect), defect.norm, defect.z_score]
+        record["metadata"] = dict(self.metadata)
+        record["replicates"] = [store_array(part, arrays, f"replicate{k}") for k, part in enumerate(self.replicates)]
+        return record, arrays
+
     # ---- internals -------------------------------------------------------------------------------------------
     def _coordinates(self, other: ArrayLike | AngleFunction, name: str, axis: int = 0) -> Floats:
         if callable(other):
@@ -544,51 +585,51 @@ def load_matrix(path: str | Path) -> KernelMatrix:
 
 
 def _restored(record: Record, arrays: Stored, basis: Basis) -> KernelMatrix:
-    defect = record["raw_defect"]
+    defect, n = record["raw_defect"], basis.size
     matrix = KernelMatrix(
-        arrays["symmetric"],
+        arrays.read("symmetric", "f8", (n, n)),
         basis,
         Estimate(*record["error"]),
-        counts=arrays.get("counts"),
-        replicates=tuple(load_array(kind, arrays, f"replicate{k}") for k, kind in enumerate(record["replicates"])),
+        counts=arrays.read("counts", "i8", (n, n)) if "counts" in arrays else None,
+        replicates=tuple(load_array(kind, arrays, f"replicate{k}", n) for k, kind in enumerate(record["replicates"])),
         raw_defect=None if defect is None else SymmetryDefect(*defect),
         metadata=record["metadata"],
         **{name: record[name] for name in PLAIN_FIELDS},
     )
-    _check_record(matrix)
-    _check_entries(matrix)
+    for name, value in matrix._packed()[0].items():
+        if _as_floats(value) != _as_floats(record[name]):
+            raise InputError(f"{name}: expected a value of another kind than {record[name]!r}")
+    with np.errstate(all="ignore"):
+        _check_entries(matrix)
     return matrix
 
 
-def _check_record(matrix: KernelMatrix) -> None:
-    """Refuse fields that no matrix has, so that the entries can be held against them."""
-    if matrix.frame not in ("paper", "specular"):
-        raise InputError(f"frame: expected 'paper' or 'specular', got {matrix.frame!r}")
-    whole_number("samples", matrix.samples, 0)
-    number_between("unresolved", matrix.unresolved, 0.0, 1.0, closed="low high")
-    number_between("norm_bound", matrix.norm_bound, 0.0, np.inf, closed="low")
-    for name in ("symmetrised", "reversible", "mirror_symmetric"):
-        value = getattr(matrix, name)  # names of fields of this class
-        if value not in (True, False) and (value is not None or name == "symmetrised"):
-            raise InputError(f"{name}: expected true or false, got {value!r}")
-    if matrix.counts is not None and matrix.counts.min() < 0:
-        raise InputError(f"counts: expected none below 0, got {matrix.counts.min()}")
-    if any(part.shape != matrix.symmetric.shape for part in matrix.replicates):
-        raise InputError(f"replicates: expected arrays of shape {matrix.symmetric.shape}")
+def _as_floats(value: Any) -> str:
+    """A plain value as text, in which whole numbers and floats are the same but truth and numbers are not."""
+    return repr(json.loads(json.dumps(value), parse_int=float))
 
 
 def _check_entries(matrix: KernelMatrix) -> None:
     """Refuse entries that contradict the error and the norm that the file states, by more than any chance."""
     symmetric, constant = matrix.symmetric, matrix.basis.constant
-    excess = BEYOND_CHANCE * (float(matrix.error) + ENTRY_ROUNDING * matrix.size * (1.0 + matrix.norm_bound))
-    if np.linalg.norm(symmetric @ constant) > matrix.norm_bound * np.linalg.norm(constant) + excess:
+    rounding = BEYOND_CHANCE * ENTRY_ROUNDING * matrix.size * (1.0 + matrix.norm_bound)
+    excess = BEYOND_CHANCE * float(matrix.error) + rounding
+    if matrix.error.value != matrix.error.error:
+        raise InputError(f"the Frobenius error is stated as {matrix.error.value:g} and as {matrix.error.error:g}")
+    if matrix.counts is not None and not matrix.counts.sum(dtype=np.float64) <= matrix.samples * (1.0 + rounding):
+        raise InputError(f"the counts add up to more than {matrix.samples}, the stated number of samples")
+    if matrix.replicates:
+        mean = sum(cast(Any, part) for part in matrix.replicates) / len(matrix.replicates)
+        if not np.abs(mean - symmetric).max() <= rounding:
+            raise InputError("the mean of the replicates is not the matrix")
+    if not np.linalg.norm(symmetric @ constant) <= matrix.norm_bound * np.linalg.norm(constant) + excess:
         raise InputError(f"the entries contradict the bound {matrix.norm_bound:g} of the norm")
-    if matrix.reversible and np.linalg.norm(symmetric - symmetric.T) > 2.0 * excess:
+    if matrix.reversible and not np.linalg.norm(symmetric - symmetric.T) <= 2.0 * excess:
         raise InputError("the entries are not symmetric, although the kernel is stated to be reversible")
     # differences and multiples of kernels are matrices too
     if matrix.method == "algebra":
         return
-    if np.linalg.norm(symmetric @ constant - constant) > excess:
+    if not np.linalg.norm(symmetric @ constant - constant) <= excess:
         raise InputError(f"the rows do not sum to 1 within the stated error {float(matrix.error):g}")
     if matrix.basis.is_partition and symmetric.min() < -excess:
         raise InputError(f"entries are negative, down to {symmetric.min():g}, beyond the stated error")
