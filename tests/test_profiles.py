@@ -75,7 +75,7 @@ def test_a_period_has_the_heights_of_the_profile_and_of_its_mirror_image(rows):
         ([[0, 1], [2, 3]], [[0, 1], [2, 3]], "step", r"got shapes \(2, 2\) and \(2, 2\)"),
         ([0, 1, 2], [0, 1], "mirror", r"got shapes \(3,\) and \(2,\)"),
         ([0], [0], "mirror", "at least 2"),
-        ([0, 1], [0, 1], "glue", "seam: expected 'mirror' or 'step', got 'glue'"),
+        ([0, 1], [0, 1], "glue", "seam: expected 'mirror', 'step' or 'wrap', got 'glue'"),
     ],
 )
 def test_unsuitable_profiles_are_refused_with_the_worst_rows(x, height, seam, words):
@@ -163,7 +163,7 @@ def test_line_scans_of_instruments_are_read_from_files_that_are_no_columns(instr
     with pytest.raises(InputError, match=r"scan\.xyz, line 3"):
         geo.read_profile(tmp_path / "scan.xyz")
     (tmp_path / "map.TXT").write_text("1 2 3\n4 5 6\n")
-    assert geo.read_profile(tmp_path / "map.TXT").height.tolist() == [1.0, 3.0, 2.0]
+    assert geo.read_profile(tmp_path / "map.TXT", row=0).height.tolist() == [1.0, 3.0, 2.0]
 
 
 def test_of_a_map_one_row_along_x_is_taken(instrument, tmp_path):

@@ -173,6 +173,7 @@ def _flag(text: str) -> bool:
 PREPARATIONS = ("seam", "sort", "interpolate", "detrend")
 PROFILE_PARAMETERS: Mapping[str, Callable[[str], Any]] = MappingProxyType({
     "seam": str, "sort": _flag, "interpolate": _flag, "detrend": int, "row": int, "skiprows": int, "encoding": str,
+    "quantity": str,
     "units": lambda text: tuple(text.split("/")) if "/" in text else text,
     "usecols": lambda text: tuple(int(part) for part in text.split("/")),
     "delimiter": lambda text: SEPARATORS.get(text, text),
