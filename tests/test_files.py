@@ -85,7 +85,7 @@ def test_sparse_indices_out_of_range_are_refused_before_compiled_code_uses_them(
         ({"symmetric": 2.0 * np.eye(6) - EXACT.symmetric}, "negative"),
         ({"symmetric": np.full((6, 6), np.nan)}, "finite"),
         ({"symmetric": np.eye(5)}, "shape"),
-        ({"symmetric": EXACT.symmetric.astype("U9")}, "size of its data"),
+        ({"symmetric": EXACT.symmetric.astype("U9")}, "expected f8 of shape"),
         ({"record": {"error": [-1.0, -1.0, "bound", "by hand"]}}, "error: expected"),
         ({"record": {"error": [0.0, 0.0, "hope", "by hand"]}}, "kind: expected"),
         ({"record": {"frame": "picture"}}, "frame: expected"),

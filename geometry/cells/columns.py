@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,11 +62,9 @@ class Columns:
         whole_number("skiprows", self.skiprows, 0)
         if self.usecols is not None:
             try:
-                first, second = self.usecols
+                _, _ = (whole_number("usecols", column, 0) for column in self.usecols)
             except (TypeError, ValueError) as reason:
                 raise InputError(f"usecols: expected two numbers such as (0, 2), got {self.usecols!r}") from reason
-            whole_number("usecols", first, 0)
-            whole_number("usecols", second, 0)
 
     def parsed(self, text: str, *, is_map: bool = False) -> tuple[Floats, Floats, Header | None]:
         """Positions, heights and the header, if it says something; of a map only NotPairs is raised.
@@ -127,62 +125,44 @@ class Columns:
 
     def _failure(self, text: str, words: str, is_map: bool) -> InputError:
         """A fault in a file of pairs, or a file of another kind."""
-        counts = [len(found) for found in map(self._words, text.splitlines()[self.skiprows :]) if found]
-        pairs = counts.count(2) if self.usecols is None else len(counts)
-        advice = "" if is_map else self._advice(text)
-        return InputError(words + advice) if advice or 2 * pairs >= len(counts) else NotPairs(words)
-
-    def _advice(self, text: str) -> str:
-        """The options with which the text is read; empty if none are found."""
-        commas = [replace(self, decimal=",")] if self.delimiter != "," and re.search(r"\d,\d", text) else []
-        for columns in (*commas, self):
-            found = columns._readable(text)
-            if found is None:
-                continue
-            options = {name: getattr(found, name) for name in ("decimal", "skiprows", "usecols")}
-            options = {name: value for name, value in options.items() if value != getattr(self, name)}
-            call = ", ".join(f"{name}={value!r}" for name, value in options.items())
-            plain = {",": "comma", ".": "point"}
-            line = ",".join(
-                f"{name}={'/'.join(map(str, value)) if name == 'usecols' else plain.get(str(value), value)}"
-                for name, value in options.items()
-            )
-            choice = "; which columns are x and height is for you to say: for example" if "usecols" in options else ";"
-            return f"{choice} pass {call} (on the command line {line})"
-        return ""
-
-    def _readable(self, text: str) -> Columns | None:
-        """These columns after lines of a header, and two of them where there are more."""
         lines = text.splitlines()
-        table: list[list[float]] = []
-        first = len(lines)
-        for number in range(len(lines) - 1, self.skiprows - 1, -1):
-            words = self._words(lines[number])
-            if self.decimal == "," and re.search(r",(?!\d)", lines[number]) and words:
-                break
-            try:
-                row = [_number(word) for word in words]
-            except ValueError:
-                break
-            if row and table and len(row) != len(table[0]):
-                break
-            if row:
-                first = number
-                table.append(row)
-        if len(table) < 2 or len(table[0]) < 2:
+        counts = [len(found) for found in map(self._words, lines[self.skiprows :]) if found]
+        comma = replace(self, decimal=",", delimiter=None if self.delimiter == "," else self.delimiter)
+        for columns in () if is_map else (comma, self):
+            found = columns._readable(lines)
+            if found is not None and (columns is self or any("," in line for line in lines[found.skiprows :])):
+                pairs = ((name, getattr(found, name)) for name in ("decimal", "skiprows", "usecols"))
+                options = {name: value for name, value in pairs if value != getattr(self, name)}
+                choice = " the columns of x and height, for example" if "usecols" in options else ""
+                return InputError(f"{words};{choice} {remedy(options)}")
+        pairs_there = counts.count(2) if self.usecols is None else len(counts)
+        return InputError(words) if 2 * pairs_there >= len(counts) else NotPairs(words)
+
+    def _readable(self, lines: list[str]) -> Columns | None:
+        """These columns after lines of a header, and two of them where there are more; None if that is no remedy."""
+        rows = [self._numbers(line) for line in lines]
+        sizes = [-1 if row is None else len(row) for row in rows]
+        count = next((size for size in reversed(sizes) if size), -1)
+        first = max((k + 1 for k, size in enumerate(sizes) if size not in (0, count)), default=0)
+        stray = sizes[self.skiprows : first].count(count)
+        table = np.array([row for row in rows[max(first, self.skiprows) :] if row])
+        if count < 2 or len(table) < 2 or stray > STRAY * len(table):
             return None
-        others = [words for words in map(self._words, lines[self.skiprows : first]) if words]
-        stray = sum(len(words) == len(table[0]) and all(map(_is_number, words)) for words in others)
-        found = replace(self, skiprows=first if others else self.skiprows)
-        if len(table[0]) > 2:
-            found = replace(found, usecols=_two_columns(np.array(table[::-1])))
-        if stray > STRAY * len(table) or found == self:
+        found = replace(
+            self,
+            skiprows=first if any(sizes[self.skiprows : first]) else self.skiprows,
+            usecols=_two_columns(table) if count > 2 else None,
+        )
+        return None if found == self or np.isnan(table[:, (found.usecols or (0, 1))[0]]).any() else found
+
+    def _numbers(self, line: str) -> list[float] | None:
+        """The numbers in a line, if it has no other words; undefined ones are NaN."""
+        if self.decimal == "," and re.search(r",(?!\d)", line):
             return None
         try:
-            found.parsed(text, is_map=True)
-        except InputError:
+            return [_number(word) for word in self._words(line)]
+        except ValueError:
             return None
-        return found
 
     def _header(self, head: list[str], count: int) -> Header | None:
         """The last line of the header that names two columns with a unit, or one that speaks of slopes."""
@@ -199,6 +179,19 @@ class Columns:
             first, second = (UNIT_OF_ONE.sub(r"\1", line).strip() for line in alone)
             return Header(f"{alone[0]}; {alone[1]}", (first, second), bool(slopes))
         return Header(slopes[-1].strip(), ("", ""), True) if slopes else None
+
+
+def remedy(options: dict[str, Any]) -> str:
+    """Options as in Python and on the command line.
+
+    Examples
+    --------
+    >>> remedy({"decimal": ",", "usecols": (0, 2)})
+    "pass decimal=',', usecols=(0, 2) (on the command line decimal=comma,usecols=0/2)"
+    """
+    texts = {name: "/".join(map(str, v)) if isinstance(v, tuple) else str(v) for name, v in options.items()}
+    line = ",".join(f"{name}={'comma' if text == ',' else text}" for name, text in texts.items())
+    return f"pass {', '.join(f'{name}={value!r}' for name, value in options.items())} (on the command line {line})"
 
 
 def _fields(line: str, count: int) -> Iterator[list[str]]:

@@ -13,9 +13,9 @@ import numpy as np
 
 from ...core.checks import Floats, whole_number
 from ...core.errors import InputError
-from ...core.files import regular_file, text_of
+from ...core.files import text_of
 from ...core.kinds import explained
-from .columns import Columns, Header, NotPairs
+from .columns import Columns, Header, NotPairs, remedy
 from .measured import METRES, Profile, heights_of, integrated, is_slope, unit_ratio
 
 Seam = Literal["mirror", "step", "wrap"]
@@ -161,7 +161,7 @@ def read_profile(
     >>> profile.x.tolist(), profile.height.tolist(), profile.unit
     ([0.0, 1.0, 3.0], [2.0, 5.0, 4.0], 'um')
     """
-    file = _existing(path)
+    file = Path(path)
     columns = Columns(delimiter, decimal, usecols, skiprows)
     given = _pair_of_units(units)
     if quantity not in ("height", "slope", None):
@@ -193,17 +193,7 @@ def _refuse_other_encoding(file: Path, columns: Columns) -> None:
         except InputError as reason:
             if isinstance(reason, NotPairs) or not str(reason).startswith("line"):
                 continue
-        raise InputError(f"{file}: not in the encoding given; pass encoding={encoding!r} (encoding={encoding})")
-
-
-def _existing(path: str | PathLike[str]) -> Path:
-    try:
-        file = Path(path)
-    except TypeError as reason:
-        raise InputError(f"path: expected the path of a file, got {path!r}") from reason
-    if not regular_file(file).exists():
-        raise InputError(f"{file}: expected a file with a profile, there is none")
-    return file
+        raise InputError(f"{file}: not in the encoding given; {remedy({'encoding': encoding})}")
 
 
 def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
@@ -224,28 +214,21 @@ def _meaning(
     """The units of the columns, and whether the second has slopes; doubt is refused with the option that decides."""
     line, units, slopes = header or Header("", ("", ""), False)
     first, second = given or units
-    if not (first or second):
-        if slopes and quantity is None:
-            raise _doubt(f"{line!r} speaks of slopes", "units=('mm', 'urad')", "quantity='height'")
-        return None, quantity == "slope"
-    length = first if first in METRES else "um"
-    if given is None and (first not in METRES or not (second in METRES or is_slope(second))):
-        pair = (length, "urad" if slopes or is_slope(second) else second if second in METRES else "nm")
-        raise _doubt(f"expected two units of length as in 'x [um], height [nm]', got {line!r}", f"units={pair!r}")
-    wanted = {None: is_slope(second) or slopes, "slope": True, "height": False}[quantity]
-    if wanted != is_slope(second):
-        what = "slopes" if wanted else "heights"
-        raise _doubt(
-            f"{what} have no unit {second!r}", f"units={(length, 'urad' if wanted else 'nm')!r}",
-            *(["quantity='height'"] if quantity is None else []),
-        )  # fmt: skip
-    return (first, second), wanted
-
-
-def _doubt(what: str, *options: str) -> InputError:
-    """What is not clear, and the options that decide, as in Python and on the command line."""
-    line = [re.sub(r"[(') ]", "", option).replace(",", "/") for option in options]
-    return InputError(f"header: {what}; pass {' or '.join(options)} (on the command line {' or '.join(line)})")
+    wanted = {None: slopes or is_slope(second), "slope": True, "height": False}[quantity]
+    if not (first or second) and (quantity is not None or not slopes):
+        return None, wanted
+    known = first in METRES and (second in METRES or is_slope(second))
+    if is_slope(second) == wanted and (known or given is not None):
+        return (first, second), wanted
+    what = (
+        "two units of length as in 'x [um], height [nm]'"
+        if known or not wanted
+        else "units as in 'x [mm], slope [urad]'"
+    )
+    likely = ("mm", "urad") if wanted else ("um", second if second in METRES else "nm")
+    call = remedy({"units": (first if first in METRES else likely[0], likely[1])})
+    alternative = f"; of heights {remedy({'quantity': 'height'})}" if slopes and quantity is None else ""
+    raise InputError(f"header: expected {what}, got {line!r}; {call}{alternative}")
 
 
 def _profile(x: Floats, values: Floats, units: tuple[str, str] | None, slopes: bool) -> Profile:

@@ -77,13 +77,11 @@ def frobenius_error(error: float, kind: ErrorKind, method: str) -> Estimate:
 def scaled(matrix: KernelMatrix, factor: float) -> KernelMatrix:
     """``factor * matrix``."""
     error = frobenius_error(abs(factor) * float(matrix.error), matrix.error.kind, matrix.error.method)
-    return replace(
-        _derived(matrix, factor * matrix.symmetric, error, f"{factor:g}*{_name(matrix)}"),
-        replicates=tuple(factor * part for part in matrix.replicates),
-        reversible=matrix.reversible,
-        mirror_symmetric=matrix.mirror_symmetric,
-        norm_bound=abs(factor) * matrix.norm_bound,
-    )
+    return _derived(
+        matrix, factor * matrix.symmetric, error, f"{factor:g}*{_name(matrix)}",
+        replicates=tuple(factor * part for part in matrix.replicates), reversible=matrix.reversible,
+        mirror_symmetric=matrix.mirror_symmetric, norm_bound=abs(factor) * matrix.norm_bound,
+    )  # fmt: skip
 
 
 def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
@@ -97,13 +95,12 @@ def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
         replicates = tuple(part + first.symmetric for part in second.replicates)
     how = f"sum of ({first.error.method}) and ({second.error.method})"
     error = frobenius_error(float(first.error) + float(second.error), joint_kind(first, second), how)
-    return replace(
-        _derived(first, first.symmetric + second.symmetric, error, f"{_name(first)} + {_name(second)}"),
-        replicates=replicates,
+    return _derived(
+        first, first.symmetric + second.symmetric, error, f"{_name(first)} + {_name(second)}", replicates=replicates,
         reversible=_both(first.reversible, second.reversible),
         mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
         norm_bound=first.norm_bound + second.norm_bound,
-    )
+    )  # fmt: skip
 
 
 def multiplied(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
@@ -113,12 +110,12 @@ def multiplied(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     how = f"product of ({first.error.method}) and ({second.error.method})"
     total = mine * second.norm_bound + (first.norm_bound + mine) * yours
     error = frobenius_error(total, joint_kind(first, second), how)
-    return replace(
-        _derived(first, first.symmetric @ second.symmetric, error, f"{_name(first)} @ {_name(second)}"),
+    return _derived(
+        first, first.symmetric @ second.symmetric, error, f"{_name(first)} @ {_name(second)}",
         reversible=first.reversible if first is second else None,
         mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
         norm_bound=first.norm_bound * second.norm_bound,
-    )
+    )  # fmt: skip
 
 
 def to_power(matrix: KernelMatrix, exponent: int) -> KernelMatrix:
@@ -131,12 +128,11 @@ def to_power(matrix: KernelMatrix, exponent: int) -> KernelMatrix:
         whole = (bound + error) ** exponent - bound**exponent
     power = frobenius_error(whole, matrix.error.kind, f"power {exponent} of: {matrix.error.method}")
     array = np.linalg.matrix_power(matrix.symmetric, exponent)
-    return replace(
-        _derived(matrix, array, power, f"({_name(matrix)})**{exponent}"),
+    return _derived(
+        matrix, array, power, f"({_name(matrix)})**{exponent}",
         reversible=True if exponent == 0 else matrix.reversible,
-        mirror_symmetric=True if exponent == 0 else matrix.mirror_symmetric,
-        norm_bound=bound**exponent,
-    )
+        mirror_symmetric=True if exponent == 0 else matrix.mirror_symmetric, norm_bound=bound**exponent,
+    )  # fmt: skip
 
 
 def tensor_product(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
@@ -145,19 +141,13 @@ def tensor_product(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     mine, yours = float(first.error), float(second.error)
     size = float(np.linalg.norm(first.symmetric)) + mine
     error = mine * float(np.linalg.norm(second.symmetric)) + size * yours
-    whole = _derived(
-        first,
-        np.asarray(np.kron(first.symmetric, second.symmetric), dtype=np.float64),
-        frobenius_error(error, joint_kind(first, second), "tensor product"),
-        f"({_name(first)}) x ({_name(second)})",
-        TensorBasis((first.basis, second.basis)),
-    )
-    return replace(
-        whole,
-        reversible=_both(first.reversible, second.reversible),
+    return _derived(
+        first, np.asarray(np.kron(first.symmetric, second.symmetric), dtype=np.float64),
+        frobenius_error(error, joint_kind(first, second), "tensor product"), f"({_name(first)}) x ({_name(second)})",
+        TensorBasis((first.basis, second.basis)), reversible=_both(first.reversible, second.reversible),
         mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
         norm_bound=first.norm_bound * second.norm_bound,
-    )
+    )  # fmt: skip
 
 
 def in_other_frame(matrix: KernelMatrix) -> KernelMatrix:
@@ -168,25 +158,25 @@ def in_other_frame(matrix: KernelMatrix) -> KernelMatrix:
         )
     flip = reflection_matrix(matrix.basis)
     return replace(
-        _derived(matrix, matrix.symmetric @ flip, matrix.error, f"({_name(matrix)}).in_specular_frame()"),
-        method=matrix.method,
+        matrix,
+        symmetric=matrix.symmetric @ flip,
+        counts=None,
         replicates=tuple(part @ flip for part in matrix.replicates),
-        samples=matrix.samples,
-        unresolved=matrix.unresolved,
-        requested_tolerance=matrix.requested_tolerance,
-        frame="paper" if matrix.frame == "specular" else "specular",
+        symmetrised=False,
+        law=f"({_name(matrix)}).in_specular_frame()",
         # P J is self-adjoint exactly if P commutes with J
         reversible=matrix.reversible if matrix.mirror_symmetric else None,
-        mirror_symmetric=matrix.mirror_symmetric,
-        norm_bound=matrix.norm_bound,
+        frame="paper" if matrix.frame == "specular" else "specular",
+        raw_defect=None,
+        metadata={},
     )
 
 
 def _derived(
-    matrix: KernelMatrix, symmetric: Floats, error: Estimate, law: str, basis: TensorBasis | None = None
+    matrix: KernelMatrix, symmetric: Floats, error: Estimate, law: str, basis: TensorBasis | None = None, **facts: Any
 ) -> KernelMatrix:
     """A matrix that is no sample any more."""
-    return type(matrix)(symmetric, basis or matrix.basis, error, method="algebra", law=law, frame=matrix.frame)
+    return type(matrix)(symmetric, basis or matrix.basis, error, method="algebra", law=law, frame=matrix.frame, **facts)
 
 
 def _name(matrix: KernelMatrix) -> str:
@@ -306,17 +296,14 @@ class KernelMatrix:
     def _check_fields(self) -> None:
         """Refuse plain fields that no matrix has."""
         plain: dict[str, Any] = {"samples": whole_number("samples", self.samples, 0, most=MOST)}
-        plain["unresolved"] = number_between("unresolved", self.unresolved, 0.0, 1.0, closed="low high")
-        plain["norm_bound"] = number_between("norm_bound", self.norm_bound, 0.0, np.inf, closed="low")
-        if self.requested_tolerance is not None:
-            plain["requested_tolerance"] = number_between(
-                "requested_tolerance", self.requested_tolerance, 0.0, np.inf, closed="low"
-            )
+        for name, most in (("unresolved", 1.0), ("norm_bound", np.inf), ("requested_tolerance", np.inf)):
+            if getattr(self, name) is not None or name != "requested_tolerance":  # names of fields of this class
+                plain[name] = number_between(name, getattr(self, name), 0.0, most, closed="low high")
         for name in ("symmetrised", "reversible", "mirror_symmetric"):
             value = getattr(self, name)  # names of fields of this class
             if not isinstance(value, (bool, np.bool_)) and (value is not None or name == "symmetrised"):
                 raise InputError(f"{name}: expected True or False, got {value!r}")
-            plain[name] = None if value is None else bool(value)
+            plain[name] = value if value is None else bool(value)
         instance("method", self.method, str, "'exact'")
         instance("law", self.law, str, "'a smooth wall'")
         instance("metadata", self.metadata, Mapping, "{'made': 'by hand'}")
@@ -325,12 +312,10 @@ class KernelMatrix:
         defect = self.raw_defect
         if defect is not None:
             instance("raw_defect", defect, SymmetryDefect, "SymmetryDefect(0.1)")
-            instance("norm of raw_defect", defect.norm, str, "'Frobenius'")
-            number_between("raw_defect", float(defect), 0.0, np.inf, closed="low")
-            if defect.z_score is not None and not -np.inf <= defect.z_score <= np.inf:
-                raise InputError(f"z_score: expected a number or None, got {defect.z_score!r}")
-        for name, value in plain.items():
-            object.__setattr__(self, name, value)
+            instance("raw_defect.norm", defect.norm, str, "'Frobenius'")
+            if not (0.0 <= defect < np.inf and (defect.z_score is None or -np.inf <= defect.z_score <= np.inf)):
+                raise InputError("raw_defect: expected numbers, got NaN or a defect below 0")
+        self.__dict__.update(plain)
 
     # ---- the arrays ------------------------------------------------------------------------------------------
     @property
@@ -616,8 +601,9 @@ def _check_entries(matrix: KernelMatrix) -> None:
     excess = BEYOND_CHANCE * float(matrix.error) + rounding
     if matrix.error.value != matrix.error.error:
         raise InputError(f"the Frobenius error is stated as {matrix.error.value:g} and as {matrix.error.error:g}")
-    if matrix.counts is not None and not matrix.counts.sum(dtype=np.float64) <= matrix.samples * (1.0 + rounding):
-        raise InputError(f"the counts add up to more than {matrix.samples}, the stated number of samples")
+    # of mirror-symmetric laws every ray counts with its mirror image
+    if matrix.counts is not None and not matrix.counts.sum(dtype=np.float64) <= 2 * matrix.samples * (1.0 + rounding):
+        raise InputError(f"the counts add up to more than twice the stated number of samples, {matrix.samples}")
     if matrix.replicates:
         mean = sum(cast(Any, part) for part in matrix.replicates) / len(matrix.replicates)
         if not np.abs(mean - symmetric).max() <= rounding:
