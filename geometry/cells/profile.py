@@ -66,7 +66,7 @@ def vertices_of_profile(profile: Profile, seam: Seam = "mirror") -> Floats:
         x, height = np.append(x, x[-1] + step), np.append(height, height[0])
     else:
         raise InputError(f"seam: expected 'mirror', 'step' or 'wrap', got {seam!r}")
-    return _rolled(x, height)
+    return rolled(x, height)
 
 
 def _warn_of_units(profile: Profile) -> None:
@@ -83,7 +83,7 @@ def _warn_of_units(profile: Profile) -> None:
     warnings.warn(f"the profile's {doubt}? Give units, for example units=('mm', 'nm')", stacklevel=5)
 
 
-def _rolled(x: Floats, height: Floats) -> Floats:
+def rolled(x: Floats, height: Floats) -> Floats:
     """Start one period (whose last height equals its first) at its highest point and drop joints of flat tops."""
     top = int(np.argmax(height[:-1]))
     period = x[-1] - x[0]

@@ -20,7 +20,7 @@ from ..cells.cell import Cell
 from ..cells.measured import Profile
 from ..cells.miniature import wall_miniature
 from ..cells.mirror_symmetry import has_mirror_axis
-from ..cells.profile import Seam, vertices_of_profile
+from ..cells.profile import Seam, rolled, vertices_of_profile
 from ..cells.toml import read_wall, save_wall
 from ..cells.validity import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
 from ..curves.curve import LARGEST_COORDINATE, Curve
@@ -98,12 +98,13 @@ class Wall(Cell):
     @classmethod
     @explained
     def from_vertices(cls, vertices: ArrayLike, unit: str = "") -> Self:
-        """Return the polygonal wall through the given points; its period is the last x.
+        """Return the polygonal wall through the given points, which span one period.
 
         Parameters
         ----------
         vertices : array_like, shape (n, 2)
-            From (0, y0) to (period, y0).
+            From (0, y0) to (period, y0), or the other way. If they begin elsewhere, the wall is moved so that it begins
+            at a highest point, (0, 0).
         unit : str
             Of lengths, for the axes of pictures.
 
@@ -134,8 +135,12 @@ class Wall(Cell):
         if same.any():
             i = int(same.argmax())
             raise WallError(f"vertices {i} and {i + 1} coincide at {tuple(points[i].tolist())}; leave one out")
+        if points[-1, 0] < points[0, 0]:
+            points = points[::-1]
+        if points[0, 0] != 0.0:
+            points = rolled(*points.T) if points[0, 1] == points[-1, 1] else points - [points[0, 0], 0.0]
         if not points[-1, 0] > 0.0:
-            raise WallError(f"vertices: expected the last x, the period, to be greater than 0, got {points[-1, 0]:g}")
+            raise WallError(f"vertices: expected the last x to be one period from the first, got {points[-1, 0]:g}")
         return cls(Segment.path(points), float(points[-1, 0]), unit=unit)
 
     @classmethod
@@ -180,7 +185,8 @@ class Wall(Cell):
         """
         if not isinstance(x, Profile):
             if height is None:
-                raise InputError("height: expected heights, one for every position, got None")
+                table = "; of a table of two columns pass Wall.from_profile(*numpy.asarray(table).T)"
+                raise InputError(f"height: expected heights, one for every position, got None{table}")
             x = Profile(x, height, unit)  # type: ignore[arg-type]
         elif height is not None:
             raise InputError("height: a Profile has its heights; leave it out")

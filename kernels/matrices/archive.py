@@ -16,7 +16,7 @@ from numpy.lib import format as npy
 
 from ...core.checks import check_memory, whole_number
 from ...core.errors import InputError
-from ...core.files import regular_file, write_whole
+from ...core.files import ending_in, regular_file, write_whole
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
@@ -42,7 +42,7 @@ def write(path: str | Path, record: Record, arrays: Arrays, basis: Basis, *, ove
     InputError
         If the file cannot be written, the basis is of an unknown kind, or the record is not of plain JSON values.
     """
-    target = Path(path)
+    target = ending_in(".npz", path)
     record = {"format": FORMAT, "version": VERSION, **record, "basis": _described(basis, arrays, "basis")}
     try:
         text = json.dumps(record)

@@ -77,6 +77,21 @@ def write_whole(path: Path, content: str | Callable[[IO[bytes]], object], *, ove
         raise InputError(f"{path}: cannot write there ({why}); choose a folder that is writable") from reason
 
 
+def ending_in(suffix: str, path: str | os.PathLike[str]) -> Path:
+    """The path of a file to be written, or an InputError if its name promises another format.
+
+    Examples
+    --------
+    >>> ending_in(".npz", "kernel.csv")
+    Traceback (most recent call last):
+    asperity.errors.InputError: kernel.csv: expected a name that ends in .npz; pass 'kernel.npz'
+    """
+    file = Path(path)
+    if file.suffix[1:].isalpha() and file.suffix.lower() != suffix:
+        raise InputError(f"{file}: expected a name that ends in {suffix}; pass {str(file.with_suffix(suffix))!r}")
+    return file
+
+
 def regular_file(path: Path) -> Path:
     """The path, or an InputError if it names a pipe or a device, where reading may never end, or nothing to be read.
 
