@@ -41,8 +41,8 @@ ROUNDS = 2000
 ALLOWED, BOMB = 100 * 2**20, 4000
 # What a plain value may become.
 OTHERS: tuple[Any, ...] = (
-    math.nan, math.inf, -math.inf, 1e308, -1e308, 10**30, 10**400, -1, 0, 1, True, False, "", "1", "nan", [], [1.0, 2.0],
-    {}, {"a": 1}, 1e-320, 0.5,
+    math.nan, math.inf, -math.inf, 1e308, -1e308, 10**30, 10**400, -1, 0, 1, True, False, "", "1", "nan", [], {},
+    [1.0, 2.0], {"a": 1}, 1e-320, 0.5,
 )  # fmt: skip
 WORDS = (
     "",
@@ -374,7 +374,7 @@ def main() -> None:
         lines.append([kind.name, str(ROUNDS), *(str(counts[name]) for name in ("refused", "read", "wrong"))])
         for found, _ in wrong:
             print(f"{kind.name}: {found}")
-    print_table(["file", "damaged", "refused", "read", "wrong"], lines)
+    print_table("file | damaged | refused | read | wrong", lines)
 
 
 if __name__ == "__main__":

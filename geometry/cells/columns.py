@@ -130,7 +130,11 @@ class Columns:
         comma = replace(self, decimal=",", delimiter=None if self.delimiter == "," else self.delimiter)
         for columns in () if is_map else (comma, self):
             found = columns._readable(lines)
-            if found is not None and (columns is self or any("," in line for line in lines[found.skiprows :])):
+            if (
+                found is not None
+                and found != self
+                and (columns is self or any("," in line for line in lines[found.skiprows :]))
+            ):
                 pairs = ((name, getattr(found, name)) for name in ("decimal", "skiprows", "usecols"))
                 options = {name: value for name, value in pairs if value != getattr(self, name)}
                 choice = " the columns of x and height, for example" if "usecols" in options else ""
@@ -153,7 +157,7 @@ class Columns:
             skiprows=first if any(sizes[self.skiprows : first]) else self.skiprows,
             usecols=_two_columns(table) if count > 2 else None,
         )
-        return None if found == self or np.isnan(table[:, (found.usecols or (0, 1))[0]]).any() else found
+        return None if np.isnan(table[:, (found.usecols or (0, 1))[0]]).any() else found
 
     def _numbers(self, line: str) -> list[float] | None:
         """The numbers in a line, if it has no other words; undefined ones are NaN."""

@@ -156,9 +156,10 @@ class Wall(Cell):
             Positions, strictly increasing, n >= 2; or a whole profile, as `read_profile` returns it.
         height : array_like, shape (n,)
             Heights above any level, in the same unit as ``x``; not given with a `Profile`.
-        seam : {"mirror", "step"}
+        seam : {"mirror", "step", "wrap"}
             How the profile becomes periodic: followed by its mirror image (twice its length), or repeated as it is
-            with a vertical step between its last and its first height.
+            with a vertical step between its last and its first height; or, of a computed periodic profile with equal
+            steps, its first point follows one step after its last.
         unit : str
             Of lengths, for the axes of pictures; a `Profile` has its own.
 

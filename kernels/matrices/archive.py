@@ -70,7 +70,7 @@ def read(path: str | Path, restored: Callable[[Record, Stored, Basis], T]) -> T:
             record = json.loads(str(arrays.read("record", "U", ())))
             if not isinstance(record, dict) or record.get("format") != FORMAT:
                 raise InputError(f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save")
-            if record["version"] != VERSION:
+            if record["version"] != VERSION or record["version"] is True:
                 raise InputError(f"{source} has version {record['version']}, this asperity reads version {VERSION}")
             size = arrays.header("symmetric")[0][0]
             check_memory("symmetric", "the matrix", size**2)
@@ -98,15 +98,17 @@ class Stored:
     def header(self, name: str) -> tuple[tuple[int, ...], str]:
         """Shape and kind of an array, whose data are as long as they say and fit into the file."""
         info = self._members.getinfo(f"{name}.npy")
+        # bzip2 and LZMA, which save does not use, inflate without limit
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{name}: not an array as KernelMatrix.save writes it")
         with self._members.open(info) as stream, warnings.catch_warnings():
             # numpy and Python warn of headers that no save wrote
             warnings.simplefilter("error")
             if npy.read_magic(stream) != (1, 0):
                 raise ValueError(f"{name}: not an array as KernelMatrix.save writes it")
             shape, _, dtype = npy.read_array_header_1_0(stream)
-            # bzip2 and LZMA, which save does not use, inflate without limit
-            most = DEFLATION * self._size if info.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) else 0
-            if info.file_size > most or math.prod(shape) * dtype.itemsize != info.file_size - stream.tell():
+            size = math.prod(shape) * dtype.itemsize
+            if info.file_size > DEFLATION * self._size or size != info.file_size - stream.tell():
                 raise ValueError(f"{name}: {dtype} of shape {shape} does not have the size of its data")
         return shape, dtype.kind if dtype.kind == "U" else f"{dtype.kind}{dtype.itemsize}"
 

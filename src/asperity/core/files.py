@@ -77,6 +77,24 @@ def write_whole(path: Path, content: str | Callable[[IO[bytes]], object], *, ove
         raise InputError(f"{path}: cannot write there ({why}); choose a folder that is writable") from reason
 
 
+def check_writable(path: Path) -> None:
+    """Refuse a new file that cannot be written, before the work for it is done.
+
+    Examples
+    --------
+    >>> check_writable(Path("/dev/null/wall.toml"))
+    Traceback (most recent call last):
+    asperity.errors.InputError: /dev/null/wall.toml: cannot write there (Not a directory); choose another folder
+    """
+    try:
+        if not path.exists():
+            TemporaryDirectory(dir=path.parent, prefix=".asperity-").cleanup()
+    except OSError as reason:
+        raise InputError(
+            f"{path}: cannot write there ({reason.strerror}); choose a folder that is writable"
+        ) from reason
+
+
 def ending_in(suffix: str, path: str | os.PathLike[str]) -> Path:
     """The path of a file to be written, or an InputError if its name promises another format.
 
@@ -97,6 +115,8 @@ def regular_file(path: Path) -> Path:
 
     Files of the system, as in /proc, have no size; reading some of them waits for ever.
     """
+    if "\0" in str(path):
+        raise InputError(f"path: expected the name of a file, got {str(path)!r}")
     try:
         status = path.stat() if path.exists() else None
     except OSError as reason:  # of a name that is too long
