@@ -35,7 +35,7 @@ from asperity.errors import AsperityError
 
 from .pages import print_table
 
-ROUNDS = 2000
+ROUNDS = 500
 # Bytes that reading a small file may take, of which the search for crossings takes up to 60 MB; the files are below
 # 100 kB. A bomb is an array of so many zeros a side, 128 MB.
 ALLOWED, BOMB = 100 * 2**20, 4000

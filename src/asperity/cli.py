@@ -21,9 +21,9 @@ from .core.estimates import described
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile. This is mirrored to make it periodic, or repeated with
-profile.txt:seam=step or, if it is periodic, seam=wrap; more of its parameters, joined by commas: units=um/nm, delimiter=semicolon, decimal=comma,
-usecols=0/2, skiprows=3, encoding=latin-1, row=5, quantity=slope, sort=yes, interpolate=yes,
-detrend=1."""
+profile.txt:seam=step or, if it is periodic, seam=wrap; more of its parameters, joined by commas: units=um/nm,
+delimiter=semicolon, decimal=comma, usecols=0/2, skiprows=3, encoding=latin-1, row=5, quantity=slope, sort=yes,
+interpolate=yes, detrend=1."""
 
 
 class OneLineErrors(click.Group):
