@@ -1,5 +1,6 @@
 """Measured profiles: from positions and heights to the vertices of a wall, and from files to positions and heights."""
 
+import re
 import sys
 from types import ModuleType, SimpleNamespace
 
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asperity import geometry as geo
+from asperity import kernels as ker
 from asperity.errors import InputError
 from asperity.geometry.cells import profile as profiles
 
@@ -75,7 +77,7 @@ def test_a_period_has_the_heights_of_the_profile_and_of_its_mirror_image(rows):
         ([[0, 1], [2, 3]], [[0, 1], [2, 3]], "step", r"got shapes \(2, 2\) and \(2, 2\)"),
         ([0, 1, 2], [0, 1], "mirror", r"got shapes \(3,\) and \(2,\)"),
         ([0], [0], "mirror", "at least 2"),
-        ([0, 1], [0, 1], "glue", "seam: expected 'mirror' or 'step', got 'glue'"),
+        ([0, 1], [0, 1], "glue", "seam: expected 'mirror', 'step' or 'wrap', got 'glue'"),
     ],
 )
 def test_unsuitable_profiles_are_refused_with_the_worst_rows(x, height, seam, words):
@@ -113,7 +115,8 @@ def test_two_column_profiles_are_read(text, tmp_path):
         ("x y\nfoo bar\n0 1\n1 2\n", "line 2"),
         ("0 1\nx y\n", "line 2"),
         ("0 1\n", "at least two rows"),
-        ("", "at least two rows of x and height, got 0"),
+        ("", "cannot read a file of 0 bytes"),
+        ("\n", "at least two rows of x and height, got 0"),
         ("x y\n0 1\n", "at least two rows of x and height, got 1"),
         ("# a\n0 1\n1 2\nx y\n3 4", "line 4: expected two numbers, x and height, got 'x y'"),
         ("x y\nz w\n0 1\n1 2", "line 2"),
@@ -162,7 +165,7 @@ def test_line_scans_of_instruments_are_read_from_files_that_are_no_columns(instr
     with pytest.raises(InputError, match=r"scan\.xyz, line 3"):
         geo.read_profile(tmp_path / "scan.xyz")
     (tmp_path / "map.TXT").write_text("1 2 3\n4 5 6\n")
-    assert geo.read_profile(tmp_path / "map.TXT").height.tolist() == [1.0, 3.0, 2.0]
+    assert geo.read_profile(tmp_path / "map.TXT", row=0).height.tolist() == [1.0, 3.0, 2.0]
 
 
 def test_of_a_map_one_row_along_x_is_taken(instrument, tmp_path):
@@ -384,3 +387,168 @@ def test_a_profile_refuses_what_is_none():
     for x, height in (([0], [1]), ([0, np.nan], [1, 2]), ([0, 1], [1]), ([0, 1], ["a", "b"])):
         with pytest.raises(InputError):
             geo.Profile(x, height)
+
+
+# ---- what the columns are ----------------------------------------------------------------------------------------
+def profile_of(folder, text, **options):
+    (folder / "scan.txt").write_text(text, encoding="utf-8")
+    return geo.read_profile(folder / "scan.txt", **options)
+
+
+def advised(refused):
+    """The options that a message says to pass, as a dict and as on the command line."""
+    found = re.search(r"pass (.*?) \(on the command line (.*?)\)", str(refused.value))
+    return eval(f"dict({found[1]})"), found[2]
+
+
+@pytest.mark.parametrize("unit", ["px", "V", "a.u.", "pixel"])
+def test_units_that_are_given_count_before_those_of_the_header(tmp_path, unit):
+    for head in (f"x [{unit}], height [nm]", f"x [um], height [{unit}]"):
+        text = f"{head}\n0 1000\n1 2000\n"
+        with pytest.raises(InputError, match="header: expected two units") as refused:
+            profile_of(tmp_path, text)
+        options, words = advised(refused)
+        assert options == {"units": ("um", "nm")}
+        assert profile_of(tmp_path, text, **options).height.tolist() == [1.0, 2.0]
+        assert geo.wall_from_text(f"{tmp_path / 'scan.txt'}:{words}").unit == "um"
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "position mm;slope urad", "position [mm]; slope [urad]", "x(mm)\tSlope (urad)",
+        "# x-position [mm]; y-slope [urad]",
+        "L(mm)  R1 slope x 1E6  /urad", "x_mm, slope_urad", "x mm slope µrad", "X unit:mm\nZ unit: urad",
+        "x [mm]  slope [um/m]",
+    ],
+)  # fmt: skip
+def test_slopes_are_recognised_with_and_without_brackets_and_integrated(tmp_path, head):
+    """The derivative of x^2/2 in 10^-6 is x; the trapezoidal rule is exact for it."""
+    x = np.linspace(0.0, 4.0, 9)
+    rows = "\n".join(f"{at:g} {at:g}" for at in x)
+    skipped = next(k for k, line in enumerate(f"{head}\n{rows}".splitlines()) if line == "0 0")
+    profile = profile_of(tmp_path, f"{head}\n{rows}", skiprows=skipped)
+    assert profile.unit == "mm" and profile.height == pytest.approx(0.5e-6 * x**2, rel=1e-9, abs=1e-18)
+
+
+def test_slopes_without_units_are_integrated_only_if_told(tmp_path):
+    text = "# measured slope\n0 0\n2 1\n1 0.5\n"
+    with pytest.raises(InputError, match=r"header: expected units as in 'x \[mm\], slope \[urad\]'") as refused:
+        profile_of(tmp_path, text)
+    assert "quantity='height'" in str(refused.value)
+    options, _ = advised(refused)
+    assert profile_of(tmp_path, text, **options).height == pytest.approx([0, 0.25e-6, 1e-6])
+    assert profile_of(tmp_path, text, quantity="slope").height.tolist() == [0.0, 0.25, 1.0]
+    assert profile_of(tmp_path, text, quantity="height").height.tolist() == [0.0, 1.0, 0.5]
+    assert geo.wall_from_text(f"{tmp_path / 'scan.txt'}:quantity=slope").depth == 1.0
+
+
+@pytest.mark.parametrize(
+    ("head", "options"),
+    [
+        ("x mm; slope mm", {}), ("x mm; slope urad", {"quantity": "height"}), ("x mm; z nm", {"quantity": "slope"}),
+        ("x mm; slope urad", {"units": ("mm", "nm")}), ("x deg; z nm", {}), ("x mm; z", {}),
+    ],
+)  # fmt: skip
+def test_contradictions_of_quantity_and_unit_are_refused_with_the_call_that_decides(tmp_path, head, options):
+    text = f"{head}\n0 1\n1 2\n2 2\n"
+    with pytest.raises(InputError, match=r"scan\.txt, header: expected") as refused:
+        profile_of(tmp_path, text, **options)
+    call, _ = advised(refused)
+    assert profile_of(tmp_path, text, **{**options, **call}).unit in ("mm", "um")
+
+
+@pytest.mark.parametrize("rows", [3, 20, 51, 300])
+@pytest.mark.parametrize(
+    ("line", "head", "expected"),
+    [
+        ("{x} {y} {h}", "", {"usecols": (0, 2)}), ("{k} {x} {h}", "", {"usecols": (1, 2)}),
+        ("{x};{h}", "1 of 2\nmade by hand\n", {"skiprows": 2}),
+        ("{k};{x};{h};9", "a 1\n", {"usecols": (1, 2), "skiprows": 1}),
+        ("{cx};{ch}", "", {"decimal": ","}),
+        ("{cx} {ch} {ch}", "scan 1\n", {"decimal": ",", "skiprows": 1, "usecols": (0, 2)}),
+    ],
+)  # fmt: skip
+def test_a_text_that_is_no_two_columns_is_refused_with_the_options_that_read_it(tmp_path, rows, line, head, expected):
+    x = 0.25 * np.arange(rows)
+    h = np.cos(3.0 * x).round(3) + 0.0001
+    lines = []
+    for k in range(rows):
+        words = {"k": k, "x": f"{x[k]:.2f}", "y": 7.5, "h": f"{h[k]:.4f}"}
+        lines.append(line.format(**words, cx=words["x"].replace(".", ","), ch=words["h"].replace(".", ",")))
+    text = head + "\n".join(lines)
+    with pytest.raises(InputError, match="expected two numbers") as refused:
+        profile_of(tmp_path, text)
+    options, words = advised(refused)
+    assert options == expected
+    found = profile_of(tmp_path, text, **options)
+    assert found.x == pytest.approx(x) and found.height == pytest.approx(h, abs=1e-9)
+    assert geo.wall_from_text(f"{tmp_path / 'scan.txt'}:{words}") == geo.Wall.from_profile(found)
+
+
+@pytest.mark.parametrize("word", ["Bad", "***", "NaN", "-nan", "n/a", "---", "1.#QNAN", "#N/A", "inf", "null", "****"])
+def test_the_words_of_instruments_for_no_height_are_undefined_heights(tmp_path, word):
+    for between in (" ", ";", "\t"):
+        profile = profile_of(tmp_path, f"0{between}1\n1{between}{word}\n2{between}3 # a comment\n")
+        assert profile.undefined == 1 and profile.interpolated().height.tolist() == [1.0, 2.0, 3.0]
+    with pytest.raises(InputError, match="line 2"):
+        profile_of(tmp_path, f"0 1\n{word} 1\n2 3\n")
+
+
+# ---- periodic profiles, and units that cannot be right -----------------------------------------------------------
+def test_a_computed_periodic_profile_wraps_round():
+    x = np.arange(4) / 4.0
+    wall = geo.Wall.from_profile(x, [0.0, -1.0, -2.0, -1.0], seam="wrap")
+    assert wall.vertices.tolist() == [[0, 0], [0.25, -1], [0.5, -2], [0.75, -1], [1, 0]]
+    with pytest.raises(InputError, match="'wrap' expects equal steps"):
+        geo.Wall.from_profile([0.0, 1.0, 3.0], [0.0, -1.0, -2.0], seam="wrap")
+
+
+@pytest.mark.parametrize(
+    ("unit", "width", "height", "warns"),
+    [
+        ("m", 160.0, 3e-6, True), ("mm", 160.0, 3e-3, False), ("m", 160.0, 3.0, False), ("m", 0.5, 1e-8, False),
+        ("", 1000.0, 1e-8, True), ("m", 160.0, 0.0, False),
+    ],
+)  # fmt: skip
+def test_a_width_of_160_metres_for_micrometres_is_taken_for_mixed_units(unit, width, height, warns):
+    import warnings
+
+    profile = geo.Profile(np.linspace(0.0, width, 5), height * np.array([0, 1, 0, 1, 0]), unit)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        geo.Wall.from_profile(profile)
+    assert [("positions in a smaller unit" in str(one.message)) for one in told] == [True] * warns
+
+
+# ---- vertices begin anywhere -------------------------------------------------------------------------------------
+@given(
+    st.lists(st.tuples(st.integers(1, 9), st.integers(0, 5)), min_size=2, max_size=8), st.integers(0, 7), st.booleans()
+)
+def test_vertices_may_begin_anywhere_and_run_either_way(rows, roll, backwards):
+    """In whole numbers: the same cell, and so the same law."""
+    x, down = np.cumsum([0, *(step for step, _ in rows)]), np.array([0, *(-depth for _, depth in rows[:-1]), 0])
+    wall = geo.Wall.from_vertices(np.column_stack([x, down]))
+    k, period = roll % len(rows), x[-1]
+    moved = np.concatenate([x[k:], period + x[1 : k + 1]]) + 100
+    vertices = np.column_stack([moved, np.concatenate([down[k:], down[1 : k + 1]]) + 3 * (k > 0) - 7])
+    if backwards:
+        vertices = vertices[::-1]
+    found = geo.Wall.from_vertices(vertices)
+    assert found.period == period and np.ptp(found.vertices[:, 1]) == np.ptp(wall.vertices[:, 1])
+    assert found.arc_length == pytest.approx(wall.arc_length, rel=1e-14)
+    at = np.linspace(0.05, 0.95, 40) * period
+    first = np.interp(at, wall.cell.vertices[:, 0], wall.cell.vertices[:, 1])
+    heights = np.concatenate([found.cell.vertices[:-1], np.add(found.cell.vertices, (period, 0))])
+    assert any(np.allclose(np.interp(at + shift, *heights.T), first, atol=1e-12) for shift in range(period))
+
+
+def test_the_law_of_rolled_and_reversed_vertices_is_the_same():
+    vertices = np.array([(0, 0), (0.25, -0.5), (0.375, -0.125), (0.75, -0.75), (1, 0)])
+    rolled = np.add(np.concatenate([vertices[2:], np.add(vertices[1:3], (1, 0))]), (5, 2))
+    bins = ker.Bins(16)
+    expected = ker.discretise(ker.WallLaw(geo.Wall.from_vertices(vertices)), bins)
+    for given_vertices in (rolled, rolled[::-1], vertices[::-1], np.subtract(vertices, (3, 0))):
+        found = ker.discretise(ker.WallLaw(geo.Wall.from_vertices(given_vertices)), bins)
+        difference = np.linalg.norm(found.symmetric - expected.symmetric)
+        assert difference <= float(found.error) + float(expected.error) + 1e-12

@@ -1,23 +1,46 @@
-"""Two columns of numbers in a text, with the units that its header names."""
+"""Two columns of numbers in a text, the header that names them, and the options for which a text is readable."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core.checks import Floats, whole_number
 from ...core.errors import InputError
 from ...core.long_runs import counted
-from .measured import METRES
+from .measured import METRES, is_slope
 
-UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
+BRACKETED = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
+# A sign # of a comment, but not that of an undefined number as in 1.#QNAN and #N/A.
+COMMENT = re.compile(r"(?:^|(?<=[\s,;]))#(?!N/?A\b|\w+!|#+\s*$)(.*)")
+# Words of instruments and tables for a height that is not known.
+UNDEFINED = re.compile(
+    r"[+-]?(nan|inf|infinity|n/?a|bad|null|none|void|invalid|missing|undef(ined)?|masked|[*?.-]+|\d\.#\w+|#\S*|)",
+    re.IGNORECASE,
+)
+# Lines that name the unit of one column each.
+UNIT_OF_ONE = re.compile(r"^\W*[xyz]\w*[ _]units?\s*[:=]\s*(\S+)", re.IGNORECASE)
+# Characters between the names of columns, from the surest to the least sure.
+BETWEEN = (r"[;\t]+", r",", r"\s{2,}", r"(?<=[\])])\s+", r"\s+")
+# A header may have this fraction of rows that look like data.
+STRAY = 0.1
 
 
 class NotPairs(InputError):
     """A text that holds something else than one pair of numbers a line."""
+
+
+class Header(NamedTuple):
+    """A line that names two columns: their units, empty where there is none, and whether it speaks of slopes."""
+
+    line: str
+    units: tuple[str, str]
+    slopes: bool
 
 
 @dataclass(frozen=True)
@@ -39,32 +62,30 @@ class Columns:
         whole_number("skiprows", self.skiprows, 0)
         if self.usecols is not None:
             try:
-                first, second = self.usecols
+                _, _ = (whole_number("usecols", column, 0) for column in self.usecols)
             except (TypeError, ValueError) as reason:
                 raise InputError(f"usecols: expected two numbers such as (0, 2), got {self.usecols!r}") from reason
-            whole_number("usecols", first, 0)
-            whole_number("usecols", second, 0)
 
-    def parsed(self, text: str) -> tuple[Floats, Floats, tuple[str, str] | None]:
-        """Positions, heights and the units of the header, if it has any.
+    def parsed(self, text: str, *, is_map: bool = False) -> tuple[Floats, Floats, Header | None]:
+        """Positions, heights and the header, if it says something; of a map only NotPairs is raised.
 
         Raises
         ------
         NotPairs
-            If fewer than half of the lines are pairs.
+            If fewer than half of the lines are pairs, and no other options make them pairs.
         InputError
-            If a line is not a pair.
+            If a line is not a pair; the message has the options that make it one.
         """
         rows: list[tuple[float, float]] = []
         head: list[str] = []
-        names_allowed = True
+        names_allowed, count = True, 2
         for number, line in enumerate(counted(text.splitlines(), "line", "profile"), start=1):
             if number <= self.skiprows:
+                head.append(line)
                 continue
-            data, _, comment = line.partition("#")
-            words = self._words(data)
+            words = self._words(line)
             if not words:
-                head += [comment] if not rows else []
+                head += [line] if not rows else []
                 continue
             try:
                 rows.append(self._pair(words))
@@ -74,14 +95,15 @@ class Columns:
                     head.append(line)
                     continue
                 words_of = "expected two numbers, x and height,"
-                raise self._failure(text, f"line {number}: {words_of} got {line.strip()[:80]!r}") from None
-            names_allowed = False
+                raise self._failure(text, f"line {number}: {words_of} got {line.strip()[:80]!r}", is_map) from None
+            names_allowed, count = False, len(words)
         if len(rows) < 2:
             raise InputError(f"all lines: expected at least two rows of x and height, got {len(rows)}")
         table = np.array(rows)
-        return table[:, 0], table[:, 1], self._units(head)
+        return table[:, 0], table[:, 1], self._header(head, count)
 
-    def _words(self, data: str) -> list[str]:
+    def _words(self, line: str) -> list[str]:
+        data = COMMENT.sub("", line) if "#" in line else line
         if self.delimiter is not None and self.delimiter != " ":
             words = [word.strip() for word in data.split(self.delimiter)] if data.strip() else []
         else:
@@ -96,45 +118,134 @@ class Columns:
             if max(self.usecols) >= len(words):
                 raise ValueError
             x, height = (words[column] for column in self.usecols)
-        return float(x), float(height or "nan")
+        position = _number(x)
+        if math.isnan(position):
+            raise ValueError
+        return position, _number(height)
 
-    def _failure(self, text: str, words: str) -> InputError:
+    def _failure(self, text: str, words: str, is_map: bool) -> InputError:
         """A fault in a file of pairs, or a file of another kind."""
-        total, pairs = 0, 0
-        for data in self._lines(text):
-            total += 1
-            try:
-                self._pair(data)
-            except ValueError:
-                continue
-            pairs += 1
-        return InputError(words) if 2 * pairs >= total else NotPairs(words)
+        lines = text.splitlines()
+        counts = [len(found) for found in map(self._words, lines[self.skiprows :]) if found]
+        comma = replace(self, decimal=",", delimiter=None if self.delimiter == "," else self.delimiter)
+        for columns in () if is_map else (comma, self):
+            found = columns._readable(lines)
+            if (
+                found is not None
+                and found != self
+                and (columns is self or any("," in line for line in lines[found.skiprows :]))
+            ):
+                pairs = ((name, getattr(found, name)) for name in ("decimal", "skiprows", "usecols"))
+                options = {name: value for name, value in pairs if value != getattr(self, name)}
+                choice = " the columns of x and height, for example" if "usecols" in options else ""
+                return InputError(f"{words};{choice} {remedy(options)}")
+        pairs_there = counts.count(2) if self.usecols is None else len(counts)
+        return InputError(words) if 2 * pairs_there >= len(counts) else NotPairs(words)
 
-    def _lines(self, text: str) -> Iterator[list[str]]:
-        for line in text.splitlines()[self.skiprows :]:
-            words = self._words(line.partition("#")[0])
-            if words:
-                yield words
+    def _readable(self, lines: list[str]) -> Columns | None:
+        """These columns after lines of a header, and two of them where there are more; None if that is no remedy."""
+        rows = [self._numbers(line) for line in lines]
+        sizes = [-1 if row is None else len(row) for row in rows]
+        count = next((size for size in reversed(sizes) if size), -1)
+        first = max((k + 1 for k, size in enumerate(sizes) if size not in (0, count)), default=0)
+        stray = sizes[self.skiprows : first].count(count)
+        table = np.array([row for row in rows[max(first, self.skiprows) :] if row])
+        if count < 2 or len(table) < 2 or stray > STRAY * len(table):
+            return None
+        found = replace(
+            self,
+            skiprows=first if any(sizes[self.skiprows : first]) else self.skiprows,
+            usecols=_two_columns(table) if count > 2 else None,
+        )
+        return None if np.isnan(table[:, (found.usecols or (0, 1))[0]]).any() else found
 
-    def _units(self, head: list[str]) -> tuple[str, str] | None:
-        """The units of the last line of the header that names any."""
-        for line in reversed(head):
-            found = UNIT.findall(line)
-            if any(unit in METRES for unit in found):
-                if self.usecols is not None and max(self.usecols) < len(found):
-                    found = [found[column] for column in self.usecols]
-                if len(found) == 2 and all(unit in METRES for unit in found):
-                    return found[0], found[1]
-                raise InputError(
-                    f"header: expected two units of length as in 'x [um], height [nm]', got {line.strip()!r}; "
-                    "give units=('um', 'nm')"
-                )
-        return None
+    def _numbers(self, line: str) -> list[float] | None:
+        """The numbers in a line, if it has no other words; undefined ones are NaN."""
+        if self.decimal == "," and re.search(r",(?!\d)", line):
+            return None
+        try:
+            return [_number(word) for word in self._words(line)]
+        except ValueError:
+            return None
+
+    def _header(self, head: list[str], count: int) -> Header | None:
+        """The last line of the header that names two columns with a unit, or one that speaks of slopes."""
+        chosen = (0, 1) if self.usecols is None else tuple(self.usecols)
+        for line in reversed([line for line in head if not UNIT_OF_ONE.match(line)]):
+            for fields in _fields(line, count):
+                names = [fields[column] for column in chosen]
+                units = [_unit(name) for name in names]
+                if any(unit in METRES or is_slope(unit) for unit in units):
+                    return Header(line.strip(), (units[0], units[1]), "slope" in names[1].lower())
+        alone = [line for line in head if UNIT_OF_ONE.match(line)]
+        slopes = [line for line in head if "slope" in line.lower()]
+        if len(alone) == 2:
+            first, second = (UNIT_OF_ONE.sub(r"\1", line).strip() for line in alone)
+            return Header(f"{alone[0]}; {alone[1]}", (first, second), bool(slopes))
+        return Header(slopes[-1].strip(), ("", ""), True) if slopes else None
+
+
+def remedy(options: dict[str, Any]) -> str:
+    """Options as in Python and on the command line.
+
+    Examples
+    --------
+    >>> remedy({"decimal": ",", "usecols": (0, 2)})
+    "pass decimal=',', usecols=(0, 2) (on the command line decimal=comma,usecols=0/2)"
+    """
+    texts = {name: "/".join(map(str, v)) if isinstance(v, tuple) else str(v) for name, v in options.items()}
+    line = ",".join(f"{name}={'comma' if text == ',' else text}" for name, text in texts.items())
+    return f"pass {', '.join(f'{name}={value!r}' for name, value in options.items())} (on the command line {line})"
+
+
+def _fields(line: str, count: int) -> Iterator[list[str]]:
+    """The names of so many columns."""
+    bare = line.strip().lstrip("#;%*! \t")
+    for between in BETWEEN:
+        fields = [field.strip() for field in re.split(between, bare) if field.strip()]
+        if len(fields) == count and not any(
+            field[0].isdigit() or len(BRACKETED.findall(field)) > 1 for field in fields
+        ):
+            yield fields
+    words = bare.split()
+    pairs = [" ".join(pair) for pair in zip(words[::2], words[1::2], strict=False)]
+    if len(words) == 2 * count and all(map(_unit, pairs)):
+        yield pairs
+
+
+def _unit(name: str) -> str:
+    """The unit in a name of a column: in brackets, or its last word if that is a unit."""
+    found = BRACKETED.findall(name)
+    if found:
+        return str(found[-1])
+    last = re.split(r"[\s_/:]+", name)[-1]
+    return last if last != name and (last in METRES or is_slope(last)) else ""
+
+
+def _two_columns(table: Floats) -> tuple[int, int]:
+    """The likeliest columns of x and of height: not the first if it counts lines beside positions."""
+    steps = np.diff(table, axis=0)
+    rising = (steps > 0.0).all(axis=0) | (steps < 0.0).all(axis=0)
+    counts = (steps[:, 0] == 1.0).all() and table[0, 0] in (0.0, 1.0) and bool(rising[1])
+    x = 1 if counts else int(np.argmax(rising[:-1]))
+    return x, table.shape[1] - 1 if table.shape[1] == 3 else x + 1
+
+
+def _number(word: str) -> float:
+    """A finite number, or NaN for a word that stands for none."""
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if math.isfinite(value) and "_" not in word and word.isascii():
+        return value
+    if not UNDEFINED.fullmatch(word):
+        raise ValueError(word)
+    return math.nan
 
 
 def _is_number(word: str) -> bool:
     try:
-        float(word)
+        return not math.isnan(_number(word))
     except ValueError:
         return False
-    return True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -11,12 +12,18 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, finite_array, finite_number, frozen, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
+from ..curves.curve import LARGEST_COORDINATE
 
 # Metres of the units that headers of profiles have; micro is written in three ways.
 METRES = {
     "pm": 1e-12, "Å": 1e-10, "A": 1e-10, "angstrom": 1e-10, "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6,
     "micron": 1e-6, "microns": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "km": 1e3, "in": 0.0254,
     "mil": 2.54e-5, "ft": 0.3048,
+}  # fmt: skip
+# Radians of the units of angles that slopes have.
+RADIANS = {
+    "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6, "μrad": 1e-6, "microrad": 1e-6, "nrad": 1e-9,
+    "deg": math.pi / 180.0, "°": math.pi / 180.0, "arcmin": math.pi / 10800.0, "arcsec": math.pi / 648000.0,
 }  # fmt: skip
 
 
@@ -55,6 +62,9 @@ class Profile:
             )
         if not isinstance(self.unit, str):
             raise InputError(f"unit: expected the name of a unit such as 'µm', got {self.unit!r}")
+        largest = max(float(np.abs(x).max()), float(np.nanmax(np.abs(height), initial=0.0)))
+        if largest > LARGEST_COORDINATE:
+            raise InputError(f"x and height: expected numbers of at most {LARGEST_COORDINATE:g}, got {largest:g}")
         object.__setattr__(self, "x", frozen(x))
         object.__setattr__(self, "height", frozen(height))
 
@@ -145,3 +155,43 @@ def unit_ratio(given: str, wanted: str) -> float:
         if unit not in METRES:
             raise InputError(f"units: expected units of length such as {', '.join(list(METRES)[:8])}, got {unit!r}")
     return finite_number("units", float(f"{METRES[given] / METRES[wanted]:.12g}"))
+
+
+def is_slope(unit: str) -> bool:
+    """Whether slopes are measured in this unit: one of angles, or one length per another.
+
+    Examples
+    --------
+    >>> is_slope("urad"), is_slope("nm/mm"), is_slope("mm")
+    (True, True, False)
+    """
+    above, per, below = unit.partition("/")
+    return unit in RADIANS or bool(per and above in METRES and below in METRES)
+
+
+def integrated(x: Floats, slopes: Floats, unit: str) -> tuple[Floats, Floats]:
+    """Positions in their order, and the heights in the same unit by the trapezoidal rule, 0 at the first.
+
+    Parameters
+    ----------
+    slopes : ndarray
+        In ``unit``, which `is_slope`; without one they are ratios.
+
+    Examples
+    --------
+    >>> integrated(np.array([0.0, 2.0, 4.0]), np.array([0.0, 1.0, 3.0]), "")[1].tolist()
+    [0.0, 1.0, 5.0]
+    """
+    if unit in RADIANS:
+        angles = slopes * RADIANS[unit]
+        if np.nanmax(np.abs(angles)) >= 0.5 * math.pi:
+            raise InputError(f"slopes: expected angles below a right one, got {np.nanmax(np.abs(slopes)):g} {unit}")
+        slopes = np.tan(angles)
+    elif unit:
+        above, _, below = unit.partition("/")
+        slopes = slopes * unit_ratio(above, below)
+    ordered = Profile(x, slopes).sorted()
+    if ordered.undefined:
+        raise InputError(f"slopes: {ordered.undefined} of {len(ordered.x)} are undefined; leave those lines out")
+    steps = 0.5 * (ordered.height[1:] + ordered.height[:-1]) * np.diff(ordered.x)
+    return ordered.x, np.concatenate([[0.0], np.cumsum(steps)])

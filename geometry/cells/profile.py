@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Sequence
 from os import PathLike
@@ -12,16 +13,23 @@ import numpy as np
 
 from ...core.checks import Floats, whole_number
 from ...core.errors import InputError
-from ...core.files import regular_file
+from ...core.files import text_of
 from ...core.kinds import explained
-from .columns import Columns, NotPairs
-from .measured import Profile, heights_of, unit_ratio
+from .columns import Columns, Header, NotPairs, remedy
+from .measured import METRES, Profile, heights_of, integrated, is_slope, unit_ratio
 
-Seam = Literal["mirror", "step"]
+Seam = Literal["mirror", "step", "wrap"]
+Quantity = Literal["height", "slope"]
 
 
 # A profile that climbs so much for its length has heights in a smaller unit than its positions, or is no surface.
 STEEPEST = 100.0
+# One so wide, in metres, and so flat has positions in a smaller unit; one flatter still is no surface in any unit.
+WIDEST, FLATTEST_WIDE, FLATTEST = 10.0, 1e-6, 1e-9
+# Steps of a profile that wraps round differ by at most this fraction of them: positions are printed with few digits.
+EVEN = 1e-3
+# What headers of maps say.
+MAP = re.compile(r"^\W*(width|channel)\s*:", re.IGNORECASE | re.MULTILINE)
 # Words for separators in texts that describe a wall, where the characters have another meaning.
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 
@@ -41,25 +49,41 @@ def vertices_of_profile(profile: Profile, seam: Seam = "mirror") -> Floats:
             f"x: expected strictly increasing positions, got {x[worst]:.10g} at row {worst} and {x[worst + 1]:.10g} "
             f"at row {worst + 1}; use Profile.sorted() (sort=yes), which also averages heights at one position"
         )
-    slope = float(np.abs(np.diff(height)).sum() / (x[-1] - x[0]))
-    if slope > STEEPEST:
-        warnings.warn(
-            f"the profile's mean slope is {slope:.3g}: are the heights in a smaller unit than the positions? "
-            "Give units, for example units=('mm', 'nm')",
-            stacklevel=4,
-        )
+    _warn_of_units(profile)
     if seam == "mirror":
         x = np.concatenate([x, 2.0 * x[-1] - x[-2::-1]])
         height = np.concatenate([height, height[-2::-1]])
     elif seam == "step":
         if height[-1] != height[0]:
             x, height = np.append(x, x[-1]), np.append(height, height[0])
+    elif seam == "wrap":
+        step = (x[-1] - x[0]) / (len(x) - 1)
+        if np.abs(np.diff(x) - step).max() > EVEN * step:
+            raise InputError(
+                "seam: 'wrap' expects equal steps between positions; append the first height at the end of the "
+                "period and pass seam='step'"
+            )
+        x, height = np.append(x, x[-1] + step), np.append(height, height[0])
     else:
-        raise InputError(f"seam: expected 'mirror' or 'step', got {seam!r}")
-    return _rolled(x, height)
+        raise InputError(f"seam: expected 'mirror', 'step' or 'wrap', got {seam!r}")
+    return rolled(x, height)
 
 
-def _rolled(x: Floats, height: Floats) -> Floats:
+def _warn_of_units(profile: Profile) -> None:
+    x, height = profile
+    width, change = float(x[-1] - x[0]), float(np.ptp(height))
+    slope = float(np.abs(np.diff(height)).sum()) / width
+    wide = width * METRES.get(profile.unit, 0.0) > WIDEST
+    if slope > STEEPEST:
+        doubt = f"mean slope is {slope:.3g}: are the heights in a smaller unit than the positions"
+    elif 0.0 < change < (FLATTEST_WIDE if wide else FLATTEST) * width:
+        doubt = f"width is {width:.3g} and its heights differ by {change:.3g}: are the positions in a smaller unit"
+    else:
+        return
+    warnings.warn(f"the profile's {doubt}? Give units, for example units=('mm', 'nm')", stacklevel=5)
+
+
+def rolled(x: Floats, height: Floats) -> Floats:
     """Start one period (whose last height equals its first) at its highest point and drop joints of flat tops."""
     top = int(np.argmax(height[:-1]))
     period = x[-1] - x[0]
@@ -84,6 +108,7 @@ def read_profile(
     usecols: Sequence[int] | None = None,
     skiprows: int = 0,
     encoding: str = "utf-8-sig",
+    quantity: Quantity | None = None,
 ) -> Profile:
     """Read a profile from a two-column text file or, with the extra ``profiles``, from an instrument's file.
 
@@ -91,13 +116,16 @@ def read_profile(
     ----------
     path : path
         Text: one "x height" pair a line, separated by blanks, tabs, commas or semicolons; lines that start with #
-        are comments and a first line of column names is skipped. Units in brackets there, ``x [um], height [nm]``, are
-        honoured: heights are converted to the unit of x. Any other file, also a text that is not mostly pairs, is given
-        to the SurfaceTopography package.
+        are comments and a first line of column names is skipped. Units there, ``x [um], height [nm]`` or
+        ``x mm; slope urad``, are honoured: heights are converted to the unit of x, and slopes integrated. Heights such
+        as ``Bad``, ``***`` and ``NaN`` are undefined. Any other file, also a text with the header of a map, is given to
+        the SurfaceTopography package.
     row : int, optional
-        Of a map z(x, y) take this row along x; the middle one by default. Line scans have no rows.
+        Of a map z(x, y) take this row along x; the middle one by default. Line scans have no rows. A text of many
+        columns is a map if it is given.
     units : str or (str, str), optional
-        Of positions and heights, or of both, where the file does not say it or says it wrong.
+        Of positions and heights, or of both, where the file does not say it or says it wrong; of slopes units such as
+        ``"urad"`` or ``"nm/mm"``.
     delimiter : str, optional
         The one separator of columns; two in a row have an undefined height between them.
     decimal : str
@@ -108,6 +136,9 @@ def read_profile(
         So many lines are left out at the beginning.
     encoding : str
         Of the text.
+    quantity : {"height", "slope"}, optional
+        Of the second column, where units do not tell. Slopes are integrated by the trapezoidal rule, from height 0 at
+        the first position.
 
     Returns
     -------
@@ -117,7 +148,8 @@ def read_profile(
     Raises
     ------
     InputError
-        If the file cannot be read; the message says why, with the line.
+        If the file cannot be read, or it is not clear what its columns are; the message has the line, and the options
+        with which it is read.
 
     Examples
     --------
@@ -129,34 +161,39 @@ def read_profile(
     >>> profile.x.tolist(), profile.height.tolist(), profile.unit
     ([0.0, 1.0, 3.0], [2.0, 5.0, 4.0], 'um')
     """
-    file = _existing(path)
+    file = Path(path)
     columns = Columns(delimiter, decimal, usecols, skiprows)
     given = _pair_of_units(units)
+    if quantity not in ("height", "slope", None):
+        raise InputError(f"quantity: expected 'height' or 'slope', got {quantity!r}")
     try:
-        text = file.read_text(encoding=encoding)
-    except (LookupError, TypeError) as reason:
-        raise InputError(f"encoding: expected the name of one such as 'latin-1', got {encoding!r}") from reason
-    except UnicodeDecodeError:
-        return _read_instrument(file, row, given, "it is not text")
+        text = text_of(file, encoding)
+    except InputError as reason:
+        if not isinstance(reason.__cause__, UnicodeDecodeError):
+            raise
+        _refuse_other_encoding(file, columns)
+        return _read_instrument(file, row, given, quantity, "it is not text")
     try:
-        return _profile(*columns.parsed(text), given)
+        x, values, header = columns.parsed(text, is_map=row is not None or MAP.search(text) is not None)
+        return _profile(x, values, *_meaning(header, given, quantity))
     except NotPairs as reason:
         try:
-            return _read_instrument(file, row, given, str(reason))
+            return _read_instrument(file, row, given, quantity, str(reason))
         except InputError as other:
             raise InputError(f"{file}, {reason}; {str(other).removeprefix(f'{file}: ')}") from other
     except InputError as reason:
         raise InputError(f"{file}, {reason}") from None
 
 
-def _existing(path: str | PathLike[str]) -> Path:
-    try:
-        file = Path(path)
-    except TypeError as reason:
-        raise InputError(f"path: expected the path of a file, got {path!r}") from reason
-    if not regular_file(file).exists():
-        raise InputError(f"{file}: expected a file with a profile, there is none")
-    return file
+def _refuse_other_encoding(file: Path, columns: Columns) -> None:
+    """Refuse a text of pairs in another encoding than the one given, with its name."""
+    for encoding in ("utf-16", "latin-1"):
+        try:
+            columns.parsed(text_of(file, encoding))
+        except InputError as reason:
+            if isinstance(reason, NotPairs) or not str(reason).startswith("line"):
+                continue
+        raise InputError(f"{file}: not in the encoding given; {remedy({'encoding': encoding})}")
 
 
 def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
@@ -165,21 +202,46 @@ def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
     pair = (units, units) if isinstance(units, str) else units
     try:
         first, second = pair
-        unit_ratio(second, first)
-    except (TypeError, ValueError) as reason:
+        unit_ratio(first if is_slope(second) else second, first)
+    except (AttributeError, TypeError, ValueError) as reason:
         raise InputError(f"units: expected two units of length such as ('um', 'nm'), got {units!r}") from reason
     return first, second
 
 
-def _profile(x: Floats, height: Floats, written: tuple[str, str] | None, given: tuple[str, str] | None) -> Profile:
+def _meaning(
+    header: Header | None, given: tuple[str, str] | None, quantity: Quantity | None
+) -> tuple[tuple[str, str] | None, bool]:
+    """The units of the columns, and whether the second has slopes; doubt is refused with the option that decides."""
+    line, units, slopes = header or Header("", ("", ""), False)
+    first, second = given or units
+    wanted = {None: slopes or is_slope(second), "slope": True, "height": False}[quantity]
+    if not (first or second) and (quantity is not None or not slopes):
+        return None, wanted
+    known = first in METRES and (second in METRES or is_slope(second))
+    if is_slope(second) == wanted and (known or given is not None):
+        return (first, second), wanted
+    what = (
+        "two units of length as in 'x [um], height [nm]'"
+        if known or not wanted
+        else "units as in 'x [mm], slope [urad]'"
+    )
+    likely = ("mm", "urad") if wanted else ("um", second if second in METRES else "nm")
+    call = remedy({"units": (first if first in METRES else likely[0], likely[1])})
+    alternative = f"; of heights {remedy({'quantity': 'height'})}" if slopes and quantity is None else ""
+    raise InputError(f"header: expected {what}, got {line!r}; {call}{alternative}")
+
+
+def _profile(x: Floats, values: Floats, units: tuple[str, str] | None, slopes: bool) -> Profile:
     """In the unit of x."""
-    units = given or written
-    if units is None:
-        return Profile(x, height)
-    return Profile(x, height * unit_ratio(units[1], units[0]), units[0])
+    if slopes:
+        x, height = integrated(x, values, units[1] if units else "")
+        return Profile(x, height, units[0] if units else "")
+    return Profile(x, values) if units is None else Profile(x, values * unit_ratio(units[1], units[0]), units[0])
 
 
-def _read_instrument(file: Path, row: int | None, given: tuple[str, str] | None, why: str) -> Profile:
+def _read_instrument(
+    file: Path, row: int | None, given: tuple[str, str] | None, quantity: Quantity | None, why: str
+) -> Profile:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -204,4 +266,5 @@ def _read_instrument(file: Path, row: int | None, given: tuple[str, str] | None,
         count = heights.shape[1]
         chosen = count // 2 if row is None else whole_number("row", row, 0, most=count - 1)
         heights, positions = heights[:, chosen], positions[0][:, chosen]
-    return _profile(np.asarray(positions, dtype=np.float64), heights, (unit, unit) if unit else None, given)
+    header = Header("", (unit, unit), False) if unit in METRES else None
+    return _profile(np.asarray(positions, dtype=np.float64), heights, *_meaning(header, given, quantity))

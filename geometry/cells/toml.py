@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import InputError
-from ...core.files import text_of, write_whole
+from ...core.files import ending_in, text_of, write_whole
 from ...core.long_runs import counted
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
@@ -38,7 +38,7 @@ def save_wall(wall: Cell, path: str | PathLike[str], overwrite: bool = False) ->
         document["pieces"] = [_table(piece) for piece in wall.pieces]
     if wall.islands:
         document["islands"] = [{"pieces": [_table(piece) for piece in loop]} for loop in wall.islands]
-    write_whole(Path(path), tomli_w.dumps(document), overwrite=overwrite)
+    write_whole(ending_in(".toml", path), tomli_w.dumps(document), overwrite=overwrite)
 
 
 def read_wall(path: str | PathLike[str]) -> tuple[list[Curve], float, list[list[Curve]], str]:

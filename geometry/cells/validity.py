@@ -214,7 +214,7 @@ def _check_heights(pieces: Pieces, vertices: Floats, size: Floats, label: str) -
             excess[i] = max(excess[i], top - JOIN_TOLERANCE * size[1])
     worst = int(np.argmax(excess))
     if excess[worst] > 0.0:
-        points = pieces[worst].flattened(1e-3 * float(size.max()))
+        points = pieces[worst].point([0.0, *pieces[worst].turning_points(1), 1.0])
         x, y = points[np.argmax(points[:, 1])]
         raise WallError(
             f"piece {worst}{label} rises to y = {y:.6g} at x = {x:.6g}: expected y <= 0; "

@@ -12,7 +12,7 @@ from ...core.checks import Floats
 from ...core.errors import WallError
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
-from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
+from .curve import LARGEST_COORDINATE, Curve, Point, as_point, stretch_factors, uniform_parameters
 
 # Up to this span (radians) the points of an arc are computed from its chord and semi-axes. The difference of two
 # angles near pi/2 has an error of eps, so the angles give a span of 1e-8 with 8 digits only, the chord with 16.
@@ -22,6 +22,8 @@ CHORD_SPAN = 1.0
 # Relative difference up to which two semi-axes count as equal after a stretch. Two products and two quotients, each
 # rounded by eps/2, separate equal semi-axes by at most 2 eps.
 CIRCLE_TOLERANCE = 4.0 * EPS
+
+SMALLEST_AXIS = 1.0 / LARGEST_COORDINATE
 
 # Error of a computed end point, relative to |c| + a: c + a cos t rounds three times.
 END_ROUNDING = 4.0 * EPS
@@ -85,8 +87,8 @@ class Arc(Curve):
         middle = as_point("Arc center", center)
         axes = as_point("Arc semi_axes", (semi_axes, semi_axes) if np.ndim(semi_axes) == 0 else semi_axes)
         angles = as_point("Arc start and end", (start, end))
-        if min(axes) <= 0.0:
-            raise WallError(f"Arc semi_axes: expected numbers greater than 0, got {axes}")
+        if min(axes) < SMALLEST_AXIS:
+            raise WallError(f"Arc semi_axes: expected numbers greater than 0, at least {SMALLEST_AXIS:g}, got {axes}")
         span = abs(angles[1] - angles[0])
         if not 0.0 < span <= 2.0 * math.pi * (1.0 + 2.0 * EPS):
             raise WallError(

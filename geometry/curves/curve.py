@@ -15,6 +15,11 @@ from ...core.checks import Floats, shortened
 from ...core.errors import WallError
 from ...core.kinds import explained_class
 
+# Of a coordinate; products of three lengths stay far below the largest double.
+LARGEST_COORDINATE = 1e100
+# Steps of a flattened curve.
+MOST_STEPS = 1e7
+
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
@@ -100,14 +105,14 @@ def point_array(points: Iterable[Point]) -> Floats:
 
 
 def as_point(name: str, value: Any) -> Point:
-    """Return ``value`` as a pair of finite floats, or raise a WallError that begins with ``name``."""
+    """Return ``value`` as a pair of floats of at most 1e100, or raise a WallError that begins with ``name``."""
     try:
         x, y = value
         point = float(x), float(y)
     except (TypeError, ValueError, OverflowError) as reason:
         raise WallError(f"{name}: expected a point (x, y), got {shortened(value)}") from reason
-    if not (math.isfinite(point[0]) and math.isfinite(point[1])):
-        raise WallError(f"{name}: expected finite coordinates, got {point}")
+    if not (abs(point[0]) <= LARGEST_COORDINATE and abs(point[1]) <= LARGEST_COORDINATE):
+        raise WallError(f"{name}: expected finite coordinates of at most {LARGEST_COORDINATE:g}, got {point}")
     return point
 
 
@@ -123,4 +128,6 @@ def uniform_parameters(tolerance: float, steps: float) -> Floats:
     """Return parameters from 0 to 1 in at least ``steps`` equal steps; ``tolerance`` must be positive."""
     if not tolerance > 0.0:
         raise WallError(f"flattened: expected a tolerance greater than 0, got {tolerance!r}")
+    if not steps <= MOST_STEPS:
+        raise WallError(f"flattened: expected a tolerance for at most {MOST_STEPS:g} points, got {steps:.3g}")
     return np.linspace(0.0, 1.0, max(1, math.ceil(steps)) + 1)

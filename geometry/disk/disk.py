@@ -7,13 +7,13 @@ and the ledger proves them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, finite_array, frozen, positive_number
+from ...core.checks import Floats, angles, finite_array, frozen, of_one_shape, positive_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 
@@ -78,11 +78,13 @@ class Disk:
     inertia : float
         J, the moment of inertia about the centre, greater than 0. A uniform disk has J = m/2 and a ring J = m;
         J > m is accepted, although no real disk of radius 1 has such an inertia.
+    radius : float
+        1, the unit of lengths. A disk of radius R moves as Disk(m, J / R^2), with R omega in place of omega.
 
     Raises
     ------
     InputError
-        If a parameter is not a finite number greater than 0.
+        If a parameter is not a finite number greater than 0, or the radius is not 1.
 
     Notes
     -----
@@ -100,10 +102,17 @@ class Disk:
 
     mass: float = 1.0
     inertia: float = 0.5
+    radius: InitVar[float] = 1.0
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, radius: float) -> None:
         object.__setattr__(self, "mass", positive_number("mass", self.mass))
         object.__setattr__(self, "inertia", positive_number("inertia", self.inertia))
+        if positive_number("radius", radius) != 1.0:
+            raise InputError(
+                f"radius: expected 1, the unit of lengths, got {radius!r}; a disk of radius R moves as "
+                f"Disk(mass={self.mass!r}, inertia={self.inertia / float(radius) ** 2!r}), whose inertia is J / R**2, "
+                "with R * omega in place of omega"
+            )
 
     @property
     def foreshortening(self) -> float:
@@ -198,7 +207,7 @@ class Disk:
         if not np.all(norms > 0.0):
             raise InputError(f"speed: expected numbers greater than 0, got {float(np.min(norms))!r}")
         try:
-            theta, psi, norms = np.broadcast_arrays(angles("theta", theta), angles("psi", psi), norms)
+            theta, psi, norms = of_one_shape(theta=angles("theta", theta), psi=angles("psi", psi), norm=norms)
         except ValueError as reason:
             if isinstance(reason, InputError):
                 raise

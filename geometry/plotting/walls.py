@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, finite_array
+from ...core.checks import Floats, angles, finite_array, of_one_shape
 from ...core.kinds import explained
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     >>> draw_wall(geo.triangular_teeth(3.1)).get_ylabel()
     'y (stretched 29.1 times against x)'
     """
-    entries, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
+    entries, incoming = of_one_shape(x=finite_array("x", x), theta=angles("theta", theta))
     if ax is None:
         from matplotlib import pyplot
 

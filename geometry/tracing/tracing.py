@@ -20,6 +20,7 @@ from ...core.checks import (
     instance,
     number_between,
     numbers,
+    of_one_shape,
     whole_number,
 )
 from ...core.kinds import explained
@@ -186,7 +187,7 @@ def trace(
     """
     _check_wall(wall)
     rays = numbers("x", x), numbers("theta", theta)
-    shape = np.broadcast_shapes(*(array.shape for array in rays))
+    shape = of_one_shape(x=rays[0], theta=rays[1])[0].shape
     whole_number("max_collisions", max_collisions, 1)
     # the compiled functions take arrays of one kind: aligned, contiguous and writable
     full = (array if array.shape == shape else np.broadcast_to(array, shape) for array in rays)

@@ -84,7 +84,8 @@ def wall_from_text(text: str) -> Wall:
         one that ends in ``.toml`` is read by ``load_wall``, any other by ``read_profile``. The path of a profile may
         be followed by parameters: ``seam=step`` (see ``Wall.from_profile``), those of ``read_profile``
         (``units=um/nm``, ``delimiter=semicolon``, ``decimal=comma``, ``usecols=0/2``, ``skiprows=3``,
-        ``encoding=latin-1``, ``row=5``), and ``sort=yes``, ``interpolate=yes``, ``detrend=1`` (see `Profile`).
+        ``encoding=latin-1``, ``row=5``,
+        ``quantity=slope``), and ``sort=yes``, ``interpolate=yes``, ``detrend=1`` (see `Profile`).
 
     Raises
     ------
@@ -173,6 +174,7 @@ def _flag(text: str) -> bool:
 PREPARATIONS = ("seam", "sort", "interpolate", "detrend")
 PROFILE_PARAMETERS: Mapping[str, Callable[[str], Any]] = MappingProxyType({
     "seam": str, "sort": _flag, "interpolate": _flag, "detrend": int, "row": int, "skiprows": int, "encoding": str,
+    "quantity": str,
     "units": lambda text: tuple(text.split("/")) if "/" in text else text,
     "usecols": lambda text: tuple(int(part) for part in text.split("/")),
     "delimiter": lambda text: SEPARATORS.get(text, text),

@@ -20,10 +20,10 @@ from ..cells.cell import Cell
 from ..cells.measured import Profile
 from ..cells.miniature import wall_miniature
 from ..cells.mirror_symmetry import has_mirror_axis
-from ..cells.profile import Seam, vertices_of_profile
+from ..cells.profile import Seam, rolled, vertices_of_profile
 from ..cells.toml import read_wall, save_wall
 from ..cells.validity import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
-from ..curves.curve import Curve
+from ..curves.curve import LARGEST_COORDINATE, Curve
 from ..curves.segment import Segment
 from ..disk.disk import Disk
 from ..scene.plan import TracePlan, plan_of
@@ -98,12 +98,13 @@ class Wall(Cell):
     @classmethod
     @explained
     def from_vertices(cls, vertices: ArrayLike, unit: str = "") -> Self:
-        """Return the polygonal wall through the given points; its period is the last x.
+        """Return the polygonal wall through the given points, which span one period.
 
         Parameters
         ----------
         vertices : array_like, shape (n, 2)
-            From (0, y0) to (period, y0).
+            From (0, y0) to (period, y0), or the other way. If they begin elsewhere, the wall is moved so that it begins
+            at a highest point, (0, 0).
         unit : str
             Of lengths, for the axes of pictures.
 
@@ -123,16 +124,23 @@ class Wall(Cell):
             raise WallError(f"vertices: expected points (x, y), got {vertices!r}") from reason
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
             raise WallError(f"vertices: expected an array of shape (n, 2) with n >= 2, got shape {points.shape}")
-        bad = ~np.isfinite(points).all(axis=1)
+        bad = ~(np.abs(points) <= LARGEST_COORDINATE).all(axis=1)
         if bad.any():
             i = int(bad.argmax())
-            raise WallError(f"vertices: expected finite coordinates, got {tuple(points[i].tolist())} at vertex {i}")
+            most = f"of at most {LARGEST_COORDINATE:g}"
+            raise WallError(
+                f"vertices: expected finite coordinates {most}, got {tuple(points[i].tolist())} at vertex {i}"
+            )
         same = np.all(points[1:] == points[:-1], axis=1)
         if same.any():
             i = int(same.argmax())
             raise WallError(f"vertices {i} and {i + 1} coincide at {tuple(points[i].tolist())}; leave one out")
+        if points[-1, 0] < points[0, 0]:
+            points = points[::-1]
+        if points[0, 0] != 0.0:
+            points = rolled(*points.T) if points[0, 1] == points[-1, 1] else points - [points[0, 0], 0.0]
         if not points[-1, 0] > 0.0:
-            raise WallError(f"vertices: expected the last x, the period, to be greater than 0, got {points[-1, 0]:g}")
+            raise WallError(f"vertices: expected the last x to be one period from the first, got {points[-1, 0]:g}")
         return cls(Segment.path(points), float(points[-1, 0]), unit=unit)
 
     @classmethod
@@ -148,9 +156,10 @@ class Wall(Cell):
             Positions, strictly increasing, n >= 2; or a whole profile, as `read_profile` returns it.
         height : array_like, shape (n,)
             Heights above any level, in the same unit as ``x``; not given with a `Profile`.
-        seam : {"mirror", "step"}
+        seam : {"mirror", "step", "wrap"}
             How the profile becomes periodic: followed by its mirror image (twice its length), or repeated as it is
-            with a vertical step between its last and its first height.
+            with a vertical step between its last and its first height; or, of a computed periodic profile with equal
+            steps, its first point follows one step after its last.
         unit : str
             Of lengths, for the axes of pictures; a `Profile` has its own.
 
@@ -177,7 +186,8 @@ class Wall(Cell):
         """
         if not isinstance(x, Profile):
             if height is None:
-                raise InputError("height: expected heights, one for every position, got None")
+                table = "; of a table of two columns pass Wall.from_profile(*numpy.asarray(table).T)"
+                raise InputError(f"height: expected heights, one for every position, got None{table}")
             x = Profile(x, height, unit)  # type: ignore[arg-type]
         elif height is not None:
             raise InputError("height: a Profile has its heights; leave it out")

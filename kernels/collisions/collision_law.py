@@ -20,6 +20,7 @@ from ...core.checks import (
     finite_number,
     generator,
     instance,
+    of_one_shape,
     shortened,
     whole_number,
 )
@@ -171,7 +172,7 @@ class VelocityLaw(TensorLaw):
         ``theta`` and ``psi`` in (0, pi) are the angles of minus the incoming velocity; they broadcast. Psi' is
         pi - psi, and psi in a term without flip.
         """
-        pairs = np.broadcast_arrays(angles("theta", theta), angles("psi", psi))
+        pairs = of_one_shape(theta=angles("theta", theta), psi=angles("psi", psi))
         terms = [weight * _expectation(law, flip, function, *pairs) for weight, law, flip in self.parts_checked()]
         return np.asarray(sum(terms[1:], terms[0]))
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
+from operator import contains
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.lib import format as npy
 
+from ...core.checks import check_memory, whole_number
 from ...core.errors import InputError
-from ...core.files import regular_file, write_whole
+from ...core.files import ending_in, regular_file, write_whole
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
@@ -21,10 +24,11 @@ from ..bases.panels import Panels
 from ..bases.tensor import TensorBasis
 
 FORMAT, VERSION = "asperity kernel matrix", 1
+# Of a record, in characters; and of a byte of a deflated member, in bytes that it inflates to.
+LONGEST_RECORD, DEFLATION = 2**24, 1032
 
 Record = dict[str, Any]
 Arrays = dict[str, np.ndarray[Any, Any]]
-Stored = Mapping[str, np.ndarray[Any, Any]]
 T = TypeVar("T")
 
 
@@ -38,12 +42,15 @@ def write(path: str | Path, record: Record, arrays: Arrays, basis: Basis, *, ove
     InputError
         If the file cannot be written, the basis is of an unknown kind, or the record is not of plain JSON values.
     """
-    target = Path(path)
+    target = ending_in(".npz", path)
     record = {"format": FORMAT, "version": VERSION, **record, "basis": _described(basis, arrays, "basis")}
     try:
-        arrays["record"] = np.array(json.dumps(record))
-    except TypeError as reason:
+        text = json.dumps(record)
+    except (TypeError, ValueError, RecursionError) as reason:
         raise InputError(f"metadata: expected numbers, text, lists and dicts of these ({reason})") from reason
+    if len(text) > LONGEST_RECORD:
+        raise InputError(f"metadata: expected at most {LONGEST_RECORD} characters as JSON, got {len(text)}")
+    arrays["record"] = np.array(text)
     write_whole(target, lambda stream: np.savez_compressed(stream, **arrays), overwrite=overwrite)  # type: ignore[arg-type]
     return target
 
@@ -59,13 +66,15 @@ def read(path: str | Path, restored: Callable[[Record, Stored, Basis], T]) -> T:
     source = Path(path)
     try:
         with regular_file(source).open("rb") as stream, zipfile.ZipFile(stream) as members:
-            arrays = _Members(members)
-            record = json.loads(str(arrays["record"]))
+            arrays = Stored(members, source.stat().st_size)
+            record = json.loads(str(arrays.read("record", "U", ())))
             if not isinstance(record, dict) or record.get("format") != FORMAT:
                 raise InputError(f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save")
-            if record["version"] != VERSION:
+            if record["version"] != VERSION or record["version"] is True:
                 raise InputError(f"{source} has version {record['version']}, this asperity reads version {VERSION}")
-            return restored(record, arrays, _basis_from(record["basis"], arrays))
+            size = arrays.header("symmetric")[0][0]
+            check_memory("symmetric", "the matrix", size**2)
+            return restored(record, arrays, _basis_from(record["basis"], arrays, size))
     except FileNotFoundError as reason:
         raise InputError(f"cannot read {source}: {reason.strerror}") from reason
     # zipfile, zlib, json and numpy fail each in its own way on a damaged file
@@ -77,31 +86,43 @@ def read(path: str | Path, restored: Callable[[Record, Stored, Basis], T]) -> T:
         ) from reason
 
 
-class _Members(Mapping[str, np.ndarray[Any, Any]]):
+class Stored:
     """The arrays in a zip archive, each inflated when it is asked for and not before its header is checked."""
 
-    def __init__(self, members: zipfile.ZipFile) -> None:
-        self._members = members
+    def __init__(self, members: zipfile.ZipFile, size: int) -> None:
+        self._members, self._size = members, size
 
-    def __getitem__(self, name: str) -> np.ndarray[Any, Any]:
+    def __contains__(self, name: str) -> bool:
+        return f"{name}.npy" in self._members.namelist()
+
+    def header(self, name: str) -> tuple[tuple[int, ...], str]:
+        """Shape and kind of an array, whose data are as long as they say and fit into the file."""
         info = self._members.getinfo(f"{name}.npy")
-        with self._members.open(info) as stream:
+        # bzip2 and LZMA, which save does not use, inflate without limit
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{name}: not an array as KernelMatrix.save writes it")
+        with self._members.open(info) as stream, warnings.catch_warnings():
+            # numpy and Python warn of headers that no save wrote
+            warnings.simplefilter("error")
             if npy.read_magic(stream) != (1, 0):
                 raise ValueError(f"{name}: not an array as KernelMatrix.save writes it")
             shape, _, dtype = npy.read_array_header_1_0(stream)
-            if (
-                dtype.kind not in ("U" if name == "record" else "iuf")
-                or math.prod(shape) * dtype.itemsize != info.file_size - stream.tell()
-            ):
+            size = math.prod(shape) * dtype.itemsize
+            if info.file_size > DEFLATION * self._size or size != info.file_size - stream.tell():
                 raise ValueError(f"{name}: {dtype} of shape {shape} does not have the size of its data")
+        return shape, dtype.kind if dtype.kind == "U" else f"{dtype.kind}{dtype.itemsize}"
+
+    def read(self, name: str, kinds: str, shape: tuple[int | range, ...]) -> np.ndarray[Any, Any]:
+        """An array of one of the kinds and of a shape, of which a range allows several."""
+        found, kind = self.header(name)
+        allowed = [entry if isinstance(entry, range) else (entry,) for entry in shape]
+        if kind not in kinds.split() or len(found) != len(shape) or not all(map(contains, allowed, found)):
+            raise ValueError(f"{name}: expected {kinds} of shape {shape}, got {kind} of shape {found}")
+        info = self._members.getinfo(f"{name}.npy")
+        if kind == "U" and info.file_size > 4 * LONGEST_RECORD + npy.BUFFER_SIZE:
+            raise ValueError(f"{name}: longer than any record")
         with self._members.open(info) as stream:
             return np.asarray(npy.read_array(stream, allow_pickle=False))
-
-    def __iter__(self) -> Iterator[str]:
-        return (name.removesuffix(".npy") for name in self._members.namelist())
-
-    def __len__(self) -> int:
-        return len(self._members.namelist())
 
 
 def _described(basis: Basis, arrays: Arrays, name: str) -> dict[str, Any]:
@@ -119,15 +140,18 @@ def _described(basis: Basis, arrays: Arrays, name: str) -> dict[str, Any]:
     raise InputError(f"basis: expected Bins, Legendre, Panels or a TensorBasis of these, got {basis!r}")
 
 
-def _basis_from(described: dict[str, Any], arrays: Stored) -> Basis:
+def _basis_from(described: dict[str, Any], arrays: Stored, most: int) -> Basis:
+    """The basis described, if it has at most so many functions."""
     kind = described["kind"]
     if kind == "TensorBasis":
-        return TensorBasis(tuple(_basis_from(factor, arrays) for factor in described["factors"]))
+        return TensorBasis(tuple(_basis_from(factor, arrays, most) for factor in described["factors"]))
     if kind == "Legendre":
         return Legendre(described["n"], described["weight"])
-    edges = arrays[described["edges"]]
+    edges = arrays.read(described["edges"], "f8", (range(most + 2),))
     if kind == "Panels":
-        return Panels(edges, described["degree"], described["weight"])
+        return Panels(edges, whole_number("degree", described["degree"], 0, most=most), described["weight"])
+    if kind != "Bins":
+        raise ValueError(f"basis: expected Bins, Legendre, Panels or TensorBasis, got {kind!r}")
     equal = Bins(edges.size - 1, described["weight"])
     # equal bins are known by their number, which also makes finding a bin faster
     return equal if np.array_equal(equal.edges, edges) else Bins(edges, described["weight"])
@@ -143,17 +167,18 @@ def store_array(part: Any, arrays: Arrays, name: str) -> str:
     return "sparse"
 
 
-def load_array(kind: str, arrays: Stored, name: str) -> Any:
-    """The array of a kind that `store_array` put there."""
+def load_array(kind: str, arrays: Stored, name: str, size: int) -> Any:
+    """The array of shape (size, size) of a kind that `store_array` put there."""
     if kind == "dense":
-        return arrays[name]
+        return arrays.read(name, "f8", (size, size))
     from scipy.sparse import csr_array
 
-    data, indices, indptr = (arrays[f"{name}.{field}"] for field in ("data", "indices", "indptr"))
-    if indices.dtype.kind != "i" or indptr.dtype.kind != "i" or not data.size == indices.size == indptr[-1]:
-        raise ValueError(f"{name}: expected as many indices as entries, {data.size}, all whole numbers")
-    rows, columns = arrays[f"{name}.shape"].tolist()
-    part = csr_array((data, indices, indptr), shape=(rows, columns))
+    data = arrays.read(f"{name}.data", "f8", (range(size * size + 1),))
+    indices = arrays.read(f"{name}.indices", "i4 i8", (data.size,))
+    indptr = arrays.read(f"{name}.indptr", "i4 i8", (size + 1,))
+    if indptr[-1] != data.size or arrays.read(f"{name}.shape", "i8", (2,)).tolist() != [size, size]:
+        raise ValueError(f"{name}: expected {data.size} entries of a matrix of shape {(size, size)}")
+    part = csr_array((data, indices, indptr), shape=(size, size))
     # compiled code trusts the indices
     part.check_format(full_check=True)
     return part

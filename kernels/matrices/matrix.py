@@ -7,6 +7,7 @@ errors are normal.
 
 from __future__ import annotations
 
+import json
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, number_between, whole_number
+from ...core.checks import Floats, finite_array, finite_number, frozen, instance, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.frames import data_array, data_frame
@@ -38,6 +39,8 @@ GRID = 240
 # A file is refused if its entries are wrong by more than this many times the stated error, which is that of 95 of 100
 # matrices, and the rounding of an entry.
 BEYOND_CHANCE, ENTRY_ROUNDING = 10.0, 64.0 * EPS
+# Of samples, and of counts: they are held as int64.
+MOST = 2**63 - 1
 # What a file holds as it is.
 PLAIN_FIELDS = (
     "symmetrised", "samples", "method", "law", "reversible", "mirror_symmetric", "frame", "requested_tolerance",
@@ -75,14 +78,12 @@ def frobenius_error(error: float, kind: ErrorKind, method: str) -> Estimate:
 def scaled(matrix: KernelMatrix, factor: float) -> KernelMatrix:
     """``factor * matrix``."""
     error = frobenius_error(abs(factor) * float(matrix.error), matrix.error.kind, matrix.error.method)
-    return replace(
-        _derived(matrix, factor * matrix.symmetric, error, f"{factor:g}*{_name(matrix)}"),
-        replicates=tuple(factor * part for part in matrix.replicates),
+    return _derived(
+        matrix, factor * matrix.symmetric, error, f"{factor:g}*{_name(matrix)}",
+        replicates=tuple(factor * part for part in matrix.replicates), reversible=matrix.reversible,
+        mirror_symmetric=matrix.mirror_symmetric, norm_bound=abs(factor) * matrix.norm_bound,
         beyond=_beyond(lambda number: factor * number, matrix),
-        reversible=matrix.reversible,
-        mirror_symmetric=matrix.mirror_symmetric,
-        norm_bound=abs(factor) * matrix.norm_bound,
-    )
+    )  # fmt: skip
 
 
 def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
@@ -96,14 +97,13 @@ def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
         replicates = tuple(part + first.symmetric for part in second.replicates)
     how = f"sum of ({first.error.method}) and ({second.error.method})"
     error = frobenius_error(float(first.error) + float(second.error), joint_kind(first, second), how)
-    return replace(
-        _derived(first, first.symmetric + second.symmetric, error, f"{_name(first)} + {_name(second)}"),
-        replicates=replicates,
+    return _derived(
+        first, first.symmetric + second.symmetric, error, f"{_name(first)} + {_name(second)}", replicates=replicates,
         reversible=_both(first.reversible, second.reversible),
         mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
         norm_bound=first.norm_bound + second.norm_bound,
         beyond=_beyond(operator.add, first, second),
-    )
+    )  # fmt: skip
 
 
 def multiplied(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
@@ -113,13 +113,13 @@ def multiplied(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     how = f"product of ({first.error.method}) and ({second.error.method})"
     total = mine * second.norm_bound + (first.norm_bound + mine) * yours
     error = frobenius_error(total, joint_kind(first, second), how)
-    return replace(
-        _derived(first, first.symmetric @ second.symmetric, error, f"{_name(first)} @ {_name(second)}"),
+    return _derived(
+        first, first.symmetric @ second.symmetric, error, f"{_name(first)} @ {_name(second)}",
         reversible=first.reversible if first is second else None,
         mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
         norm_bound=first.norm_bound * second.norm_bound,
         beyond=_beyond(operator.mul, first, second),
-    )
+    )  # fmt: skip
 
 
 def to_power(matrix: KernelMatrix, exponent: int) -> KernelMatrix:
@@ -132,13 +132,12 @@ def to_power(matrix: KernelMatrix, exponent: int) -> KernelMatrix:
         whole = (bound + error) ** exponent - bound**exponent
     power = frobenius_error(whole, matrix.error.kind, f"power {exponent} of: {matrix.error.method}")
     array = np.linalg.matrix_power(matrix.symmetric, exponent)
-    return replace(
-        _derived(matrix, array, power, f"({_name(matrix)})**{exponent}"),
+    return _derived(
+        matrix, array, power, f"({_name(matrix)})**{exponent}",
         reversible=True if exponent == 0 else matrix.reversible,
-        mirror_symmetric=True if exponent == 0 else matrix.mirror_symmetric,
-        norm_bound=bound**exponent,
+        mirror_symmetric=True if exponent == 0 else matrix.mirror_symmetric, norm_bound=bound**exponent,
         beyond=_beyond(lambda number: number**exponent, matrix),
-    )
+    )  # fmt: skip
 
 
 def tensor_product(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
@@ -147,19 +146,13 @@ def tensor_product(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     mine, yours = float(first.error), float(second.error)
     size = float(np.linalg.norm(first.symmetric)) + mine
     error = mine * float(np.linalg.norm(second.symmetric)) + size * yours
-    whole = _derived(
-        first,
-        np.asarray(np.kron(first.symmetric, second.symmetric), dtype=np.float64),
-        frobenius_error(error, joint_kind(first, second), "tensor product"),
-        f"({_name(first)}) x ({_name(second)})",
-        TensorBasis((first.basis, second.basis)),
-    )
-    return replace(
-        whole,
-        reversible=_both(first.reversible, second.reversible),
+    return _derived(
+        first, np.asarray(np.kron(first.symmetric, second.symmetric), dtype=np.float64),
+        frobenius_error(error, joint_kind(first, second), "tensor product"), f"({_name(first)}) x ({_name(second)})",
+        TensorBasis((first.basis, second.basis)), reversible=_both(first.reversible, second.reversible),
         mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
         norm_bound=first.norm_bound * second.norm_bound,
-    )
+    )  # fmt: skip
 
 
 def in_other_frame(matrix: KernelMatrix) -> KernelMatrix:
@@ -170,18 +163,18 @@ def in_other_frame(matrix: KernelMatrix) -> KernelMatrix:
         )
     flip = reflection_matrix(matrix.basis)
     return replace(
-        _derived(matrix, matrix.symmetric @ flip, matrix.error, f"({_name(matrix)}).in_specular_frame()"),
-        method=matrix.method,
+        matrix,
+        symmetric=matrix.symmetric @ flip,
+        counts=None,
         replicates=tuple(part @ flip for part in matrix.replicates),
-        samples=matrix.samples,
-        unresolved=matrix.unresolved,
-        requested_tolerance=matrix.requested_tolerance,
-        frame="paper" if matrix.frame == "specular" else "specular",
+        symmetrised=False,
+        law=f"({_name(matrix)}).in_specular_frame()",
         # P J is self-adjoint exactly if P commutes with J
         reversible=matrix.reversible if matrix.mirror_symmetric else None,
-        mirror_symmetric=matrix.mirror_symmetric,
-        norm_bound=matrix.norm_bound,
         beyond=None if matrix.beyond is None else (matrix.beyond[0], -matrix.beyond[1]),
+        frame="paper" if matrix.frame == "specular" else "specular",
+        raw_defect=None,
+        metadata={},
     )
 
 
@@ -193,10 +186,10 @@ def _beyond(combined: Callable[..., float], *matrices: KernelMatrix) -> tuple[fl
 
 
 def _derived(
-    matrix: KernelMatrix, symmetric: Floats, error: Estimate, law: str, basis: TensorBasis | None = None
+    matrix: KernelMatrix, symmetric: Floats, error: Estimate, law: str, basis: TensorBasis | None = None, **facts: Any
 ) -> KernelMatrix:
     """A matrix that is no sample any more."""
-    return type(matrix)(symmetric, basis or matrix.basis, error, method="algebra", law=law, frame=matrix.frame)
+    return type(matrix)(symmetric, basis or matrix.basis, error, method="algebra", law=law, frame=matrix.frame, **facts)
 
 
 def _name(matrix: KernelMatrix) -> str:
@@ -302,21 +295,51 @@ class KernelMatrix:
         n = self.basis.size
         if symmetric.shape != (n, n):
             raise InputError(f"symmetric: expected shape {(n, n)} for {self.basis!r}, got {symmetric.shape}")
-        if not isinstance(self.error, Estimate):
+        if not isinstance(self.error, Estimate) or not self.error.value >= 0.0:
             raise InputError(
-                f"error: expected an Estimate such as Estimate(0.0, 0.0, 'bound', 'given'), got {self.error!r}; the "
-                "law of transition probabilities between bins, ker.MatrixLaw(array), needs none"
+                "error: expected an Estimate of at least 0 such as Estimate(0.0, 0.0, 'bound', 'given'), got "
+                f"{self.error!r}; the law of transition probabilities between bins, ker.MatrixLaw(array), needs none"
             )
         object.__setattr__(self, "symmetric", frozen(symmetric))
-        if self.beyond is not None:
-            even, odd = (number_between("beyond", part, -np.inf, np.inf) for part in self.beyond)
-            object.__setattr__(self, "beyond", (even, odd))
         if self.counts is not None:
-            counts = np.array(self.counts, dtype=np.int64)
-            if counts.shape != (n, n):
-                raise InputError(f"counts: expected shape {(n, n)}, got {counts.shape}")
+            counts = np.array(self.counts)
+            if counts.shape != (n, n) or counts.dtype.kind not in "iu" or counts.min() < 0 or counts.max() > MOST:
+                raise InputError(
+                    f"counts: expected whole numbers of at least 0, shape {(n, n)}, got {counts.dtype} of shape "
+                    f"{counts.shape}"
+                )
+            counts = counts.astype(np.int64)
             counts.setflags(write=False)
             object.__setattr__(self, "counts", counts)
+        self._check_fields()
+
+    def _check_fields(self) -> None:
+        """Refuse plain fields that no matrix has."""
+        plain: dict[str, Any] = {"samples": whole_number("samples", self.samples, 0, most=MOST)}
+        for name, most in (("unresolved", 1.0), ("norm_bound", np.inf), ("requested_tolerance", np.inf)):
+            if getattr(self, name) is not None or name != "requested_tolerance":  # names of fields of this class
+                plain[name] = number_between(name, getattr(self, name), 0.0, most, closed="low high")
+        for name in ("symmetrised", "reversible", "mirror_symmetric"):
+            value = getattr(self, name)  # names of fields of this class
+            if not isinstance(value, (bool, np.bool_)) and (value is not None or name == "symmetrised"):
+                raise InputError(f"{name}: expected True or False, got {value!r}")
+            plain[name] = value if value is None else bool(value)
+        if self.beyond is not None:
+            bound = plain["norm_bound"]
+            even, odd = (number_between("beyond", part, -bound, bound, closed="low high") for part in self.beyond)
+            plain["beyond"] = even, odd
+        instance("method", self.method, str, "'exact'")
+        instance("law", self.law, str, "'a smooth wall'")
+        instance("metadata", self.metadata, Mapping, "{'made': 'by hand'}")
+        if self.frame not in ("paper", "specular"):
+            raise InputError(f"frame: expected 'paper' or 'specular', got {self.frame!r}")
+        defect = self.raw_defect
+        if defect is not None:
+            instance("raw_defect", defect, SymmetryDefect, "SymmetryDefect(0.1)")
+            instance("raw_defect.norm", defect.norm, str, "'Frobenius'")
+            if not (0.0 <= defect < np.inf and (defect.z_score is None or -np.inf <= defect.z_score <= np.inf)):
+                raise InputError("raw_defect: expected numbers, got NaN or a defect below 0")
+        self.__dict__.update(plain)
 
     # ---- the arrays ------------------------------------------------------------------------------------------
     @property
@@ -449,16 +472,7 @@ class KernelMatrix:
     @explained
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write everything to an .npz file that `load_matrix` reads; an existing file only with ``overwrite``."""
-        arrays: Arrays = {"symmetric": self.symmetric}
-        if self.counts is not None:
-            arrays["counts"] = self.counts
-        record = {name: getattr(self, name) for name in PLAIN_FIELDS}  # names of fields of this class, in one list
-        error, defect = self.error, self.raw_defect
-        record["error"] = [error.value, error.error, error.kind, error.method]
-        record["raw_defect"] = None if defect is None else [float(defect), defect.norm, defect.z_score]
-        record["metadata"] = dict(self.metadata)
-        record["replicates"] = [store_array(part, arrays, f"replicate{k}") for k, part in enumerate(self.replicates)]
-        return archive.write(path, record, arrays, self.basis, overwrite=overwrite)
+        return archive.write(path, *self._packed(), self.basis, overwrite=overwrite)
 
     def to_frame(self) -> Any:
         """P[i, j] as a pandas.DataFrame (extra ``studies``): a row for each incoming, a column for each outgoing bin.
@@ -538,6 +552,19 @@ class KernelMatrix:
             parts.append(f"tolerance {self.requested_tolerance:g} not met")
         return f"KernelMatrix({', '.join(part for part in parts if part)})"
 
+    def _packed(self) -> tuple[Record, Arrays]:
+        """The record of plain values and the arrays of a file, all but the basis."""
+        arrays: Arrays = {"symmetric": self.symmetric}
+        if self.counts is not None:
+            arrays["counts"] = self.counts
+        record = {name: getattr(self, name) for name in PLAIN_FIELDS}  # names of fields of this class, in one list
+        error, defect = self.error, self.raw_defect
+        record["error"] = [error.value, error.error, error.kind, error.method]
+        record["raw_defect"] = None if defect is None else [float(defect), defect.norm, defect.z_score]
+        record["metadata"] = dict(self.metadata)
+        record["replicates"] = [store_array(part, arrays, f"replicate{k}") for k, part in enumerate(self.replicates)]
+        return record, arrays
+
     # ---- internals -------------------------------------------------------------------------------------------
     def _coordinates(self, other: ArrayLike | AngleFunction, name: str, axis: int = 0) -> Floats:
         if callable(other):
@@ -567,54 +594,53 @@ def load_matrix(path: str | Path) -> KernelMatrix:
 
 
 def _restored(record: Record, arrays: Stored, basis: Basis) -> KernelMatrix:
-    defect = record["raw_defect"]
+    defect, n = record["raw_defect"], basis.size
     matrix = KernelMatrix(
-        arrays["symmetric"],
+        arrays.read("symmetric", "f8", (n, n)),
         basis,
         Estimate(*record["error"]),
-        counts=arrays.get("counts"),
-        replicates=tuple(load_array(kind, arrays, f"replicate{k}") for k, kind in enumerate(record["replicates"])),
+        counts=arrays.read("counts", "i8", (n, n)) if "counts" in arrays else None,
+        replicates=tuple(load_array(kind, arrays, f"replicate{k}", n) for k, kind in enumerate(record["replicates"])),
         raw_defect=None if defect is None else SymmetryDefect(*defect),
         metadata=record["metadata"],
         # files from before this field was introduced have no "beyond"
         **{name: record[name] for name in PLAIN_FIELDS if name != "beyond" or name in record},
     )
-    _check_record(matrix)
-    _check_entries(matrix)
+    for name, value in matrix._packed()[0].items():
+        if _as_floats(value) != _as_floats(record.get(name)):
+            raise InputError(f"{name}: expected a value of another kind than {record[name]!r}")
+    with np.errstate(all="ignore"):
+        _check_entries(matrix)
     return matrix
 
 
-def _check_record(matrix: KernelMatrix) -> None:
-    """Refuse fields that no matrix has, so that the entries can be held against them."""
-    if matrix.frame not in ("paper", "specular"):
-        raise InputError(f"frame: expected 'paper' or 'specular', got {matrix.frame!r}")
-    whole_number("samples", matrix.samples, 0)
-    number_between("unresolved", matrix.unresolved, 0.0, 1.0, closed="low high")
-    number_between("norm_bound", matrix.norm_bound, 0.0, np.inf, closed="low")
-    for part in matrix.beyond or ():
-        number_between("beyond", part, -matrix.norm_bound, matrix.norm_bound, closed="low high")
-    for name in ("symmetrised", "reversible", "mirror_symmetric"):
-        value = getattr(matrix, name)  # names of fields of this class
-        if value not in (True, False) and (value is not None or name == "symmetrised"):
-            raise InputError(f"{name}: expected true or false, got {value!r}")
-    if matrix.counts is not None and matrix.counts.min() < 0:
-        raise InputError(f"counts: expected none below 0, got {matrix.counts.min()}")
-    if any(part.shape != matrix.symmetric.shape for part in matrix.replicates):
-        raise InputError(f"replicates: expected arrays of shape {matrix.symmetric.shape}")
+def _as_floats(value: Any) -> str:
+    """A plain value as text, in which whole numbers and floats are the same but truth and numbers are not."""
+    return repr(json.loads(json.dumps(value), parse_int=float))
 
 
 def _check_entries(matrix: KernelMatrix) -> None:
     """Refuse entries that contradict the error and the norm that the file states, by more than any chance."""
     symmetric, constant = matrix.symmetric, matrix.basis.constant
-    excess = BEYOND_CHANCE * (float(matrix.error) + ENTRY_ROUNDING * matrix.size * (1.0 + matrix.norm_bound))
-    if np.linalg.norm(symmetric @ constant) > matrix.norm_bound * np.linalg.norm(constant) + excess:
+    rounding = BEYOND_CHANCE * ENTRY_ROUNDING * matrix.size * (1.0 + matrix.norm_bound)
+    excess = BEYOND_CHANCE * float(matrix.error) + rounding
+    if matrix.error.value != matrix.error.error:
+        raise InputError(f"the Frobenius error is stated as {matrix.error.value:g} and as {matrix.error.error:g}")
+    # of mirror-symmetric laws every ray counts with its mirror image
+    if matrix.counts is not None and not matrix.counts.sum(dtype=np.float64) <= 2 * matrix.samples * (1.0 + rounding):
+        raise InputError(f"the counts add up to more than twice the stated number of samples, {matrix.samples}")
+    if matrix.replicates:
+        mean = sum(cast(Any, part) for part in matrix.replicates) / len(matrix.replicates)
+        if not np.abs(mean - symmetric).max() <= rounding:
+            raise InputError("the mean of the replicates is not the matrix")
+    if not np.linalg.norm(symmetric @ constant) <= matrix.norm_bound * np.linalg.norm(constant) + excess:
         raise InputError(f"the entries contradict the bound {matrix.norm_bound:g} of the norm")
-    if matrix.reversible and np.linalg.norm(symmetric - symmetric.T) > 2.0 * excess:
+    if matrix.reversible and not np.linalg.norm(symmetric - symmetric.T) <= 2.0 * excess:
         raise InputError("the entries are not symmetric, although the kernel is stated to be reversible")
     # differences and multiples of kernels are matrices too
     if matrix.method == "algebra":
         return
-    if np.linalg.norm(symmetric @ constant - constant) > excess:
+    if not np.linalg.norm(symmetric @ constant - constant) <= excess:
         raise InputError(f"the rows do not sum to 1 within the stated error {float(matrix.error):g}")
     if matrix.basis.is_partition and symmetric.min() < -excess:
         raise InputError(f"entries are negative, down to {symmetric.min():g}, beyond the stated error")

@@ -8,7 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, angles, finite_array, finite_number, generator, positive_number, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    angles,
+    finite_array,
+    finite_number,
+    generator,
+    of_one_shape,
+    positive_number,
+    whole_number,
+)
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.kinds import explained, explained_class
@@ -125,7 +135,7 @@ class SpringWall:
         >>> round(float(speed), 12), round(float(theta + 0.5), 12) == round(np.pi, 12)
         (2.0, True)
         """
-        size, angle = np.broadcast_arrays(finite_array("speed", speed), angles("theta", theta))
+        size, angle = of_one_shape(speed=finite_array("speed", speed), theta=angles("theta", theta))
         if not np.all(size > 0.0):
             raise InputError("speed: expected numbers greater than 0")
         velocity = -np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1).reshape(-1, 2)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, instance
+from ...core.checks import Floats, angles, instance, of_one_shape
 from ...core.errors import AccuracyError
 from ...core.kinds import explained_class
 from ...geometry import MushroomGenerations
@@ -64,7 +64,7 @@ class MushroomLaw(DrivenLaw):
 
         The openings are moved to the left: ``x`` below ``wall.opened`` enters a mushroom.
         """
-        x, theta = np.broadcast_arrays(entry_points(x), angles("theta", theta))
+        x, theta = of_one_shape(x=entry_points(x), theta=angles("theta", theta))
         left, right = self.wall.opening
         inside = x < self.wall.opened
         outgoing, escaped = np.array(np.pi - theta), np.ones(theta.shape, dtype=np.bool_)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -30,7 +31,7 @@ def checkpoint_in(folder: Path, *, overwrite: bool) -> Path:
         If the folder cannot be made.
     """
     checkpoint = folder / CHECKPOINT
-    results = [name for name in (*FILES, PICTURE, PARQUET, MEANS, MEAN_LAW) if (folder / name).exists()]
+    results = [name for name in (*FILES, PICTURE, PARQUET, MEANS, MEAN_LAW) if os.path.exists(folder / name)]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if overwrite:

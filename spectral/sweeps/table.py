@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -174,7 +175,7 @@ class SweepTable:
             If they cannot be written.
         """
         target = Path(folder)
-        existing = [name for name in FILES if (target / name).exists()]
+        existing = [name for name in FILES if os.path.exists(target / name)]
         if existing and not overwrite:
             raise FileExistsRefusal(f"{target}: {', '.join(existing)} exist; pass overwrite=True to replace them")
         try:

@@ -21,8 +21,9 @@ from .core.estimates import described
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile. This is mirrored to make it periodic, or repeated with
-profile.txt:seam=step; more of its parameters, joined by commas: units=um/nm, delimiter=semicolon, decimal=comma,
-usecols=0/2, skiprows=3, encoding=latin-1, row=5, sort=yes, interpolate=yes, detrend=1."""
+profile.txt:seam=step or, if it is periodic, seam=wrap; more of its parameters, joined by commas: units=um/nm,
+delimiter=semicolon, decimal=comma, usecols=0/2, skiprows=3, encoding=latin-1, row=5, quantity=slope, sort=yes,
+interpolate=yes, detrend=1."""
 
 
 class OneLineErrors(click.Group):
@@ -371,14 +372,17 @@ def realise(
     """
     import numpy as np
 
+    from .core.files import check_writable
     from .geometry import Disk
     from .kernels import wall_for
     from .kernels.inverse.named_laws import law_from_text
 
     if (mass is None) != (inertia is None):
         raise click.UsageError("--mass and --inertia belong together; give both or none")
-    if out is not None and out.exists() and not force:
-        raise FileExistsRefusal(f"{out} exists; use another name or --force to replace it")
+    if out is not None:
+        check_writable(out)
+        if out.exists() and not force:
+            raise FileExistsRefusal(f"{out} exists; use another name or --force to replace it")
     disk = None if mass is None or inertia is None else Disk(mass, inertia)
     found = wall_for(law_from_text(law), moments, tolerance, rng=np.random.default_rng(seed), most_hollows=hollows)
     wall = found.wall if disk is None else found.wall.unforeshorten(disk)

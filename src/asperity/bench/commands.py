@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -45,7 +46,7 @@ def run_bench(
 def _show(path: Path, make: Callable[[], str], force: bool) -> int:
     """Print and write a report; an existing file is refused before the work."""
     made_here(path.parent)
-    if path.exists() and not force:
+    if os.path.exists(path) and not force:
         raise FileExistsRefusal(f"--out: {path} exists; use another folder or --force to replace it")
     text = make()
     write_whole(path, text + "\n", overwrite=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -143,7 +144,7 @@ def prepare_folder(folder: Path, names: Sequence[str], *, force: bool) -> None:
             (folder / f"{file_stem(name)}.json").unlink(missing_ok=True)
         return
     pictures = {f"{name.split('/')[0]}.png" for name in names}
-    found = sorted(name for name in (SUMMARY, TABLES, DATA, *pictures) if (folder / name).exists())
+    found = sorted(name for name in (SUMMARY, TABLES, DATA, *pictures) if os.path.exists(folder / name))
     if found and not _is_earlier(folder / DATA, names):
         raise FileExistsRefusal(
             f"--out: {', '.join(found)} in {folder} are not of an earlier run of these problems; "
@@ -153,7 +154,7 @@ def prepare_folder(folder: Path, names: Sequence[str], *, force: bool) -> None:
 
 def made_here(folder: Path) -> None:
     """Make the folder if it is missing; raise a FileExistsRefusal if it is a file, an InputError if it cannot be."""
-    if folder.exists() and not folder.is_dir():
+    if os.path.exists(folder) and not folder.is_dir():
         raise FileExistsRefusal(f"--out: {folder} is a file; name a folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)

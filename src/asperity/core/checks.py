@@ -54,6 +54,23 @@ def finite_number(name: str, value: Any) -> float:
     return float(array)
 
 
+def of_one_shape(**arrays: Floats) -> tuple[Floats, ...]:
+    """Return the arrays in their common shape, or raise an InputError that names them.
+
+    Examples
+    --------
+    >>> of_one_shape(x=np.zeros(3), theta=np.zeros(4))
+    Traceback (most recent call last):
+    asperity.errors.InputError: x and theta: expected equal shapes, got (3,) and (4,); for all pairs pass x[:, None]
+    """
+    try:
+        return tuple(np.broadcast_arrays(*arrays.values()))
+    except ValueError as reason:
+        shapes = " and ".join(str(array.shape) for array in arrays.values())
+        pairs = f"for all pairs pass {next(iter(arrays))}[:, None]"
+        raise InputError(f"{' and '.join(arrays)}: expected equal shapes, got {shapes}; {pairs}") from reason
+
+
 def instance(name: str, value: object, kind: type, example: str) -> None:
     """Refuse what is not of a kind; the message has an example.
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import stat
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import BytesIO
@@ -10,7 +12,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO
 
+from .checks import DOUBLE, check_memory
 from .errors import FileExistsRefusal, InputError
+
+# Endings of formats in which a reader would expect a file to be.
+OTHER_FORMATS = {".csv", ".dat", ".h5", ".hdf5", ".json", ".mat", ".npy", ".npz", ".pdf", ".pickle", ".pkl", ".png",
+                 ".toml", ".tsv", ".txt", ".xlsx", ".yaml", ".yml"}  # fmt: skip
 
 
 @contextmanager
@@ -54,10 +61,13 @@ def write_whole(path: Path, content: str | Callable[[IO[bytes]], object], *, ove
         # of a link the file that it names is replaced
         target = path.resolve()
         if target.exists() and not target.is_file():
-            # a device or a pipe cannot be replaced, and a folder is refused here
+            # a device or a pipe cannot be replaced; a folder and a pipe that nothing reads are refused here
             whole = BytesIO()
             write(whole)
-            target.write_bytes(whole.getvalue())
+            handle = os.open(target, os.O_WRONLY | os.O_NONBLOCK)
+            os.set_blocking(handle, True)
+            with open(handle, "wb") as stream:
+                stream.write(whole.getvalue())
             return
         with moved_when_complete(target.parent) as beside:
             with (beside / target.name).open("xb") as stream:
@@ -71,18 +81,62 @@ def write_whole(path: Path, content: str | Callable[[IO[bytes]], object], *, ove
         raise InputError(f"{path}: cannot write there ({why}); choose a folder that is writable") from reason
 
 
-def regular_file(path: Path) -> Path:
-    """The path, or an InputError if it names a pipe or a device, where reading may never end."""
+def check_writable(path: Path) -> None:
+    """Refuse a new file that cannot be written, before the work for it is done.
+
+    Examples
+    --------
+    >>> check_writable(Path("/dev/null/wall.toml"))
+    Traceback (most recent call last):
+    asperity.errors.InputError: /dev/null/wall.toml: cannot write there (Not a directory); choose another folder
+    """
     try:
-        if path.exists() and not path.is_file():
-            kind = "a folder" if path.is_dir() else "a pipe or a device"
-            raise InputError(f"{path}: cannot read {kind}; expected a file")
+        if not path.exists():
+            TemporaryDirectory(dir=path.parent, prefix=".asperity-").cleanup()
+    except OSError as reason:
+        raise InputError(
+            f"{path}: cannot write there ({reason.strerror}); choose a folder that is writable"
+        ) from reason
+
+
+def ending_in(suffix: str, path: str | os.PathLike[str]) -> Path:
+    """The path of a file to be written, or an InputError if its name promises another format.
+
+    Examples
+    --------
+    >>> ending_in(".npz", "kernel.csv")
+    Traceback (most recent call last):
+    asperity.errors.InputError: kernel.csv: expected a name that ends in .npz; pass 'kernel.npz'
+    """
+    file = Path(path)
+    if file.suffix.lower() in OTHER_FORMATS - {suffix}:
+        raise InputError(f"{file}: expected a name that ends in {suffix}; pass {str(file.with_suffix(suffix))!r}")
+    return file
+
+
+def regular_file(path: Path) -> Path:
+    """The path, or an InputError if it names a pipe or a device, where reading may never end, or nothing to be read.
+
+    Files of the system, as in /proc, have no size; reading some of them waits for ever.
+    """
+    if "\0" in str(path):
+        raise InputError(f"path: expected the name of a file, got {str(path)!r}")
+    try:
+        status = path.stat() if path.exists() else None
     except OSError as reason:  # of a name that is too long
         raise InputError(f"{path}: cannot read it ({reason.strerror}); expected a file") from reason
+    if status is None:
+        return path
+    if not stat.S_ISREG(status.st_mode):
+        kind = "a folder" if stat.S_ISDIR(status.st_mode) else "a pipe or a device"
+        raise InputError(f"{path}: cannot read {kind}; expected a file")
+    if status.st_size == 0:
+        raise InputError(f"{path}: cannot read a file of 0 bytes; expected one with content")
+    check_memory(str(path), "its content", status.st_size // DOUBLE)
     return path
 
 
-def text_of(path: Path) -> str:
+def text_of(path: Path, encoding: str = "utf-8") -> str:
     """The text of a file, or an InputError that says why there is none.
 
     Examples
@@ -93,10 +147,15 @@ def text_of(path: Path) -> str:
     """
     file = regular_file(path)
     try:
-        return file.read_text(encoding="utf-8")
-    except (OSError, ValueError) as reason:
+        with warnings.catch_warnings():
+            # some codecs warn of what they cannot read
+            warnings.simplefilter("error")
+            return file.read_text(encoding=encoding)
+    except (OSError, UnicodeDecodeError) as reason:
         why = getattr(reason, "strerror", reason)
         raise InputError(f"{path}: cannot read it ({why}); expected a file of text") from reason
+    except (LookupError, TypeError, ValueError, Warning) as reason:
+        raise InputError(f"encoding: expected the name of one such as 'latin-1', got {encoding!r}") from reason
 
 
 @contextmanager
@@ -114,7 +173,7 @@ def removed_on_failure(folder: Path | None) -> Iterator[None]:
     ...         list(Path(parent).iterdir())
     []
     """
-    missing = [] if folder is None else [path for path in (folder, *folder.parents) if not path.exists()]
+    missing = [] if folder is None else [path for path in (folder, *folder.parents) if not os.path.exists(path)]
     try:
         yield
     except BaseException:

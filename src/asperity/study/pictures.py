@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -157,7 +158,7 @@ def draw_gallery(path: Path, *, overwrite: bool) -> None:
     InputError
         If it cannot be written.
     """
-    if path.exists() and not overwrite:
+    if os.path.exists(path) and not overwrite:
         raise FileExistsRefusal(f"{path} exists; use another name or --force to replace it")
     figure, kind = gallery(), path.suffix[1:] or "png"
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -202,7 +203,7 @@ def prepare_folder(folder: str | Path, *, overwrite: bool, picture_format: str =
     """Make the output folder, and refuse it where a file of an earlier study would be lost."""
     target, names = Path(folder), (*picture_names(picture_format), *DATA)
     try:
-        existing = [name for name in names if (target / name).exists()]
+        existing = [name for name in names if os.path.exists(target / name)]
         if existing and not overwrite:
             raise FileExistsRefusal(
                 f"{target}: {', '.join(existing)} exist; use another folder or --force to replace them"

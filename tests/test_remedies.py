@@ -1,0 +1,183 @@
+"""What messages advise works: every call that a message of the library names is run."""
+
+import ast
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import asperity
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import AsperityError
+
+ROOT = Path(asperity.__file__).parent
+RAISED = {"InputError", "WallError", "FileExistsRefusal", "AccuracyError", "warn"}
+ADVICE = re.compile(r"\b(pass|use|take|give|call|write|for example|such as)\b", re.IGNORECASE)
+X, H = np.linspace(0.0, 1.0, 5), np.array([0.0, 0.2, 0.1, 0.3, 0.0])
+DISK, LAW, WALL, P = geo.Disk(), ker.lambertian(), geo.koch(1), ker.discretise(ker.lambertian(), ker.Bins(4))
+SPECULAR = LAW.in_specular_frame()
+
+# A part of the message, the call that it refuses, and the one that it advises.
+REMEDIES = {
+    "use Profile.interpolated()": (
+        lambda: geo.Wall.from_profile([0, 1, 2], [0, np.nan, 0.5]),
+        lambda: geo.Wall.from_profile(geo.Profile([0, 1, 2], [0, np.nan, 0.5]).interpolated()),
+    ),
+    "use Profile.sorted()": (
+        lambda: geo.Wall.from_profile([0, 2, 1], [0, 1, 2]),
+        lambda: geo.Wall.from_profile(geo.Profile([0, 2, 1], [0, 1, 2]).sorted()),
+    ),
+    "pass seam='step'": (
+        lambda: geo.Wall.from_profile([0, 1, 3], [0, 0.5, 0.2], seam="wrap"),
+        lambda: geo.Wall.from_profile([0, 1, 3, 4], [0, 0.5, 0.2, 0], seam="step"),
+    ),
+    "pass Wall.from_profile(*numpy.asarray(table).T)": (
+        lambda: geo.Wall.from_profile(np.c_[X, H]),
+        lambda: geo.Wall.from_profile(*np.asarray(np.c_[X, H]).T),
+    ),
+    "for all pairs pass": (
+        lambda: geo.trace(WALL, X[1:4], [0.5, 1.0]),
+        lambda: geo.trace(WALL, X[1:4][:, None], [0.5, 1.0]),
+    ),
+    "moves as Disk(mass=": (lambda: geo.Disk(2.0, 1.0, radius=2.0), lambda: geo.Disk(mass=2.0, inertia=0.25)),
+    "pass the period or complete the path": (
+        lambda: geo.Wall([geo.Segment((0, 0), (2, 0))]),
+        lambda: geo.Wall([geo.Segment((0, 0), (2, 0))], 2.0),
+    ),
+    "pass minus the velocity of an incoming disk": (
+        lambda: DISK.to_angles((0.1, -1.0, 0.2)),
+        lambda: DISK.to_angles((-0.1, 1.0, -0.2)),
+    ),
+    "pass a larger stem_aspect": (
+        lambda: geo.mushrooms(generations=2, stem_aspect=0.0),
+        lambda: geo.mushrooms(generations=2, stem_aspect=1.0),
+    ),
+    "pass ker.CollisionLaw(law, disk), or ker.smooth(disk) and ker.no_slip(disk)": (
+        lambda: ker.play(geo.Container.circle(), LAW, [0.0, 0.0], [0.1, 1.0, 0.2], 3),
+        lambda: [ker.CollisionLaw(LAW, DISK), ker.smooth(DISK), ker.no_slip(DISK)],
+    ),
+    "use P.tensor(Q)": (lambda: ker.discretise(LAW, ker.TensorBasis((ker.Bins(2), ker.Bins(2)))), lambda: P.tensor(P)),
+    "use kind='pseudometric'": (
+        lambda: ker.distance(*2 * (ker.discretise(LAW, ker.Legendre(4)),)),
+        lambda: ker.distance(*2 * (ker.discretise(LAW, ker.Legendre(4)),), kind="pseudometric"),
+    ),
+    "use sample() or apply()": (
+        lambda: LAW.branches(1.0),
+        lambda: (LAW.sample([1.0]), LAW.apply(np.cos, [1.0])),
+    ),
+    "use in_specular_frame() on one": (
+        lambda: ker.distance(LAW, SPECULAR),
+        lambda: ker.distance(LAW.in_specular_frame(), SPECULAR),
+    ),
+    "call in_specular_frame() on one of them": (lambda: LAW @ SPECULAR, lambda: LAW @ SPECULAR.in_specular_frame()),
+    "use in_specular_frame() on both or on neither": (
+        lambda: P + P.in_specular_frame(),
+        lambda: P.in_specular_frame() + P.in_specular_frame(),
+    ),
+    "use WallLaw(wall), which traces curves": (
+        lambda: ker.PolygonLaw(geo.focusing_arcs()),
+        lambda: ker.WallLaw(geo.focusing_arcs()),
+    ),
+    "expected a name that ends in": (None, None),
+    "pass overwrite=True to replace": (None, None),
+}  # fmt: skip
+# Advice that names no call to be run as it stands, or that other tests run.
+EXPLAINED = {
+    "Give units, for example units=": "test_profiles.py runs it",
+    "give the gap a width": "no call",
+    "take a smaller scale": "the limit is in the message",
+    "the next generation needs room": "in the list above",
+    "mushrooms in each flat top": "the limits depend on the machine's memory",
+    "take fewer cells, or method='monte-carlo'": "the size depends on the machine's memory",
+    "use sample() or discretise()": "takes thousands of branches",
+    "use KernelMatrix.adjoint()": "test_composed_laws.py runs it",
+    "use discretise() and compose the matrices": "takes a million evaluations",
+    "use discretise(law, basis) ** n": "takes a deep power",
+    "samples that cover all angles": "no single call",
+    "pass invariant=False": "test_streams.py runs it",
+    "which traces with periodic wrap": "as for curves",
+    "its symmetric half where it was sampled": "a formula",
+    "use law.in_specular_frame()": "in the list above",
+    "call in_specular_frame() on it": "in the list above",
+    "spectrum(law) and spectral_gap(law) take its matrix": "test_enclosures.py runs it",
+    "take one beside it": "no call",
+    "use a .png, .pdf or .svg name": "test_study.py runs it",
+    "pass time_limit=None": "test_verification.py runs it",
+    "cannot write there": "another folder",
+    "a relation such as a <= b": "words",
+    "compose the law from specular() and retroreflection()": "words",
+    "units of length such as ('um', 'nm')": "test_profiles.py runs it",
+    "two numbers such as (0, 2)": "test_profiles.py runs it",
+    "a list of walls such as [": "words",
+    "Use law @ law.adjoint() if that is what you mean": "test_enclosures.py runs it",
+    "is what you mean": "test_spectrum.py runs it",
+}
+
+
+def messages() -> list[str]:
+    """The texts of all messages that advise a call, with braces for what is filled in."""
+    found = []
+    folders = [ROOT / name for name in ("geometry", "kernels", "spectral")]
+    files = {file for folder in (ROOT, *map(Path.resolve, folders)) for file in folder.rglob("*.py")}
+    for file in sorted(files):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            name = isinstance(node, ast.Call) and getattr(node.func, "id", getattr(node.func, "attr", ""))
+            if name in RAISED and node.args:
+                text = text_of(node.args[0])
+                if ADVICE.search(text) and re.search(r"[(=]", text):
+                    found.append(text)
+    return found
+
+
+def text_of(node: ast.expr) -> str:
+    if isinstance(node, ast.JoinedStr):
+        return "".join("{}" if isinstance(part, ast.FormattedValue) else str(part.value) for part in node.values)
+    return str(node.value) if isinstance(node, ast.Constant) else ""
+
+
+@pytest.mark.parametrize("words", [words for words, (mistake, _) in REMEDIES.items() if mistake is not None])
+@pytest.mark.filterwarnings("ignore:the profile's")
+def test_the_call_that_a_message_advises_works(words):
+    mistake, advised = REMEDIES[words]
+    with pytest.raises(AsperityError) as refused:
+        mistake()
+    assert words in str(refused.value)
+    assert advised() is not None
+
+
+def test_what_is_given_as_an_example_is_one():
+    """Code after 'such as' is evaluated."""
+    names = {
+        **{name: getattr(room, name) for room in (geo, ker) for name in dir(room)},
+        "geo": geo, "ker": ker, "spec": spec, "wall": WALL, "law": LAW, "disk": DISK, "n": 3,
+    }  # fmt: skip
+    examples = {
+        code for text in messages() for code in re.findall(r"such as ((?:geo\.|ker\.)?[A-Za-z]+\.?\w*\(.*)", text)
+    }
+    assert len(examples) >= 8
+    for example in examples:
+        end = next(k for k in range(1, len(example) + 1) if example[:k].count("(") == example[:k].count(")") > 0)
+        assert eval(example[:end], names) is not None
+
+
+def test_every_message_that_advises_a_call_is_run_or_explained():
+    known = [*REMEDIES, *EXPLAINED]
+    missing = [
+        text for text in messages()
+        if not any(words in text for words in known) and not re.search(r"such as (geo\.|ker\.)?[A-Za-z]\w+[.(]", text)
+    ]  # fmt: skip
+    assert missing == []
+
+
+def test_the_names_that_are_advised_for_files_are_written(tmp_path):
+    for save, name in ((P.save, "kern.csv"), (WALL.save, "wall.txt")):
+        with pytest.raises(AsperityError, match="expected a name that ends in") as refused:
+            save(tmp_path / name)
+        advised = re.search(r"pass '(.*)'", str(refused.value))[1]
+        save(advised)
+        with pytest.raises(AsperityError, match="pass overwrite=True"):
+            save(advised)
+        save(advised, overwrite=True)

@@ -1,0 +1,127 @@
+"""Names of what is no file: every function and command that takes a path answers at once, with one clear error."""
+
+import os
+import signal
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.cli import main
+from asperity.errors import AsperityError, FileExistsRefusal, InputError
+from asperity.kernels.inverse.named_laws import law_from_text
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+# Seconds in which any of these must answer.
+LIMIT = 60
+WALL, MATRIX = geo.flat(), ker.discretise(ker.lambertian(), ker.Bins(4))
+PROBLEM = spec.WorkProblem("a", (spec.ReferenceValue(0.0, 0.0, "by hand"),))
+
+
+def command(*words):
+    """What the command line prints, as an error if it failed."""
+    result = CliRunner().invoke(main, [str(word) for word in words])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.output.count("\n") == 1 or result.exit_code != 1
+    if result.exit_code:
+        raise InputError(result.output)
+
+
+def swept(path):
+    return spec.sweep(lambda g: ker.lambertian(), {"g": [1.0]}, quantities=["gap"], checkpoint=path)
+
+
+READERS = {
+    "load_wall": geo.load_wall,
+    "read_profile": geo.read_profile,
+    "wall_from_text": lambda path: geo.wall_from_text(str(path)),
+    "load_matrix": ker.load_matrix,
+    "law_from_text": lambda path: law_from_text(str(path)),
+    "work_precision": lambda path: spec.work_precision(
+        PROBLEM, [spec.WorkMethod("b", float)], [1.0], repeats=1, path=path
+    ),
+    "asperity gap": lambda path: command("gap", path),
+    "asperity realise": lambda path: command("realise", path),
+}
+WRITERS = {
+    "Wall.save": lambda path: WALL.save(path, overwrite=True),
+    "KernelMatrix.save": lambda path: MATRIX.save(path, overwrite=True),
+    "sweep": swept,
+    "asperity walls": lambda path: command("walls", "--out", path),
+    "asperity study": lambda path: command("study", "flat", "--bins", 4, "--out", path),
+    "asperity sweep": lambda path: command("sweep", "flat", "--out", path),
+    "asperity realise": lambda path: command("realise", "lambertian", "--moments", 3, "--out", path),
+    "asperity bench": lambda path: command("bench", "koch/law", "--out", path),
+}
+
+
+@contextmanager
+def at_once():
+    def late(*_):
+        pytest.fail(f"no answer within {LIMIT} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(LIMIT)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def special(kind, folder):
+    if kind == "pipe":
+        os.mkfifo(folder / "pipe")
+        return folder / "pipe"
+    if kind == "folder":
+        return folder
+    return {"long name": folder / ("n" * 300), "no folder": folder / "missing" / "file"}.get(kind, Path(kind))
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder", "/dev/zero", "/proc/kmsg", "/proc/self/status", "long name"])
+@pytest.mark.parametrize("name", READERS)
+def test_what_is_no_file_is_refused_by_every_reader(name, kind, tmp_path):
+    path = special(kind, tmp_path)
+    if kind.startswith("/") and not path.exists():
+        pytest.skip("not on this system")
+    with at_once(), pytest.raises(InputError) as refused:
+        READERS[name](path)
+    assert str(refused.value).strip()
+
+
+@pytest.mark.parametrize("kind", ["pipe", "/dev/full", "/dev/null/file", "long name"])
+@pytest.mark.parametrize("name", WRITERS)
+def test_where_nothing_can_be_written_every_writer_says_so_before_its_work(name, kind, tmp_path):
+    path = special(kind, tmp_path)
+    if kind == "/dev/full" and not path.exists():
+        pytest.skip("not on this system")
+    with at_once(), pytest.raises((InputError, FileExistsRefusal)):
+        WRITERS[name](path)
+
+
+@pytest.mark.parametrize("encoding", ["undefined", "klingon", "hex", "idna", "\0", "", 3])
+def test_an_encoding_that_reads_no_text_is_refused_by_name(encoding, tmp_path):
+    (tmp_path / "scan.txt").write_bytes(b"# \xc3\xb6\n0 1\n1 2\n")
+    with pytest.raises(AsperityError, match="encoding"):
+        geo.read_profile(tmp_path / "scan.txt", encoding=encoding)
+
+
+def test_a_text_in_another_encoding_is_refused_with_its_name(tmp_path):
+    for encoding in ("latin-1", "utf-16"):
+        (tmp_path / "scan.txt").write_bytes("x [µm]; z [nm]\n0 1000\n1 2000\n".encode(encoding))
+        with pytest.raises(InputError, match=f"pass encoding='{encoding}'"):
+            geo.read_profile(tmp_path / "scan.txt")
+        assert geo.read_profile(tmp_path / "scan.txt", encoding=encoding).height.tolist() == [1.0, 2.0]
+
+
+@pytest.mark.skipif(not Path("/proc/kcore").exists(), reason="not on this system")
+def test_a_file_larger_than_the_memory_is_not_read():
+    if Path("/proc/kcore").stat().st_size < 2**45:
+        pytest.skip("small here")
+    with at_once(), pytest.raises(InputError, match="more than there is"):
+        geo.load_wall("/proc/kcore")
