@@ -124,6 +124,8 @@ def discretise(
     frame from its inner law, a composition from its factors if none of them needs rays. Methods 10 to 13 come last. A
     wall with different hollows is a sum, unless up to 2^17 rays that enter anywhere meet the tolerance.
 
+    A law of matrices, with Lambertian reflection and isometries, in `Bins` that refine the matrices' is exact (auto).
+
     For a composition the result is the Galerkin matrix of the product, not the product of Galerkin matrices, which
     differs unless the basis is invariant. Compositions are first simplified by the algebra: isometries are moved
     through mirror-symmetric laws, scatterings joined, mixtures multiplied out. They are then computed by isometries,
@@ -184,10 +186,8 @@ def discretise(
     segments = MOST_SEGMENTS if method == "quadrature" else QUICK_SEGMENTS
     budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)
     exact = finite_matrix(law, edges=basis.edges) if isinstance(basis, Bins) else None
-    if exact is not None and method == "auto" and not holds_of_all(law, lambda part: not isinstance(part, MatrixLaw)):
-        found = replace(exact, basis=basis)
-    else:
-        found = recipe(law, method)(basis, budget)
+    has_bins = method == "auto" and not holds_of_all(law, lambda part: not isinstance(part, MatrixLaw))
+    found = replace(exact, basis=basis) if exact is not None and has_bins else recipe(law, method)(basis, budget)
     return replace(
         found,
         beyond=None if exact is None or found.samples else exact.beyond,
