@@ -75,7 +75,7 @@ def test_no_member_is_inflated_before_its_header_is_checked(tmp_path, name, meth
     with zipfile.ZipFile(path) as archive:
         members = {one: archive.read(one) for one in archive.namelist()}
     bomb = BytesIO()
-    np.save(bomb, np.zeros((2000, 2000)) if name != "record" else np.array("a" * 10**7))
+    np.save(bomb, np.zeros((2000, 2000)) if name != "record" else np.array("a" * 2 * 10**7))
     members[f"{name}.npy"] = bomb.getvalue()
     with zipfile.ZipFile(path, "w", method) as archive:
         for one, data in members.items():

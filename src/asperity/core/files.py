@@ -94,9 +94,7 @@ def check_writable(path: Path) -> None:
         if not path.exists():
             TemporaryDirectory(dir=path.parent, prefix=".asperity-").cleanup()
     except OSError as reason:
-        raise InputError(
-            f"{path}: cannot write there ({reason.strerror}); choose a folder that is writable"
-        ) from reason
+        raise InputError(f"{path}: cannot write there ({reason.strerror}); choose another folder") from reason
 
 
 def ending_in(suffix: str, path: str | os.PathLike[str]) -> Path:
