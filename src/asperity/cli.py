@@ -6,6 +6,7 @@ import atexit
 import gc
 import os
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -222,7 +223,7 @@ def _run_in_folder(
         raise click.UsageError("--workers are started here, a --scheduler has its own; choose one")
     checkpoint = checkpoint_in(out, overwrite=force)
     quantities = [name.strip() for name in asked.pop("quantity").split(",")]
-    with _ending_at_ctrl_c():
+    with _ending_at_ctrl_c(), _with_a_sign_of_life():
         return run(quantities=quantities, checkpoint=checkpoint, client=scheduler or workers, progress=True, **asked)
 
 
@@ -234,6 +235,19 @@ def _ending_at_ctrl_c() -> Iterator[None]:
     except KeyboardInterrupt as stop:
         click.echo(f"asperity: {stop}", err=True)
         os._exit(INTERRUPTED)
+
+
+@contextmanager
+def _with_a_sign_of_life() -> Iterator[None]:
+    """Say after a second that the work is under way: the first wall may take minutes, and a pipe shows no bar."""
+    words = "asperity: computing; Ctrl-C stops it, and the same command goes on"
+    timer = threading.Timer(1.0, click.echo, [words], {"err": True})
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 @main.command(name="sweep", epilog=WALL_HELP)
@@ -310,7 +324,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
     for path in save_ensemble(found, out):
         click.echo(f"wrote {path}")
     if bins is not None:
-        with _ending_at_ctrl_c():
+        with _ending_at_ctrl_c(), _with_a_sign_of_life():
             law = mean_law(
                 family, walls, Bins(bins), given["tolerance"], rng=seed, checkpoint=out / LAW_CHECKPOINT,
                 client=given["scheduler"] or given["workers"],

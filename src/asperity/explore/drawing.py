@@ -143,7 +143,10 @@ class WallFigure:
 
     def show(self, picture: Picture, title: str, *, dragged: bool) -> None:
         """Draw a wall; while a vertex is being dragged the vertices and the view are left alone."""
-        self.plot.title.text = title
+        from bokeh.models.text import PlainText
+
+        # in other text bokeh reads formulas
+        self.plot.title.text = PlainText(title)
         paths, wall = picture.solids, picture.question.wall
         self._solid.data = {
             "xs": [path[:, 0].tolist() for path in paths], "ys": [path[:, 1].tolist() for path in paths],
@@ -155,8 +158,8 @@ class WallFigure:
         left, right = -MARGIN * wall.period, (1.0 + MARGIN) * wall.period
         self._view.data = {"x": [left, right], "y": list(picture.heights)}
         self.plot.aspect_scale = picture.stretch
-        self.plot.xaxis.axis_label = f"x ({wall.unit or 'length units of the wall'})"
-        self.plot.yaxis.axis_label = f"y ({wall.unit})" if wall.unit else "y"
+        self.plot.xaxis.axis_label = PlainText(f"x ({wall.unit or 'length units of the wall'})")
+        self.plot.yaxis.axis_label = PlainText(f"y ({wall.unit})" if wall.unit else "y")
 
     def show_vertices(self, points: list[tuple[float, float]]) -> None:
         """Show handles at these points; none for a wall that is not `editable`."""
