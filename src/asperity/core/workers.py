@@ -82,19 +82,6 @@ class _Worker:
         self.process = context.Process(target=_work, args=(theirs, processors), daemon=True)
         self.process.start()
         theirs.close()
-        self.function = b""
-
-    def give(self, function: bytes, task: Any) -> None:
-        """Send a task, with its function where that is another than before."""
-        from cloudpickle import dumps
-
-        content = dumps((None if function == self.function else function, task))
-        self.function = function
-        try:
-            self.channel.send_bytes(content)
-        except OSError:
-            # its end is noticed by who waits for the result
-            return
 
     def end(self) -> None:
         """End the process, whatever it computes."""
@@ -135,14 +122,16 @@ class Workers:
         packed, rest = dumps(function), iter(tasks)
         running: dict[_Worker, tuple[Task, int]] = {}
 
-        def start(worker: _Worker) -> None:
-            for task in islice(rest, 1):
-                running[worker] = task, 1
-                worker.give(packed, task)
+        def give(worker: _Worker, task: Task, tries: int) -> None:
+            running[worker] = task, tries
+            # one that is gone is noticed below
+            with suppress(OSError):
+                worker.channel.send_bytes(dumps((packed, task)))
 
         try:
             # one task first: it compiles the loops, which the other workers then find on the disk
-            start(self._workers[0])
+            for task in islice(rest, 1):
+                give(self._workers[0], task, 1)
             while running:
                 for channel in wait([worker.channel for worker in running]):
                     worker = next(one for one in running if one.channel is channel)
@@ -150,16 +139,14 @@ class Workers:
                     try:
                         error, result = loads(worker.channel.recv_bytes())
                     except (EOFError, OSError):
-                        again = self._replacement(worker, tries)
-                        running[again] = task, tries + 1
-                        again.give(packed, task)
+                        give(self._replacement(worker, tries), task, tries + 1)
                         continue
                     if error:
                         raise AsperityError(COULD_NOT_RUN.format(error))
                     yield task, result
-                    for idle in self._workers:
-                        if idle not in running:
-                            start(idle)
+                    idle = [one for one in self._workers if one not in running]
+                    for one, task in zip(idle, islice(rest, len(idle)), strict=False):
+                        give(one, task, 1)
         except BaseException:
             # what still runs would come as the results of the next call
             self.end()
@@ -185,14 +172,13 @@ def _work(channel: Connection, processors: list[int]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if processors:
         os.sched_setaffinity(0, processors)
-    function: Any = None
+    known, function = b"", abs
     # the other end is closed when the process there ends
     with suppress(EOFError, OSError):
         while True:
-            content = channel.recv_bytes()
+            packed, task = loads(channel.recv_bytes())
             try:
-                other, task = loads(content)
-                function = function if other is None else loads(other)
+                known, function = packed, function if packed == known else loads(packed)
                 answer = dumps((None, function(task)))
             except Exception as reason:
                 answer = dumps((repr(reason), None))

@@ -43,16 +43,18 @@ if (now - (window.asperity_sent ?? 0) > interval) {
 
 @dataclass(frozen=True)
 class Picture:
-    """What `WallFigure` shows of a question, the depth of its wall, and whether that is of the catalogue."""
+    """What `WallFigure` shows of a question, and whether its wall is of the catalogue."""
 
     question: Question
     named: bool
-    depth: float
-    heights: tuple[float, float]
-    stretch: float
+    wall: Wall
     solids: list[Floats]
     rays: list[Floats]
-    handles: list[tuple[float, float]]
+
+    @property
+    def handles(self) -> list[tuple[float, float]]:
+        """The vertices that can be dragged: those of a polygon that is not foreshortened."""
+        return [] if self.question.foreshortened else [(float(x), float(y)) for x, y in handles_of(self.wall)]
 
 
 def pictured_and_answered(
@@ -86,11 +88,7 @@ def pictured(question: Question, named: bool = True) -> Picture:
     """The picture of a question."""
     wall = question.seen
     floor, free = _heights(wall)
-    handles = [] if question.foreshortened else [(float(x), float(y)) for x, y in handles_of(wall)]
-    return Picture(
-        question, named, wall.depth, (floor, free), vertical_stretch(wall), solids(wall, floor), ray_lines(wall, free),
-        handles,
-    )  # fmt: skip
+    return Picture(question, named, wall, solids(wall, floor), ray_lines(wall, free))
 
 
 def _figure(title: str, **options: Any) -> Any:
@@ -147,7 +145,7 @@ class WallFigure:
 
         # in other text bokeh reads formulas
         self.plot.title.text = PlainText(title)
-        paths, wall = picture.solids, picture.question.wall
+        paths, wall = picture.solids, picture.wall
         self._solid.data = {
             "xs": [path[:, 0].tolist() for path in paths], "ys": [path[:, 1].tolist() for path in paths],
         }  # fmt: skip
@@ -156,8 +154,8 @@ class WallFigure:
             return
         self.show_vertices(picture.handles)
         left, right = -MARGIN * wall.period, (1.0 + MARGIN) * wall.period
-        self._view.data = {"x": [left, right], "y": list(picture.heights)}
-        self.plot.aspect_scale = picture.stretch
+        self._view.data = {"x": [left, right], "y": list(_heights(wall))}
+        self.plot.aspect_scale = vertical_stretch(wall)
         self.plot.xaxis.axis_label = PlainText(f"x ({wall.unit or 'length units of the wall'})")
         self.plot.yaxis.axis_label = PlainText(f"y ({wall.unit})" if wall.unit else "y")
 

@@ -15,18 +15,9 @@ from bokeh.events import PanEnd, PanStart
 from ..core.errors import AsperityError
 from ..core.estimates import compact
 from ..geometry import WALLS, Disk, Wall
+from . import drawing
 from .answers import Answer
 from .background import Background
-from .drawing import (
-    MOST_HANDLES,
-    CollisionFigure,
-    KernelFigure,
-    Picture,
-    SpectrumFigure,
-    WallFigure,
-    handles_of,
-    pictured_and_answered,
-)
 from .files import new_folder, opened, plain_name, studied, unpacked, wall_as_toml
 from .question import Question, named, pinned, with_new_vertex
 
@@ -81,7 +72,7 @@ class Page:
         self._out = out
         self._background, self._saving = Background(), Background()
         self._dragging = self._filling = self._awaited = False
-        self._picture: Picture | None = None
+        self._picture: drawing.Picture | None = None
         self._archive: bytes | None = None
         self._was_busy = False
         self._make_figures()
@@ -91,8 +82,8 @@ class Page:
             pn.state.add_periodic_callback(self.collect, INTERVAL)
 
     def _make_figures(self) -> None:
-        self.wall_figure, self.kernel = WallFigure(), KernelFigure()
-        self.spectrum, self.collision = SpectrumFigure(), CollisionFigure()
+        self.wall_figure, self.kernel = drawing.WallFigure(), drawing.KernelFigure()
+        self.spectrum, self.collision = drawing.SpectrumFigure(), drawing.CollisionFigure()
         self.wall_figure.vertices.on_change("data", self._vertices_changed)
         self.wall_figure.plot.on_event(PanStart, self._drag_begins)
         self.wall_figure.plot.on_event(PanEnd, self._drag_ends)
@@ -181,7 +172,7 @@ class Page:
 
     def _polygon_from_here(self) -> None:
         """A polygon to drag, where the wall is one already, or a plain one."""
-        points = handles_of(self.question.wall)
+        points = drawing.handles_of(self.question.wall)
         self._ask_polygon(points if len(points) else [(0, 0), (0.3, -0.5), (0.6, -0.2), (1, 0)])
 
     def _ask_polygon(self, points: Any) -> None:
@@ -220,8 +211,10 @@ class Page:
             self._settle()
 
     def _vertices_changed(self, _name: str, _old: Any, new: Any) -> None:
-        if len(new["x"]) > MOST_HANDLES:
-            self._refuse(f"expected at most {MOST_HANDLES} vertices to drag, got {len(new['x'])}; open a file instead")
+        if len(new["x"]) > drawing.MOST_HANDLES:
+            self._refuse(
+                f"expected at most {drawing.MOST_HANDLES} vertices to drag, got {len(new['x'])}; open a file instead"
+            )
             self._settle()
             return
         points = list(zip(new["x"], new["y"], strict=True))
@@ -259,7 +252,7 @@ class Page:
         self.message, self._awaited = "", True
         # two results, so that a wall that is dragged has answers and not pictures alone
         self._background.ask(
-            pictured_and_answered, wall, name, disk, self.convention.value, bool(self.foreshortened.value),
+            drawing.pictured_and_answered, wall, name, disk, self.convention.value, bool(self.foreshortened.value),
             of_catalogue, first=2,
         )  # fmt: skip
         self._show_status()
@@ -268,10 +261,10 @@ class Page:
         """Ask for the last valid wall with the disk and the convention that are chosen now."""
         self.ask(self.question.wall, self.question.name, of_catalogue=self._picture is None or self._picture.named)
 
-    def _show_wall(self, picture: Picture, *, dragged: bool) -> None:
+    def _show_wall(self, picture: drawing.Picture, *, dragged: bool) -> None:
         felt = ", as the disk feels it" if picture.question.foreshortened else ""
         hint = ": drag its vertices, tap to add one" if picture.handles else ""
-        title = f"{picture.question.name}, depth {picture.depth:.4g}{felt}{hint}"
+        title = f"{picture.question.name}, depth {picture.wall.depth:.4g}{felt}{hint}"
         self.wall_figure.show(picture, title, dragged=dragged)
 
     def collect(self) -> None:
@@ -280,7 +273,7 @@ class Page:
         for error, result in self._background.collect():
             if error is not None:
                 self._failed(error, outdated=outdated)
-            elif isinstance(result, Picture):
+            elif isinstance(result, drawing.Picture):
                 self._came(result, outdated=outdated)
             else:
                 self.answer = result
@@ -292,7 +285,7 @@ class Page:
             self._was_busy = self._background.busy
             self._show_status()
 
-    def _came(self, picture: Picture, *, outdated: bool) -> None:
+    def _came(self, picture: drawing.Picture, *, outdated: bool) -> None:
         """Take a valid wall; vertices that have changed since are left alone."""
         self._picture, self.question, self._awaited = picture, picture.question, outdated
         self._show_wall(picture, dragged=self._dragging or outdated)
