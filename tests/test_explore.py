@@ -359,6 +359,17 @@ def test_after_a_refused_wall_the_answers_of_the_last_one_go_on(page):
     assert "wrong.toml" in page.message
 
 
+def test_another_convention_does_not_lose_the_wall_that_is_awaited(page):
+    page.choice.value = "koch"
+    page.convention.value = "specular"
+    end = time.monotonic() + 300.0
+    while page.question.convention != "specular" and time.monotonic() < end:
+        page.collect()
+        time.sleep(0.02)
+    assert (page.question.name, page.question.convention) == ("koch", "specular")
+    assert page.choice.value == "koch"
+
+
 def test_a_process_that_dies_after_a_first_answer_is_reported(background):
     background.ask(one_and_dies)
     assert results(background) == [(None, 1), (GONE, None)]

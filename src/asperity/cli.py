@@ -65,6 +65,9 @@ def main() -> None:
       asperity sweep focusing-arcs --over half_angle=0.2:1.5:50 --out arcs
       asperity ensemble gaussian:length=0.3 --points 12 --rms-slope 0.1 --smooth --quantity gap_specular --out gaussian
     """
+    for stream in (sys.stdout, sys.stderr):
+        # names of files need not be text
+        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     # at its end Python would look through all objects of numba for garbage, which takes 0.3 s
     atexit.register(gc.freeze)
 

@@ -249,7 +249,7 @@ class Page:
         except AsperityError as reason:
             self._refuse(str(reason))
             return
-        self.message, self._awaited = "", True
+        self.message, self._awaited, self._asked = "", True, (wall, name, of_catalogue)
         # two results, so that a wall that is dragged has answers and not pictures alone
         self._background.ask(
             drawing.pictured_and_answered, wall, name, disk, self.convention.value, bool(self.foreshortened.value),
@@ -258,8 +258,10 @@ class Page:
         self._show_status()
 
     def _ask_again(self) -> None:
-        """Ask for the last valid wall with the disk and the convention that are chosen now."""
-        self.ask(self.question.wall, self.question.name, of_catalogue=self._picture is None or self._picture.named)
+        """Ask for the wall that is awaited, or else the last valid one, with the disk and convention chosen now."""
+        last = self.question.wall, self.question.name, self._picture is None or self._picture.named
+        wall, name, of_catalogue = self._asked if self._awaited else last
+        self.ask(wall, name, of_catalogue=of_catalogue)
 
     def _show_wall(self, picture: drawing.Picture, *, dragged: bool) -> None:
         felt = ", as the disk feels it" if picture.question.foreshortened else ""
