@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
 
@@ -66,8 +67,9 @@ def main() -> None:
       asperity ensemble gaussian:length=0.3 --points 12 --rms-slope 0.1 --smooth --quantity gap_specular --out gaussian
     """
     for stream in (sys.stdout, sys.stderr):
-        # names of files need not be text
-        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+        if isinstance(stream, TextIOWrapper):
+            # names of files need not be text
+            stream.reconfigure(errors="backslashreplace")
     # at its end Python would look through all objects of numba for garbage, which takes 0.3 s
     atexit.register(gc.freeze)
 
