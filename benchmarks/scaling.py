@@ -25,7 +25,7 @@ import numpy as np
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.core.workers import connected, results
+from asperity.core.workers import results
 from asperity.kernels.sampling import chunks
 
 BINS = 64
@@ -118,7 +118,7 @@ def processor_seconds(function: Callable[[int], Any], tasks: int, client: Any) -
 def measured_costs(tasks: int, workers: int = 2) -> Costs:
     """The costs of tasks whose results are the counts of 64 by 64 cells."""
     payload = 8 * BINS**2
-    with connected(workers) as client:
+    with scheduled(workers) as client:
         empty = processor_seconds(partial(returned, 8), tasks, client)
         full = processor_seconds(partial(returned, payload), tasks, client)
     return Costs(0.5 * empty, max(full - 0.5 * empty, 0.5 * empty), payload)
@@ -136,11 +136,14 @@ def on_one_processor() -> Iterator[int]:
 
 
 @contextmanager
-def single_threaded(workers: int) -> Iterator[Any]:
-    """Workers with one processor each, also a single one."""
-    with connected(workers) as client:
-        if workers == 1:
-            client.run(os.sched_setaffinity, 0, {min(os.sched_getaffinity(0))})
+def scheduled(workers: int) -> Iterator[Any]:
+    """Workers of dask with one processor each, and their scheduler in this process."""
+    from distributed import Client
+
+    usable = sorted(os.sched_getaffinity(0))
+    with Client(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as client:
+        for number, address in enumerate(client.nthreads()):
+            client.run(os.sched_setaffinity, 0, {usable[number % len(usable)]}, workers=[address])
         yield client
 
 
@@ -163,7 +166,7 @@ def measured_times(rays: int, arcs: int) -> dict[str, float]:
             found["rays"] = seconds_of(count)
             found["rays, checkpoint"] = seconds_of(count, checkpoint=Path(folder) / "rays")
         for workers in (1, 2):
-            with single_threaded(workers) as client:
+            with scheduled(workers) as client:
                 # workers load the library and the compiled loops first
                 client.run(count, samples=2**16)
                 client.run(one_gap)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -276,3 +278,15 @@ def test_an_interrupted_study_leaves_no_folder_and_ends_with_130(tmp_path, monke
 def test_a_study_that_is_refused_leaves_no_folder(tmp_path):
     refused("study", "flat", "--bins", 0, "--out", tmp_path / "new")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_whose_name_is_no_text_is_studied_and_named(tmp_path):
+    name = os.fsdecode(b"wall-\xff.toml")
+    geo.rectangular_teeth(2.0).save(tmp_path / name)
+    for command in (["study", name, "--bins", "4", "--out", "found"], ["gap", name]):
+        done = subprocess.run(
+            [sys.executable, "-m", "asperity", *command], cwd=tmp_path, capture_output=True, check=False,
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[1] / "src")},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "found" / "wall.png").exists()

@@ -5,6 +5,7 @@ import time
 import zipfile
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,9 +16,14 @@ from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.explore.answers import Answer, answers_to, first_answer, histogram, largest_gap
 from asperity.explore.background import GONE, Background
+from asperity.explore.drawing import pictured_and_answered
 from asperity.explore.files import LARGEST, new_folder, opened, plain_name, studied, unpacked, wall_as_toml
 from asperity.explore.question import Question, pinned, with_new_vertex
 from asperity.explore.server import _called, _usable
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.* is deprecated and will be removed in version 2:PendingDeprecationWarning"
+)
 
 TEETH = geo.Wall.from_vertices([(0, 0), (0.3, -0.6), (0.5, -0.1), (0.7, -0.8), (1, 0)])
 CURVED = {
@@ -158,6 +164,11 @@ def dies():
     yield
 
 
+def one_and_dies():
+    yield 1
+    yield from dies()
+
+
 def results(background, seconds=60.0):
     found, end = [], time.monotonic() + seconds
     while background.busy and time.monotonic() < end:
@@ -270,6 +281,98 @@ def test_an_out_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="choose another --out"):
         new_folder(tmp_path / "file", "teeth")
+
+
+# -- one tab does not stop the others
+
+# Seconds of the processor of the server that a message of the browser may take.
+MESSAGE = 1.0
+
+
+@pytest.fixture
+def page():
+    pytest.importorskip("panel", reason="the page needs asperity[explore]")
+    from asperity.explore.page import Page
+
+    made = Page(geo.mushrooms(0.5, 0.5, 1), "mushrooms")
+    yield made
+    made.close()
+
+
+def profile_of_60_megabytes():
+    return b"".join(b"%d %.9f\n" % (k, -((k * 7919) % 1000) / 1000) for k in range(3_200_000))
+
+
+def test_a_file_of_60_megabytes_is_read_in_a_process_that_is_ended_and_its_copy_removed(page, monkeypatch):
+    content = profile_of_60_megabytes()
+    assert len(content) > 55e6
+    page.file.filename = "profile.txt"
+    begun = time.process_time()
+    page.file.value = content
+    for _ in range(20):
+        time.sleep(0.05)
+        page.collect()
+    assert time.process_time() - begun < 2.0 * MESSAGE
+    folder = page._background._folder.name
+    page.close()
+    assert not page._background.busy
+    assert not Path(folder).exists()
+
+
+def test_a_hundred_thousand_vertices_are_refused_before_any_work(page):
+    x = np.linspace(0.0, 1.0, 100_000)
+    begun = time.process_time()
+    page.wall_figure.vertices.data = {"x": x.tolist(), "y": (-x * (1.0 - x)).tolist()}
+    assert time.process_time() - begun < MESSAGE
+    assert "expected at most 400 vertices" in page.message
+
+
+def test_numbers_past_the_end_of_a_slider_are_refused_before_any_work(page):
+    begun = time.process_time()
+    page.parameters["generations"].value = 10
+    assert time.process_time() - begun < MESSAGE
+    assert "generations: expected 1 to 4, got 10" in page.message
+
+
+def test_walls_of_too_many_pieces_are_refused_with_another_command():
+    wall = lambda: geo.Wall.from_vertices(np.c_[np.linspace(0, 1, 10_002), np.r_[0, np.full(10_000, -0.1), 0]])  # noqa: E731
+    with pytest.raises(InputError, match="at most 10000 pieces, got 10001; thin it out, or use the command"):
+        next(pictured_and_answered(wall, "long", geo.Disk(), "paper", False, False))
+
+
+def test_after_a_refused_wall_the_answers_of_the_last_one_go_on(page):
+    end = time.monotonic() + 120.0
+    while page.answer is None and time.monotonic() < end:
+        page.collect()
+        time.sleep(0.02)
+    page.file.filename = "wrong.toml"
+    page.file.value = b"period = ["
+    while not page.message and time.monotonic() < end:
+        page.collect()
+        time.sleep(0.02)
+    assert "wrong.toml" in page.message
+    assert page.question.name == "mushrooms"
+    assert page._background.busy
+    while page.answer.stage == "coarse" and time.monotonic() < end:
+        page.collect()
+        time.sleep(0.02)
+    assert "wrong.toml" in page.message
+
+
+def test_another_convention_does_not_lose_the_wall_that_is_awaited(page):
+    page.choice.value = "koch"
+    page.convention.value = "specular"
+    end = time.monotonic() + 300.0
+    while page.question.convention != "specular" and time.monotonic() < end:
+        page.collect()
+        time.sleep(0.02)
+    assert (page.question.name, page.question.convention) == ("koch", "specular")
+    assert page.choice.value == "koch"
+
+
+def test_a_process_that_dies_after_a_first_answer_is_reported(background):
+    background.ask(one_and_dies)
+    assert results(background) == [(None, 1), (GONE, None)]
 
 
 # -- command line

@@ -2,6 +2,7 @@
 
 import asyncio
 import http.client
+import os
 import re
 import shutil
 import signal
@@ -24,6 +25,9 @@ FLAGS = [
 ]  # fmt: skip
 # Milliseconds; a machine with other work takes long.
 PATIENCE = 60_000
+SOURCE = Path(__file__).resolve().parents[1] / "src"
+# Bytes of memory that a closed tab may leave; without a leak it is about 1,000.
+LEFT = 100_000
 # The pixel of the vertex k, and all vertices, from bokeh's own views.
 VERTEX = """k => {
   const find = view => {
@@ -43,10 +47,11 @@ VERTEX = """k => {
 class Server:
     """`asperity explore` in a process of its own."""
 
-    def __init__(self, *arguments, waits_for="shows the page"):
+    def __init__(self, *arguments, waits_for="shows the page", browser=None, cwd=None):
+        command = [sys.executable, "-m", "asperity", "explore", *arguments, "--port", "0"]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "asperity", "explore", *arguments, "--no-browser", "--port", "0"],
-            stderr=subprocess.PIPE, text=True,
+            command if browser else [*command, "--no-browser"], stderr=subprocess.PIPE, text=True, cwd=cwd,
+            env={**os.environ, "PYTHONPATH": str(SOURCE)} | ({"BROWSER": browser} if browser else {}),
         )  # fmt: skip
         self.lines = []
         for line in self.process.stderr:
@@ -54,9 +59,9 @@ class Server:
             if waits_for in line:
                 break
         assert waits_for in self.lines[-1], self.lines
-        found = re.search(r"http://127\.0\.0\.1:(\d+)/", self.lines[-1])
+        found = re.search(r"http://127\.0\.0\.1:(\d+)(/[-\w]{43}/)", self.lines[-1])
         if found:
-            self.address, self.port = found[0], int(found[1])
+            self.address, self.port, self.path = found[0], int(found[1]), found[2]
 
     def stop(self):
         """Ctrl-C; the seconds that it took and what was printed."""
@@ -286,9 +291,9 @@ def test_without_a_folder_the_browser_takes_wall_and_study(browser, tmp_path):
 # -- who may ask
 
 
-def answer_to(server, **headers):
+def answer_to(server, path=None, method="GET", **headers):
     with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)) as connection:
-        connection.request("GET", "/", headers=headers)
+        connection.request(method, server.path if path is None else path, headers=headers)
         with connection.getresponse() as response:
             return response.status
 
@@ -304,8 +309,8 @@ def test_other_hosts_and_origins_are_refused(server):
         assert answer_to(server, Origin=origin) == 403, origin
 
 
-@pytest.mark.parametrize("header", ["Origin", "Host"])
-def test_the_websocket_refuses_other_origins_and_hosts(server, header):
+@pytest.mark.parametrize(("header", "path"), [("Origin", None), ("Host", None), ("X", "/"), ("X", f"/{'A' * 43}/")])
+def test_the_websocket_refuses_other_origins_hosts_and_tokens(server, header, path):
     from tornado.httpclient import HTTPClientError, HTTPRequest
     from tornado.websocket import websocket_connect
 
@@ -314,12 +319,136 @@ def test_the_websocket_refuses_other_origins_and_hosts(server, header):
             "Origin": f"http://127.0.0.1:{server.port}",
             header: {"Origin": "http://evil.example"}.get(header, "evil.example"),
         }
-        request = HTTPRequest(f"ws://127.0.0.1:{server.port}/ws", headers=headers)
+        request = HTTPRequest(f"ws://127.0.0.1:{server.port}{path or server.path}ws", headers=headers)
         await websocket_connect(request, subprotocols=["bokeh", "token"])
 
     # a thread of its own, because playwright's loop runs in this one
     with ThreadPoolExecutor(1) as pool, pytest.raises(HTTPClientError, match="403"):
         pool.submit(asyncio.run, connect()).result()
+
+
+# The module's name comes first in the addresses of panel's handler of components, which imports it.
+ADDRESSES = (
+    "", "ws", "metadata", "autoload.js?bokeh-autoload-element=a", "static/js/bokeh.min.js", "components/{}/a/b/c",
+    "components/{}/A/__css__/c", "static/extensions/panel/panel.min.js", "favicon.ico", "admin", "liveness", "rest",
+)  # fmt: skip
+
+
+def test_no_handler_is_reached_with_another_host_origin_method_or_without_the_token():
+    from tornado.httputil import HTTPHeaders, HTTPServerRequest, RequestStartLine
+    from tornado.web import ErrorHandler
+
+    from asperity.explore.server import page_server
+
+    server = page_server(port=0)
+    try:
+        port, token = server.port, server.prefix
+        mine = {"Host": f"127.0.0.1:{port}"}
+
+        def refused(path, headers, method="GET"):
+            line = RequestStartLine(method, path, "HTTP/1.1")
+            request = HTTPServerRequest(start_line=line, headers=HTTPHeaders(headers))
+            found = server._tornado.find_handler(request)
+            return found.handler_class is ErrorHandler and found.handler_kwargs == {"status_code": 403}
+
+        # every pattern of every handler that bokeh and panel have, with something for what varies
+        patterns = [rule.matcher.regex.pattern for rule in server._tornado.wildcard_router.rules]
+        paths = {re.sub(r"\(.*\)", "a/b/c/d", pattern).rstrip("$").replace("?", "") for pattern in patterns}
+        paths |= {f"{token}/{address}" for address in ADDRESSES}
+        assert len(paths) > 15
+        assert any("components" in path for path in paths)
+        for path in paths:
+            for wrong in (
+                {"Host": "evil.example"}, {"Host": f"evil.example:{port}"}, {"Host": "127.0.0.1"},
+                {**mine, "Origin": "http://evil.example"}, {**mine, "Origin": "null"}, {**mine, "Origin": ""},
+            ):  # fmt: skip
+                assert refused(path, wrong), (path, wrong)
+            for method in ("POST", "PUT", "OPTIONS", "DELETE", "HEAD"):
+                assert refused(path, mine, method), (path, method)
+            for other in (path.replace(token, ""), path.replace(token, "/A" + token[2:]), f"http://a{path}"):
+                assert refused(other or "/", mine), other
+        for path in (f"{token}/", f"{token}/ws", f"{token}/static/js/bokeh.min.js"):
+            assert not refused(path, {**mine, "Origin": f"http://127.0.0.1:{port}"}), path
+        for path in ("components/a/b/c/d", "metadata", "autoload.js", "admin", "ws/", "static"):
+            assert refused(f"{token}/{path}", mine), path
+    finally:
+        server._http.stop()
+
+
+def test_no_address_runs_a_module_or_ends_the_server(tmp_path):
+    (tmp_path / "trap.py").write_text(f"open({str(tmp_path / 'sprung')!r}, 'w')\n")
+    with subprocess_ended(Server("flat", cwd=tmp_path)) as server:
+        for module in ("unittest.__main__", "trap", "antigravity"):
+            for address in ADDRESSES:
+                for path in ("/", server.path):
+                    for foreign in ({}, {"Host": "evil.example", "Origin": "http://evil.example"}):
+                        status = answer_to(server, path + address.format(module), **foreign)
+                        assert status == 403 or (path == server.path and not foreign and module not in address)
+        assert answer_to(server) == 200
+        assert server.process.poll() is None
+        assert not (tmp_path / "sprung").exists()
+
+
+def test_the_browser_is_given_a_private_file_and_no_token(tmp_path):
+    (tmp_path / "browser").write_text(
+        f'#!/bin/sh\necho "$@" > {tmp_path}/part && mv {tmp_path}/part {tmp_path}/asked\n'
+    )
+    (tmp_path / "browser").chmod(0o700)
+    with subprocess_ended(Server("flat", browser=f"{tmp_path}/browser %s")) as server:
+        end = time.monotonic() + 0.001 * PATIENCE
+        while not (tmp_path / "asked").exists():
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        asked = (tmp_path / "asked").read_text().strip()
+        assert server.path.strip("/") not in asked
+        file = Path(asked.removeprefix("file://"))
+        assert f"url={server.address}" in file.read_text()
+        assert file.parent.stat().st_mode & 0o077 == 0
+        server.stop()
+        assert not file.parent.exists()
+
+
+CLOSED_TABS = """
+import asyncio, gc, tracemalloc
+from tornado.httpclient import AsyncHTTPClient
+from asperity.explore import server
+from asperity.explore.background import Background
+from asperity.explore.page import Page
+
+# what a tab computes is in another process
+Background.ask = lambda *_, **__: None
+
+async def open_and_close(server, tabs):
+    (context,) = server._tornado.applications.values()
+    for _ in range(tabs):
+        await AsyncHTTPClient().fetch(f"http://127.0.0.1:{server.port}{server.prefix}/", request_timeout=60)
+        (session,) = context.sessions
+        await context._discard_session(session, lambda _: True)
+    gc.collect()
+
+if __name__ == "__main__":
+    # milliseconds: none ends by itself
+    server.CLOSED_AFTER = 10**7
+    server = server.page_server(port=0)
+    server.start()
+    server.io_loop.run_sync(lambda: open_and_close(server, 2))
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    server.io_loop.run_sync(lambda: open_and_close(server, 12))
+    left = tracemalloc.get_traced_memory()[0] - before
+    print(left // 12, sum(type(thing) is Page for thing in gc.get_objects()))
+"""
+
+
+def test_closed_tabs_leave_no_memory(tmp_path):
+    (tmp_path / "tabs.py").write_text(CLOSED_TABS)
+    done = subprocess.run(
+        [sys.executable, "tabs.py"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(SOURCE)}, capture_output=True,
+        text=True, check=True,
+    )  # fmt: skip
+    left, pages = map(int, done.stdout.split())
+    assert pages == 0
+    assert left < LEFT
 
 
 def test_only_the_loopback_address_listens(server):

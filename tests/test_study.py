@@ -13,7 +13,8 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, FileExistsRefusal, InputError
-from asperity.study import DATA, PICTURES, check_tracer, study_wall
+from asperity.study import DATA, PICTURES, check_tracer, pictures, study_wall
+from asperity.study.pictures import draw_study_wall
 
 TOLERANCE = 1e-2
 
@@ -264,3 +265,51 @@ def test_an_unknown_format_and_resolution_are_refused_before_the_folder_is_made(
         with pytest.raises(InputError, match=next(iter(options))):
             teeth.save(tmp_path / "new", **options)
     assert not (tmp_path / "new").exists()
+
+
+HOSTILE = (r"$\frac{$", "$x$ $", r"\$y$", "$$", "100 %_#^&~{}", "half a pair: \ud800", r"$\alpha_{$")
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_every_picture_shows_the_texts_of_users_letter_by_letter(teeth, text, tmp_path):
+    from matplotlib.figure import Figure
+
+    from asperity.spectral.sweeps.picture import draw_curves
+    from asperity.spectral.sweeps.row import SweepRow
+
+    wall = geo.Wall.from_vertices(teeth.wall.vertices, unit=text)
+    points = [{f"b{text}": 0.1 * k, "wall": text} for k in range(3)]
+    rows = [SweepRow(point, f"q{text}", 1.0, 0.1, "bound", "isolated", "m", 1.0, "1", "") for point in points]
+    report = replace(teeth, name=text, wall=wall, spectrum=None, refusals={"spectrum": text})
+    figures = [Figure() for _ in range(4)]
+    geo.draw_wall(wall, ax=figures[0].subplots())
+    draw_study_wall(report, figures[1].subplots())
+    draw_curves(rows, [f"b{text}", "wall"], f"q{text}", figures[2].subplots())
+    work = spec.work_precision(
+        spec.WorkProblem(text, spec.ReferenceValue(1.0, 0.0, "by hand")),
+        [spec.WorkMethod(text, lambda n: 1.0 + 1.0 / n)], [1, 2], repeats=1, warm_up=False,
+    )  # fmt: skip
+    work.plot(figures[3].subplots())
+    shown = text.replace("\ud800", "?")
+    for figure in figures:
+        figure.savefig(tmp_path / "a.svg")
+        letters = [artist.get_text() for artist in figure.findobj(lambda one: hasattr(one, "get_text"))]
+        # but for the numbers that matplotlib writes
+        letters = [one for one in letters if one and "mathdefault" not in one]
+        assert any(shown in one.replace(r"\$", "$") for one in letters), letters
+        assert all("$" not in one.replace(r"\$", "") for one in letters), letters
+    paths = report.save(tmp_path / "study")
+    assert [path.name for path in paths] == [*PICTURES, *DATA]
+
+
+def test_a_picture_that_fails_costs_the_picture_alone(teeth, tmp_path, monkeypatch):
+    def fails(*_):
+        raise ValueError("a\nbackend fails")
+
+    teeth.save(tmp_path)
+    monkeypatch.setattr(pictures, "_draw_kernel", fails)
+    with pytest.warns(UserWarning, match=r"kernel\.png: this picture cannot be drawn \(ValueError: a backend fails\)"):
+        paths = teeth.save(tmp_path, overwrite=True)
+    assert [path.name for path in paths] == ["wall.png", "spectrum.png", "collision.png", *DATA]
+    assert not (tmp_path / "kernel.png").exists()
+    assert ker.load_matrix(tmp_path / "kernel.npz").method == "exact"

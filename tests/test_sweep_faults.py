@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
+import textwrap
 import threading
 import time
 from dataclasses import replace
@@ -17,7 +19,7 @@ import pytest
 from asperity import AsperityError, Estimate
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.core.workers import connected
+from asperity.core.workers import connected, results
 from asperity.spectral.sweeps.named_families import wall_by_name
 
 distributed = pytest.importorskip("distributed")
@@ -268,3 +270,83 @@ def test_a_disk_that_is_full_stops_the_sweep_and_loses_nothing(undisturbed, tmp_
         out, _ = process.communicate(timeout=60)
     assert out.count("point") == len(FRACTIONS) - len(stored)
     assert out.splitlines()[-1] == repr([(row.value, row.error, row.quantity) for row in undisturbed])
+
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+BLOCKS = [
+    pytest.param(block, id=f"{page.name}-{number}")
+    for page in sorted(DOCS.glob("*.md"))
+    for number, block in enumerate(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+    if re.search(r"client=\d", block)
+]
+GUARD = 'if __name__ == "__main__":\n'
+
+
+def test_there_are_examples_that_start_workers():
+    assert len(BLOCKS) >= 2
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_an_example_that_starts_workers_runs_as_a_script_and_says_what_it_lacks_without_its_guard(block, tmp_path):
+    if "random_wall" in block:
+        pytest.importorskip("SurfaceTopography")
+    shorter = {
+        "1.5, 50": "1.5, 3",
+        "1e-6": "1e-2",
+        "family, 100": "family, 4",
+        ", 64,": ", 12,",
+        ".extremum(": ".plot(",
+    }
+    for long, short in shorter.items():
+        block = block.replace(long, short)
+    (tmp_path / "whole.py").write_text(block)
+    with started("whole.py", cwd=tmp_path) as process:
+        _, err = process.communicate(timeout=600)
+    assert process.returncode == 0, err
+    assert list(tmp_path.glob("*.sweep"))
+    head, tail = block.split(GUARD)
+    (tmp_path / "without.py").write_text(head + textwrap.dedent(tail).replace(".sweep", ".other"))
+    with started("without.py", cwd=tmp_path) as process:
+        _, err = process.communicate(timeout=600)
+    assert process.returncode == 1
+    last = err.splitlines()[-1]
+    assert last.startswith("asperity.errors.InputError: client: each worker reads the script")
+    assert GUARD.strip() in last
+    # the trace of this one call
+    assert err.count("Traceback") == 1 and len(err.splitlines()) < 40
+
+
+def listening(_=None):
+    """Sockets of this process to which others can connect."""
+    held = {os.readlink(link) for link in Path("/proc/self/fd").iterdir() if link.is_symlink()}
+    found = []
+    for table in map(Path, ("/proc/net/tcp", "/proc/net/tcp6")):
+        lines = [line.split() for line in table.read_text().splitlines()[1:]] if table.exists() else []
+        found += [line for line in lines if line[3] == "0A" and f"socket:[{line[9]}]" in held]
+    named = [line.split() for line in Path("/proc/net/unix").read_text().splitlines()[1:]]
+    # flags with 10000: it accepts connections
+    return found + [line for line in named if line[3] == "00010000" and f"socket:[{line[6]}]" in held]
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="no list of sockets here")
+def test_workers_that_are_started_here_listen_nowhere():
+    import socket
+
+    before = listening()
+    with connected(2) as workers:
+        tasks = dict(results(listening, range(4), workers))
+        assert list(tasks.values()) == [[]] * 4
+        assert listening() == before
+    # the list does show a socket that listens
+    with socket.create_server(("127.0.0.1", 0)):
+        assert len(listening()) == len(before) + 1
+
+
+def test_a_random_ensemble_gives_a_sign_of_life_before_its_first_wall(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    with started("-m", "asperity", *RANDOM, "--quantity", "gap_specular", "--out", "a", cwd=tmp_path) as process:
+        try:
+            assert process.stderr is not None
+            assert process.stderr.readline().startswith("asperity: computing; Ctrl-C stops it")
+        finally:
+            process.kill()

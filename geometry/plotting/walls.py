@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles, finite_array, of_one_shape
+from ...core.html import verbatim
 from ...core.kinds import explained
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     left, right = (first - MARGIN) * wall.period, (last + MARGIN) * wall.period
     ax.set_xlim(left, right)
     ax.set_ylim(floor, free)
-    unit = wall.unit
+    unit = verbatim(wall.unit or "")
     ax.set_xlabel(f"x ({unit or 'length units of the wall'})")
     factor = vertical_stretch(wall)
     words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
 from ...core.checkpoints import Checkpoint
 from ...core.errors import FileExistsRefusal, InputError
 from ...core.estimates import described
-from ...core.files import write_whole
+from ...core.files import draw_whole, write_whole
 from .ensembles import Ensemble
 from .table import FILES, SweepTable
 
@@ -50,11 +52,11 @@ def save_all(table: SweepTable, folder: Path) -> list[Path]:
     """Write tables and, where something can be drawn, a picture of every quantity; returns the paths."""
     written = _save_tables(table, folder)
     try:
-        _draw(table, folder / PICTURE)
+        drawn = draw_whole(folder / PICTURE, partial(_draw, table))
     except InputError:
         # walls by name alone are no axis
         return written
-    return [*written, folder / PICTURE]
+    return [*written, folder / PICTURE] if drawn else written
 
 
 def save_ensemble(found: Ensemble, folder: Path) -> list[Path]:
@@ -71,7 +73,7 @@ def _save_tables(table: SweepTable, folder: Path) -> list[Path]:
     return written
 
 
-def _draw(table: SweepTable, path: Path) -> None:
+def _draw(table: SweepTable, stream: IO[bytes]) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -80,7 +82,7 @@ def _draw(table: SweepTable, path: Path) -> None:
     FigureCanvasAgg(figure)
     for quantity, panel in zip(table.quantities, np.atleast_1d(figure.subplots(number)), strict=True):
         table.plot(quantity, panel)
-    write_whole(path, lambda stream: figure.savefig(stream, dpi=100, format="png"), overwrite=True)
+    figure.savefig(stream, dpi=100, format="png")
 
 
 def in_words(table: SweepTable) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.html import verbatim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +38,7 @@ def draw_curves(rows: Sequence[SweepRow], parameters: Sequence[str], quantity: s
     name = numeric[0]
     curves: dict[str, list[SweepRow]] = {}
     for row in sorted(rows, key=lambda row: float(row.point[name])):
-        label = ", ".join(f"{key} = {value}" for key, value in row.point.items() if key != name)
+        label = verbatim(", ".join(f"{key} = {value}" for key, value in row.point.items() if key != name))
         curves.setdefault(label, []).append(row)
     for number, (label, curve) in enumerate(curves.items()):
         _draw_curve(ax, curve, name, f"C{number}", label)
@@ -46,8 +47,8 @@ def draw_curves(rows: Sequence[SweepRow], parameters: Sequence[str], quantity: s
         ax.plot([], [], MARKERS[verdict], color="0.3", linestyle="none", label=verdict)
     for number, (low, high) in enumerate(gapless(next(iter(curves.values())), name) if len(curves) == 1 else []):
         ax.axvspan(low, high, color=NO_GAP, zorder=0, label="no gap" if number == 0 else None)
-    ax.set_xlabel(name.replace("_", " "))
-    ax.set_ylabel(quantity.replace("_", " "))
+    ax.set_xlabel(verbatim(name.replace("_", " ")))
+    ax.set_ylabel(verbatim(quantity.replace("_", " ")))
     if ax.get_legend_handles_labels()[0]:
         ax.legend(frameon=False)
     return ax

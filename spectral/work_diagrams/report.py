@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.frames import data_frame
+from ...core.html import verbatim
 from ...core.kinds import explained_class
 from ...core.tables import table
 from .machine import Machine
@@ -342,10 +343,11 @@ def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
         ax.plot(
             [row.least for row in rows], [report.level(row) for row in rows],
             marker=MARKERS[number % len(MARKERS)], markersize=8.0 if chosen else 5.0, linewidth=1.2,
-            color="black" if chosen else f"C{number}", fillstyle="none" if chosen else "full", label=name,
+            color="black" if chosen else f"C{number}", fillstyle="none" if chosen else "full", label=verbatim(name),
         )  # fmt: skip
     ax.axhline(max(floors), color="0.5", linestyle=":", linewidth=1.0, label="reference known to")
-    ax.set(xscale="log", yscale="log", xlabel="seconds", ylabel=f"{report.norms[0]} error", title=report.problem)
+    ax.set(xscale="log", yscale="log", xlabel="seconds", ylabel=verbatim(f"{report.norms[0]} error"))
+    ax.set_title(verbatim(report.problem))
     from matplotlib.ticker import NullFormatter
 
     for axis, (low, high), limit in ((ax.xaxis, ax.get_xlim(), ax.set_xlim), (ax.yaxis, ax.get_ylim(), ax.set_ylim)):

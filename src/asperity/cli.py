@@ -6,10 +6,12 @@ import atexit
 import gc
 import os
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +67,10 @@ def main() -> None:
       asperity sweep focusing-arcs --over half_angle=0.2:1.5:50 --out arcs
       asperity ensemble gaussian:length=0.3 --points 12 --rms-slope 0.1 --smooth --quantity gap_specular --out gaussian
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            # names of files need not be text
+            stream.reconfigure(errors="backslashreplace")
     # at its end Python would look through all objects of numba for garbage, which takes 0.3 s
     atexit.register(gc.freeze)
 
@@ -226,7 +232,7 @@ def _run_in_folder(
         raise click.UsageError("--workers are started here, a --scheduler has its own; choose one")
     checkpoint = checkpoint_in(out, overwrite=force)
     quantities = [name.strip() for name in asked.pop("quantity").split(",")]
-    with _ending_at_ctrl_c():
+    with _ending_at_ctrl_c(), _with_a_sign_of_life():
         return run(quantities=quantities, checkpoint=checkpoint, client=scheduler or workers, progress=True, **asked)
 
 
@@ -238,6 +244,19 @@ def _ending_at_ctrl_c() -> Iterator[None]:
     except KeyboardInterrupt as stop:
         click.echo(f"asperity: {stop}", err=True)
         os._exit(INTERRUPTED)
+
+
+@contextmanager
+def _with_a_sign_of_life() -> Iterator[None]:
+    """Say after a second that the work is under way: the first wall may take minutes, and a pipe shows no bar."""
+    words = "asperity: computing; Ctrl-C stops it, and the same command goes on"
+    timer = threading.Timer(1.0, click.echo, [words], {"err": True})
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 @main.command(name="sweep", epilog=WALL_HELP)
@@ -314,7 +333,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
     for path in save_ensemble(found, out):
         click.echo(f"wrote {path}")
     if bins is not None:
-        with _ending_at_ctrl_c():
+        with _ending_at_ctrl_c(), _with_a_sign_of_life():
             law = mean_law(
                 family, walls, Bins(bins), given["tolerance"], rng=seed, checkpoint=out / LAW_CHECKPOINT,
                 client=given["scheduler"] or given["workers"],

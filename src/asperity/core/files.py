@@ -81,6 +81,20 @@ def write_whole(path: Path, content: str | Callable[[IO[bytes]], object], *, ove
         raise InputError(f"{path}: cannot write there ({why}); choose a folder that is writable") from reason
 
 
+def draw_whole(path: Path, draw: Callable[[IO[bytes]], object]) -> bool:
+    """Write a picture as `write_whole` does. One that cannot be drawn costs a warning, and an old one is removed."""
+    try:
+        write_whole(path, draw, overwrite=True)
+    except InputError:
+        raise
+    except Exception as reason:
+        path.unlink(missing_ok=True)
+        words = " ".join(f"{type(reason).__name__}: {reason}".split())
+        warnings.warn(f"{path}: this picture cannot be drawn ({words}); all else is saved", stacklevel=2)
+        return False
+    return True
+
+
 def check_writable(path: Path) -> None:
     """Refuse a new file that cannot be written, before the work for it is done.
 

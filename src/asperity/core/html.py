@@ -1,9 +1,21 @@
-"""Values as small tables in notebooks."""
+"""Values as small tables in notebooks, and text that pictures show as it is."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from html import escape
+
+
+def verbatim(text: str) -> str:
+    r"""Text of a user for matplotlib, which shows it letter by letter: nothing in it is a formula.
+
+    Examples
+    --------
+    >>> print(verbatim(r"load $\frac{$"))
+    load \$\frac{\$
+    """
+    # fonts have no letters for halves of surrogate pairs
+    return text.encode("utf-8", "replace").decode().replace("$", r"\$")
 
 
 def html_table(title: str, lines: Mapping[str, object], picture: str = "") -> str:

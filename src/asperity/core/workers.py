@@ -1,12 +1,14 @@
-"""Independent tasks in this process or on the workers of dask.distributed."""
+"""Independent tasks in this process, in processes at the ends of its pipes, or on the workers of dask.distributed."""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from itertools import islice
+from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
 from .checks import whole_number
@@ -17,7 +19,19 @@ BACKLOG = 2000
 LARGEST_TASK = "100 MB"
 # Seconds to wait for a result whose worker is gone, before it is asked whether there is any other.
 PATIENCE = 20.0
+# Processes that a task may end: another task of the machine may have taken the memory of the first ones.
+MOST_ENDED = 3
+# Exit code of a process that reads a script which starts processes again.
+STARTED_AGAIN = 79
 SCHEDULER_GONE = "the scheduler is gone, and with it the tasks that it had; start one, and this again"
+COULD_NOT_RUN = (
+    "the workers could not run a task; they need the same environment as this process, and the modules of your own "
+    "functions ({})"
+)
+STARTED_FROM_A_SCRIPT = (
+    "client: each worker reads the script that starts it, and so would start workers again; put what is computed below "
+    'the line `if __name__ == "__main__":`'
+)
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -25,40 +39,150 @@ Result = TypeVar("Result")
 
 @contextmanager
 def connected(client: Any) -> Iterator[Any]:
-    """A client of dask.distributed, or None for this process.
+    """Workers, a client of dask.distributed, or None for this process.
 
     Parameters
     ----------
-    client : None, int, str or distributed.Client
-        None for this process, a number of workers that are started here, a scheduler's address, or a client, which is
-        used as it is.
+    client : None, int, str, distributed.Client or Workers
+        None for this process, a number of workers that are started here, a scheduler's address, or a client or
+        workers, which are used as they are.
     """
-    if client is None:
-        yield None
+    if client is None or isinstance(client, Workers):
+        yield client
         return
     try:
-        from distributed import Client, LocalCluster
+        from distributed import Client
     except ImportError as reason:
         raise InputError("client: workers need dask; pip install 'asperity[distributed]'") from reason
     if isinstance(client, Client):
         yield client
         return
-    with ExitStack() as stack:
-        if isinstance(client, str):
-            try:
-                found = stack.enter_context(Client(client))
-            except (OSError, ValueError) as reason:
-                raise InputError(f"client: no scheduler answers at {client!r} ({reason})") from reason
-        else:
-            number = whole_number("client", client, 1)
-            cluster = stack.enter_context(
-                LocalCluster(n_workers=number, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0")
-            )
-            found = stack.enter_context(Client(cluster))
-            _pin(found)
-            # what they still compute is not wanted any more; asked to end they would finish it first
-            stack.callback(_kill, cluster)
+    if not isinstance(client, str):
+        workers = Workers(whole_number("client", client, 1))
+        try:
+            yield workers
+        finally:
+            workers.end()
+        return
+    try:
+        found = Client(client)
+    except (OSError, ValueError) as reason:
+        raise InputError(f"client: no scheduler answers at {client!r} ({reason})") from reason
+    with found:
         yield found
+
+
+class _Worker:
+    """A process at the other end of a pipe; it has some of the processors."""
+
+    def __init__(self, processors: list[int]) -> None:
+        self.processors = processors
+        context = multiprocessing.get_context("spawn")
+        self.channel, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs, processors), daemon=True)
+        self.process.start()
+        theirs.close()
+
+    def end(self) -> None:
+        """End the process, whatever it computes."""
+        self.process.kill()
+        self.process.join()
+        self.channel.close()
+
+
+class Workers:
+    """Processes of this machine. Each is at the end of a pipe that no other process has: nothing listens.
+
+    They are started with the first task. Each has processors of its own, so that its compiled loops start no more
+    threads than it has of them.
+    """
+
+    def __init__(self, number: int) -> None:
+        if getattr(multiprocessing.current_process(), "_inheriting", False):
+            # a process that is being started reads the script of the one that starts it
+            os._exit(STARTED_AGAIN)
+        usable = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+        self._processors = [usable[k::number] or usable[k % len(usable) :][:1] if usable else [] for k in range(number)]
+        self._workers: list[_Worker] = []
+
+    def nthreads(self) -> dict[str, int]:
+        """The workers, each with one thread, as a client of dask gives them."""
+        return {f"worker {k}": 1 for k in range(len(self._processors))}
+
+    def end(self) -> None:
+        """End them; what they compute is not wanted any more."""
+        while self._workers:
+            self._workers.pop().end()
+
+    def results(self, function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[tuple[Task, Result]]:
+        """Every task with its result; the tasks of a process that is lost are computed again by another."""
+        from cloudpickle import dumps, loads
+
+        self._workers = self._workers or [_Worker(own) for own in self._processors]
+        packed, rest = dumps(function), iter(tasks)
+        running: dict[_Worker, tuple[Task, int]] = {}
+
+        def give(worker: _Worker, task: Task, tries: int) -> None:
+            running[worker] = task, tries
+            # one that is gone is noticed below
+            with suppress(OSError):
+                worker.channel.send_bytes(dumps((packed, task)))
+
+        try:
+            # one task first: it compiles the loops, which the other workers then find on the disk
+            for task in islice(rest, 1):
+                give(self._workers[0], task, 1)
+            while running:
+                for channel in wait([worker.channel for worker in running]):
+                    worker = next(one for one in running if one.channel is channel)
+                    task, tries = running.pop(worker)
+                    try:
+                        error, result = loads(worker.channel.recv_bytes())
+                    except (EOFError, OSError):
+                        give(self._replacement(worker, tries), task, tries + 1)
+                        continue
+                    if error:
+                        raise AsperityError(COULD_NOT_RUN.format(error))
+                    yield task, result
+                    idle = [one for one in self._workers if one not in running]
+                    for one, task in zip(idle, islice(rest, len(idle)), strict=False):
+                        give(one, task, 1)
+        except BaseException:
+            # what still runs would come as the results of the next call
+            self.end()
+            raise
+
+    def _replacement(self, lost: _Worker, tries: int) -> _Worker:
+        lost.process.join(PATIENCE)
+        lost.end()
+        if lost.process.exitcode == STARTED_AGAIN:
+            raise InputError(STARTED_FROM_A_SCRIPT)
+        if tries > MOST_ENDED:
+            raise AsperityError("a task ended every worker that tried it; perhaps it needs more memory")
+        new = _Worker(lost.processors)
+        self._workers[self._workers.index(lost)] = new
+        return new
+
+
+def _work(channel: Connection, processors: list[int]) -> None:
+    """Compute what comes through the pipe until its other end is closed."""
+    from cloudpickle import dumps, loads
+
+    # Ctrl-C in a terminal reaches every process; the one that started this one ends it
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if processors:
+        os.sched_setaffinity(0, processors)
+    known, function = b"", abs
+    # the other end is closed when the process there ends
+    with suppress(EOFError, OSError):
+        while True:
+            packed, task = loads(channel.recv_bytes())
+            try:
+                known, function = packed, function if packed == known else loads(packed)
+                answer = dumps((None, function(task)))
+            except Exception as reason:
+                answer = dumps((repr(reason), None))
+            channel.send_bytes(answer)
 
 
 def results(
@@ -71,7 +195,7 @@ def results(
     function : callable
         Of one task. It must not raise.
     tasks : iterable
-    client : distributed.Client or None
+    client : Workers, distributed.Client or None
         From `connected`.
     backlog : int
         Tasks that the scheduler knows at a time; fewer where tasks or results are large.
@@ -89,6 +213,9 @@ def results(
     """
     if client is None:
         yield from ((task, function(task)) for task in tasks)
+        return
+    if isinstance(client, Workers):
+        yield from client.results(function, tasks)
         return
     from dask import config
 
@@ -156,10 +283,7 @@ def _failure(reason: BaseException) -> AsperityError:
 
     if isinstance(reason, KilledWorker):
         return AsperityError(f"a task ended every worker that tried it; perhaps it needs more memory ({reason})")
-    return AsperityError(
-        "the workers could not run a task; they need the same environment as this process, and the modules of your own "
-        f"functions ({reason!r})"
-    )
+    return AsperityError(COULD_NOT_RUN.format(repr(reason)))
 
 
 def _result(future: Any) -> Any:
@@ -188,21 +312,3 @@ def _one_worker_a_machine(client: Any) -> list[str]:
     for address in client.nthreads():
         machines.setdefault(address.rpartition(":")[0], address)
     return list(machines.values())
-
-
-def _kill(cluster: Any) -> None:
-    for worker in cluster.workers.values():
-        if worker.pid is not None:
-            with suppress(ProcessLookupError):
-                os.kill(worker.pid, signal.SIGKILL)
-
-
-def _pin(client: Any) -> None:
-    """Give each worker processors of its own, so that its compiled loops start no more threads than it has of them."""
-    # only some systems have it
-    if not hasattr(os, "sched_setaffinity"):
-        return
-    processors, workers = sorted(os.sched_getaffinity(0)), list(client.nthreads())
-    for index, address in enumerate(workers):
-        own = processors[index :: len(workers)] or [processors[index % len(processors)]]
-        client.run(os.sched_setaffinity, 0, own, workers=[address])

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..core.errors import AsperityError
@@ -26,9 +28,29 @@ def _context() -> Any:
     return context
 
 
-def _work(channel: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
+def end_all() -> None:
+    """End every computation of this process, and remove the private folders."""
+    for computation in multiprocessing.active_children():
+        computation.kill()
+    for folder in tuple(_folders):
+        folder.cleanup()
+
+
+def private_folder() -> TemporaryDirectory[str]:
+    """A folder of this user alone, until its ``cleanup`` or `end_all`."""
+    folder = TemporaryDirectory(prefix="asperity-", ignore_cleanup_errors=True)
+    _folders.add(folder)
+    return folder
+
+
+_folders: set[TemporaryDirectory[str]] = set()
+
+
+def _work(channel: Connection, job: Job, arguments: tuple[Any, ...], folder: str) -> None:
     # Ctrl-C in a terminal reaches every process; the page ends this one
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # files of its own are removed by the process that ends this one
+    tempfile.tempdir = folder
     try:
         for result in job(*arguments):
             channel.send((None, result))
@@ -44,8 +66,8 @@ def _work(channel: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
 class Background:
     """One computation at a time: a new one replaces the old one, which is ended.
 
-    A computation whose first result has not come is left to finish it, so that a wall that is dragged has answers, but
-    for `PATIENCE` seconds at most.
+    A computation whose first results have not come is left to finish them, so that a wall that is dragged has answers,
+    but for `PATIENCE` seconds at most.
 
     Examples
     --------
@@ -57,17 +79,26 @@ class Background:
     def __init__(self) -> None:
         self._process: BaseProcess | None = None
         self._channel: Connection | None = None
-        self._next: tuple[Job, tuple[Any, ...]] | None = None
-        self._begun, self._answered = 0.0, False
+        self._next: tuple[Job, tuple[Any, ...], int] | None = None
+        self._begun, self._missing = 0.0, 0
+        self._folder: TemporaryDirectory[str] | None = None
 
     @property
     def busy(self) -> bool:
         """Whether a computation runs or waits."""
         return self._process is not None or self._next is not None
 
-    def ask(self, job: Job, *arguments: Any) -> None:
-        """Compute ``job(*arguments)``, an iterator of results, in place of what is being computed."""
-        self._next = (job, arguments)
+    @property
+    def outdated(self) -> bool:
+        """Whether what is being computed waits to be replaced."""
+        return self._next is not None
+
+    def ask(self, job: Job, *arguments: Any, first: int = 1) -> None:
+        """Compute ``job(*arguments)``, an iterator of results, in place of what is being computed.
+
+        ``first`` is the number of results that the computation is left to give before another may replace it.
+        """
+        self._next = (job, arguments, first)
         self._proceed()
 
     def collect(self) -> list[tuple[str | None, Any]]:
@@ -77,12 +108,13 @@ class Background:
         try:
             while channel is not None and channel.poll():
                 found.append(channel.recv())
-                self._answered = True
+                self._missing -= 1
         except (EOFError, ConnectionResetError):
-            answered = self._answered
-            self.drop(waiting=False)
-            if not answered:
+            assert self._process is not None
+            self._process.join()
+            if self._process.exitcode:
                 found.append((GONE, None))
+            self.drop(waiting=False)
         self._proceed()
         return found
 
@@ -94,20 +126,24 @@ class Background:
             self._process.close()
         if self._channel is not None:
             self._channel.close()
-        self._process = self._channel = None
+        if self._folder is not None:
+            self._folder.cleanup()
+            _folders.discard(self._folder)
+        self._process = self._channel = self._folder = None
         if waiting:
             self._next = None
 
     def _proceed(self) -> None:
         if self._next is None:
             return
-        if self._process is not None and not (self._answered or time.monotonic() - self._begun > PATIENCE):
+        if self._process is not None and self._missing > 0 and time.monotonic() - self._begun < PATIENCE:
             return
-        (job, arguments), self._next = self._next, None
+        (job, arguments, first), self._next = self._next, None
         self.drop()
         context = _context()
         self._channel, theirs = context.Pipe(duplex=False)
-        self._process = context.Process(target=_work, args=(theirs, job, arguments), daemon=True)
+        self._folder = private_folder()
+        self._process = context.Process(target=_work, args=(theirs, job, arguments, self._folder.name), daemon=True)
         self._process.start()
         theirs.close()
-        self._begun, self._answered = time.monotonic(), False
+        self._begun, self._missing = time.monotonic(), first

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..core.checks import Floats
-from ..geometry import Wall, trace, trajectory
+from ..core.errors import InputError
+from ..geometry import Disk, Wall, trace, trajectory
 from ..geometry.plotting.walls import vertical_stretch
+from ..kernels.bases.basis import Frame
 from ..study.pictures import chosen_rays
-from .answers import Answer, Eigenvalues, Histogram
-from .question import editable
+from .answers import Answer, Eigenvalues, Histogram, answers_to
+from .question import Question, editable
 
 # Okabe and Ito's colours, as in the pictures of a study.
 RAY_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
@@ -22,6 +26,8 @@ PIXELS, COLOUR_POWER = 240, 0.5
 OUTLINE, MARGIN, FREE = 2e-4, 0.12, 0.3
 # More vertices are not drawn as handles.
 MOST_HANDLES = 400
+# Pieces of a wall that is shown: to draw its rays takes three seconds.
+MOST_PIECES = 10_000
 # Milliseconds between two messages of a vertex that is being dragged.
 DRAG_INTERVAL = 100
 ANGLES = {0.0: "0", 0.5 * np.pi: "π/2", np.pi: "π"}
@@ -33,6 +39,56 @@ if (now - (window.asperity_sent ?? 0) > interval) {
     vertices.setv({data: vertices.data}, {check_eq: false})
 }
 """
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What `WallFigure` shows of a question, and whether its wall is of the catalogue."""
+
+    question: Question
+    named: bool
+    wall: Wall
+    solids: list[Floats]
+    rays: list[Floats]
+
+    @property
+    def handles(self) -> list[tuple[float, float]]:
+        """The vertices that can be dragged: those of a polygon that is not foreshortened."""
+        return [] if self.question.foreshortened else [(float(x), float(y)) for x, y in handles_of(self.wall)]
+
+
+def pictured_and_answered(
+    wall: Wall | Callable[[], Wall], name: str, disk: Disk, convention: Frame, foreshortened: bool, named: bool
+) -> Iterator[Picture | Answer]:
+    """Make the wall, then its picture and the answers to its question.
+
+    Raises
+    ------
+    InputError
+        If the wall cannot be made or has more than `MOST_PIECES` pieces.
+
+    Examples
+    --------
+    >>> from asperity.geometry import triangular_teeth
+    >>> len(next(pictured_and_answered(triangular_teeth, "teeth", Disk(), "paper", False, True)).handles)
+    3
+    """
+    made = wall() if callable(wall) else wall
+    if len(made.pieces) > MOST_PIECES:
+        raise InputError(
+            f"{name}: expected a wall of at most {MOST_PIECES} pieces, got {len(made.pieces)}; thin it out, or use the "
+            "command `asperity study`, which has no limit"
+        )
+    question = Question(made, name, disk, convention, foreshortened)
+    yield pictured(question, named)
+    yield from answers_to(question)
+
+
+def pictured(question: Question, named: bool = True) -> Picture:
+    """The picture of a question."""
+    wall = question.seen
+    floor, free = _heights(wall)
+    return Picture(question, named, wall, solids(wall, floor), ray_lines(wall, free))
 
 
 def _figure(title: str, **options: Any) -> Any:
@@ -83,31 +139,33 @@ class WallFigure:
         send = CustomJS(args={"vertices": self.vertices, "interval": DRAG_INTERVAL}, code=SEND_WHILE_DRAGGING)
         plot.js_on_event("pan", send)
 
-    def show(self, wall: Wall, title: str, *, dragged: bool) -> None:
+    def show(self, picture: Picture, title: str, *, dragged: bool) -> None:
         """Draw a wall; while a vertex is being dragged the vertices and the view are left alone."""
-        self.plot.title.text = title
-        floor, free = _heights(wall)
-        paths = solids(wall, floor)
+        from bokeh.models.text import PlainText
+
+        # in other text bokeh reads formulas
+        self.plot.title.text = PlainText(title)
+        paths, wall = picture.solids, picture.wall
         self._solid.data = {
             "xs": [path[:, 0].tolist() for path in paths], "ys": [path[:, 1].tolist() for path in paths],
         }  # fmt: skip
-        self._show_rays(wall, free)
+        self._show_rays(picture.rays)
         if dragged:
             return
+        self.show_vertices(picture.handles)
         left, right = -MARGIN * wall.period, (1.0 + MARGIN) * wall.period
-        self._view.data = {"x": [left, right], "y": [floor, free]}
+        self._view.data = {"x": [left, right], "y": list(_heights(wall))}
         self.plot.aspect_scale = vertical_stretch(wall)
-        self.plot.xaxis.axis_label = f"x ({wall.unit or 'length units of the wall'})"
-        self.plot.yaxis.axis_label = f"y ({wall.unit})" if wall.unit else "y"
+        self.plot.xaxis.axis_label = PlainText(f"x ({wall.unit or 'length units of the wall'})")
+        self.plot.yaxis.axis_label = PlainText(f"y ({wall.unit})" if wall.unit else "y")
 
-    def show_vertices(self, points: Any) -> None:
-        """Show handles at these points, an array or list of pairs; none for a wall that is not `editable`."""
-        x, y = zip(*((float(x), float(y)) for x, y in points), strict=True) if len(points) else ((), ())
+    def show_vertices(self, points: list[tuple[float, float]]) -> None:
+        """Show handles at these points; none for a wall that is not `editable`."""
+        x, y = zip(*points, strict=True) if points else ((), ())
         if list(x) != list(self.vertices.data["x"]) or list(y) != list(self.vertices.data["y"]):
             self.vertices.data = {"x": list(x), "y": list(y)}
 
-    def _show_rays(self, wall: Wall, free: float) -> None:
-        lines = ray_lines(wall, free)
+    def _show_rays(self, lines: list[Floats]) -> None:
         colours = [RAY_COLOURS[k % len(RAY_COLOURS)] for k in range(len(lines))]
         self._rays.data = {
             "xs": [line[:, 0].tolist() for line in lines], "ys": [line[:, 1].tolist() for line in lines],

@@ -16,6 +16,7 @@ from .question import Question
 
 # Largest file that is opened, in bytes: a profile of a million points.
 LARGEST = 64 * 2**20
+LONGEST_NAME = 100
 # Characters that stay in the names of files.
 PLAIN = re.compile(r"[^A-Za-z0-9._-]+")
 
@@ -62,7 +63,8 @@ def plain_name(name: str) -> str:
     ('my-wall-angle-0.7.toml', 'wall')
     """
     last = name.replace("\\", "/").rpartition("/")[2]
-    return PLAIN.sub("-", last).strip(".-") or "wall"
+    # the ending tells the kind, and file systems bear 255 bytes
+    return PLAIN.sub("-", last[-LONGEST_NAME:]).strip(".-") or "wall"
 
 
 def wall_as_toml(wall: Wall) -> bytes:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import html
 import io
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +15,11 @@ from bokeh.events import PanEnd, PanStart
 from ..core.errors import AsperityError
 from ..core.estimates import compact
 from ..geometry import WALLS, Disk, Wall
-from .answers import Answer, answers_to
+from . import drawing
+from .answers import Answer
 from .background import Background
-from .drawing import CollisionFigure, KernelFigure, SpectrumFigure, WallFigure, handles_of
 from .files import new_folder, opened, plain_name, studied, unpacked, wall_as_toml
-from .question import Question, pinned, with_new_vertex
+from .question import Question, named, pinned, with_new_vertex
 
 # Milliseconds between two looks for better answers.
 INTERVAL = 40
@@ -69,18 +71,19 @@ class Page:
         self.message = ""
         self._out = out
         self._background, self._saving = Background(), Background()
-        self._dragging = self._filling = False
+        self._dragging = self._filling = self._awaited = False
+        self._picture: drawing.Picture | None = None
         self._archive: bytes | None = None
         self._was_busy = False
         self._make_figures()
         self._make_controls(parameters or {})
-        self.ask(wall, name)
+        self.ask(wall, name, of_catalogue=name in WALLS)
         if pn.state.curdoc is not None and pn.state.curdoc.session_context is not None:
             pn.state.add_periodic_callback(self.collect, INTERVAL)
 
     def _make_figures(self) -> None:
-        self.wall_figure, self.kernel = WallFigure(), KernelFigure()
-        self.spectrum, self.collision = SpectrumFigure(), CollisionFigure()
+        self.wall_figure, self.kernel = drawing.WallFigure(), drawing.KernelFigure()
+        self.spectrum, self.collision = drawing.SpectrumFigure(), drawing.CollisionFigure()
         self.wall_figure.vertices.on_change("data", self._vertices_changed)
         self.wall_figure.plot.on_event(PanStart, self._drag_begins)
         self.wall_figure.plot.on_event(PanEnd, self._drag_ends)
@@ -90,6 +93,7 @@ class Page:
         self.choice = pn.widgets.Select(name="Wall", options=[*WALLS, DRAWN], value=name if name in WALLS else DRAWN,
                                         sizing_mode="stretch_width")  # fmt: skip
         self.sliders = pn.Column(sizing_mode="stretch_width", margin=0)
+        self.parameters: dict[str, Any] = {}
         self.mass = _slider("mass of the disk", *RANGES["mass"], self.question.disk.mass)
         self.inertia = _slider("inertia of the disk", *RANGES["inertia"], self.question.disk.inertia)
         self.convention = pn.widgets.RadioButtonGroup(
@@ -109,7 +113,7 @@ class Page:
         self.choice.param.watch(lambda _: self._wall_chosen(), "value")
         self.file.param.watch(lambda _: self._file_sent(), "value")
         for widget in (self.mass, self.inertia, self.convention, self.foreshortened):
-            widget.param.watch(lambda _: self.ask(self.question.wall, self.question.name), "value")
+            widget.param.watch(lambda _: self._ask_again(), "value")
 
     def _make_saving(self) -> None:
         stretch: dict[str, Any] = {"sizing_mode": "stretch_width"}
@@ -133,6 +137,7 @@ class Page:
     def _make_sliders(self, parameters: dict[str, float | int]) -> None:
         entry = WALLS.get(self.choice.value)
         defaults = {**entry.defaults, **parameters} if entry else {}
+        _forget(self.parameters.values())
         self.parameters = {key: _slider(key, *RANGES[key], value) for key, value in defaults.items()}
         for slider in self.parameters.values():
             slider.param.watch(lambda _: self._parameters_moved(), "value")
@@ -161,28 +166,34 @@ class Page:
         self._make_sliders({})
         entry = WALLS.get(self.choice.value)
         if entry is not None:
-            self.ask(entry.build(), entry.name)
+            self.ask(partial(named, entry.name, {}), entry.name, of_catalogue=True)
         else:
             self._polygon_from_here()
 
     def _polygon_from_here(self) -> None:
         """A polygon to drag, where the wall is one already, or a plain one."""
-        points = handles_of(self.question.wall)
-        self.ask(Wall.from_vertices(points if len(points) else [(0, 0), (0.3, -0.5), (0.6, -0.2), (1, 0)]), "polygon")
+        points = drawing.handles_of(self.question.wall)
+        self._ask_polygon(points if len(points) else [(0, 0), (0.3, -0.5), (0.6, -0.2), (1, 0)])
+
+    def _ask_polygon(self, points: Any) -> None:
+        self.ask(partial(Wall.from_vertices, points, self.question.wall.unit), "polygon")
 
     def _parameters_moved(self) -> None:
         if self._filling:
             return
-        entry = WALLS[self.choice.value]
-        values = {name: slider.value for name, slider in self.parameters.items()}
-        self._try(lambda: entry.build(**values), entry.name)
+        name, values = self.choice.value, {key: slider.value for key, slider in self.parameters.items()}
+        for key, slider in self.parameters.items():
+            # what is sent to the server need not come from the slider
+            if isinstance(slider, pn.widgets.IntSlider) and not slider.start <= slider.value <= slider.end:
+                self._refuse(f"{key}: expected {slider.start} to {slider.end}, got {slider.value}; use the slider")
+                return
+        self.ask(partial(named, name, values), name, of_catalogue=True)
 
     def _file_sent(self) -> None:
         if not self.file.value:
             return
         name, content, options = str(self.file.filename), self.file.value, str(self.options.value or "")
-        if self._try(lambda: opened(name, content, options), Path(name).stem):
-            self._choose(DRAWN)
+        self.ask(partial(opened, name, content, options), Path(name).stem)
 
     def _choose(self, choice: str) -> None:
         """Set the choice without asking for its wall."""
@@ -196,12 +207,19 @@ class Page:
 
     def _drag_ends(self, _event: Any) -> None:
         self._dragging = False
-        self._settle()
+        if not self._awaited:
+            self._settle()
 
     def _vertices_changed(self, _name: str, _old: Any, new: Any) -> None:
+        if len(new["x"]) > drawing.MOST_HANDLES:
+            self._refuse(
+                f"expected at most {drawing.MOST_HANDLES} vertices to drag, got {len(new['x'])}; open a file instead"
+            )
+            self._settle()
+            return
         points = list(zip(new["x"], new["y"], strict=True))
-        before = self._handles()
-        if points == before:
+        before = [] if self._picture is None else self._picture.handles
+        if points == before and not self._awaited:
             return
         if len(points) == len(before) + 1 and not self._dragging:
             points = with_new_vertex(points)
@@ -210,74 +228,84 @@ class Page:
             self._refuse("this wall has no vertices to drag; choose a polygon")
             self._settle()
             return
-        period = self.question.wall.period
-        if self._try(lambda: Wall.from_vertices(pinned(points, period), self.question.wall.unit), "polygon"):
-            self._choose(DRAWN)
-        if not self._dragging:
-            self._settle()
+        self._ask_polygon(pinned(points, self.question.wall.period))
 
     def _settle(self) -> None:
-        """Show the vertices of the wall that is asked, also where the last ones were refused or moved."""
-        self.wall_figure.show(self.question.seen, self._title(), dragged=False)
-        self.wall_figure.show_vertices(self._handles())
-
-    def _handles(self) -> list[tuple[float, float]]:
-        """The vertices that can be dragged: those of a polygon that is not foreshortened."""
-        if self.question.foreshortened:
-            return []
-        return [(float(x), float(y)) for x, y in handles_of(self.question.wall)]
+        """Show the last valid wall with its vertices, also where later ones were refused or moved."""
+        if self._picture is not None:
+            self._show_wall(self._picture, dragged=self._dragging)
 
     # -- what it does
-
-    def _try(self, make: Any, name: str) -> bool:
-        try:
-            wall = make()
-        except AsperityError as reason:
-            self._refuse(str(reason))
-            return False
-        self.ask(wall, name)
-        return True
 
     def _refuse(self, reason: str) -> None:
         """Say why, and leave the last valid wall and its answer as they are."""
         self.message = reason
         self._show_status()
 
-    def ask(self, wall: Wall, name: str) -> None:
-        """Show a wall, and begin to compute its answers; those of the last wall stay until the first has come."""
-        self.message = ""
+    def ask(self, wall: Wall | Callable[[], Wall], name: str, *, of_catalogue: bool = False) -> None:
+        """Begin to make a wall and its answers in another process; the last wall stays until they come."""
         try:
             disk = Disk(float(self.mass.value), float(self.inertia.value))
-            self.question = Question(wall, name, disk, self.convention.value, bool(self.foreshortened.value))
-            self.wall_figure.show(self.question.seen, self._title(), dragged=self._dragging)
         except AsperityError as reason:
             self._refuse(str(reason))
             return
-        if not self._dragging:
-            self.wall_figure.show_vertices(self._handles())
-        self._background.ask(answers_to, self.question)
+        self.message, self._awaited, self._asked = "", True, (wall, name, of_catalogue)
+        # two results, so that a wall that is dragged has answers and not pictures alone
+        self._background.ask(
+            drawing.pictured_and_answered, wall, name, disk, self.convention.value, bool(self.foreshortened.value),
+            of_catalogue, first=2,
+        )  # fmt: skip
         self._show_status()
 
-    def _title(self) -> str:
-        wall = self.question.seen
-        felt = ", as the disk feels it" if self.question.foreshortened else ""
-        hint = ": drag its vertices, tap to add one" if self._handles() else ""
-        return f"{self.question.name}, depth {wall.depth:.4g}{felt}{hint}"
+    def _ask_again(self) -> None:
+        """Ask for the wall that is awaited, or else the last valid one, with the disk and convention chosen now."""
+        last = self.question.wall, self.question.name, self._picture is None or self._picture.named
+        wall, name, of_catalogue = self._asked if self._awaited else last
+        self.ask(wall, name, of_catalogue=of_catalogue)
+
+    def _show_wall(self, picture: drawing.Picture, *, dragged: bool) -> None:
+        felt = ", as the disk feels it" if picture.question.foreshortened else ""
+        hint = ": drag its vertices, tap to add one" if picture.handles else ""
+        title = f"{picture.question.name}, depth {picture.wall.depth:.4g}{felt}{hint}"
+        self.wall_figure.show(picture, title, dragged=dragged)
 
     def collect(self) -> None:
         """Show the results that have come."""
-        for error, answer in self._background.collect()[-1:]:
+        outdated = self._background.outdated
+        for error, result in self._background.collect():
             if error is not None:
-                self.message = error
+                self._failed(error, outdated=outdated)
+            elif isinstance(result, drawing.Picture):
+                self._came(result, outdated=outdated)
             else:
-                self.answer = answer
-                self._show_answer(answer)
+                self.answer = result
+                self._show_answer(result)
             self._show_status()
         for error, archive in self._saving.collect():
             self._study_came(error, archive)
         if self._was_busy != self._background.busy:
             self._was_busy = self._background.busy
             self._show_status()
+
+    def _came(self, picture: drawing.Picture, *, outdated: bool) -> None:
+        """Take a valid wall; vertices that have changed since are left alone."""
+        self._picture, self.question, self._awaited = picture, picture.question, outdated
+        self._show_wall(picture, dragged=self._dragging or outdated)
+        if not picture.named and self.choice.value != DRAWN:
+            self._choose(DRAWN)
+
+    def _failed(self, error: str, *, outdated: bool) -> None:
+        """Say why there is no wall or no answer; of a wall that has been replaced nothing is said."""
+        if outdated:
+            return
+        refused, self._awaited = self._awaited, False
+        if refused:
+            self._settle()
+            if self._picture is not None and not (self.answer and self.answer.finished):
+                # go on with the last valid wall
+                self._ask_again()
+                self._awaited = False
+        self.message = error
 
     def _show_answer(self, answer: Answer) -> None:
         self.kernel.show(answer)
@@ -334,9 +362,10 @@ class Page:
         self.saved.object = f"<div role='log'>{html.escape(text)}</div>"
 
     def close(self) -> None:
-        """End the computations."""
+        """End the computations, and let go of the widgets."""
         self._background.drop()
         self._saving.drop()
+        _forget([self.mass, self.inertia, *self.parameters.values()])
 
 
 def _slider(name: str, low: float, high: float, value: float) -> Any:
@@ -348,6 +377,13 @@ def _slider(name: str, low: float, high: float, value: float) -> Any:
         name=name, start=min(low, value), end=max(high, value), fixed_start=0.0, step=0.01, value=float(value),
         sizing_mode="stretch_width",
     )  # fmt: skip
+
+
+def _forget(sliders: Iterable[Any]) -> None:
+    """Remove sliders from panel's list of callbacks, in which each would hold itself and its page for ever."""
+    for slider in sliders:
+        for part in slider.select():
+            pn.links.Callback.registry.pop(part, None)
 
 
 def answer_as_html(answer: Answer) -> str:

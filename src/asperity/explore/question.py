@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
 
 from ..core.checks import Floats
-from ..geometry import Disk, Wall
+from ..geometry import WALLS, Disk, Wall
 from ..kernels import CollisionLaw, Law, WallLaw
 from ..kernels.bases.basis import Frame
 
@@ -59,6 +59,17 @@ class Question:
     def collision(self) -> CollisionLaw:
         """The collision law of the disk with the wall itself."""
         return CollisionLaw.from_wall(self.wall, self.disk)
+
+
+def named(name: str, parameters: Mapping[str, float | int]) -> Wall:
+    """A wall of the catalogue.
+
+    Examples
+    --------
+    >>> named("triangular-teeth", {"angle": 1.0}) == WALLS["triangular-teeth"].build(angle=1.0)
+    True
+    """
+    return WALLS[name].build(**parameters)
 
 
 def editable(wall: Wall) -> bool:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import errno
+import hmac
 import logging
-import multiprocessing
 import os
+import secrets
 import signal
 import socket
 import time
@@ -16,6 +17,7 @@ from typing import Any
 
 from ..core.errors import INTERRUPTED, InputError
 from ..geometry import WALLS, wall_from_text
+from .background import end_all, private_folder
 
 ADDRESS, PORT = "127.0.0.1", 5006
 # The file descriptor.
@@ -31,6 +33,8 @@ FIRST_WALL = "triangular-teeth"
 
 def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = None) -> Any:
     """Return a server of the page, which listens already and answers as soon as its ``io_loop`` is started.
+
+    Every address begins with the ``prefix`` of the server, a token that is made for it.
 
     Parameters
     ----------
@@ -58,16 +62,19 @@ def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = Non
 
     number = _usable(port)
     hosts = [f"{name}:{number}" for name in NAMES]
+    token = secrets.token_urlsafe()
     # panel sets a handler of its own, which would end the loop without a word
     interrupt = signal.getsignal(signal.SIGINT)
     try:
-        return panel.io.server.get_server(
-            page, address=ADDRESS, port=number, show=False, start=False, title="asperity explore",
-            websocket_origin=hosts, auth_provider=_own_host(hosts), websocket_max_message_size=LARGEST_MESSAGE,
+        made = panel.io.server.get_server(
+            page, address=ADDRESS, port=number, prefix=token, show=False, start=False, title="asperity explore",
+            websocket_origin=hosts, websocket_max_message_size=LARGEST_MESSAGE,
             check_unused_sessions_milliseconds=CHECKED_EVERY, unused_session_lifetime_milliseconds=CLOSED_AFTER,
         )  # fmt: skip
     finally:
         signal.signal(signal.SIGINT, interrupt)
+    _refuse_strangers(made, hosts)
+    return made
 
 
 def serve_page(text: str, port: int, out: Path | None, *, browser: bool, say: Callable[[str], object]) -> None:
@@ -76,8 +83,7 @@ def serve_page(text: str, port: int, out: Path | None, *, browser: bool, say: Ca
 
     def end(*_: object) -> None:
         # what runs for the tabs that are open
-        for computation in multiprocessing.active_children():
-            computation.kill()
+        end_all()
         # not by `say`: Python refuses to write while the signal interrupts a line that is being written
         os.write(STANDARD_ERROR, b"asperity: interrupted\n")
         # an exception could be caught by a library, and libraries would wait for their threads
@@ -86,11 +92,14 @@ def serve_page(text: str, port: int, out: Path | None, *, browser: bool, say: Ca
     signal.signal(signal.SIGINT, end)
     say("preparing; the first time this compiles for some seconds")
     _prepare(text)
-    address = f"http://{ADDRESS}:{server.port}/"
+    address = f"http://{ADDRESS}:{server.port}{server.prefix}/"
     say(f"{address} shows the page; Ctrl-C ends it")
     server.start()
     if browser:
-        server.io_loop.add_callback(webbrowser.open, address)
+        # other users see the arguments of the browser, but cannot read this file
+        way = Path(private_folder().name) / "asperity-explore.html"
+        way.write_text(f'<meta http-equiv="refresh" content="0; url={address}">')
+        server.io_loop.add_callback(webbrowser.open, way.as_uri())
     server.io_loop.start()
 
 
@@ -123,28 +132,28 @@ def _usable(port: int) -> int:
         return int(probe.getsockname()[1])
 
 
-def _own_host(hosts: list[str]) -> Any:
-    """Refuses every request to another host name, or from a page of another origin, before the page is made."""
-    from bokeh.server.auth_provider import AuthProvider
-    from tornado.web import HTTPError
+def _refuse_strangers(server: Any, hosts: list[str]) -> None:
+    """Answer 403 to every request but those of the page for itself, before any handler of bokeh and panel is chosen.
 
-    def user(handler: Any) -> str:
-        origin = handler.request.headers.get("Origin")
-        if handler.request.host not in hosts or origin not in (None, *(f"http://{host}" for host in hosts)):
-            raise HTTPError(403, "asperity explore answers to its own page only")
-        return "user"
+    A request is the page's own if its host is ours, its origin too or not named, and its address has the token. Nothing
+    is served but the page, its socket and the files that bokeh and panel have for browsers.
+    """
+    from tornado.routing import Matcher, Rule
+    from tornado.web import ErrorHandler
 
-    class OwnHost(AuthProvider):
-        @property
-        def get_user(self) -> Any:
-            return user
+    begin = f"{server.prefix}/".encode()
+    origins = (None, *(f"http://{host}" for host in hosts))
 
-        @property
-        def login_url(self) -> str:
-            # never used: a request has the user or is refused
-            return "/"
+    class Stranger(Matcher):
+        def match(self, request: Any) -> dict[str, Any] | None:
+            path, headers = request.path.encode(), request.headers
+            rest = path[len(begin) :]
+            known = hmac.compare_digest(path[: len(begin)], begin)
+            served = request.method == "GET" and (rest in (b"", b"ws") or rest.startswith(b"static/"))
+            own = headers.get("Host") in hosts and headers.get("Origin") in origins
+            return None if known and served and own else {}
 
-    return OwnHost()
+    server._tornado.default_router.rules.insert(0, Rule(Stranger(), ErrorHandler, {"status_code": 403}))
 
 
 def _called(text: str) -> tuple[str, dict[str, float | int]]:

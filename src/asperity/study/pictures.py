@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
 from ..core.checks import Floats
 from ..core.errors import FileExistsRefusal, InputError
-from ..core.files import write_whole
+from ..core.files import draw_whole, write_whole
+from ..core.html import verbatim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,18 +37,23 @@ GALLERY_COLUMNS = 3
 SMOOTH, NO_SLIP = "#0072B2", "#D55E00"
 
 
-def save_pictures(study: StudyResult, paths: Sequence[Path], dpi: float = RESOLUTION) -> None:
-    """Write wall, kernel, spectrum and collision, in this order."""
+def save_pictures(study: StudyResult, paths: Sequence[Path], dpi: float = RESOLUTION) -> list[Path]:
+    """Write wall, kernel, spectrum and collision, in this order; returns the paths of those that could be drawn."""
     from matplotlib.figure import Figure
 
-    drawings = ((draw_study_wall, (7.0, 5.0)), (_draw_kernel, (6.4, 5.0)), (_draw_spectrum, (7.0, 5.0)))
-    for path, (draw, size) in zip(paths, drawings, strict=False):
-        figure = Figure(figsize=size)
-        draw(study, figure.subplots())
-        figure.savefig(path, dpi=dpi, bbox_inches="tight")
-    figure = Figure(figsize=(7.0, 6.0), layout="constrained")
-    draw_outgoing_velocities(study.collision, figure)
-    figure.savefig(paths[-1], dpi=dpi)
+    def write(path: Path, draw: Callable[..., object], size: tuple[float, float], stream: IO[bytes]) -> None:
+        last = draw is draw_outgoing_velocities
+        figure = Figure(figsize=size, layout="constrained" if last else None)
+        draw(*((study.collision, figure) if last else (study, figure.subplots())))
+        figure.savefig(stream, dpi=dpi, format=path.suffix[1:], bbox_inches=None if last else "tight")
+
+    drawings: tuple[tuple[Callable[..., object], tuple[float, float]], ...] = (
+        (draw_study_wall, (7.0, 5.0)), (_draw_kernel, (6.4, 5.0)), (_draw_spectrum, (7.0, 5.0)),
+        (draw_outgoing_velocities, (7.0, 6.0)),
+    )  # fmt: skip
+    return [
+        path for path, drawing in zip(paths, drawings, strict=True) if draw_whole(path, partial(write, path, *drawing))
+    ]
 
 
 def draw_study_wall(study: StudyResult, ax: Axes) -> None:
@@ -89,7 +96,7 @@ def _draw_spectrum(study: StudyResult, ax: Axes) -> None:
 
     if study.spectrum is None:
         ax.set_axis_off()
-        reason = textwrap.fill(study.refusals["spectrum"], TITLE_WIDTH)
+        reason = verbatim(textwrap.fill(study.refusals["spectrum"], TITLE_WIDTH))
         ax.text(0.5, 0.5, f"No spectrum:\n{reason}", ha="center", va="center", transform=ax.transAxes)
         return
     if study.gap is None:
@@ -195,4 +202,4 @@ def gallery() -> Figure:
 
 
 def _title(text: str) -> str:
-    return "\n".join(textwrap.wrap(text, TITLE_WIDTH))
+    return verbatim("\n".join(textwrap.wrap(text, TITLE_WIDTH)))

@@ -80,7 +80,9 @@ class Study(StudyResult):
     def save(
         self, folder: str | Path, *, overwrite: bool = False, picture_format: str = "png", dpi: float = RESOLUTION
     ) -> list[Path]:
-        """Write the pictures, the matrix with its metadata, and the study as JSON; returns the paths.
+        """Write the matrix with its metadata, the study as JSON, and the pictures; returns the paths.
+
+        A picture that cannot be drawn is missing, with a warning.
 
         Parameters
         ----------
@@ -104,12 +106,11 @@ class Study(StudyResult):
         pictures = picture_names(picture_format)
         try:
             with moved_when_complete(target) as beside:
-                save_pictures(self, [beside / name for name in pictures], dpi)
                 self.matrix.save(beside / DATA[0])
                 (beside / DATA[1]).write_text(self.to_json() + "\n", encoding="utf-8")
         except OSError as reason:
             raise InputError(f"{target}: cannot write there ({reason}); choose another folder") from reason
-        return [target / name for name in (*pictures, *DATA)]
+        return [*save_pictures(self, [target / name for name in pictures], dpi), *(target / name for name in DATA)]
 
 
 @explained
