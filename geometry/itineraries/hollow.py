@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import count_time
 from ..scene.columns import LEFT, RIGHT
 from .pieces import Pieces, samples_between
 
@@ -154,6 +155,7 @@ class HollowConditionals:
         (nodes, widths), node_starts, pieces, piece_starts, errors, unresolved, rays, segments = found
         self.rays += int(rays.sum())
         self.segments += int(segments.sum())
+        count_time(int(segments.sum()) * self.scene.segment_time)
         found_conditionals = {}
         for k, angle in enumerate(theta.tolist()):
             own = slice(node_starts[k], node_starts[k + 1])
