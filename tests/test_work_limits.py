@@ -74,8 +74,8 @@ def test_a_gap_within_a_time_limit_agrees_with_one_without() -> None:
 
 
 def test_a_resistance_within_a_time_limit_agrees_with_one_without() -> None:
-    law = ker.WallLaw(geo.random_wall(geo.HeightCorrelation(0.3), points=8, rms_slope=0.5, smooth=True, rng=3))
-    exact, quick = ker.resistance(law, 1e-7), ker.resistance(law, 1e-7, time_limit=0.1)
+    law = ker.WallLaw(geo.mushrooms(0.3, 0.2))
+    exact, quick = ker.resistance(law, 1e-6), ker.resistance(law, 1e-6, time_limit=0.1)
     assert exact.error < 0.1 * quick.error
     assert abs(quick.value - exact.value) <= quick.error + exact.error
 
@@ -101,7 +101,6 @@ def test_a_time_limit_is_a_positive_number(tool, limit) -> None:
     [
         ("ker.TriangularTeethLaw(0.7)", ""),
         ("ker.maxwell(0.5)", ""),
-        ("ker.CircularArcLaw(1.2)", ", tolerance=1e-3"),
         ("ker.WallLaw(geo.dispersing_arcs(1.0))", ", method='qmc'"),
         ("ker.WallLaw(geo.dispersing_arcs(1.0))", ", method='monte-carlo'"),
     ],
