@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ..scene.columns import LEFT, RIGHT, RUN_SINE
+from ...core.long_runs import count_time
+from ..scene.columns import LEFT, RIGHT
 from .pieces import Pieces, samples_between
 
 if TYPE_CHECKING:
@@ -20,9 +21,8 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result")
 
-# A ray is unresolved after MOST_COLLISIONS collisions. Where runs of collisions are computed in one step, at most
-# MOST_IN_RUNS of them count as ray segments.
-MOST_COLLISIONS, MOST_IN_RUNS = 100_000, 8
+# A ray is unresolved after MOST_COLLISIONS collisions.
+MOST_COLLISIONS = 100_000
 # No limit on the ray segments of one conditional distribution, or on the collisions of a ray in a channel.
 NO_LIMIT = 2**62
 # Rounds in which conditional distributions are recomputed because a neighbour has a piece that they missed.
@@ -99,10 +99,7 @@ class HollowConditionals:
         from .compiled.changes import Limits, setting_of
 
         scene = self.scene
-        has_channels = scene.pairs is not None
-        has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, RUN_SINE] > 0.0)))
-        most = NO_LIMIT if has_channels else MOST_COLLISIONS
-        limits = Limits(most, MOST_IN_RUNS if has_runs else MOST_COLLISIONS, self.most_segments)
+        limits = Limits(NO_LIMIT if scene.pairs is not None else MOST_COLLISIONS, self.most_segments)
         return setting_of(scene, self.hollow, limits, self.edges, self.sizes)
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Conditional], set[float]]:
@@ -158,6 +155,7 @@ class HollowConditionals:
         (nodes, widths), node_starts, pieces, piece_starts, errors, unresolved, rays, segments = found
         self.rays += int(rays.sum())
         self.segments += int(segments.sum())
+        count_time(int(segments.sum()) * self.scene.segment_time)
         found_conditionals = {}
         for k, angle in enumerate(theta.tolist()):
             own = slice(node_starts[k], node_starts[k + 1])
@@ -270,6 +268,8 @@ class HollowConditionals:
                 middle = 0.5 * float(there.low[other[0]] + there.high[other[0]])
                 drift = (0.5 * (low + high) - middle) / (present - beyond)
         piece = np.uint64(label), present, absent, low, high, drift
-        angle = float(compiled_result(lambda: find_critical(*piece, self._setting, self.degree, np.zeros(1, np.int64))))
+        segments = np.zeros(1, np.int64)
+        angle = float(compiled_result(lambda: find_critical(*piece, self._setting, self.degree, segments)))
+        self.segments += int(segments[0])
         self._critical[key] = angle
         return angle

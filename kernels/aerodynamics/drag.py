@@ -13,6 +13,8 @@ from ...core.checks import Floats, finite_array, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
 from ...core.kinds import explained
+from ...core.long_runs import TIME_LIMIT
+from ...geometry.scene.scene import SEGMENT_TIME
 from ..bases.basis import AngleFunction, Basis
 from ..bases.directions import Directions
 from ..bases.measure import SINE, gauss_rule
@@ -57,6 +59,7 @@ def resistance(
     cost: CostFunction = air_resistance,
     incoming: AngleFunction | None = None,
     breakpoints: ArrayLike = (),
+    time_limit: float = TIME_LIMIT,
 ) -> Estimate:
     r"""The mean resistance E[c(theta, theta')] of a surface with the given law.
 
@@ -68,8 +71,7 @@ def resistance(
     law : Law
         A law in the paper's convention.
     tolerance : float
-        Wanted error. For a traced wall with few pieces the work is limited to 140 million ray segments, 10 to 25
-        seconds; ``error`` is the error reached.
+        Wanted error; ``error`` is the error reached.
     cost : callable
         ``cost(theta, theta_out)`` of two arrays that broadcast, radians; smooth between the breakpoints.
     incoming : callable, optional
@@ -77,6 +79,9 @@ def resistance(
         differ from 1.
     breakpoints : array_like, optional
         Angles in (0, pi) at which the cost or the density is not smooth.
+    time_limit : float
+        Limit in seconds on the quadrature of a traced wall, counted as some million ray segments each, so that the
+        result does not depend on the machine.
 
     Returns
     -------
@@ -109,7 +114,7 @@ def resistance(
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
     if law.frame != "paper":
         raise InputError(f"law: expected one in the paper's convention, got {law!r}; call in_specular_frame() on it")
-    wanted = positive_number("tolerance", tolerance)
+    wanted, seconds = positive_number("tolerance", tolerance), positive_number("time_limit", time_limit)
 
     def weighted(theta: Floats, outgoing: Floats) -> Floats:
         value = finite_array("cost", cost(theta, outgoing))
@@ -122,7 +127,8 @@ def resistance(
     else:
         basis, coefficients, missed = _represented(weighted, finite_array("breakpoints", breakpoints), 0.1 * wanted)
     size = float(np.linalg.norm(coefficients))
-    matrix = recipe(law, "auto")(basis, Budget(MATRIX_FRACTION * wanted / max(size, 1.0)))
+    budget = Budget(MATRIX_FRACTION * wanted / max(size, 1.0), segments=int(seconds / SEGMENT_TIME))
+    matrix = recipe(law, "auto")(basis, budget)
     value = float(np.sum(coefficients * matrix.symmetric))
     error = _error(matrix, coefficients) + missed
     how = f"{matrix.method} on {basis!r} ({matrix.error.method})"

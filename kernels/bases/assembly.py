@@ -18,6 +18,8 @@ from .panels import Panels
 CHUNK = 2**21
 # OpenBLAS uses one thread for products of at most this many multiplications, and to limit it takes 30 us.
 SMALL_PRODUCT = 2**18
+# Matrices with more entries are copied as seldom as possible.
+LARGE = 2**22
 
 
 def one_blas_thread() -> AbstractContextManager[Any]:
@@ -59,6 +61,9 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
 
 def add_masses(total: Floats, basis: Basis, source: NDArray[np.int64], target: NDArray[np.int64], mass: Floats) -> None:
     """Add masses transported from ``source`` to ``target`` cells of a partition to the Galerkin matrix ``total``."""
+    if mass.size < total.size > LARGE:
+        np.add.at(total, (source, target), basis.normalisation[source] * basis.normalisation[target] * mass)
+        return
     flux = np.bincount(source * basis.size + target, weights=mass, minlength=total.size).reshape(total.shape)
     total += basis.normalisation[:, None] * flux * basis.normalisation
 

@@ -161,15 +161,16 @@ def _add_strips(
 ) -> float:
     """Add the integrals over all strips; returns their mass."""
     if basis.is_partition:
-        long_nodes = NODES_CELL
+        # a node crosses a quarter of the cells or fewer
+        long_nodes, cut = NODES_CELL, max(32, basis.size // 4)
         short = strips.high - strips.low < SHORT
     else:
-        long_nodes = basis.nodes_per_interval
+        long_nodes, cut = basis.nodes_per_interval, 32
         short = _reach(strips, edges) * long_nodes < 1.0
     mass = 0.0
     for chosen, order in ((short, NODES_SHORT), (~short, long_nodes)):
         selected = np.flatnonzero(chosen)
-        step = max(1, CHUNK // (order * 32))
+        step = max(1, CHUNK // (order * cut))
         for start in range(0, selected.size, step):
             part = strips.part(selected[start : start + step])
             theta, weight = gauss_on_intervals(part.low, part.high, order)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple, cast
 
 from ...core.errors import AccuracyError
+from ...geometry.scene.scene import SEGMENT_TIME
 from ..bases.basis import Basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
@@ -60,7 +61,8 @@ class AutoWall:
         more = budget.segments > quick.segments and is_few(wall_law.wall)
         if not more or float(found.error) <= budget.tolerance:
             return found
-        return _more_exact(found, Traced().matrix(law, basis, budget))
+        segments = int(budget.segments * SEGMENT_TIME / wall_law.wall.scene.segment_time)
+        return _more_exact(found, Traced().matrix(law, basis, replace(budget, segments=segments)))
 
     def _quick(self, law: WallLaw, basis: Basis, budget: Budget) -> KernelMatrix:
         if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:

@@ -27,7 +27,7 @@ from ..laws.tensor_law import TensorLaw
 from ..matrices.matrix import KernelMatrix
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
-from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SAMPLING, SEED_WITHOUT_RNG, Budget, MethodName
+from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SAMPLING, SEED_WITHOUT_RNG, SEGMENTS_A_RAY, Budget, MethodName
 from .methods import recipe
 
 
@@ -183,7 +183,7 @@ def discretise(
     if engine and method not in SAMPLING:
         raise InputError(f"method: checkpoint and client need 'monte-carlo' or 'qmc', got {method!r}")
     # Quadrature requested by name may take some seconds.
-    segments = MOST_SEGMENTS if method == "quadrature" else QUICK_SEGMENTS
+    segments = MOST_SEGMENTS if method == "quadrature" else min(QUICK_SEGMENTS, SEGMENTS_A_RAY * number)
     budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)
     exact = finite_matrix(law, edges=basis.edges) if isinstance(basis, Bins) else None
     has_bins = method == "auto" and not holds_of_all(law, lambda part: not isinstance(part, MatrixLaw))

@@ -24,8 +24,8 @@ MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
 SAMPLING: tuple[MethodName, ...] = ("qmc", "monte-carlo")
 
 # Limits on the ray segments of traced conditional distributions of one matrix: ten to twenty seconds of work; without
-# an explicit request for quadrature, the time of two million rays.
-MOST_SEGMENTS, QUICK_SEGMENTS = 140_000_000, 4_000_000
+# an explicit request for quadrature, the time of two million rays, or of the largest number of rays.
+MOST_SEGMENTS, QUICK_SEGMENTS, SEGMENTS_A_RAY = 140_000_000, 4_000_000, 4
 # The error of a traced matrix falls like its segments to the power -ORDER (1.6 to 2.2 on nine walls). Angles that were
 # too coarse are computed again, which costs the factor REPEATED.
 ORDER, REPEATED = 1.75, 2.0

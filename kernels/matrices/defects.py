@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ..bases.assembly import LARGE
 
 # Statistics with fewer degrees of freedom than this carry no information.
 LEAST_FREEDOM = 1e-9
@@ -72,10 +75,30 @@ class SymmetryDefect(Defect):
         return super().__new__(cls, value, norm, z_score)
 
 
-def relative_asymmetry(symmetric: Floats) -> float:
-    """||(S - S^T)/2||_F / ||S||_F, which is 0 for reversible kernels and invariant under scaling."""
-    whole = float(np.linalg.norm(symmetric))
-    return float(np.linalg.norm(symmetric - symmetric.T)) / (2.0 * whole) if whole > 0.0 else 0.0
+def relative_asymmetry(symmetric: NDArray[Any], scale: Floats | None = None) -> float:
+    """||(S - S^T)/2||_F / ||S||_F, which is 0 for reversible kernels; of the entries S_ij s_i s_j if s is given."""
+    apart = whole = 0.0
+    for rows in row_blocks(len(symmetric)):
+        factor = 1.0 if scale is None else scale[rows, None] * scale
+        ahead, back = factor * symmetric[rows], factor * symmetric[:, rows].T
+        apart, whole = apart + float(np.sum((ahead - back) ** 2)), whole + float(np.sum(ahead**2))
+    return math.sqrt(apart / whole) / 2.0 if whole > 0.0 else 0.0
+
+
+def row_blocks(size: int) -> Iterator[slice]:
+    """The rows of a square matrix, so many at a time that temporary arrays have at most `LARGE` entries."""
+    step = max(1, LARGE // size)
+    return (slice(start, start + step) for start in range(0, size, step))
+
+
+def occupied_pairs(counts: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The cells (i, j), i < j, with a count at (i, j) or (j, i)."""
+    found = []
+    for rows in row_blocks(len(counts)):
+        source, target = np.nonzero(np.triu(counts[rows] + counts[:, rows].T, rows.start + 1))
+        found.append((source + rows.start, target))
+    source, target = (np.concatenate(part) for part in zip(*found, strict=True))
+    return source, target
 
 
 def reversibility_z_score(counts: NDArray[np.int64]) -> float:
@@ -94,8 +117,8 @@ def reversibility_z_score(counts: NDArray[np.int64]) -> float:
     no information. The sum of Z^2 over pairs is matched to a scaled chi-square by its two moments, and the cube root
     (Wilson-Hilferty) makes it normal.
     """
-    upper = np.triu_indices(counts.shape[0], 1)
-    forth, back = counts[upper].astype(np.float64), counts.T[upper].astype(np.float64)
+    occupied = occupied_pairs(counts)
+    forth, back = counts[occupied].astype(np.float64), counts.T[occupied].astype(np.float64)
     informative = forth + back >= 2.0
     pair, difference = (forth + back)[informative], (forth - back)[informative]
     return _cube_root_score(float(np.sum(difference**2 / pair)), pair.size, float(np.sum(2.0 - 2.0 / pair)))

@@ -17,7 +17,14 @@ from ...core.rounding import EPS
 from ..bases.assembly import add_products
 from ..bases.basis import Basis
 from ..bases.panels import Panels
-from ..matrices.defects import SymmetryDefect, relative_asymmetry, replicate_z_score, reversibility_z_score
+from ..matrices.defects import (
+    SymmetryDefect,
+    occupied_pairs,
+    relative_asymmetry,
+    replicate_z_score,
+    reversibility_z_score,
+    row_blocks,
+)
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -111,9 +118,14 @@ def array_from_counts(
     counts = parts[0] if len(parts) == 1 else _summed(parts)
     number, rows = float(counts.sum()), counts.sum(axis=1)
     _check_occupied(rows + counts.sum(axis=0) if symmetrise else rows, basis)
-    scale = basis.normalisation[:, None] * basis.normalisation  # from fluxes to the orthonormal basis
-    flux = (counts + counts.T) / (2.0 * number) if symmetrise else counts * (basis.weights / rows)[:, None]
-    symmetric = scale * flux
+
+    def normalised(flux: Floats) -> Floats:
+        flux *= basis.normalisation[:, None]  # from fluxes to the orthonormal basis
+        flux *= basis.normalisation
+        return flux
+
+    fractions = (basis.weights / np.where(rows > 0, rows, 1))[:, None]
+    symmetric = normalised((counts + counts.T) / (2.0 * number) if symmetrise else counts * fractions)
     replicates = _Replicates(symmetric, len(parts))
     if independent:
         error = _quantile(*_moments_of_counts(counts, basis, symmetrise))
@@ -122,15 +134,19 @@ def array_from_counts(
         for part in parts:
             # The influence of a part on the estimate: its numerators minus its denominators times the estimate.
             if symmetrise:
-                excess = (part + part.T) / (2.0 * number) - float(part.sum()) / number * flux
+                excess = normalised((part + part.T) / (2.0 * number)) - float(part.sum()) / number * symmetric
             else:
-                excess = (part - (part.sum(axis=1) / rows)[:, None] * counts) * (basis.weights / rows)[:, None]
-            replicates.add(len(parts) * scale * excess)
+                excess = (part.sum(axis=1) / rows)[:, None] * counts
+                np.subtract(part, excess, out=excess)
+                excess *= fractions
+                normalised(excess)
+            excess *= len(parts)
+            replicates.add(excess)
         error = replicates.half_width()
-        pairs = np.nonzero(np.triu(counts + counts.T, 1))
-        root = np.sqrt((counts + counts.T)[pairs])
+        pairs = occupied_pairs(counts)
+        root = np.sqrt(counts[pairs] + counts.T[pairs])
         z_score = replicate_z_score([(part[pairs] - part.T[pairs]) / root for part in parts])
-    raw = relative_asymmetry(scale * counts / number)
+    raw = relative_asymmetry(counts, basis.normalisation)
     whole = np.asarray(counts, dtype=np.int64) if np.issubdtype(counts.dtype, np.integer) else None
     return SampledArray(symmetric, error, replicates.stored(), SymmetryDefect(raw, z_score=z_score), whole)
 
@@ -173,7 +189,7 @@ class _Replicates:
         self.differences: list[Floats] = []
 
     def add(self, difference: Floats) -> None:
-        self.squares += float(np.sum(difference**2))
+        self.squares += sum(float(np.sum(difference[rows] ** 2)) for rows in row_blocks(len(difference)))
         self.differences.append(difference[self.rows].ravel())
         if self.symmetric.nbytes * self.number > LARGEST_REPLICATES:
             return
@@ -237,7 +253,7 @@ def _with_constant(arrays: Floats, constant: Floats, both: bool) -> Floats:
 
 
 def _summed(parts: Sequence[Counts | Floats]) -> Counts | Floats:
-    total = parts[0].copy()
+    total = np.array(parts[0], dtype=np.result_type(parts[0], np.int64))
     for part in parts[1:]:
         total += part
     return total
@@ -249,7 +265,8 @@ def _moments_of_counts(counts: Counts | Floats, basis: Basis, symmetrise: bool) 
     if not symmetrise:
         # Entry (i, j) of the array is C_ij w_i h_i h_j / N_i, and each row is an independent multinomial.
         rows = counts.sum(axis=1)
-        mean, variance = _squared_norms(counts, normalisation**2, rows)
+        found = [_squared_norms(counts[some], normalisation**2, rows[some]) for some in row_blocks(len(rows))]
+        mean, variance = (np.concatenate(part) for part in zip(*found, strict=True))
         scale = (weights * normalisation / rows) ** 2
         return float(scale @ mean), float(scale**2 @ variance)
     # A pair counts one half at each of its two entries, or fully on the diagonal.

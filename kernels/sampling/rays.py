@@ -2,22 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats
+from ...core.checks import Floats, check_memory
 from ...core.errors import AccuracyError
-from ..bases.assembly import largest_square_sum
+from ..bases.assembly import LARGE, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.mirror import reflection_matrix
 from ..laws.law import Law
 from ..walls.traced_map import UNRESOLVED_TOLERANCE
-from .counts import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products, sums_of_rows
+from .counts import SampledArray, array_from_counts, array_from_sums, sums_of_rows
 
 # Rays in a chunk: at least SMALLEST_CHUNK, and one for CELLS_A_RAY matrix entries, so that adding matrices is cheap.
 SMALLEST_CHUNK, CELLS_A_RAY = 2**16, 16
+# Memory in which a sampled matrix is computed, in matrices of doubles.
+MOST_MATRICES = 8
+
+
+@dataclass(frozen=True)
+class _WithImages(Sequence[Any]):
+    """Tables to which their mirror images are added when they are asked for, so that no copy is kept."""
+
+    tables: NDArray[Any]
+    image: Callable[[Any], Any]
+
+    def __len__(self) -> int:
+        return len(self.tables)
+
+    def __getitem__(self, number: Any) -> Any:
+        return self.tables[number] + self.image(self.tables[number])
 
 
 class RaySums:
@@ -36,23 +54,33 @@ class RaySums:
     def __init__(self, law: Law, basis: Basis, parts: int) -> None:
         self.law, self.basis = law, basis
         shape = parts, basis.size, basis.size
-        self.tables = np.zeros(shape, dtype=np.int64 if basis.is_partition else np.float64)
+        check_memory("basis", f"sampling in {basis!r}", MOST_MATRICES * basis.size**2)
+        counts = np.int32 if parts > 1 and self._is_large else np.int64
+        self.tables = np.zeros(shape, dtype=counts if basis.is_partition else np.float64)
         self.each, self.unresolved = 0, 0
+
+    @property
+    def _is_large(self) -> bool:
+        return self.basis.size**2 > LARGE
 
     @property
     def chunk(self) -> int:
         """Rays in a chunk: a power of two, which preserves the balance of the Sobol sequence."""
-        cells = self.basis.size**2 if self.basis.is_partition else 0
+        cells = 0 if self._is_large or not self.basis.is_partition else self.basis.size**2
         return max(SMALLEST_CHUNK, 1 << (cells // CELLS_A_RAY).bit_length())
 
     def add(self, table: int, incoming: Floats, outgoing: Floats) -> None:
         """Add rays to one of the tables."""
-        found = (count_pairs if self.basis.is_partition else sum_products)(self.basis, incoming, outgoing)
-        self.tables[table] += found
+        self.add_rows(table, incoming[None], outgoing[None])
 
     def add_rows(self, first: int, incoming: Floats, outgoing: Floats) -> None:
         """Add rays, shape (rows, rays), row by row to the tables from ``first`` on."""
-        self.tables[first : first + len(incoming)] += sums_of_rows(self.basis, incoming, outgoing)
+        tables = self.tables[first : first + len(incoming)]
+        if not (self._is_large and self.basis.is_partition):
+            tables += sums_of_rows(self.basis, incoming, outgoing)
+            return
+        for table, sources, targets in zip(tables, self.basis.index(incoming), self.basis.index(outgoing), strict=True):
+            np.add.at(table, (sources, targets), 1)
 
     def count_unresolved(self, escaped: NDArray[np.bool_] | None) -> None:
         """Count the rays that did not escape."""
@@ -76,7 +104,7 @@ class RaySums:
                 "geometry.trace(wall, x, theta).counts() says how they ended",
                 fraction,
             )
-        parts: list[Any] = [table + self._mirror_image(table) if mirrored else table for table in self.tables]
+        parts = _WithImages(self.tables, self._mirror_image) if mirrored else self.tables
         if self.basis.is_partition:
             array = array_from_counts(parts, self.basis, symmetrise=symmetrise, independent=len(parts) == 1)
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from ...core.checks import Rng, generator, positive_number
 from ...core.errors import AccuracyError, InputError
 from ...core.kinds import explained
+from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
 from ...kernels.bases.panels import ONE_PANEL
@@ -37,6 +39,8 @@ CLOSER, LARGEST_MISS = 0.25, 1e-3
 # From the tolerance ROUGH on, small sampled matrices are tried for traced walls: sizes with wanted errors, and rays.
 # Larger bases change the gap by at most BEYOND_CHANGE times the last change, if changes decrease like size^-0.6.
 ROUGH, GLANCES, FEW_RAYS, BEYOND_CHANGE = 2e-3, ((24, 1.0), (48, 0.1)), 2**17, 2.0
+# Fraction of the time limit for enclosures; the rest is for the rays if these fail.
+HALF = 0.5
 # Number of eigenvalues computed to find the least one.
 MODULI = 3
 
@@ -59,7 +63,7 @@ def rough_gap(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essent
 
 
 def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
-    """The gap from an indexed enclosure, or None if the conditional expectations or the separation are inaccurate."""
+    """The gap from an indexed enclosure; None if it would be inaccurate, or take longer than `time_limited` allows."""
     if isinstance(law, DensityLaw):
         found = (_gap_of_enclosures(law, number, tolerance) for number in (ENCLOSED, 2 * ENCLOSED))
         return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
@@ -97,7 +101,9 @@ def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
 
 
 @explained
-def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6, rng: Rng = None) -> SpectralGap:
+def spectral_gap(
+    law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6, rng: Rng = None, *, time_limit: float = TIME_LIMIT
+) -> SpectralGap:
     """The gap 1 - sup(spectrum off the constants) of a reversible law.
 
     Parameters
@@ -111,6 +117,10 @@ def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6
         Wanted error. If it is not reached with the largest basis and number of rays, ``error`` is larger.
     rng : None, int or numpy.random.Generator
         Source of rays for traced laws; by default ``np.random.default_rng(0)``.
+    time_limit : float
+        Limit in seconds: half for the enclosures of a traced law, half for the rays if these fail. It is counted as one
+        to five million ray segments or some 200,000 to a million rays a second, so that the result does not depend on
+        the machine. A longer limit allows more rays, hence a smaller error.
 
     Returns
     -------
@@ -146,6 +156,7 @@ def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6
     (0.176041, 'essential edge')
     """
     positive_number("tolerance", tolerance)
+    seconds = positive_number("time_limit", time_limit)
     if isinstance(law, CollisionLaw):
         law = law.law
     if isinstance(law, KernelMatrix):
@@ -154,12 +165,12 @@ def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6
         raise not_a_law("law", "a Law, a CollisionLaw or a KernelMatrix", law)
     other = self_adjoint_elsewhere(law)
     if other is not None:
-        return _contraction(law, other, tolerance, generator(rng, 0))
+        return _contraction(law, other, tolerance, generator(rng, 0), seconds)
     refuse_unless_self_adjoint(law)
     power = as_power(law)
     if power is not None:
-        return _of_power(law, *power, tolerance, generator(rng, 0))
-    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(generator(rng, 0)))
+        return _of_power(law, *power, tolerance, generator(rng, 0), seconds)
+    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(generator(rng, 0), seconds))
 
 
 @explained
@@ -199,17 +210,19 @@ def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
     return split_gap(matrix, gap) or (gap.cut_at_zero() if matrix.norm_bound == 1.0 else gap)
 
 
-def _of_power(law: Law, base: Law, exponent: int, tolerance: float, rng: np.random.Generator) -> SpectralGap:
+def _of_power(
+    law: Law, base: Law, exponent: int, tolerance: float, rng: np.random.Generator, seconds: float
+) -> SpectralGap:
     """The gap of P^n, from the gap of P for odd n and from 1 - slem of P for even n."""
     ask = modulus_gap if exponent % 2 == 0 else spectral_gap
-    found = ask(base, tolerance / exponent, rng)
+    found = ask(base, tolerance / exponent, rng, time_limit=seconds)
     value, error = gap_of_power(found.value, found.error, exponent)
     method = f"power {exponent} of the spectrum of P; {found.method}"
     evidence = (f"P: {found}", *found.evidence)
     return SpectralGap(value, error, found.kind, method, found.verdict, evidence, law.frame)
 
 
-def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> SpectralGap:
+def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limit: float = TIME_LIMIT) -> SpectralGap:
     """1 - slem, the distance from 1 of the largest modulus in the spectrum off the constants, as `spectral_gap` is.
 
     Examples
@@ -225,11 +238,11 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> SpectralG
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small
-    upper = spectral_gap(law, tolerance, rng)
+    upper = spectral_gap(law, tolerance, rng, time_limit=time_limit)
     if upper.verdict == "no gap" or lambertian_fraction(law) == upper.value:
         # the slem is 1, or is the norm 1 - a of the rest of a law with a Lambertian fraction a
         return upper
-    listed = law_eigenvalues(law, MODULI, tolerance, rng)
+    listed = law_eigenvalues(law, MODULI, tolerance, rng, time_limit)
     lowest = int(np.argmin(listed.values))
     least, error = -float(listed.values[lowest]), float(listed.errors.total()[lowest])
     top = 1.0 - upper.value
@@ -261,9 +274,9 @@ def _shallow_modulus(law: Law, tolerance: float) -> SpectralGap | None:
     return replace(least, convention=law.frame, method=f"the lesser of the gaps in both conventions; {least.method}")
 
 
-def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generator) -> SpectralGap:
+def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generator, seconds: float) -> SpectralGap:
     """The value 1 - ||P J|| on functions of mean 0, for a self-adjoint P whose P J is not self-adjoint."""
-    found = modulus_gap(other, tolerance, rng)
+    found = modulus_gap(other, tolerance, rng, time_limit=seconds)
     evidence = (why_not_self_adjoint(other), what_is_true(), *found.evidence)
     method = f"norm of P J on functions of mean 0, the slem of P; {found.method}"
     return replace(
@@ -275,7 +288,7 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
     """The gap from the quadratic form of 1 - P for shallow walls, or from enclosures and matrices."""
     fraction, rest = without_identity(law)
     if fraction < 1.0:
-        own = SharedMatrices(matrices.rng)
+        own = SharedMatrices(matrices.rng, matrices.time_limit)
         return _scaled(gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, own), fraction)
     edge = essential_edge(law)
     small = shallow_gap(law, edge)
@@ -300,7 +313,10 @@ def _by_matrices(law: Law, tolerance: float, matrices: SharedMatrices, edge: Ess
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
-    found_at_once = rough_gap(law, tolerance, matrices, edge) or enclosed_gap(law, tolerance, edge)
+    found_at_once = rough_gap(law, tolerance, matrices, edge)
+    if found_at_once is None:
+        with suppress(OutOfTime), time_limited(HALF * matrices.time_limit):
+            found_at_once = enclosed_gap(law, tolerance, edge)
     if found_at_once is not None:
         return found_at_once
     steps = refined(law, tolerance, matrices, edge)

@@ -10,6 +10,7 @@ import numpy as np
 from ...core.checks import Rng, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
+from ...core.long_runs import TIME_LIMIT
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import not_a_law
 from ..bounds.contraction import refuse_unless_self_adjoint
@@ -30,6 +31,7 @@ def spectrum(
     *,
     tolerance: float | None = None,
     rng: Rng = None,
+    time_limit: float = TIME_LIMIT,
     **discretisation: Any,
 ) -> Spectrum:
     """The k eigenvalues of largest modulus of a reversible kernel, sorted descending.
@@ -45,6 +47,8 @@ def spectrum(
         given, it is the wanted error of the matrix.
     rng : None, int or numpy.random.Generator
         Source of rays for traced laws.
+    time_limit : float
+        As of `spectral_gap`.
     **discretisation
         ``basis=`` and further keywords of `asperity.kernels.discretise`. The law is then replaced by its matrix in this
         basis (by default Legendre polynomials of degree below 48), without refinement.
@@ -82,13 +86,14 @@ def spectrum(
     Spectrum(k=10, gap=0, slem=1, verdict='no gap', convention='paper')
     """
     whole_number("k", k, 1)
+    seconds = positive_number("time_limit", time_limit)
     how = dict(discretisation)
     if tolerance is not None:
         how["tolerance"] = positive_number("tolerance", tolerance)
     if rng is not None:
         how["rng"] = generator(rng)
     if isinstance(kernel, CollisionLaw):
-        return _both_signs(spectrum(kernel.law, max(1, (k + 1) // 2), **how), k)
+        return _both_signs(spectrum(kernel.law, max(1, (k + 1) // 2), time_limit=seconds, **how), k)
     if isinstance(kernel, KernelMatrix):
         if how:
             raise InputError(f"{', '.join(how)}: only for laws; a KernelMatrix is discretised already")
@@ -98,12 +103,13 @@ def spectrum(
     refuse_unless_self_adjoint(kernel)
     if discretisation:
         basis = how.pop("basis", None) or Legendre(DEGREES[0])
-        return _with_verdict(kernel, matrix_spectrum(discretise(kernel, basis, **how), k), tolerance or TOLERANCE, rng)
+        found = matrix_spectrum(discretise(kernel, basis, **how), k)
+        return _with_verdict(kernel, found, tolerance or TOLERANCE, rng, seconds)
     wanted = tolerance or TOLERANCE
-    return _with_verdict(kernel, law_eigenvalues(kernel, k, wanted, rng), wanted, rng)
+    return _with_verdict(kernel, law_eigenvalues(kernel, k, wanted, rng, seconds), wanted, rng, seconds)
 
 
-def _with_verdict(law: Law, found: Spectrum, tolerance: float, rng: Rng) -> Spectrum:
+def _with_verdict(law: Law, found: Spectrum, tolerance: float, rng: Rng, seconds: float) -> Spectrum:
     """With the law's gap and its verdict: what a matrix shows short of the essential spectrum's edge is not the gap."""
     known = gap_by_theorem(law)
     if known is None:
@@ -119,7 +125,7 @@ def _with_verdict(law: Law, found: Spectrum, tolerance: float, rng: Rng) -> Spec
         if top - found.gap_error > edge.high and found.gap > found.gap_error:
             outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
             return replace(found, verdict="isolated", evidence=(*evidence, outside))
-        known = spectral_gap(law, tolerance, rng)
+        known = spectral_gap(law, tolerance, rng, time_limit=seconds)
     return with_gap(found, known)
 
 

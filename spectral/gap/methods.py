@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from ...core.checks import Floats, Rng, frozen
+from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, Legendre, discretise
 from ...kernels.bases.panels import ONE_PANEL
@@ -26,13 +28,13 @@ FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 3, 1e-3, 0.5
 MOST_ENCLOSED = 24
 
 
-def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng) -> Spectrum:
+def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng, seconds: float = TIME_LIMIT) -> Spectrum:
     """The k eigenvalues of largest modulus of a law, without a word on its gap: see `spectrum`."""
     power = as_power(law)
     if power is not None:
         base, exponent = power
         # an even power needs the largest modulus off the constants
-        found = law_eigenvalues(base, max(k, 2), tolerance / exponent, rng)
+        found = law_eigenvalues(base, max(k, 2), tolerance / exponent, rng, seconds)
         return _raised(found, exponent, k)
     matrix = None if made_of_isometries(law) else finite_matrix(law, k)
     if matrix is not None:
@@ -42,7 +44,8 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng) -> Spectrum:
             return _of_density(law, k, tolerance)
         known = law.expectations(ONE_PANEL)
         if known.has_errors and not known.are_costly():
-            return _enclosed(law, k, tolerance)
+            with suppress(OutOfTime), time_limited(seconds):
+                return _enclosed(law, k, tolerance)
     return _by_matrices(law, k, tolerance, rng)
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...core.long_runs import progress_bar
+from ...core.long_runs import TIME_LIMIT, progress_bar
 from ...kernels import Basis, CircularArcLaw, KernelMatrix, Law, Legendre, Panels, SpecularFrame, discretise
 from ...kernels.bases.mirror import is_mirror_symmetric
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
@@ -21,7 +22,11 @@ DEGREES = (12, 24, 48, 96)
 ARC_PANELS = ((1, 1e-1), (2, 1e-2), (3, 1e-3), (4, 1e-3), (6, 1e-4))
 # Up to this half angle the eigenfunctions of arcs are close to Legendre polynomials.
 SHALLOW = 0.5
-FIRST_SAMPLES, LARGEST_SAMPLES = 2**17, 2**22
+FIRST_SAMPLES = 2**17
+# Fraction of the time limit for rays.
+RAYS_FRACTION = 0.5
+# Nominal time of a ray, and of the product of two basis functions at a ray, in seconds.
+RAY_TIME, PRODUCT_TIME = 1e-6, 4e-10
 # Limits at an edge of the essential spectrum, where the edge itself is the result and more rays do not help.
 SAMPLES_AT_EDGE, DEGREE_AT_EDGE, TOLERANCE_AT_EDGE = 2**19, 24, 1e-4
 # Quadratures are abandoned if their error exceeds this many standard errors n^(-1/2) of n rays.
@@ -108,8 +113,8 @@ class Refinement:
 class SharedMatrices:
     """Cache of the matrices of one law, shared by both conventions of a mirror-symmetric law."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
-        self.rng = rng
+    def __init__(self, rng: np.random.Generator, time_limit: float = TIME_LIMIT) -> None:
+        self.rng, self.time_limit = rng, time_limit
         self._made: dict[tuple[Basis, int, float], KernelMatrix] = {}
         self._by_rays = False
 
@@ -149,7 +154,7 @@ def _refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essenti
     evidence: list[str] = []
     steps = Refinement((), False, ())
     near_edge = edge.low > NEGLIGIBLE
-    for basis, samples in _steps(law):
+    for basis, samples in _steps(law, RAYS_FRACTION * matrices.time_limit):
         wanted = max(MATRIX_FRACTION * tolerance, TOLERANCE_AT_EDGE if near_edge else 0.0)
         matrix = matrices(law, basis, samples, wanted)
         found = matrix_spectrum(matrix, EIGENVALUES, margin=1.0)
@@ -174,8 +179,8 @@ def _refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essenti
     return steps
 
 
-def _steps(law: Law) -> Iterator[tuple[Basis, int]]:
-    """Pairs of a basis and a number of rays, increasing."""
+def _steps(law: Law, seconds: float) -> Iterator[tuple[Basis, int]]:
+    """Pairs of a basis and a number of rays, as many as some seconds allow."""
     inner = law.law if isinstance(law, SpecularFrame) else law
     inner = inner.closed_form or inner
     if isinstance(inner, CircularArcLaw) and inner.half_angle > SHALLOW:
@@ -184,8 +189,12 @@ def _steps(law: Law) -> Iterator[tuple[Basis, int]]:
         return
     samples = FIRST_SAMPLES
     for degree in DEGREES:
-        yield Legendre(degree), samples
-        samples = min(4 * samples, LARGEST_SAMPLES)
+        of_ray = RAY_TIME + PRODUCT_TIME * degree**2
+        # a power of two, as Sobol sequences need
+        most = 2 ** math.floor(math.log2(max(seconds / of_ray, FIRST_SAMPLES)))
+        yield Legendre(degree), min(samples, most)
+        seconds -= min(samples, most) * of_ray
+        samples = 4 * min(samples, most)
 
 
 def _noise(level: Spectrum) -> float:

@@ -47,13 +47,9 @@ BLOCK = 32
 
 
 class Limits(NamedTuple):
-    """Limits at one angle: collisions of a ray, how many of these count as ray segments at most, and all ray segments.
-
-    A run of any length counts as one segment, and so does every cell of an open wall that a ray passes.
-    """
+    """Limits at one angle: collisions of a ray, and segments of all rays as in `Details.segments`."""
 
     collisions: int
-    collisions_that_count: int
     segments: int
 
 
@@ -155,15 +151,13 @@ def cell_of(out, edges):
 
 
 @inlined
-def outcome(k, x, task):
-    """-> (angle, label): the outgoing angle of ray k of the block, which entered at x, and its label.
+def outcome(k, task):
+    """-> (angle, label): the outgoing angle of ray k of the block, and its label.
 
     The label combines the itinerary and the outgoing bin. The segments of the ray are added to those of the task.
     """
-    hollow, limits, edges = task.setting.hollow, task.setting.limits, task.setting.edges
-    results = task.setting.tracer.results
-    cells = np.int64(abs(results.x[k] - x) / (hollow[RIGHT] - hollow[LEFT]))
-    task.segments[0] += 1 + min(results.collisions[k], limits.collisions_that_count) + cells
+    edges, results = task.setting.edges, task.setting.tracer.results
+    task.segments[0] += results.details.segments[k]
     if results.status[k] != ESCAPED:
         return task.theta, np.uint64(results.status[k])
     # clipped for a ray along y = 0 within rounding
@@ -178,7 +172,7 @@ def probe(x, task):
     entries = task.setting.tracer.entries[:1]
     entries[0] = x
     trace_block(entries, task)
-    return outcome(np.int64(0), x, task)
+    return outcome(np.int64(0), task)
 
 
 @inlined
@@ -305,7 +299,7 @@ def example_task() -> Task:
     """Return a task of the types of all tasks, for which functions are compiled to be called by their address."""
     results, stop = results_for(0), np.zeros(1, np.int64)
     tracer = Record(Tracer(0, 0, SLOTS, np.empty(0), results, np.empty(0), stop))
-    setting = Record(Setting(np.empty(0), NO_TABLES, Record(Limits(1, 1, 1)), np.empty(0), np.empty(0), tracer))
+    setting = Record(Setting(np.empty(0), NO_TABLES, Record(Limits(1, 1)), np.empty(0), np.empty(0), tracer))
     return Task(setting, 0.0, 0, stop)
 
 
@@ -341,14 +335,18 @@ def sample_entries(entries, task, chain, goal):
         xs[count] = x
         follow[count] = count + 1
         count += 1
-    for first in range(0, count, BLOCK):
-        end = min(first + BLOCK, count)
+    end = np.int64(0)
+    while end < count:
+        first, end = end, min(end + BLOCK, count)
         trace_block(xs[first:end], task)
         for k in range(first, end):
-            outs[k], labels[k] = outcome(k - first, xs[k], task)
+            outs[k], labels[k] = outcome(k - first, task)
             if k > 0 and labels[k] != labels[k - 1]:
                 gaps[gap_count] = k - 1
                 gap_count += 1
+        if is_spent(task) and end < count - 1:
+            # between these samples and the last one there is a gap, which counts as error
+            xs[end], count = xs[count - 1], end + 1
     last = count - 1
     follow[last] = -1
     return halved(task, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last

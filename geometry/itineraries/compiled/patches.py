@@ -98,7 +98,7 @@ def trace_points(entries, angles, setting, outs, exits, labels, segments):
             setting.tracer.angles[n - first] = angles[n]
         trace_block(entries[first:last], task)
         for n in range(first, last):
-            outs[n], labels[n] = outcome(n - first, entries[n], task)
+            outs[n], labels[n] = outcome(n - first, task)
             exits[n] = setting.tracer.results.x[n - first]
 
 

@@ -97,7 +97,7 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
             trace_block(block, task)
             for n in range(first, last):
                 x = block[n - first]
-                out, here = outcome(n - first, x, task)
+                out, here = outcome(n - first, task)
                 if strict and here != label:
                     return used, error, x, np.int64(last)
                 node[filled + n] = out

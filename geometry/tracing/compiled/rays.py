@@ -338,10 +338,10 @@ def piece_label(tables, hit, vx):
 
 @inlined
 def trace_ray(scope, entry, theta, limit, labelled, path):
-    """-> (x, vx, vy, bounces, status, label): trace one ray through one hollow.
+    """-> (x, vx, vy, bounces, status, label, steps): trace one ray through one hollow.
 
-    In an open wall x is unfolded. ``label`` is the hash of `Details.itinerary`, if ``labelled``; ``path`` is
-    `Details.path`.
+    In an open wall x is unfolded. ``label`` is the hash of `Details.itinerary`, if ``labelled``; ``steps`` are
+    `Details.segments`; ``path`` is `Details.path`.
     """
     sine, cosine = sine_cosine(theta)
     px, py, vx, vy, shift = entry, 0.0, -cosine, -sine, 0.0
@@ -353,21 +353,21 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
         hit, corner = nearest_piece(scope, own, px, py, vx, vy)
         bounces = own.bounces
         if hit.doubt == DOUBTFUL:
-            return shift + px, vx, vy, bounces, CORNER, label
+            return shift + px, vx, vy, bounces, CORNER, label, steps
         time, kind = exit_time(scope, own, px, py, vx, vy, hit.time)
         if kind != NO_PIECE:
             hit = Hit(time, kind, hit.number, hit.s, hit.doubt)
         steps += 1
         if hit.kind == NO_PIECE or meets_corner(scope, hit, corner, px, py, vx, vy):
-            return shift + px, vx, vy, bounces, CORNER, label
+            return shift + px, vx, vy, bounces, CORNER, label, steps
         if hit.kind == OPENING:
             if with_path:
                 path[bounces + 1, POINT_X], path[bounces + 1, POINT_Y] = shift + px + hit.time * vx, 0.0
-            return shift + px + hit.time * vx, vx, vy, bounces, ESCAPED, label
+            return shift + px + hit.time * vx, vx, vy, bounces, ESCAPED, label, steps
         if hit.doubt != 0:
-            return shift + px, vx, vy, bounces, GRAZING, label
+            return shift + px, vx, vy, bounces, GRAZING, label, steps
         if (bounces >= limit and hit.kind != SIDE) or steps > MOST_STEPS:
-            return shift + px, vx, vy, bounces, BOUNCE_LIMIT, label
+            return shift + px, vx, vy, bounces, BOUNCE_LIMIT, label, steps
         if labelled:
             label = HASH_FACTOR * label + piece_label(scope.tables, hit, vx)
         if hit.kind == SIDE:
@@ -379,14 +379,14 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
             continue
         px, py, vx, vy, at_corner = reflect(scope, hit, own, px, py, vx, vy)
         if at_corner:
-            return shift + px, vx, vy, bounces, CORNER, label
+            return shift + px, vx, vy, bounces, CORNER, label, steps
         flown = hit.time
         if not with_path:
             hits = np.int64(0)
             if may_run(scope.tables, hit, own, px, py, vx, vy):
                 address = address_at(scope.slots.run)
                 if address == 0:
-                    return shift + px, vx, vy, bounces, CORNER, label
+                    return shift + px, vx, vy, bounces, CORNER, label, steps
                 arguments = scope, hit, own, px, py, vx, vy, limit - bounces - 1
                 px, py, vx, vy, hits = call_at(address, NO_RUN, arguments)
                 bounces += hits
@@ -426,14 +426,14 @@ def trace_rays(x, theta, tables, limit, stop, results, details, slots):
             out_x[i], out_theta[i], collisions[i], status[i] = x[i], theta[i] - math.pi, 0, CORNER
             continue
         scope = scope_of(tables, h, slots)
-        end, vx, vy, collisions[i], status[i], label = trace_ray(
+        end, vx, vy, collisions[i], status[i], label, steps = trace_ray(
             scope, x[i] - base, theta[i], limit, labelled, details.path
         )
         out_x[i] = base + end
         angle = direction_angle(vx, vy)
         out_theta[i] = min(angle, LAST_ANGLE) if status[i] == ESCAPED else angle
         if labelled:
-            details.itinerary[i] = label
+            details.itinerary[i], details.segments[i] = label, steps
         velocity = details.velocity
         if velocity.shape[0] > 0:
             velocity[i, POINT_X], velocity[i, POINT_Y] = vx, vy

@@ -102,18 +102,21 @@ class Details(NamedTuple):
     """Further arrays to fill, empty if they are not wanted.
 
     ``velocity`` is the outgoing velocity, shape (n, 2). ``itinerary`` is a hash of the pieces hit, in order, of the
-    lengths of runs, and of the sides passed. ``path``, shape (limit + 2, 2), for a single ray, has the points of the
+    lengths of runs, and of the sides passed; ``segments``, of the same length, counts the segments that were computed,
+    where a run of hits is one segment. ``path``, shape (limit + 2, 2), for a single ray, has the points of the
     trajectory, with every hit of a run.
     """
 
     velocity: Floats
     itinerary: NDArray[np.uint64]
+    segments: NDArray[np.int64]
     path: Floats
 
 
 def details_for(velocity: int = 0, itinerary: int = 0, path: int = 0) -> Record:
     """Return arrays with the given numbers of rows."""
-    return Record(Details(np.empty((velocity, 2)), np.zeros(itinerary, np.uint64), np.full((path, 2), np.nan)))
+    labels, segments = np.zeros(itinerary, np.uint64), np.zeros(itinerary, np.int64)
+    return Record(Details(np.empty((velocity, 2)), labels, segments, np.full((path, 2), np.nan)))
 
 
 # The details, if only the ends of the rays are wanted.

@@ -9,7 +9,8 @@ import multiprocessing
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypedDict, TypeVar
@@ -20,6 +21,9 @@ from .workers import connected, results
 
 T = TypeVar("T")
 
+# Seconds after which a faster method with a larger error takes over. They are counted from the work, at nominal speeds,
+# so that results depend neither on the machine nor on its load.
+TIME_LIMIT = 10.0
 # Before that no progress bar appears.
 SLOW_SECONDS = 2.0
 # Least seconds between two pictures of a bar.
@@ -120,6 +124,46 @@ def all_parts(
         lost = "without a checkpoint they are lost"
         raise KeyboardInterrupt(f"{done}; {lost if path is None else f'{path} has them: give the same call'}") from stop
     return [unpacked_arrays(packed[part]) for part in range(number)]
+
+
+class OutOfTime(Exception):
+    """The time of `time_limited` is used up; another method takes over, so that no user sees this exception."""
+
+
+_seconds_left: ContextVar[list[float] | None] = ContextVar("seconds_left", default=None)
+
+
+@contextmanager
+def time_limited(seconds: float) -> Iterator[None]:
+    """Limit the nominal time of conditional distributions.
+
+    Raises
+    ------
+    OutOfTime
+        If more time is counted.
+
+    Examples
+    --------
+    >>> with time_limited(1.0):
+    ...     count_time(2.0)
+    Traceback (most recent call last):
+    asperity.core.long_runs.OutOfTime: 2 seconds, 1 allowed
+    """
+    token = _seconds_left.set([seconds])
+    try:
+        yield
+    finally:
+        _seconds_left.reset(token)
+
+
+def count_time(seconds: float) -> None:
+    """Count nominal time against the limit in force."""
+    left = _seconds_left.get()
+    if left is None:
+        return
+    if seconds > left[0]:
+        raise OutOfTime(f"{seconds:.3g} seconds, {left[0]:.3g} allowed")
+    left[0] -= seconds
 
 
 def progress_bar(total: int | None, unit: str, text: str | None = None, *, shown: bool = True) -> Any:
