@@ -379,7 +379,9 @@ def begins_along(curve: Piece, position: Floats) -> NDArray[np.bool_]:
     size = size_of([curve]) + float(np.abs(position).max(initial=0.0))
     ends = np.array([curve.start, curve.end])[:, None] - position
     inner = is_whole(curve) | np.all(np.hypot(ends[..., 0], ends[..., 1]) > SLACK * size, axis=0)
-    return np.asarray(inner & is_on(curve, position, TANGENT * size) & (touch(curve, position).curvature > 0.0))
+    found = np.asarray(inner & is_on(curve, position, TANGENT * size))
+    found[found] = touch(curve, position[found]).curvature > 0.0
+    return found
 
 
 def is_whole(curve: Piece) -> bool:

@@ -285,7 +285,7 @@ class Container:
     def next_wall(
         self, position: Floats, velocity: Floats, last: NDArray[np.int64]
     ) -> tuple[Floats, NDArray[np.int64], NDArray[np.uint8]]:
-        """Return the time to the next wall, its index and the ``FlightStatus``: ``FLYING`` if the wall reflects the disk.
+        """Return the time to the next wall, its index and the ``FlightStatus``, ``FLYING`` for a hit.
 
         This decides whether a disk hits a wall or grazes it. One that grazes an obstacle or a side flies on.
 

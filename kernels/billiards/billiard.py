@@ -64,7 +64,7 @@ class BilliardRecord:
         Index of the wall, -1 at the start.
     collisions : array of int, shape (n,)
     status : array of int, shape (n,)
-        Values of ``FlightStatus``. ``FLYING``: all collisions were computed. ``FREE``: no wall is ahead. ``CORNER``: the
+        Values of ``FlightStatus``. ``FLYING``: all were computed. ``FREE``: no wall is ahead. ``CORNER``: the
         next one is at a corner, where the outcome depends on which wall is met first. ``GRAZING``: the path runs along
         a wall that bends towards it. ``UNREFLECTED``: the law of the wall found no outgoing velocity.
     """
