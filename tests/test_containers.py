@@ -116,7 +116,7 @@ def test_a_no_slip_disk_in_a_circle_keeps_its_angle_of_incidence_every_second_ti
 def test_the_starts_are_in_equilibrium_and_fly_as_far_as_santalo_says(name, spinning):
     table, rng, n = TABLES[name], np.random.default_rng(6), 20_000
     position, velocity, wall = equilibrium_starts(table, DISK, n, spinning, rng)
-    flight, _ = table.next_wall(position, velocity, wall)
+    flight, _, _ = table.next_wall(position, velocity, wall)
     # volume over flux of the phase space: directions 2 pi over 2 on the circle, 4 pi over pi on the sphere
     expected = (4.0 if spinning else math.pi) * table.area / table.perimeter
     assert abs(flight.mean() - expected) < 4.5 * flight.std() / math.sqrt(n)

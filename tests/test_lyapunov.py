@@ -107,7 +107,7 @@ def test_two_close_trajectories_in_sixty_digits_separate_as_the_derivative_says(
     rng = np.random.default_rng(3)
     position, velocity, wall = equilibrium_starts(table, DISK, 3, spinning, rng)
     # inside, where the plain version needs no wall to start from
-    flight, _ = table.next_wall(position, velocity, wall)
+    flight, _, _ = table.next_wall(position, velocity, wall)
     position = position + 0.5 * velocity[:, :2] * flight[:, None]
     pencil = first = Pencil.around(position, velocity, np.full(3, -1), rng)
     for _ in range(12):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from itertools import combinations
 
 import numpy as np
@@ -28,6 +29,10 @@ JOIN_TOLERANCE = 1e-12
 # Curves count as longer by this length at both ends, relative to the size of the table, and centres as inside up to
 # it. It exceeds gaps at joints and the rounding of positions, so that no centre leaves through a joint.
 SLACK = 4.0 * JOIN_TOLERANCE
+# Sine of the angle between tangents from which a joint is a corner; those of smooth joints have rounding errors.
+KINK = 1e-9
+# How far ahead, in semi-axes, it is decided whether a path that is tangent to an arc from inside runs along the arc.
+AHEAD = 1e-7
 # Largest semi-axis, relative to the size of the table: positions on an arc have errors of its rounded semi-axes, and
 # EPS * MOST_CURVED is far below SLACK.
 MOST_CURVED = 1e3
@@ -36,8 +41,27 @@ FLATTENING = 1e-6
 # Directions, radians, of the lines by which it is decided whether a point is inside; the majority counts.
 LINES_OF_SIGHT = (0.7312, 2.8251, 4.9187)
 FULL_CIRCLE = 2.0 * math.pi
+# Rounding of the distance of a path from the centre of an arc, relative to the distance of its start.
+TANGENT = 8.0 * EPS
+TINIEST = float(np.finfo(np.float64).tiny)
 # Halvings after which an interval of angles has the width of their rounding.
 BISECTIONS = 56
+
+
+class FlightStatus(IntEnum):
+    """What a flight in a container comes to.
+
+    ``FLYING``: a wall reflects the disk. ``CORNER``: the disk meets a corner within rounding, where the outcome depends
+    on which wall it meets first. ``GRAZING``: it is so nearly tangent to a wall that bends towards its path that double
+    precision does not resolve the reflections. ``FREE``: it rests, or no wall is ahead. ``UNREFLECTED``: the law of the
+    wall found no outgoing velocity.
+    """
+
+    FLYING = 0
+    CORNER = 1
+    GRAZING = 2
+    FREE = 3
+    UNREFLECTED = 4
 
 
 def size_of(curves: Sequence[Curve]) -> float:
@@ -109,6 +133,17 @@ def loops_of(curves: Sequence[Piece]) -> list[list[int]]:
     return loops
 
 
+def corners_of(curves: Sequence[Piece]) -> Floats:
+    """Return the joints (c, 2) of the curves at which the tangent turns."""
+    found = []
+    for loop in loops_of(curves) if curves else ():
+        for one, two in zip(loop, loop[1:] + loop[:1], strict=True):
+            (x0, y0), (x1, y1) = curves[one].tangent(1.0), curves[two].tangent(0.0)
+            if x0 * x1 + y0 * y1 < 0.0 or abs(x0 * y1 - y0 * x1) > KINK:
+                found.append(curves[two].start)
+    return np.array(found).reshape(-1, 2)
+
+
 def signed_area(curve: Piece) -> float:
     """Return (1/2) of the integral of x dy - y dx along the curve."""
     if isinstance(curve, Segment):
@@ -161,11 +196,31 @@ class Touch:
     tangent: Floats
     curvature: Floats
 
+    @property
+    def normal(self) -> Floats:
+        """The unit normals (n, 2) into the table."""
+        return np.stack([-self.tangent[:, 1], self.tangent[:, 0]], axis=1)
+
+    def incoming(self, velocity: Floats) -> Floats:
+        """Return (v1, v2, ...) along the tangents and normals of velocities (n, 2 or 3) that hit the wall: v2 < 0.
+
+        That they hit the wall is decided by `arrival`; here rounding cannot decide otherwise.
+        """
+        plane = velocity[:, :2]
+        along, up = np.sum(plane * self.tangent, axis=1), np.sum(plane * self.normal, axis=1)
+        return np.column_stack([along, np.minimum(up, -TINIEST), velocity[:, 2:]])
+
+    def outgoing(self, local: Floats) -> Floats:
+        """Return, in fixed axes, velocities (n, 2 or 3) that are given along the tangents and normals."""
+        return np.column_stack([local[:, :1] * self.tangent + local[:, 1:2] * self.normal, local[:, 2:]])
+
 
 def arrival(
     curve: Piece, position: Floats, velocity: Floats, own: NDArray[np.bool_], slack: float, front: bool = True
 ) -> Floats:
     """Return the times (n,) at which moving points reach the curve from its left, inf where they do not.
+
+    A point that is tangent to a curve flies on, except where the curve bends towards it: there it is reached.
 
     Parameters
     ----------
@@ -190,10 +245,10 @@ def _arrival_at_segment(
     along = curve.tangent(0.0)
     normal = turn * np.array([-along[1], along[0]])
     relative = position - np.array(curve.start)
-    distance, approach = relative @ normal, -(velocity[:, :2] @ normal)
+    distance, approach = np.sum(relative * normal, axis=1), -np.sum(velocity[:, :2] * normal, axis=1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         time = np.maximum(distance, 0.0) / approach
-        at = (relative + velocity[:, :2] * time[:, None]) @ along
+        at = np.sum((relative + velocity[:, :2] * time[:, None]) * along, axis=1)
     hit = (approach > 0.0) & (distance >= -slack) & (at >= -slack) & (at <= curve.length + slack) & ~own
     return np.where(hit & np.isfinite(time), time, np.inf)
 
@@ -211,17 +266,20 @@ def _arrival_at_arc(
     speed = np.sqrt(square)
     root = np.sqrt(np.maximum((speed - across) * (speed + across), 0.0))
     behind = slack / float(axes.min())
+    tangent = np.zeros(len(position), dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         if curve.direction * turn > 0:
             # the way out of the circle; from the circle itself C = 0
             time = np.where(along > 0.0, -excess / (along + root), (root - along) / square)
             time = np.where(own, -2.0 * along / square, time)
-            hit = (own & (along < 0.0)) | (~own & (across <= speed) & (time * speed >= -behind))
+            # within rounding the path is tangent: it is reached unless it leaves the arc there
+            tangent = ~own & (np.abs(across - speed) <= TANGENT * speed * (1.0 + np.hypot(start[:, 0], start[:, 1])))
+            hit = own | ((tangent | (across < speed)) & (time * speed >= -behind))
         else:
             time = excess / (root - along)
-            hit = ~own & (along < 0.0) & (across <= speed) & (excess >= -behind)
+            hit = ~own & (along < 0.0) & (across < speed) & (excess >= -behind)
         time = np.maximum(time, 0.0)
-        met = start + direction * time[:, None]
+        met = start + direction * (time + np.where(tangent, AHEAD / speed, 0.0))[:, None]
     return np.where(hit & np.isfinite(time) & _within_span(curve, met, behind), time, np.inf)
 
 
@@ -309,6 +367,26 @@ def is_on(curve: Piece, position: Floats, slack: float) -> NDArray[np.bool_]:
     unit = (position - np.array(curve.center)) / axes
     near = np.abs(np.hypot(unit[:, 0], unit[:, 1]) - 1.0) * float(axes.min()) <= slack
     return np.asarray(near & _within_span(curve, unit, slack / float(axes.min())))
+
+
+def begins_along(curve: Piece, position: Floats) -> NDArray[np.bool_]:
+    """Return whether points (n, 2) are on the curve up to rounding, not at its ends, and it bends towards the table.
+
+    Paths from there begin on the curve, whichever side of it rounding has put the points.
+    """
+    if isinstance(curve, Segment) or (isinstance(curve, Arc) and curve.direction < 0):
+        return np.zeros(len(position), dtype=bool)
+    size = size_of([curve]) + float(np.abs(position).max(initial=0.0))
+    ends = np.array([curve.start, curve.end])[:, None] - position
+    inner = is_whole(curve) | np.all(np.hypot(ends[..., 0], ends[..., 1]) > SLACK * size, axis=0)
+    found = np.asarray(inner & is_on(curve, position, TANGENT * size))
+    found[found] = touch(curve, position[found]).curvature > 0.0
+    return found
+
+
+def is_whole(curve: Piece) -> bool:
+    """Whether the curve is a whole ellipse, which has no ends."""
+    return isinstance(curve, Arc) and abs(curve.end_angle - curve.start_angle) + SLACK >= FULL_CIRCLE
 
 
 def on_the_left(curves: Sequence[Piece], position: Floats, bounded: bool) -> NDArray[np.bool_]:

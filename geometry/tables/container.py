@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,16 +15,21 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, finite_array, frozen, number_between, positive_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
+from ...core.rounding import EPS
 from ..curves.arc import Arc
 from ..curves.curve import Curve
 from ..curves.segment import Segment
 from . import boundary
+from .boundary import FlightStatus
+from .splines import GRAZE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Tolerance for the length 1 of the normals, which have a few rounding errors.
 UNIT_TOLERANCE = 1e-12
+# Distance from a corner, relative to the coordinates, up to which rounding decides which wall is met first.
+CORNER_ROUNDING = 16.0 * EPS
 
 
 @explained_class
@@ -277,8 +284,10 @@ class Container:
 
     def next_wall(
         self, position: Floats, velocity: Floats, last: NDArray[np.int64]
-    ) -> tuple[Floats, NDArray[np.int64]]:
-        """Return the time to the next wall and its index, inf and -1 if there is none.
+    ) -> tuple[Floats, NDArray[np.int64], NDArray[np.uint8]]:
+        """Return the time to the next wall, its index and the ``FlightStatus``, ``FLYING`` for a hit.
+
+        This decides whether a disk hits a wall or grazes it. One that grazes an obstacle or a side flies on.
 
         Parameters
         ----------
@@ -288,22 +297,61 @@ class Container:
             The first two columns count.
         last : array of int, shape (n,)
             The wall on which a point is, -1 if on none. A straight wall and an obstacle cannot be the next one too.
-            A centre that meets two walls at once, in a corner, meets one of them first and the other after no time.
+
+        Returns
+        -------
+        (time, wall, status)
+            The time is inf and the wall -1 where no wall is ahead, with the status ``FREE``.
         """
         times = np.full((len(position), self.wall_count), np.inf)
         straight = len(self.points)
         if straight:
-            approach = -(velocity[:, :2] @ self.normals.T)
+            approach = -np.sum(velocity[:, None, :2] * self.normals, axis=2)
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 flight = np.maximum(self.distances(position), 0.0) / approach
             own = last[:, None] == np.arange(straight)
             times[:, :straight] = np.where((approach > 0.0) & ~own & np.isfinite(flight), flight, np.inf)
         slack = boundary.SLACK * boundary.size_of(self.curves) if self.curves else 0.0
+        new = np.flatnonzero(last < 0)
         for k, curve in enumerate(self.curves, straight):
-            times[:, k] = boundary.arrival(curve, position, velocity, last == k, slack)
+            begins = last == k
+            if new.size:
+                begins[new] = boundary.begins_along(curve, position[new])
+            times[:, k] = boundary.arrival(curve, position, velocity, begins, slack)
         wall = np.argmin(times, axis=1)
         first = times[np.arange(len(position)), wall]
-        return first, np.where(np.isfinite(first), wall, -1)
+        wall = np.where(np.isfinite(first), wall, -1)
+        return first, wall, self._outcome(position, velocity, first, wall, slack)
+
+    def _outcome(
+        self, position: Floats, velocity: Floats, time: Floats, wall: NDArray[np.int64], slack: float
+    ) -> NDArray[np.uint8]:
+        """The ``FlightStatus`` of flights from positions (n, 2) that reach these walls after these times."""
+        status = np.full(len(wall), FlightStatus.FREE, dtype=np.uint8)
+        for k in np.unique(wall[wall >= 0]):
+            here = np.flatnonzero(wall == k)
+            start, plane = position[here], velocity[here, :2]
+            met = start + plane * time[here, None]
+            away = np.hypot(*np.moveaxis(met[:, None] - self._corners, -1, 0)).min(axis=1, initial=np.inf)
+            room = slack + CORNER_ROUNDING * np.abs(np.column_stack([start, met])).max(axis=1)
+            found = np.where(away <= room, FlightStatus.CORNER, FlightStatus.FLYING)
+            if k >= len(self.points):
+                point = self.touch(int(k), met)
+                up = np.sum(plane * point.normal, axis=1)
+                level = up >= -GRAZE * np.hypot(plane[:, 0], plane[:, 1])
+                found[(found == FlightStatus.FLYING) & level & (point.curvature > 0.0)] = FlightStatus.GRAZING
+            status[here] = found
+        return status
+
+    @cached_property
+    def _corners(self) -> Floats:
+        """The points (c, 2) where walls meet at an angle: joints of curves, and crossings of straight walls."""
+        crossings = [
+            np.linalg.solve(self.normals[[i, j]], np.sum(self.normals[[i, j]] * self.points[[i, j]], axis=1))
+            for i, j in combinations(range(len(self.points)), 2)
+            if abs(self.normals[i] @ self.tangents[j]) > boundary.KINK
+        ]
+        return np.concatenate([boundary.corners_of(self.curves), np.array(crossings).reshape(-1, 2)])
 
     def touch(self, wall: int, position: Floats) -> boundary.Touch:
         """Return points (n, 2) of a wall without their rounding error, with unit tangents and curvatures there.

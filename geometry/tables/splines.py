@@ -9,6 +9,8 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..curves.bezier import Bezier
 
+# Sine of the angle to the tangent up to which a path along a wall that bends towards it is not resolved.
+GRAZE = 64.0 * EPS
 # Limit on steps for a root; every fourth is a bisection, of which 53 suffice.
 ROOT_STEPS = 220
 # Halvings after which an interval of parameters has the width of rounding.
@@ -62,7 +64,31 @@ def arrival(
     with np.errstate(invalid="ignore"):
         fresh = np.where(own[:, np.newaxis], time > 0.0, time * approach >= -slack)
         hit = np.isfinite(roots) & (approach > 0.0) & fresh
-    return np.asarray(np.where(hit, np.maximum(time, 0.0), np.inf).min(axis=1))
+    first = np.where(hit, np.maximum(time, 0.0), np.inf).min(axis=1)
+    return np.minimum(first, _tangency(curve, position, v, own, slack, turn))
+
+
+def _tangency(curve: Bezier, position: Floats, v: Floats, own: NDArray[np.bool_], slack: float, turn: float) -> Floats:
+    """Return the times (n,) at which paths run along a curve that bends towards them, inf for all others.
+
+    A path from the curve does so where it begins, any other one from an end of the curve.
+    """
+    speed, found = np.hypot(v[:, 0], v[:, 1]), np.full(len(position), np.inf)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for end in (0.0, 1.0):
+            s = np.where(own, parameter_of(curve, position) if np.any(own) else end, end)
+            point, first, second = _values(powers(curve), s)
+            size = np.hypot(first[:, 0], first[:, 1])
+            up = turn * (first[:, 0] * v[:, 1] - first[:, 1] * v[:, 0]) / size
+            bends = turn * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) > 0.0
+            off = point - position
+            time = np.where(own, 0.0, np.sum(off * v, axis=1) / speed**2)
+            aside = np.where(own, 0.0, np.abs(off[:, 0] * v[:, 1] - off[:, 1] * v[:, 0]) / speed)
+            onward = own | ((np.sum(first * v, axis=1) > 0.0) == (end == 0.0))
+            near = bends & onward & (aside <= slack) & (time * speed >= -slack)
+            along = near & np.where(own, up <= GRAZE * speed, np.abs(up) <= GRAZE * speed)
+            found = np.where(along, np.minimum(found, np.maximum(time, 0.0)), found)
+    return found
 
 
 def _roots(c: Floats, low: float, high: float) -> Floats:

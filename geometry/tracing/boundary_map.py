@@ -11,8 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, angles, finite_array, instance, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
+from ..tables.boundary import TINIEST, FlightStatus
 from ..tables.container import Container
 from .tracing import MAX_COLLISIONS, Status, StatusCounts
+
+# The least and the largest angle in (0, pi).
+ANGLES = (TINIEST, float(np.nextafter(np.pi, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class BoundaryStates(StatusCounts):
     collisions : array of int, shape (n,)
     status : array of int, shape (n,)
         Values of `Status`: ``ESCAPED`` for particles that did what was asked, ``BOUNCE_LIMIT`` for those that came to
-        no opening, ``CORNER`` for those that met no wall because of rounding.
+        no opening, ``CORNER`` and ``GRAZING`` as in `BilliardRecord`; the state is then the last one that is resolved.
     """
 
     s: Floats
@@ -191,9 +195,11 @@ class _Flight:
 
     def advance(self, moving: NDArray[np.int64]) -> None:
         """Move some particles to their next wall and reflect them."""
-        flight, wall = self.container.next_wall(self.position[moving], self.velocity[moving], self.wall[moving])
-        self.status[moving[wall < 0]] = Status.CORNER
-        moving, flight, wall = moving[wall >= 0], flight[wall >= 0], wall[wall >= 0]
+        flight, wall, status = self.container.next_wall(self.position[moving], self.velocity[moving], self.wall[moving])
+        # corners and grazing paths have the same values in both; a wall is missed at corners only
+        self.status[moving] = np.where(wall < 0, Status.CORNER, status)
+        hit = status == FlightStatus.FLYING
+        moving, flight, wall = moving[hit], flight[hit], wall[hit]
         self.time[moving] += flight
         self.position[moving] += self.velocity[moving] * flight[:, None]
         self.wall[moving] = wall
@@ -201,14 +207,11 @@ class _Flight:
         for k in np.unique(wall):
             here = moving[wall == k]
             point = self.container.touch(int(k), self.position[here])
-            tangent, incoming = point.tangent, self.velocity[here]
-            normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-            along, up = np.sum(incoming * tangent, axis=1), -np.sum(incoming * normal, axis=1)
+            mirrored = point.incoming(self.velocity[here]) * [1.0, -1.0]
             self.position[here] = point.position
+            self.theta[here] = np.clip(np.arctan2(mirrored[:, 1], mirrored[:, 0]), *ANGLES)
             # without growth of the speed by rounding
-            self.theta[here] = np.arctan2(up, along)
-            speed = np.hypot(along, up)[:, None]
-            self.velocity[here] = (along[:, None] * tangent + up[:, None] * normal) / speed
+            self.velocity[here] = point.outgoing(mirrored / np.hypot(mirrored[:, :1], mirrored[:, 1:]))
 
     def states(self) -> BoundaryStates:
         length = self.container.length_at(self.position, self.wall)

@@ -89,8 +89,13 @@ class StatusCounts:
         >>> geo.trace(geo.flat(), [0.2, 0.7], 1.0).counts()
         {'escaped': 2, 'corner': 0, 'grazing': 0, 'bounce_limit': 0}
         """
-        numbers = np.bincount(np.ravel(self.status), minlength=len(Status))
-        return {outcome.name.lower(): int(numbers[outcome]) for outcome in Status}
+        return numbers_of(self.status, Status)
+
+
+def numbers_of(status: NDArray[np.uint8], outcomes: type[IntEnum]) -> dict[str, int]:
+    """Return how often each of the outcomes is in an array of their values, by name in lower case."""
+    numbers = np.bincount(np.ravel(status), minlength=len(outcomes))
+    return {outcome.name.lower(): int(numbers[outcome]) for outcome in outcomes}
 
 
 @dataclass(frozen=True)

@@ -286,7 +286,7 @@ class PolygonalBody:
         tangent, normal = region.frames(start, wall)
         angle = before[:, 1, None]
         out = self.scatter(start, np.cos(angle) * tangent + np.sin(angle) * normal)
-        time, wall = region.next_wall(out.position, out.velocity, np.where(out.reflections > 0, -1, wall))
+        time, wall, _ = region.next_wall(out.position, out.velocity, np.where(out.reflections > 0, -1, wall))
         if np.any(wall < 0):
             raise AccuracyError("region: a particle leaves through a corner; use another rng", float(np.mean(wall < 0)))
         ends = out.position + time[:, None] * out.velocity

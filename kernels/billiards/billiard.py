@@ -15,11 +15,15 @@ from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ...core.long_runs import Engine, all_parts
 from ...core.version import __version__
+from ...geometry.tables.boundary import FlightStatus
+from ...geometry.tracing.tracing import numbers_of
+from ..collisions.satellite_law import SatelliteLaw
 from ..laws.law import Law
 from .along_walls import CollisionAlongWall, Located
 
 if TYPE_CHECKING:
     from ...geometry import Container, Disk
+    from ...geometry.tables.boundary import Touch
 
 # Disks of a part: their random numbers depend on its number alone.
 TOGETHER = 1024
@@ -42,7 +46,8 @@ class Reflector(Protocol):
 class BilliardRecord:
     """States of n disks after each of their collisions; the first entry of every array is the initial state.
 
-    A disk that meets no further wall has fewer ``collisions`` than ``steps``; its last state is repeated.
+    A disk that meets no further wall, or whose next collision is not resolved, has fewer ``collisions`` than
+    ``steps``; its last state is repeated. The other disks move as without it.
 
     Attributes
     ----------
@@ -57,6 +62,10 @@ class BilliardRecord:
     wall : array of int, shape (steps + 1, n)
         Index of the wall, -1 at the start.
     collisions : array of int, shape (n,)
+    status : array of int, shape (n,)
+        Values of ``FlightStatus``. ``FLYING``: all were computed. ``FREE``: no wall is ahead. ``CORNER``: the
+        next one is at a corner, where the outcome depends on which wall is met first. ``GRAZING``: the path runs along
+        a wall that bends towards it. ``UNREFLECTED``: the law of the wall found no outgoing velocity.
     """
 
     container: Container
@@ -67,6 +76,22 @@ class BilliardRecord:
     velocity: Floats
     wall: NDArray[np.int64]
     collisions: NDArray[np.int64]
+    status: NDArray[np.uint8]
+
+    def counts(self) -> dict[str, int]:
+        """Return the number of disks with every ``FlightStatus``, by name in lower case.
+
+        Examples
+        --------
+        Of two disks in a square one runs into a corner; the other goes on:
+
+        >>> from asperity import geometry as geo, kernels as ker
+        >>> square = geo.Container.polygon([(0, 0), (2, 0), (2, 2), (0, 2)])
+        >>> record = ker.play(square, ker.smooth(geo.Disk()), [1.0, 1.0], [[1.0, 1.0, 0.0], [1.0, 0.5, 0.0]], 8)
+        >>> {name: count for name, count in record.counts().items() if count}, record.collisions.tolist()
+        ({'flying': 1, 'corner': 1}, [0, 8])
+        """
+        return numbers_of(self.status, FlightStatus)
 
     @property
     def radius(self) -> float | None:
@@ -165,9 +190,8 @@ def play(
     located, moving = _starts(container, position, velocity)
     job = _Disks(container, tuple(each), located, moving, collisions, root)
     parts = all_parts(job.states, -(-len(located) // TOGETHER), job.identity(), engine, job.stored)
-    columns = {
-        name: np.concatenate([part[name] for part in parts], axis=0 if name == "collisions" else 1) for name in parts[0]
-    }
+    columns = {name: np.concatenate([part[name] for part in parts], axis=-1 if parts[0][name].ndim == 1 else 1)
+               for name in parts[0]}  # fmt: skip
     for array in columns.values():
         array.setflags(write=False)
     return BilliardRecord(container, disk, **columns)
@@ -199,6 +223,7 @@ class _Disks:
             "time": Stored("f", shape, 0.0), "position": Stored("f", (*shape, 2)), "angle": Stored("f", shape),
             "velocity": Stored("f", (*shape, 3)), "wall": Stored("i", shape, -1, len(self.laws) - 1),
             "collisions": Stored("i", shape[1:], 0, self.collisions),
+            "status": Stored("u", shape[1:], 0, max(FlightStatus)),
         }  # fmt: skip
 
     def states(self, part: int) -> dict[str, NDArray[Any]]:
@@ -208,29 +233,31 @@ class _Disks:
         located, moving = self.position[own].copy(), self.velocity[own].copy()
         n = len(located)
         time, angle, last = np.zeros(n), np.zeros(n), np.full(n, -1)
-        made = np.zeros(n, dtype=np.int64)
+        made, status = np.zeros(n, dtype=np.int64), np.full(n, FlightStatus.FLYING, dtype=np.uint8)
         states = [(time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy())]
         for _ in range(self.collisions):
-            flight, wall = self.container.next_wall(located, moving, last)
-            hit = wall >= 0
-            made[hit] += 1
-            step = np.where(hit, flight, 0.0)
-            time, angle = time + step, angle + moving[:, 2] * step
-            located = located + moving[:, :2] * step[:, None]
-            last = np.where(hit, wall, last)
+            rows = np.flatnonzero(status == FlightStatus.FLYING)
+            flight, wall, status[rows] = self.container.next_wall(located[rows], moving[rows], last[rows])
             for k, law in enumerate(self.laws):
-                here = np.flatnonzero(wall == k)
-                if here.size:
-                    point = self.container.touch(k, located[here])
-                    located[here] = point.position
-                    if isinstance(law, CollisionAlongWall):
-                        law = Located(law, law.coordinate(self.container, k, point.position))
-                    moving[here] = reflected(point.tangent, law, moving[here], rng)
+                own = (wall == k) & (status[rows] == FlightStatus.FLYING)
+                here, step = rows[own], flight[own]
+                if not here.size:
+                    continue
+                point = self.container.touch(k, located[here] + moving[here, :2] * step[:, None])
+                if isinstance(law, CollisionAlongWall):
+                    law = Located(law, law.coordinate(self.container, k, point.position))
+                after = reflected(point, law, moving[here], rng)
+                found = np.all(np.isfinite(after), axis=1)
+                status[here[~found]] = FlightStatus.UNREFLECTED
+                here, step = here[found], step[found]
+                time[here], angle[here] = time[here] + step, angle[here] + moving[here, 2] * step
+                located[here], moving[here], last[here] = point.position[found], after[found], k
+                made[here] += 1
             states.append((time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy()))
         columns = [np.stack(column) for column in zip(*states, strict=True)]
         return {
             "time": columns[0], "position": columns[1], "angle": columns[2], "velocity": columns[3],
-            "wall": columns[4].astype(np.int64), "collisions": made,
+            "wall": columns[4].astype(np.int64), "collisions": made, "status": status,
         }  # fmt: skip
 
 
@@ -282,9 +309,7 @@ def _starts(container: Container, position: ArrayLike, velocity: ArrayLike) -> t
     return np.broadcast_to(located, (n, 2)).copy(), np.broadcast_to(moving, (n, 3)).copy()
 
 
-def reflected(tangent: Floats, law: Reflector, moving: Floats, rng: np.random.Generator) -> Floats:
-    """Velocities after a collision with a wall of these unit tangents (n, 2), on whose left the disk is."""
-    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-    along, up = np.sum(moving[:, :2] * tangent, axis=1), np.sum(moving[:, :2] * normal, axis=1)
-    out = law.sample(np.stack([along, up, moving[:, 2]], axis=1), rng)
-    return np.concatenate([out[:, :1] * tangent + out[:, 1:2] * normal, out[:, 2:]], axis=1)
+def reflected(point: Touch, law: Reflector, moving: Floats, rng: np.random.Generator) -> Floats:
+    """Velocities (n, 3) after a collision with a wall at these points; nan where the law found none."""
+    incoming = point.incoming(moving)
+    return point.outgoing(law.attempt(incoming, rng) if isinstance(law, SatelliteLaw) else law.sample(incoming, rng))

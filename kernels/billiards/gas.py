@@ -15,7 +15,7 @@ from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
 from ...core.kinds import explained, explained_class
 from ..collisions.collision_law import smooth
-from .billiard import BilliardRecord, Reflector, laws_of_walls, reflected
+from .billiard import BilliardRecord, FlightStatus, Reflector, laws_of_walls, reflected
 from .pair_law import PairLaw
 
 if TYPE_CHECKING:
@@ -34,8 +34,9 @@ BATCHES, BURN_IN, FEWEST_EVENTS = (16, 8, 4), 0.2, 64
 class GasRecord(BilliardRecord):
     """States of all disks of a gas after each event; the first entry of every array is the initial state.
 
-    An event is a collision of one disk with a wall or of two disks with each other. Beside the attributes of
-    `BilliardRecord`, of which ``wall`` is -1 for disks that met no wall in the event:
+    An event is a collision of one disk with a wall or of two disks with each other. The record ends before an event
+    that is not resolved, after which the state of no disk would be known; ``status`` tells which disk it is. Beside the
+    attributes of `BilliardRecord`, of which ``wall`` is -1 for disks that met no wall in the event:
 
     Attributes
     ----------
@@ -89,6 +90,8 @@ class GasRecord(BilliardRecord):
         duration, rotation = np.diff(self.time[:, 0]), self.rotational_energy[:-1] / float(self.energy[0].sum())
         first = int(burn_in * len(duration))
         duration, rotation = duration[first:], rotation[first:]
+        if not len(duration):
+            return Estimate(float(self.rotational_energy[0] / self.energy[0].sum()), math.inf, "estimate", "no event")
         value = float(rotation @ duration / duration.sum())
         if len(duration) < FEWEST_EVENTS * self.velocity.shape[1]:
             return Estimate(value, math.inf, "estimate", "mean over a time too short for an error")
@@ -175,15 +178,14 @@ def play_gas(
     rng = generator(rng)
     gas = _Gas(container, pair, laws, located, moving)
     states = [gas.state()]
-    for _ in range(events):
-        gas.next_event(rng)
+    while len(states) <= events and gas.next_event(rng):
         states.append(gas.state())
     columns = [np.stack(column) for column in zip(*states, strict=True)]
     wall, partner = columns[4].astype(np.int64), columns[5].astype(np.int64)
     made = np.sum((wall[1:] >= 0) | (partner[1:] >= 0), axis=0)
-    for array in (*columns[:4], wall, partner, made):
+    for array in (*columns[:4], wall, partner, made, gas.status):
         array.setflags(write=False)
-    return GasRecord(container, disk, columns[0], columns[1], columns[2], columns[3], wall, made, partner, pair)
+    return GasRecord(container, disk, *columns[:4], wall, made, gas.status, partner, pair)
 
 
 def _start(container: Container, position: ArrayLike, velocity: ArrayLike, diameter: float) -> tuple[Floats, Floats]:
@@ -217,7 +219,8 @@ class _Gas:
         self.now, self.angle = 0.0, np.zeros(n)
         self.last, self.wall, self.partner = (np.full(n, -1) for _ in range(3))
         self.pairs, self.walls = np.full((n, n), np.inf), np.full(n, np.inf)
-        self.next_wall = np.full(n, -1)
+        self.next_wall, self.ahead = np.full(n, -1), np.zeros(n, dtype=np.uint8)
+        self.status = np.full(n, FlightStatus.FLYING, dtype=np.uint8)
         self.predict(np.arange(n))
 
     def state(self) -> tuple[Floats, ...]:
@@ -235,7 +238,7 @@ class _Gas:
 
     def predict(self, disks: NDArray[np.int64]) -> None:
         """Compute the next collisions of these disks."""
-        flight, self.next_wall[disks] = self.container.next_wall(
+        flight, self.next_wall[disks], self.ahead[disks] = self.container.next_wall(
             self.position[disks], self.velocity[disks], self.last[disks]
         )
         self.walls[disks] = self.now + flight
@@ -246,31 +249,36 @@ class _Gas:
             times[k] = np.inf
             self.pairs[k], self.pairs[:, k] = times, times
 
-    def next_event(self, rng: np.random.Generator) -> None:
-        """Move all disks to the next event, and collide."""
+    def next_event(self, rng: np.random.Generator) -> bool:
+        """Move all disks to the next event, and collide; False, without a change, if the event is not resolved."""
         at_wall = int(np.argmin(self.walls))
         first, second = (int(i) for i in np.unravel_index(np.argmin(self.pairs), self.pairs.shape))
         then = float(min(self.walls[at_wall], self.pairs[first, second]))
         if not math.isfinite(then):
             raise AccuracyError("no disk meets a wall or another disk any more; is the container closed?", math.inf)
+        hits_wall = bool(self.walls[at_wall] <= self.pairs[first, second])
+        if hits_wall and self.ahead[at_wall] != FlightStatus.FLYING:
+            self.status[at_wall] = self.ahead[at_wall]
+            return False
         step = max(then - self.now, 0.0)
         self.position += self.velocity[:, :2] * step
         self.angle += self.velocity[:, 2] * step
         self.now = then
         self.wall[:], self.partner[:] = -1, -1
-        if self.walls[at_wall] <= self.pairs[first, second]:
+        if hits_wall:
             self.collide_with_wall(at_wall, rng)
             self.predict(np.array([at_wall]))
         else:
             self.collide_pair(first, second, rng)
             self.predict(np.array([first, second]))
+        return True
 
     def collide_with_wall(self, disk: int, rng: np.random.Generator) -> None:
         """Collide one disk with the wall where it is."""
         wall = int(self.next_wall[disk])
         point = self.container.touch(wall, self.position[[disk]])
         self.position[disk] = point.position[0]
-        self.velocity[disk] = reflected(point.tangent, self.laws[wall], self.velocity[[disk]], rng)[0]
+        self.velocity[disk] = reflected(point, self.laws[wall], self.velocity[[disk]], rng)[0]
         self.wall[disk] = self.last[disk] = wall
 
     def collide_pair(self, first: int, second: int, rng: np.random.Generator) -> None:

@@ -15,6 +15,7 @@ from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
 from ...core.kinds import explained
 from ...geometry import Container
+from ...geometry.tables.boundary import FlightStatus
 from ..collisions.collision_law import CollisionLaw
 from ..collisions.velocity_matrices import no_slip_matrix, smooth_matrix
 from ..laws.law import IsometryLaw
@@ -74,7 +75,7 @@ def lyapunov_exponent(
     InputError
         If the container has no outer loop, a law is neither smooth nor no-slip, or a number is too small.
     AccuracyError
-        If a trajectory meets no wall, through a corner that rounding does not close.
+        If fewer than 8 trajectories are resolved; one that runs into a corner does not count.
 
     Notes
     -----
@@ -113,11 +114,17 @@ def lyapunov_exponent(
         pencil = pencil.after_collision(container, matrices)
         if step in marks:
             growth[step], time[step] = pencil.growth, pencil.time
+    kept = pencil.resolved
+    if kept.sum() < LEAST_TRAJECTORIES:
+        raise AccuracyError(
+            f"{n - kept.sum()} of {n} trajectories ended at a corner, or along a wall; take another rng", math.inf
+        )
+    growth, time = ({step: values[kept] for step, values in table.items()} for table in (growth, time))
     late, spread = _rate(growth, time, [round(part * collisions) for part in LATE])
     early, _ = _rate(growth, time, [round(part * collisions) for part in EARLY])
     method = (
-        f"{n} trajectories of {collisions} collisions, the last three quarters; 95 % from their scatter "
-        f"({spread:.2g}), plus {DRIFT:g} of the difference to an earlier quarter"
+        f"{kept.sum()} trajectories of {collisions} collisions, the last three quarters; 95 % from their scatter "
+        f"({spread:.2g}), plus {DRIFT:g} of the difference to an earlier quarter; {n - kept.sum()} not resolved"
     )
     return Estimate(late, spread + DRIFT * abs(late - early), "estimate", method)
 
@@ -153,6 +160,8 @@ class Pencil:
     growth : array, shape (n,)
         Logarithm of the factor by which the difference has grown.
     time : array, shape (n,)
+    resolved : array of bool, shape (n,)
+        False from a collision on that double precision does not resolve, at which the state stays.
     """
 
     position: Floats
@@ -162,6 +171,7 @@ class Pencil:
     tilt: Floats
     growth: Floats
     time: Floats
+    resolved: NDArray[np.bool_]
 
     @classmethod
     def around(cls, position: Floats, velocity: Floats, wall: NDArray[np.int64], rng: np.random.Generator) -> Pencil:
@@ -169,16 +179,14 @@ class Pencil:
         n = len(position)
         difference = rng.standard_normal((n, 5))
         difference /= np.sqrt(np.sum(difference**2, axis=1))[:, None]
-        return cls(position, velocity, wall, difference[:, :2], difference[:, 2:], np.zeros(n), np.zeros(n))
+        return cls(position, velocity, wall, difference[:, :2], difference[:, 2:], np.zeros(n), np.zeros(n),
+                   np.ones(n, dtype=bool))  # fmt: skip
 
     def after_collision(self, container: Container, matrices: Sequence[Floats]) -> Pencil:
         """Return the disks and their neighbours after the next collision of each."""
-        flight, wall = container.next_wall(self.position, self.velocity, self.wall)
-        if np.any(wall < 0):
-            stray = self.position[int(np.argmin(wall))].tolist()
-            raise AccuracyError(
-                f"a disk at {stray} meets no wall; take another rng, or curves that join more closely", math.inf
-            )
+        flight, wall, status = container.next_wall(self.position, self.velocity, self.wall)
+        resolved = self.resolved & (status == FlightStatus.FLYING)
+        flight, wall = np.where(resolved, flight, 0.0), np.where(resolved, wall, -1)
         position = self.position + self.velocity[:, :2] * flight[:, None]
         velocity = self.velocity.copy()
         shift, tilt = self.shift + self.tilt[:, :2] * flight[:, None], self.tilt.copy()
@@ -192,21 +200,20 @@ class Pencil:
                 )
         size = np.sqrt(np.sum(shift**2, axis=1) + np.sum(tilt**2, axis=1))
         scaled = shift / size[:, None], tilt / size[:, None]
-        return Pencil(position, velocity, wall, *scaled, self.growth + np.log(size), self.time + flight)
+        return Pencil(position, velocity, wall, *scaled, self.growth + np.log(size), self.time + flight, resolved)
 
 
 def reflected_pair(
     matrix: Floats, point: Touch, velocity: Floats, shift: Floats, tilt: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return velocity, shift and tilt after a collision, by the derivatives in `lyapunov_exponent`."""
-    tangent = point.tangent
-    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    tangent, normal = point.tangent, point.normal
     turn = np.zeros((len(tangent), 3, 3))
     # columns: tangent, normal and spin
     turn[:, :2, 0], turn[:, :2, 1], turn[:, 2, 2] = tangent, normal, 1.0
     rotated = turn @ matrix @ np.swapaxes(turn, 1, 2)
     plane = velocity[:, :2]
-    delay = -np.sum(shift * normal, axis=1) / np.sum(plane * normal, axis=1)
+    delay = np.sum(shift * normal, axis=1) / -point.incoming(velocity)[:, 1]
     along = np.sum((shift + plane * delay[:, None]) * tangent, axis=1)
     after = _times(rotated, velocity)
     bend = _quarter_turn(after) - _times(rotated, _quarter_turn(velocity))

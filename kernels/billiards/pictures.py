@@ -9,7 +9,7 @@ import numpy as np
 from ...core.checks import Floats, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
-from .billiard import BilliardRecord
+from .billiard import BilliardRecord, FlightStatus
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
@@ -74,7 +74,7 @@ def phase_portrait(record: BilliardRecord, coordinates: Coordinates = "boundary"
     Returns
     -------
     (array, array), each of shape (collisions, n)
-        NaN after the last collision of a disk that left.
+        NaN after the last collision of a disk that left, or whose next collision is not resolved.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def animate(record: BilliardRecord, frames: int = 200, duration: float = 10.0) -
     Parameters
     ----------
     record : BilliardRecord
-        The animation ends when the first disk has made its last collision.
+        The animation ends when the first disk that went on has made its last collision.
     frames : int
         Number of pictures, equally spaced in time.
     duration : float
@@ -187,7 +187,8 @@ def animate(record: BilliardRecord, frames: int = 200, duration: float = 10.0) -
     axes = draw_paths(record)
     for line in axes.lines[-record.position.shape[1] :]:
         line.remove()
-    times = np.linspace(0.0, float(record.time[-1].min()), count)
+    went_on = record.time[-1, record.status == FlightStatus.FLYING]
+    times = np.linspace(0.0, float(went_on.min() if went_on.size else record.time[-1].max()), count)
     small = DRAWN_RADIUS * max(np.ptp(record.position[..., 0]), np.ptp(record.position[..., 1]))
     size = record.radius or small
     low, high = record.position.min(axis=(0, 1)) - 1.2 * size, record.position.max(axis=(0, 1)) + 1.2 * size

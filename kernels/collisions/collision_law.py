@@ -27,6 +27,7 @@ from ...core.checks import (
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ...geometry import Disk, Wall
+from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.tensor import TensorBasis
@@ -111,8 +112,9 @@ class VelocityLaw(TensorLaw):
         rng = generator(rng)
         frame = np.asarray(self.disk.frame)
         along, up, roll = (self.disk.inner(incoming, np.broadcast_to(direction, incoming.shape)) for direction in frame)
-        # angle and length of minus the incoming velocity in the plane of chi_perp and e2^; the flip leaves ``roll``
-        theta = np.arctan2(-up, -along)
+        # angle and length of minus the incoming velocity in the plane of chi_perp and e2^; the flip leaves ``roll``.
+        # Rounding may put the angle on an end of (0, pi).
+        theta = clipped_inside(np.arctan2(np.abs(up), -along))
         outgoing, flipped = self._sample(theta, rng)
         size = np.hypot(along, up)
         parts = (size * np.cos(outgoing), size * np.sin(outgoing), np.where(flipped, roll, -roll))

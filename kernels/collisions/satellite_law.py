@@ -66,21 +66,28 @@ class SatelliteLaw:
         AccuracyError
             If a disk does not come back from the wall in 20 draws of its position.
         """
+        moving = finite_array("velocity", velocity)
+        out = self.attempt(moving, generator(rng))
+        lost = np.flatnonzero(np.isnan(out[:, 0]))
+        if lost.size:
+            raise AccuracyError(
+                f"{lost.size} disks did not come back from the wall in {MOST_DRAWS} draws of their position; row "
+                f"{int(lost[0])} has the velocity {moving[lost[0]].tolist()}",
+                lost.size / len(moving),
+            )
+        return out
+
+    def attempt(self, moving: Floats, rng: np.random.Generator) -> Floats:
+        """Draw outgoing velocities as `sample`, nan for disks that do not come back."""
         from ...geometry import collide
 
         assert self.spacing is not None
-        moving = finite_array("velocity", velocity)
-        rng = generator(rng)
-        out, rest = np.empty(moving.shape), np.arange(len(moving))
+        out, rest = np.full(moving.shape, np.nan), np.arange(len(moving))
         for _ in range(MOST_DRAWS):
+            if not len(rest):
+                break
             position = rng.random((len(rest), 2)) * [self.scale * self.wall.period, self.spacing]
             hit = collide(self.disk, self.wall, self.scale, position, moving[rest], self.spacing)
             out[rest[hit.escaped]] = hit.velocity[hit.escaped]
             rest = rest[~hit.escaped]
-            if not len(rest):
-                return out
-        raise AccuracyError(
-            f"{len(rest)} disks did not come back from the wall in {MOST_DRAWS} draws of their position; row "
-            f"{int(rest[0])} has the velocity {moving[rest[0]].tolist()}",
-            len(rest) / len(moving),
-        )
+        return out
