@@ -58,7 +58,7 @@ def evaluate(expression: Any, point: Mapping[Any, Any], bits: int) -> Value:
 def interval(low: Any, high: Any, bits: int = 64) -> Any:
     """A ball that contains all numbers between two exact numbers."""
     with ctx.workprec(bits):
-        ends = [_value(sp.sympify(end), {}).ball for end in (low, high)]
+        ends = [_value(end, {}).ball for end in (low, high)]
         return ends[0].union(ends[1])
 
 

@@ -18,7 +18,7 @@ from .polyhedron import BITS, Inequality, Polyhedron, sign_of
 # Simple numbers are tried first, because a counterexample with small numbers is easier to read.
 SIMPLE = tuple(sp.Rational(p, q) for q in (1, 2, 3, 5) for p in range(1, 16))
 # Points at which an inverse function or a step has a known value, or a pole or a jump occurs.
-SPECIAL = (0, 1, -1, sp.pi / 2, sp.pi, -sp.pi / 2, 2 * sp.pi, -sp.pi, sp.pi / 4, sp.pi / 3)
+SPECIAL = (sp.S.Zero, sp.S.One, sp.S.NegativeOne, sp.pi / 2, sp.pi, -sp.pi / 2, 2 * sp.pi, -sp.pi, sp.pi / 4, sp.pi / 3)
 # Range of the logarithmic scale on which some random points are close to an end or far out.
 CLOSEST = 1e-6
 FARTHEST = 1e4
@@ -125,7 +125,6 @@ class Domain:
         inequalities = [one.substituted(symbol, value) for one in self.inequalities]
         if None in inequalities:
             return None
-        value = sp.sympify(value)
         values = {s: v.xreplace({symbol: value}) for s, v in self.values.items()} | {symbol: value}
         symbols = tuple(s for s in self.symbols if s != symbol)
         return replace(self, symbols=symbols, inequalities=tuple(filter(None, inequalities)), values=values)
@@ -229,7 +228,7 @@ class Domain:
         """The points where a function may jump."""
         (symbol,) = self.symbols
         bounds = self.interval(symbol)
-        for value in map(sp.sympify, SPECIAL):
+        for value in SPECIAL:
             whole = self._whole({symbol: value}) if _is_inside(value, bounds) else None
             if whole is not None:
                 yield whole
@@ -313,7 +312,7 @@ def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng:
             value = int(rng.choice([-1, 1])) * SIMPLE[rng.integers(len(SIMPLE))]
             if bool(low < value) and bool(value < high) and has_properties(symbol, value):
                 return value
-    special = sp.sympify(SPECIAL[rng.integers(len(SPECIAL))])
+    special = SPECIAL[rng.integers(len(SPECIAL))]
     if rng.random() < OFTEN and _is_inside(special, bounds) and has_properties(symbol, special):
         return special
     value = _between(float(low), float(high), rng)
@@ -349,7 +348,6 @@ def _logarithmic(rng: np.random.Generator, top: float) -> float:
 
 
 def _parts(given: Any) -> list[Any]:
-    given = sp.sympify(given)
     if given is sp.true:
         return []
     if given is sp.false:

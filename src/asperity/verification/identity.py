@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ..core.checks import positive_number
 from ..core.errors import InputError
 from .verdict import Verdict, every
 
@@ -77,11 +79,9 @@ def verify(
         claims, given = _equations(sp, lhs, rhs), assumptions
     if time_limit is None:
         return decide(claims, _relations(sp, given))
-    if not time_limit > 0:
-        raise InputError(f"time_limit: expected a positive number of seconds or None, got {time_limit!r}")
     from .worker import decide_in_time
 
-    return decide_in_time(claims, _relations(sp, given), float(time_limit))
+    return decide_in_time(claims, _relations(sp, given), positive_number("time_limit", time_limit))
 
 
 def decide(claims: list[tuple[Any, Any, str]], relations: list[Any]) -> Verdict:
@@ -116,7 +116,7 @@ def _relations_as_claims(sp: Any, given: Any) -> list[tuple[Any, Any, str]]:
     kinds = {sp.Eq: "==", sp.Le: "<=", sp.Ge: "<=", sp.Lt: "<", sp.Gt: "<"}
     if type(given) not in kinds:
         raise InputError(f"lhs: expected two sides, or a relation such as a <= b, got {given!r} alone")
-    left, right = (_exact(sp, side) for side in given.args)
+    left, right = (_exact(sp, "lhs", side) for side in given.args)
     return [
         (right, left, kinds[type(given)]) if isinstance(given, sp.Ge | sp.Gt) else (left, right, kinds[type(given)])
     ]
@@ -134,17 +134,36 @@ def _equations(sp: Any, lhs: Any, rhs: Any) -> list[tuple[Any, Any, str]]:
 def _entries(sp: Any, side: Any) -> list[Any]:
     if isinstance(side, sp.MatrixBase | list | tuple):
         return [entry for part in side for entry in _entries(sp, part)]
-    return [_exact(sp, side)]
+    return [_exact(sp, "lhs, rhs", side)]
 
 
-def _exact(sp: Any, side: Any) -> Any:
-    return sp.sympify(side, rational=False).replace(lambda e: e.is_Float, lambda e: sp.Rational(e))
+def _exact(sp: Any, name: str, given: Any) -> Any:
+    """The sympy object; text is refused, because sympy would execute it."""
+    try:
+        found = sp.sympify(given, strict=True)
+    except sp.SympifyError as reason:
+        raise InputError(
+            f"{name}: expected expressions, equations or inequalities of sympy, or numbers, got {reprlib.repr(given)}; "
+            "build expressions from sympy.Symbol"
+        ) from reason
+    return found.replace(lambda e: e.is_Float, lambda e: sp.Rational(e))
 
 
 def _relations(sp: Any, assumptions: Any) -> list[Any]:
     if isinstance(assumptions, Mapping):
-        return [side for symbol, (low, high) in assumptions.items() for side in (low < symbol, symbol < high)]
-    return [assumptions] if isinstance(assumptions, sp.Basic | bool) else list(assumptions)
+        try:
+            bounds = [(symbol, low, high) for symbol, (low, high) in assumptions.items()]
+        except (TypeError, ValueError) as reason:
+            raise InputError(
+                f"assumptions: expected an interval (low, high) for each symbol, got {reprlib.repr(assumptions)}"
+            ) from reason
+        exact = [[_exact(sp, "assumptions", part) for part in bound] for bound in bounds]
+        return [side for symbol, low, high in exact for side in (sp.Lt(low, symbol), sp.Lt(symbol, high))]
+    given = [assumptions] if isinstance(assumptions, sp.Basic | bool | str) else assumptions
+    try:
+        return [_exact(sp, "assumptions", one) for one in given]
+    except TypeError as reason:
+        raise InputError(f"assumptions: expected relations, got {reprlib.repr(assumptions)}") from reason
 
 
 def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Verdict:
@@ -155,7 +174,7 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
     from .integrals import prepared
     from .refutation import Search
 
-    relations = [sp.sympify(given).replace(lambda e: e.is_Float, lambda e: sp.Rational(e)) for given in assumptions]
+    relations = list(assumptions)
     # the variable of an integral may have the name of another symbol
     left, right = (side.replace(sp.Integral, lambda *parts: sp.Integral(*parts).as_dummy()) for side in (left, right))
     symbols = set(left.free_symbols | right.free_symbols).union(*(given.free_symbols for given in relations))

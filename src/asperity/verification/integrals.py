@@ -137,8 +137,8 @@ def _between(t: Any, low: Any, high: Any, domain: Domain) -> list[Inequality] | 
     # either end may come first, so only bounds common to both orders are used
     bounds = []
     for sign in (1, -1):
-        for bound in {0, *(end for s in domain.symbols for end in domain.interval(s)[:2] if end.is_finite)}:
+        for bound in {sp.S.Zero, *(end for s in domain.symbols for end in domain.interval(s)[:2] if end.is_finite)}:
             beyond = [Inequality.of(sign * (end - bound), True) for end in (low, high)]
             if all(one is not None and domain.polyhedron.implies(one) for one in beyond):
-                bounds.append(Inequality({t: sp.Integer(sign)}, -sign * sp.sympify(bound), True))
+                bounds.append(Inequality({t: sp.Integer(sign)}, -sign * bound, True))
     return bounds
