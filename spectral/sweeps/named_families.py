@@ -81,7 +81,7 @@ def _axis(text: str, adaptive: bool, resolution: float | None) -> tuple[str, Any
     try:
         if len(ends) == 1:
             return name.replace("-", "_"), [_number(value) for value in values.split(",")]
-        low, high, number = _number(ends[0]), _number(ends[1]), int(ends[2])
+        low, high, number = float(_number(ends[0])), float(_number(ends[1])), int(ends[2])
     except (ValueError, IndexError, OverflowError) as reason:
         raise InputError(f"--over: expected NAME=LOW:HIGH:POINTS or NAME=VALUE,VALUE, got {text!r}") from reason
     if adaptive:

@@ -140,13 +140,12 @@ def _entries(sp: Any, side: Any) -> list[Any]:
 def _exact(sp: Any, name: str, given: Any) -> Any:
     """The sympy object; text is refused, because sympy would execute it."""
     try:
-        found = sp.sympify(given, strict=True)
+        return sp.sympify(given, strict=True)
     except sp.SympifyError as reason:
         raise InputError(
-            f"{name}: expected expressions, equations or inequalities of sympy, or numbers, got {reprlib.repr(given)}; "
-            "build expressions from sympy.Symbol"
+            f"{name}: expected expressions, equations or inequalities of sympy, or numbers, got "
+            f"{reprlib.repr(given)}; build expressions from sympy.Symbol"
         ) from reason
-    return found.replace(lambda e: e.is_Float, lambda e: sp.Rational(e))
 
 
 def _relations(sp: Any, assumptions: Any) -> list[Any]:
@@ -158,7 +157,7 @@ def _relations(sp: Any, assumptions: Any) -> list[Any]:
                 f"assumptions: expected an interval (low, high) for each symbol, got {reprlib.repr(assumptions)}"
             ) from reason
         exact = [[_exact(sp, "assumptions", part) for part in bound] for bound in bounds]
-        return [side for symbol, low, high in exact for side in (sp.Lt(low, symbol), sp.Lt(symbol, high))]
+        return [sp.Lt(*side, evaluate=False) for symbol, low, high in exact for side in ((low, symbol), (symbol, high))]
     given = [assumptions] if isinstance(assumptions, sp.Basic | bool | str) else assumptions
     try:
         return [_exact(sp, "assumptions", one) for one in given]
@@ -169,32 +168,37 @@ def _relations(sp: Any, assumptions: Any) -> list[Any]:
 def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Verdict:
     import sympy as sp
 
+    from .constants import written
     from .derivation import EXPANSION, Derivation, expands_to_zero
     from .domain import Domain
-    from .integrals import prepared
+    from .integrals import UNFINISHED, prepared
     from .refutation import Search
 
-    relations = list(assumptions)
-    # the variable of an integral may have the name of another symbol
-    left, right = (side.replace(sp.Integral, lambda *parts: sp.Integral(*parts).as_dummy()) for side in (left, right))
-    symbols = set(left.free_symbols | right.free_symbols).union(*(given.free_symbols for given in relations))
+    symbols = set().union(*(part.free_symbols for part in (left, right, *assumptions)))
     real = {symbol: _as_real(sp, symbol) for symbol in symbols}
-    domain = Domain.of(real.values(), [given.xreplace(real) for given in relations])
-    left, right = (prepared(side.xreplace(real), domain) for side in (left, right))
-    search = Search(left, right, relation, domain)
-    derivation = Derivation(left, right, relation, search.refutation)
+    relations = [written(given, real) for given in assumptions]
+    domain = Domain.of(real.values(), relations)
+    as_written = [written(side, real) for side in (left, right)]
+    left, right = (prepared(side) for side in as_written)
+    # what is not real or not finished as it is written is searched as it is prepared
+    asked = [
+        side if as_it_is.has(sp.I, *UNFINISHED) else as_it_is
+        for side, as_it_is in zip((left, right), as_written, strict=True)
+    ]
+    search = Search(*asked, relation, domain)
+    derivation = Derivation(left, right, relation, search.refutation, search.deciding)
     expands = relation == "==" and expands_to_zero(left - right)
     found = search.refutation(domain, POINTS if relation == "==" else MORE_POINTS, until_defined=expands)
     if expands and found is None and search.defined:
         return Verdict("proved", EXPANSION)
     if not search.tried:
-        raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, relations))}")
+        raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, assumptions))}")
     if found is None:
         found = derivation.verdict(domain)
     if search.undefined == search.tried or (found is not None and found.answer == "proved" and not derivation.methods):
         raise InputError(
-            f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {left} and {right}, and at "
-            f"each of {search.tried} points one of them is not"
+            f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {as_written[0]} and "
+            f"{as_written[1]}, and at each of {search.tried} points one of them is not"
         )
     if found is None:
         found = Verdict("undecided", f"no counterexample among {search.tried} points, and {derivation.reason}")
