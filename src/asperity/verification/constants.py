@@ -81,13 +81,15 @@ def built(function: Any, args: Any) -> Any:
     if any(one.free_symbols or one.has(sp.I, sp.oo, sp.zoo, sp.nan) for one in args):
         return function(*args)
     if issubclass(function, sp.core.relational.Relational):
-        return _decided(unevaluated(function, args))
+        return sp.sympify(_decided(unevaluated(function, args)), strict=True)
     if function is sp.Add:
         found = sp.Add(*args)
         if found.is_Add and found.is_number:
             # not a number for sympy, which would look for its sign
             return sp.Add(*(t if t.as_coeff_Mul(rational=True)[1] is sp.pi else t * ONE for t in found.args))
         return found
+    if function is sp.Abs and isinstance(is_negative := _decided(unevaluated(sp.Lt, (args[0], 0))), bool):
+        return -args[0] if is_negative else args[0]
     if function is sp.Pow:
         return _power(*args)
     if function is sp.log and args[0].is_Rational and args[0] > 0 and max(args[0].p, args[0].q) < LARGEST:
@@ -144,8 +146,8 @@ def constant(number: Any) -> Any:
 
 
 def _decided(relation: Any) -> Any:
+    """Whether a relation of constants is true, as a bool; the relation itself where it is not known."""
     try:
-        sign = evaluate(relation.lhs - relation.rhs, {}, BITS[-1]).sign
+        return bool(relation.func(sp.Integer(evaluate(relation.lhs - relation.rhs, {}, BITS[-1]).sign), 0))
     except (Undefined, Unclear):
         return relation
-    return relation.func(sp.Integer(sign), 0)
