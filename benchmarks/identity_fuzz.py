@@ -173,13 +173,18 @@ def compared(claim: Claim, point: dict[Any, Any]) -> bool | None:
 
 
 def compared_in_more_digits(claim: Claim, point: dict[Any, Any]) -> bool | None:
-    """As `compared` in 200 digits; None unless 1000 digits give the same values."""
-    few, many = (_sides(claim, point, times * DIGITS) for times in (4, 20))
+    """As `compared` in 200 digits; None unless 1000 digits give the same values. Integrals get 50 and 75 digits."""
+    digits = (DIGITS, DIGITS + 25) if _has_integral(claim) else (4 * DIGITS, 20 * DIGITS)
+    few, many = (_sides(claim, point, number) for number in digits)
     if few is None or many is None:
         return None
-    if any(_far(a, b, 4 * DIGITS) for a, b in zip(few, many, strict=True)):
+    if any(_far(a, b, digits[0]) for a, b in zip(few, many, strict=True)):
         return None
-    return _agree(claim, few, 4 * DIGITS)
+    return _agree(claim, few, digits[0])
+
+
+def _has_integral(claim: Claim) -> bool:
+    return bool(claim.left.has(sp.Integral) or claim.right.has(sp.Integral))
 
 
 def _sides(claim: Claim, point: dict[Any, Any], digits: int) -> tuple[Any, Any] | None:
@@ -257,8 +262,8 @@ class Maker:
         return self.pick([
             lambda: self.pick([sp.csc, sp.sec, sp.tan, sp.cot, sp.sin, sp.cos])(angle),
             lambda: self.pick([sp.csc, sp.sec, sp.tan])(angle) - self.pick([0, 1, whole]),
-            lambda: sp.exp(-(whole**2)) - self.pick([0, sp.Rational(1, 10**whole)]),
-            lambda: whole ** sp.sqrt(2) - round(float(whole) ** 2**0.5, 12),
+            lambda: sp.exp(-5 * whole) - self.pick([0, sp.Rational(1, 10**whole)]),
+            lambda: whole ** sp.sqrt(2) - sp.Rational(str(round(float(whole) ** 2**0.5, 12))),
             lambda: sp.exp(sp.exp(sp.cos(whole))) - sp.exp(whole) / whole,
             lambda: sp.sqrt(whole) - sp.Rational(*(float(whole) ** 0.5).as_integer_ratio()),
             lambda: sp.log(whole) - sp.log(whole + sp.Rational(1, 10**15)), lambda: sp.sqrt(2 + sp.sqrt(whole)),
@@ -415,8 +420,7 @@ def places(claim: Claim, rng: np.random.Generator) -> Iterator[dict[Any, Any]]:
     ends = {s: (max([-12.0, *_bounds(claim, s, sp.Gt, sp.Ge)]), min([12.0, *_bounds(claim, s, sp.Lt, sp.Le)]))
             for s in claim.symbols}  # fmt: skip
     # the judge's integrals take seconds
-    slow = claim.left.has(sp.Integral) or claim.right.has(sp.Integral)
-    for _ in range(1 if not claim.symbols else POINTS // 8 if slow else POINTS):
+    for _ in range(1 if not claim.symbols else POINTS // 4 if _has_integral(claim) else POINTS):
         point = {}
         for symbol in claim.symbols:
             choice = rng.random()

@@ -20,10 +20,6 @@ BITS = (64, 2000)
 # Larger numbers are not factored.
 LARGEST = 10**15
 
-# Functions whose identities the normal form knows; other functions of constants become symbols.
-_KEPT = (
-    sp.exp, sp.sin, sp.cos, sp.tan, sp.cot, sp.sec, sp.csc, sp.sinh, sp.cosh, sp.tanh,
-)  # fmt: skip
 # The number 1 where a function of a rational number is meant: exp(3) is written exp(3 ONE).
 ONE = Constant.of(sp.S.One, positive=True)
 
@@ -88,19 +84,15 @@ def built(function: Any, args: Any) -> Any:
             # not a number for sympy, which would look for its sign
             return sp.Add(*(t if t.as_coeff_Mul(rational=True)[1] is sp.pi else t * ONE for t in found.args))
         return found
-    if function is sp.Abs and isinstance(is_negative := _decided(unevaluated(sp.Lt, (args[0], 0))), bool):
-        return -args[0] if is_negative else args[0]
     if function is sp.Pow:
         return _power(*args)
     if function is sp.log and args[0].is_Rational and args[0] > 0 and max(args[0].p, args[0].q) < LARGEST:
         return sp.Add(*(k * constant(sp.log(p, evaluate=False)) for p, k in sp.factorrat(args[0]).items() if p > 1))
-    if function in _KEPT:
-        found = function(*(one * ONE if one.is_Rational and one != 0 else one for one in args))
-    elif function is sp.Mul or not issubclass(function, sp.Function | sp.Max | sp.Min):
+    if not issubclass(function, sp.Function | sp.Max | sp.Min) or function is sp.Piecewise:
         return function(*args)
-    else:
-        return constant(unevaluated(function, args))
-    return constant(unevaluated(function, args)) if found.is_number and not found.is_Rational else found
+    known = constant(unevaluated(function, args))
+    found = function(*(one * ONE if one.is_Rational else one for one in args))
+    return found if isinstance(known, Constant) and not found.is_number else known
 
 
 def _power(base: Any, exponent: Any) -> Any:

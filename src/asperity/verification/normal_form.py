@@ -52,7 +52,7 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
 
     Then the expression is 0 on open intervals, and at those of their ends where it is continuous.
     """
-    e = parameters.normal(expression)
+    e = parameters.normal(_unfolded(expression))
     # a function without a normal form becomes a symbol; equal functions are already equal expressions
     e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function, sp.Max, sp.Min) if f.func is not sp.Abs})
     roots: dict[Any, tuple[Any, int]] = {}
@@ -63,16 +63,20 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
         e = _reduced(e, root, index, radicand)
     for cosine, sine in parameters.circles.values():
         e = _reduced(e, sine, 2, 1 - cosine**2)
-    done: set[Any] = set()
-    while waiting := {c for c in e.atoms(Constant) if c.number.is_Pow and c.number.exp.is_Rational} - done:
-        root = max(waiting, key=_depth)
-        done.add(root)
+    for root in _roots(e):
         e = _reduced(e, root, int(root.number.exp.q), root.number.base)
     return bool(sp.expand(e.xreplace({ONE: sp.S.One})) == 0)
 
 
-def _depth(constant: Any) -> int:
-    return 1 + max(map(_depth, constant.number.atoms(Constant)), default=0)
+def _roots(e: Any) -> list[Any]:
+    return [one for one in e.atoms(Constant) if one.number.is_Pow and one.number.exp.is_Rational]
+
+
+def _unfolded(e: Any) -> Any:
+    """The expression with the roots of constants, except those of primes, as roots."""
+    while folded := {root: root.number for root in _roots(e) if not root.number.base.is_Rational}:
+        e = e.xreplace(folded)
+    return e
 
 
 def product_of(factors: list[Signs]) -> Signs:
@@ -221,7 +225,7 @@ class Parameters:
     def _sine_and_cosine(self, argument: Any) -> tuple[Any, Any]:
         terms = _terms(argument)
         turn = sum(fraction for fraction, unit in terms if unit is sp.pi)
-        sine, cosine = (visible(function(sp.pi * turn)) for function in (sp.sin, sp.cos))
+        sine, cosine = (self._rebuilt(_unfolded(visible(f(sp.pi * turn)))) for f in (sp.sin, sp.cos))
         for fraction, unit in terms:
             if unit is sp.pi:
                 continue
@@ -358,7 +362,9 @@ def _power(base: Any, exponent: Any) -> Any:
     outside, inside = sp.Integer(1), sp.Integer(1)
     for factor, times in _factors(base):
         signs = sign_in(factor)
-        if signs <= NOT_NEGATIVE:
+        if not factor.free_symbols and not factor.is_Rational:
+            inside *= factor**times
+        elif signs <= NOT_NEGATIVE:
             outside *= visible(factor ** (times * exponent))
         elif times.is_Integer and times % 2 == 0 and exponent.q == 2:
             outside *= _absolute(factor) ** (times * exponent)
@@ -367,7 +373,8 @@ def _power(base: Any, exponent: Any) -> Any:
             inside *= (-1) ** times
         else:
             inside *= factor**times
-    return outside * visible((sp.expand(inside) if inside.is_polynomial() else inside) ** exponent)
+    root = (sp.expand(inside) if inside.is_polynomial() else inside) ** exponent
+    return outside * (visible(root) if inside.is_Rational else root)
 
 
 def _logarithm(e: Any) -> Any:

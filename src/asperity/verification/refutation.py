@@ -40,9 +40,13 @@ def _deciding(e: Any) -> Iterator[Any]:
             yield from (a - b for a, b in combinations(part.args, 2))
         elif part.func in (sp.floor, sp.ceiling, sp.Mod):
             yield from (part.args[0] - k for k in _OUTWARD)
-        elif part.func in (sp.acos, sp.asin, sp.atan, sp.acot) and part.args[0].args:
-            inner = part.args[0].args[0] if part.args[0].is_Function else part.args[0]
-            yield from (inner - k * sp.pi / 2 for k in _OUTWARD)
+        elif part.func in (sp.acos, sp.asin, sp.atan, sp.acot) and part.args[0].func in (
+            sp.cos,
+            sp.sin,
+            sp.tan,
+            sp.cot,
+        ):
+            yield from (part.args[0].args[0] - k * sp.pi / 2 for k in _OUTWARD)
         elif part.is_Pow:
             yield from () if part.exp.is_Integer and part.exp > 0 else part.args
         elif part.is_Function and part.func is not sp.Piecewise:
@@ -89,7 +93,8 @@ class Search:
 
     def __post_init__(self) -> None:
         self._rng = np.random.default_rng(SEED)
-        found = dict.fromkeys(g for side in (self.left, self.right) for g in _deciding(side) if g.free_symbols)
+        parts = (g for side in (self.left, self.right) for part in _deciding(side) for g in sp.Mul.make_args(part))
+        found = dict.fromkeys(g for g in parts if g.free_symbols)
         self.deciding = list(found)[:MOST_CRITICAL]
         self._critical = [place for g in self.deciding for place in _zeros(g)]
 

@@ -272,12 +272,12 @@ class Resolution:
     def _hyperbolic(self, e: Any) -> Any:
         (x,) = e.args
         if e.func is sp.asinh:
-            return sp.log(x + sp.sqrt(x**2 + 1))
+            return self.resolved(sp.log(x + sp.sqrt(x**2 + 1)))
         if e.func is sp.acosh:
             self._limit(x - 1)
-            return sp.log(x + sp.sqrt(x**2 - 1))
+            return self.resolved(sp.log(x + sp.sqrt(x**2 - 1)))
         self._limit(1 - x, 1 + x)
-        return sp.log((1 + x) / (1 - x)) / 2
+        return self.resolved(sp.log((1 + x) / (1 - x))) / 2
 
 
 def is_infinite(e: Any) -> bool:
