@@ -91,6 +91,10 @@ def built(function: Any, args: Any) -> Any:
     if not issubclass(function, sp.Function | sp.Max | sp.Min) or function is sp.Piecewise:
         return function(*args)
     known = constant(unevaluated(function, args))
+    if all(one.is_Rational or one.as_coeff_Mul(rational=True)[1] is sp.pi for one in args):
+        exact = function(*args)
+        if not exact.has(sp.Function) and not exact.has(sp.I, sp.zoo, sp.E):
+            return visible(exact)
     found = function(*(one * ONE if one.is_Rational else one for one in args))
     return found if isinstance(known, Constant) and not found.is_number else known
 

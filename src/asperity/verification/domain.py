@@ -199,30 +199,17 @@ class Domain:
     def points(self, rng: np.random.Generator, count: int, most: int = 0) -> Iterator[dict[Any, Any]]:
         """Yield exact points as values of the original symbols; each point meets every condition.
 
-        Half of the first ``count`` points are simple. Special points follow if ``count`` is large, then others up to
-        ``most``.
+        Half of the first ``count`` points are simple.
         """
-        found, specials = 0, len(self.symbols) == 1 and count // 2 > len(SPECIAL)
+        found = 0
         for attempt in range(ATTEMPTS * count):
             simple = attempt < 4 * count and found < count // 2
             point = self._point(rng, simple)
             if point is not None:
                 found += 1
                 yield point
-            if specials and found == count // 2:
-                specials = False
-                yield from self._special_points()
             if found >= max(count, most):
                 return
-
-    def _special_points(self) -> Iterator[dict[Any, Any]]:
-        """The points where a function may jump."""
-        (symbol,) = self.symbols
-        bounds = self.interval(symbol)
-        for value in SPECIAL:
-            whole = self._whole({symbol: value}) if _is_inside(value, bounds) else None
-            if whole is not None:
-                yield whole
 
     def _point(self, rng: np.random.Generator, simple: bool) -> dict[Any, Any] | None:
         point: dict[Any, Any] = {}

@@ -29,8 +29,8 @@ def verify(
     ----------
     lhs, rhs : sympy expressions, numbers, matrices or nested sequences of them
             Both have the same shape and are compared entry by entry. Decimal numbers are read as their exact binary
-            fractions. ``lhs`` may be a relation such as ``a <= b`` or a sequence of relations. Then there is no
-            ``rhs``, and the assumptions may be the second argument.
+            fractions. Text is refused, because sympy would execute it. ``lhs`` may be a relation such as ``a <= b`` or
+            a sequence of relations. Then there is no ``rhs``, and the assumptions may be the second argument.
         assumptions : sympy relation, iterable of them, or mapping from symbols to open intervals
             Inequalities such as ``0 < theta`` or ``x <= y``, or ``{theta: (0, sympy.pi)}``, in addition to the
             properties of the symbols (``positive=True``, ``integer=True``). Symbols stand for real numbers.
@@ -49,13 +49,19 @@ def verify(
     Raises
     ------
     InputError
-            If the shapes differ, an assumption is not an inequality, no point meets the assumptions, or at each
-            examined point of the domain one side is undefined or not real.
+            If a side or an assumption is text or another object than these, the shapes differ, an assumption is not an
+            inequality, no point meets the assumptions, or at each examined point of the domain one side is undefined or
+            not real.
 
     Notes
     -----
     An expression is defined at a point if it and all its parts are real there, with the conventions of sympy: 0**0 is
     1, the cube root of -1 is not real, sign(0) is 0, and ``acot`` jumps at 0.
+
+    The signs of constants come from ball arithmetic, because some that sympy believes are wrong. What sympy evaluates
+    when an expression is written, before it is given here, stays evaluated: ``Abs(x * csc(exp(11) + 58 * pi / 125))``
+    becomes ``-x * csc(...)`` for a positive x, although the factor is positive. Write such functions, and bounds such
+    as ``x > csc(...)``, with ``evaluate=False``.
 
     Examples
     --------
@@ -66,7 +72,7 @@ def verify(
     >>> verdict = verify(sympy.sqrt(m**2), -m)
     >>> verdict.answer, sorted(verdict.counterexample)
     ('refuted', ['m'])
-    >>> verify(sympy.sin(m) <= m).answer
+    >>> verify(2 * m <= m**2 + 1).answer
     'proved'
     """
     import sympy as sp

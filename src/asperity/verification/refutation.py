@@ -13,7 +13,7 @@ from flint import ctx
 
 from .balls import Unclear, Undefined, Value, evaluate
 from .constants import spelled
-from .domain import Domain, as_float
+from .domain import SPECIAL, Domain, as_float
 from .polyhedron import is_below
 from .verdict import Verdict
 
@@ -108,20 +108,22 @@ class Search:
                 return found
             if self.defined - before >= count:
                 break
-        return next((found for point in self._special(part) if (found := self._at(point)) is not None), None)
+        special = self._special() if part is self.domain else ()
+        return next((found for point in special if (found := self._at(point)) is not None), None)
 
-    def _special(self, part: Domain) -> Iterator[dict[Any, Any]]:
+    def _special(self) -> Iterator[dict[Any, Any]]:
         """Points at which a function may jump or bend, and points between these and the ends of the domain."""
-        for symbol in part.symbols:
-            low, high, *_ = part.interval(symbol)
+        for symbol in self.domain.symbols:
+            low, high, *_ = self.domain.interval(symbol)
             places = {place for one, place in self._critical if one == symbol}
+            places |= set(SPECIAL) if len(self.domain.symbols) == 1 else set()
             try:
                 inside = sorted((p for p in places if is_below(low, p) and is_below(p, high)), key=as_float)
             except Unclear:
                 continue
             ends = [end for end in (low, *inside, high) if end not in (sp.oo, -sp.oo)]
             for value in (*inside, *((a + b) / 2 for a, b in pairwise(ends) if inside)):
-                face = part.fixed(symbol, value)
+                face = self.domain.fixed(symbol, value)
                 if face is not None and not face.is_empty and (symbol.is_integer is not True or value.is_Integer):
                     yield from face.points(self._rng, 1)
 

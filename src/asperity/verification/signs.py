@@ -120,6 +120,9 @@ class Part:
         if all(base.func in (sp.sin, sp.cos) and times.is_Integer and times > 0 for base, times in factors):
             even = all(times % 2 == 0 for _, times in factors)
             return (sp.S.Zero if even and fraction > 0 else -abs(fraction)), False
+        if rest in self.domain.symbols:
+            end = self.domain.interval(rest)[0 if fraction > 0 else 1]
+            return None if end in (sp.oo, -sp.oo) else (fraction * visible(end), True)
         signs = self.signs(term)
         return (sp.S.Zero, 0 not in signs) if signs <= NOT_NEGATIVE else None
 
