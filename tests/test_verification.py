@@ -305,10 +305,11 @@ def test_questions_that_cannot_be_asked_are_refused_in_words():
 
 
 def test_no_verdict_of_a_random_campaign_is_false():
-    outcomes = [identity_fuzz.run(seed) for seed in range(16)]
+    # the last five are about constants
+    outcomes = [identity_fuzz.run(seed) for seed in (*range(16), 43, 56, 67, 72, 79)]
     assert not [one for one in outcomes if "FALSE" in one[3]], outcomes
     # and most are decided
-    assert sum(one[3] in ("proved", "refuted", "error") for one in outcomes) >= 12
+    assert sum(one[3] in ("proved", "refuted", "error") for one in outcomes) >= 15
 
 
 @pytest.mark.parametrize(

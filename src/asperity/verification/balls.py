@@ -22,7 +22,7 @@ class Unclear(Exception):
     """The value cannot be determined at this precision, or no rule for a function is known."""
 
 
-class Constant(sp.Dummy):
+class Constant(sp.Dummy):  # type: ignore[misc]
     """A symbol for one real number, which sympy treats as any symbol."""
 
     number: Any
