@@ -220,6 +220,7 @@ REFUTED = {
     "one integer of four": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 0, n <= 3]),
     "an integral": (sp.Integral(sp.sqrt(1 - t**2), (t, 0, 1)), pi / 5, []),
     "the sine below its argument, everywhere": (sp.sin(x) <= x, None, ()),
+    "a shifted square above a small number": (sp.Rational(1, 10**25) <= (3 * x + 1) ** 2, [x > -3, x <= 0], ()),
     "a square above a small number": (x**2 >= sp.Rational(1, 10**25), None, ()),
     "on the diagonal": (sp.sign(x**2 - y**2) ** 2, 1, []),
     "a strict inequality with equality at one point": (sp.Lt(sp.sin(x), x), [x >= 0], ()),

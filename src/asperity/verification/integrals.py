@@ -33,7 +33,7 @@ def prepared(e: Any) -> Any:
     InputError
         If the imaginary unit stands anywhere but in polynomials and exponential, trigonometric or hyperbolic functions.
     """
-    e = visible(e)
+    e = visible(e).replace(sp.Mod, lambda x, y: x - y * sp.floor(x / y))
     e = e.replace(lambda part: isinstance(part, sp.Derivative), _derivative)
     e = e.replace(lambda part: isinstance(part, sp.Integral), _integral)
     if e.has(*UNFINISHED):

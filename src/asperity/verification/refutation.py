@@ -93,8 +93,10 @@ class Search:
 
     def __post_init__(self) -> None:
         self._rng = np.random.default_rng(SEED)
-        parts = (g for side in (self.left, self.right) for part in _deciding(side) for g in sp.Mul.make_args(part))
-        found = dict.fromkeys(g for g in parts if g.free_symbols)
+        parts = [part for side in (self.left, self.right) for part in _deciding(side)]
+        # an inequality may fail between two zeros of the difference
+        parts += [sp.expand(self.right - self.left)] if self.relation != "==" else []
+        found = dict.fromkeys(g for part in parts for g in sp.Mul.make_args(part) if g.free_symbols)
         self.deciding = list(found)[:MOST_CRITICAL]
         self._critical = [place for g in self.deciding for place in _zeros(g)]
 

@@ -80,11 +80,6 @@ class Resolution:
         found = self._piece(-e.args[0], sp.Integer(0), sp.Integer(1))
         return e if found is None else -sp.Integer(found)
 
-    def _remainder(self, e: Any) -> Any:
-        x, y = e.args
-        whole = self.resolved(sp.floor(x / y))
-        return e if whole.has(sp.floor) else x - y * whole
-
     def _piece(self, e: Any, start: Any, length: Any) -> int | None:
         """k with start + k length <= e < start + (k + 1) length on the whole part; None if there is none or it is
         unknown."""
@@ -295,7 +290,6 @@ _RULES: dict[Any, Any] = {
     sp.Min: Resolution._extreme,
     sp.floor: Resolution._floor,
     sp.ceiling: Resolution._ceiling,
-    sp.Mod: Resolution._remainder,
     sp.atan2: Resolution._direction,
     sp.asin: Resolution._arcsine,
     sp.acos: Resolution._arccosine,

@@ -106,8 +106,8 @@ class Part:
     def _of_sum(self, e: Any) -> Signs:
         """The sign of a sum from bounds of its terms: products of sines lie in [-1, 1], other terms have a sign."""
         for sign, strict, loose in ((1, POSITIVE, NOT_NEGATIVE), (-1, NEGATIVE, NOT_POSITIVE)):
-            lows = [self._low(sign * term) for term in e.args]
-            if None not in lows and (total := sign_of(sp.Add(*(low for low, _ in lows)))) >= 0:
+            lows = [low for term in e.args if (low := self._low(sign * term)) is not None]
+            if len(lows) == len(e.args) and (total := sign_of(sp.Add(*(low for low, _ in lows)))) >= 0:
                 return strict if total > 0 or any(open_ for _, open_ in lows) else loose
         return ANY
 
