@@ -30,7 +30,7 @@ from asperity.spectral.work_diagrams.report import WorkReport
 
 PACKAGE = Path(__file__).parents[1]
 CANARY = "module_that_nothing_should_import"
-# A refusal takes milliseconds; a busy machine gets more.
+# Of the processor, because the machine may be busy; a refusal takes milliseconds.
 SECONDS = 1.0
 
 TEXTS = {
@@ -179,12 +179,12 @@ def test_hostile_texts_are_refused_or_taken_for_what_they_spell(door, tmp_path, 
         here.mkdir()
         monkeypatch.chdir(here)
         modules = set(sys.modules)
-        start = time.perf_counter()
+        start = time.process_time()
         try:
             DOORS[door](text)
         except InputError as reason:
             assert str(reason)
-        assert time.perf_counter() - start < SECONDS, text[:80]
+        assert time.process_time() - start < SECONDS, text[:80]
         assert not (here / "executed").exists(), text[:80]
         assert CANARY not in sys.modules
         assert set(sys.modules) - modules == set(), text[:80]
