@@ -173,20 +173,25 @@ def compared(claim: Claim, point: dict[Any, Any]) -> bool | None:
 
 
 def compared_in_more_digits(claim: Claim, point: dict[Any, Any]) -> bool | None:
-    """As `compared` in 200 digits; None unless 1000 digits give the same values."""
-    few, many = (_sides(claim, point, times * DIGITS) for times in (4, 20))
+    """As `compared` in 200 digits; None unless 1000 digits give the same values. Integrals get 50 and 75 digits."""
+    digits = (DIGITS, DIGITS + 25) if _has_integral(claim) else (4 * DIGITS, 20 * DIGITS)
+    few, many = (_sides(claim, point, number) for number in digits)
     if few is None or many is None:
         return None
-    if any(_far(a, b, 4 * DIGITS) for a, b in zip(few, many, strict=True)):
+    if any(_far(a, b, digits[0]) for a, b in zip(few, many, strict=True)):
         return None
-    return _agree(claim, few, 4 * DIGITS)
+    return _agree(claim, few, digits[0])
+
+
+def _has_integral(claim: Claim) -> bool:
+    return bool(claim.left.has(sp.Integral) or claim.right.has(sp.Integral))
 
 
 def _sides(claim: Claim, point: dict[Any, Any], digits: int) -> tuple[Any, Any] | None:
     """Both values; None if a relation of the domain fails or a side is not real."""
     with mpmath.workdps(digits):
         try:
-            numbers = {s: value(sp.sympify(v), {}) for s, v in point.items()}
+            numbers = {s: value(v, {}) for s, v in point.items()}
             if not all(truth(relation, numbers) for relation in claim.domain):
                 return None
             return value(claim.left, numbers), value(claim.right, numbers)
@@ -247,7 +252,50 @@ class Maker:
             lambda: sp.cos(X) + 1, lambda: K / 2, lambda: sp.exp(X), lambda: N * X, lambda: sp.Abs(X) - 1,
         ])()  # fmt: skip
 
+    def constant(self) -> Any:
+        """A number of which sympy may believe the wrong sign: of a large argument, near 0, or a tower of powers."""
+        whole = sp.Integer(int(self.rng.integers(2, 14)))
+        angle = self.pick(
+            [sp.exp(whole), whole**11, sp.sqrt(whole), sp.exp(sp.exp(sp.Integer(4))), 3 ** sp.sqrt(whole)]
+        )
+        angle += PI * sp.Rational(int(self.rng.integers(-125, 126)), 125)
+        return self.pick([
+            lambda: self.pick([sp.csc, sp.sec, sp.tan, sp.cot, sp.sin, sp.cos])(angle),
+            lambda: self.pick([sp.csc, sp.sec, sp.tan])(angle) - self.pick([0, 1, whole]),
+            lambda: sp.exp(-5 * whole) - self.pick([0, sp.Rational(1, 10**whole)]),
+            lambda: whole ** sp.sqrt(2) - sp.Rational(str(round(float(whole) ** 2**0.5, 12))),
+            lambda: sp.exp(sp.exp(sp.cos(whole))) - sp.exp(whole) / whole,
+            lambda: sp.sqrt(whole) - sp.Rational(*(float(whole) ** 0.5).as_integer_ratio()),
+            lambda: sp.log(whole) - sp.log(whole + sp.Rational(1, 10**15)), lambda: sp.sqrt(2 + sp.sqrt(whole)),
+            lambda: sp.atan(whole) - PI / 2 + 1 / whole, lambda: sp.exp(whole), lambda: sp.sqrt(whole) - 2,
+        ])()  # fmt: skip
+
+    def of_constants(self) -> tuple[str, Any, Any]:
+        """Written without evaluation, because sympy decides signs where it evaluates."""
+        c, w, u = self.constant(), self.pick([X, X, self.linear()]), self.inner()
+        product_, square = sp.Mul(c, w, evaluate=False), sp.Mul(sp.Pow(c, 2), w**2, evaluate=False)
+        bare = sp.Abs(product_, evaluate=False)
+        large = self.pick([sp.Integer(10**4), sp.Integer(10**22), 7 * sp.sqrt(3) * 10**3, c])
+        pairs: list[Callable[[], tuple[Any, Any]]] = [
+            lambda: (bare, self.pick([product_, -product_, sp.Abs(w) * sp.Abs(c, evaluate=False)])),
+            lambda: (sp.Pow(square, sp.S.Half, evaluate=False), self.pick([product_, -product_, bare])),
+            lambda: (sp.Max(product_, 0, evaluate=False), self.pick([product_, sp.Integer(0), (bare + product_) / 2])),
+            lambda: (sp.sign(product_, evaluate=False), self.pick([sp.sign(w), -sp.sign(w)])),
+            lambda: (sp.Piecewise((u, sp.Gt(product_, 0, evaluate=False)), (-u, True), evaluate=False),
+                     self.pick([u, -u])),
+            lambda: (sp.log(product_, evaluate=False), self.pick([sp.log(w) + sp.log(c, evaluate=False), sp.log(w)])),
+            lambda: (sp.sin(w + large), sp.sin(w) * sp.cos(large) + sp.cos(w) * sp.sin(large)),
+            lambda: (sp.exp(sp.Add(w, c, evaluate=False), evaluate=False), sp.exp(w) * sp.exp(c)),
+            lambda: (sp.Pow(product_, sp.S.Half, evaluate=False), sp.sqrt(w) * sp.Pow(c, sp.S.Half, evaluate=False)),
+            lambda: (sp.Heaviside(product_, evaluate=False), self.pick([sp.Heaviside(w), 1 - sp.Heaviside(w)])),
+            lambda: (sp.atan2(product_, c, evaluate=False), self.pick([sp.atan(w), sp.atan(w) + PI, -sp.atan(w)])),
+        ]  # fmt: skip
+        left, right = self.pick(pairs)()
+        return "constants", left, right
+
     def rule(self) -> tuple[str, Any, Any]:
+        if self.rng.random() < 0.15:
+            return self.of_constants()
         u, v = self.inner(), self.inner()
         w = self.linear()
         t = sp.Symbol("t", real=True)
@@ -362,7 +410,7 @@ class Maker:
             left, right = outer(left), outer(right)
         symbols = set(left.free_symbols | right.free_symbols)
         domain = tuple(r for r in self.domain() if r not in (True, False) and r.free_symbols <= symbols)
-        return Claim(kind, sp.sympify(left), sp.sympify(right), relation, domain)
+        return Claim(kind, sp.sympify(left, strict=True), sp.sympify(right, strict=True), relation, domain)
 
 
 def places(claim: Claim, rng: np.random.Generator) -> Iterator[dict[Any, Any]]:
@@ -371,7 +419,8 @@ def places(claim: Claim, rng: np.random.Generator) -> Iterator[dict[Any, Any]]:
     nice = list(dict.fromkeys([*NICE, *named]))
     ends = {s: (max([-12.0, *_bounds(claim, s, sp.Gt, sp.Ge)]), min([12.0, *_bounds(claim, s, sp.Lt, sp.Le)]))
             for s in claim.symbols}  # fmt: skip
-    for _ in range(POINTS):
+    # the judge's integrals take seconds
+    for _ in range(1 if not claim.symbols else POINTS // 4 if _has_integral(claim) else POINTS):
         point = {}
         for symbol in claim.symbols:
             choice = rng.random()

@@ -34,7 +34,6 @@ TRUE = {
     "a root of a square on the half circle": (sp.sqrt(m**2 * (1 - sp.cos(theta) ** 2)), m * sp.sin(theta), ANGLES),
     "the inverse of the cosine": (sp.acos(-sp.cos(theta)), sp.pi - theta, ANGLES),
     "half an angle": (sp.tan(psi / 2), (1 - sp.cos(psi)) / sp.sin(psi), ANGLES),
-    "complementary arctangents": (sp.atan(x) + sp.atan(1 / x), sp.pi / 2, [x > 0]),
     "the no-slip matrix keeps the energy": (sym.inner(sym.no_slip * w, sym.no_slip * w), sym.inner(w, w), []),
     "no-slip twice": (sym.no_slip**2, sp.eye(3), []),
     "two collisions, the velocity reversed in between": (
@@ -71,7 +70,8 @@ FALSE = {
 
 @pytest.mark.parametrize("name", TRUE)
 def test_a_true_identity_is_proved(name):
-    assert verify(*TRUE[name]).answer == "proved"
+    # the longest takes some seconds on a busy machine
+    assert verify(*TRUE[name], time_limit=60).answer == "proved"
 
 
 @pytest.mark.parametrize("name", FALSE)
@@ -148,6 +148,10 @@ p, q = sp.symbols("p q", positive=True)
 t = sp.Symbol("t", real=True)
 pi, half = sp.pi, sp.Rational(1, 2)
 
+# A constant of which sympy believes the wrong sign: it is 66.80 (its issue 29850).
+s = sp.csc(sp.exp(11) + 58 * pi / 125)
+large = 10**22
+
 # What is elementary: (left, right or the assumptions of a relation, assumptions).
 PROVED = {
     "acos(cos) on its first piece": (sp.acos(sp.cos(x)), x, [x >= 0, x <= pi]),
@@ -158,35 +162,54 @@ PROVED = {
     "atan(tan)": (sp.atan(sp.tan(x)), x - pi, [x > pi / 2, x < 3 * pi / 2]),
     "asin(cos)": (sp.asin(sp.cos(x)), x - 3 * pi / 2, [x > pi, x < 2 * pi]),
     "acot(cot)": (sp.acot(sp.cot(x)), x, [x > 0, x < pi / 2]),
+    "a constant whose sign sympy mistakes": (sp.Abs(x * s, evaluate=False), x * s, [x > 0]),
+    "a root of its square": (sp.Pow(sp.Mul(s**2, x**2, evaluate=False), half, evaluate=False), s * x, [x > 0]),
+    "a maximum with it": (sp.Max(x * s, 0, evaluate=False), x * s, [x > 0]),
+    "an angle of ten thousand": (sp.sin(x + 10**4), sp.sin(x) * sp.cos(10**4) + sp.cos(x) * sp.sin(10**4), []),
+    "an angle of 10^22": (sp.cos(x + large), sp.cos(x) * sp.cos(large) - sp.sin(x) * sp.sin(large), []),
+    "a large multiple of an angle": (sp.sin(large * x) ** 2, 1 - sp.cos(large * x) ** 2, []),
+    "a large exponent": (sp.exp(large * x + y), sp.exp(large * x) * sp.exp(y), []),
+    "identities of constants": (
+        sp.sqrt(6) * sp.exp(x + 3) * sp.sin(2),
+        2 * sp.sin(1) * sp.cos(1) * sp.sqrt(2) * sp.sqrt(3) * sp.exp(x) * sp.E**3, [],
+    ),
     "cases that the domain settles": (sp.Piecewise((1, x < 0), (2, x < 1), (3, True)), 2, [x >= 0, x < 1]),
     "cases in other words": (sp.Piecewise((x, x > 0), (-x, True)), sp.Abs(x), []),
     "a sum of maximum and minimum": (sp.Min(x, y) + sp.Max(x, y), x + y, []),
     "a root where one symbol is larger": (sp.sqrt((x**2 - y**2) ** 2), x**2 - y**2, [x > y, y > 0]),
-    "atan2": (sp.atan2(p * sp.sin(x), p * sp.cos(x)), x, [x > -pi, x <= pi]),
-    "twice acos, where both are defined": (2 * sp.acos(x), sp.acos(2 * x**2 - 1), [x >= 0]),
     "complementary arcs, where both are defined": (sp.asin(x) + sp.acos(x), pi / 2, []),
-    "a sum of arctangents under a condition": (
-        sp.atan(x) + sp.atan(y), sp.atan((x + y) / (1 - x * y)), [x > 0, y > 0, x * y < 1],
-    ),
-    "Machin's formula": (4 * sp.atan(sp.Rational(1, 5)) - sp.atan(sp.Rational(1, 239)), pi / 4, []),
     "nested roots": (sp.sqrt(2 + sp.sqrt(3)), (sp.sqrt(6) + sp.sqrt(2)) / 2, []),
     "an integral": (sp.Integral(t * sp.sin(t), (t, 0, x)), sp.sin(x) - x * sp.cos(x), []),
     "an integral to infinity": (sp.Integral(sp.exp(-t), (t, 0, sp.oo)), 1, []),
     "an integral up to a singular end": (sp.Integral(1 / sp.sqrt(t), (t, 0, 1)), 2, []),
-    "an integral between symbols": (sp.Integral(1 / t, (t, x, 2 * x)), sp.log(2), [x > 0]),
     "steps": (sp.floor(x), 0, [x >= 0, x < 1]),
-    "an odd number": (sp.floor(odd / 2), (odd - 1) / 2, []),
-    "the parity of an integer": (sp.Abs(sp.sin(pi * n / 2)), (1 - (-1) ** n) / 2, []),
     "few integers": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 1, n <= 3]),
     "logarithms where both are defined": (sp.log(x**2), 2 * sp.log(x), []),
     "powers": (p ** (x + y), p**x * p**y, []),
+    "geometric and arithmetic mean": (2 * sp.sqrt(p * q) <= p + q, None, ()),
+}  # fmt: skip
+# Undecided since the smaller prover; true: by a derivative, cuts at zeros of sines, parity, integrals between symbols.
+UNDECIDED = {
+    "complementary arctangents": (sp.atan(x) + sp.atan(1 / x), sp.pi / 2, [x > 0]),
+    "atan2": (sp.atan2(p * sp.sin(x), p * sp.cos(x)), x, [x > -pi, x <= pi]),
+    "twice acos, where both are defined": (2 * sp.acos(x), sp.acos(2 * x**2 - 1), [x >= 0]),
+    "a sum of arctangents under a condition": (
+        sp.atan(x) + sp.atan(y), sp.atan((x + y) / (1 - x * y)), [x > 0, y > 0, x * y < 1],
+    ),
+    "Machin's formula": (4 * sp.atan(sp.Rational(1, 5)) - sp.atan(sp.Rational(1, 239)), pi / 4, []),
+    "an integral between symbols": (sp.Integral(1 / t, (t, x, 2 * x)), sp.log(2), [x > 0]),
+    "an odd number": (sp.floor(odd / 2), (odd - 1) / 2, []),
+    "the parity of an integer": (sp.Abs(sp.sin(pi * n / 2)), (1 - (-1) ** n) / 2, []),
     "the sine below its argument": (sp.sin(x) <= x, [x >= 0], ()),
     "a Taylor polynomial below the sine": (x - x**3 / 6 <= sp.sin(x), [x >= 0], ()),
     "the exponential above its tangent": (1 + x <= sp.exp(x), None, ()),
-    "geometric and arithmetic mean": (2 * sp.sqrt(p * q) <= p + q, None, ()),
     "Jordan's inequality": (2 * x / pi <= sp.sin(x), [x >= 0, x <= pi / 2], ()),
 }  # fmt: skip
 REFUTED = {
+    "a constant whose sign sympy mistakes": (sp.Abs(x * s, evaluate=False), -x * s, [x > 0]),
+    "a root of its square": (sp.Pow(sp.Mul(s**2, x**2, evaluate=False), half, evaluate=False), -s * x, [x > 0]),
+    "cases by its sign": (sp.Piecewise((x, sp.Gt(s, 0, evaluate=False)), (-x, True), evaluate=False), -x, []),
+    "an angle of 10^22": (sp.sin(x + large), sp.sin(x), []),
     "a power of 0 at 0": (0**x, 0, [x >= 0]),
     "a difference of 1e-25": (x, x + sp.Rational(1, 10**25), []),
     "a decimal difference of 1e-25": (x, x + 1e-25, []),
@@ -197,6 +220,7 @@ REFUTED = {
     "one integer of four": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 0, n <= 3]),
     "an integral": (sp.Integral(sp.sqrt(1 - t**2), (t, 0, 1)), pi / 5, []),
     "the sine below its argument, everywhere": (sp.sin(x) <= x, None, ()),
+    "a shifted square above a small number": (sp.Rational(1, 10**25) <= (3 * x + 1) ** 2, [x > -3, x <= 0], ()),
     "a square above a small number": (x**2 >= sp.Rational(1, 10**25), None, ()),
     "on the diagonal": (sp.sign(x**2 - y**2) ** 2, 1, []),
     "a strict inequality with equality at one point": (sp.Lt(sp.sin(x), x), [x >= 0], ()),
@@ -207,6 +231,12 @@ REFUTED = {
 def test_what_is_elementary_is_proved(name):
     verdict = verify(*PROVED[name])
     assert verdict.answer == "proved", verdict
+
+
+@pytest.mark.parametrize("name", UNDECIDED)
+def test_what_is_true_and_not_proved_is_never_refuted(name):
+    verdict = verify(*UNDECIDED[name])
+    assert verdict.answer == "undecided", verdict
 
 
 @pytest.mark.parametrize("name", REFUTED)
@@ -265,7 +295,7 @@ def test_questions_that_cannot_be_asked_are_refused_in_words():
     with pytest.raises(InputError, match="time_limit=None"):
         verify(Own(x), x)
     assert verify(Own(x), Own(x + 1), time_limit=None).answer == "undecided"
-    with pytest.raises(InputError, match="positive number of seconds"):
+    with pytest.raises(InputError, match="time_limit: expected a number greater than 0"):
         verify(x, x, time_limit=0)
     with pytest.raises(InputError, match="assumptions are the second"):
         verify(x <= 1, [x < 0], [x > -1])
@@ -276,10 +306,11 @@ def test_questions_that_cannot_be_asked_are_refused_in_words():
 
 
 def test_no_verdict_of_a_random_campaign_is_false():
-    outcomes = [identity_fuzz.run(seed) for seed in range(16)]
+    # the last five are about constants
+    outcomes = [identity_fuzz.run(seed) for seed in (*range(16), 43, 56, 67, 72, 79)]
     assert not [one for one in outcomes if "FALSE" in one[3]], outcomes
     # and most are decided
-    assert sum(one[3] in ("proved", "refuted", "error") for one in outcomes) >= 12
+    assert sum(one[3] in ("proved", "refuted", "error") for one in outcomes) >= 15
 
 
 @pytest.mark.parametrize(
@@ -364,6 +395,14 @@ def test_intervals_may_be_shorter_than_floats_can_tell():
     tiny = sp.Rational(1, 10**30)
     assert verify(x**2, 2 * x, [x > 1, x < 1 + tiny]).answer == "refuted"
     assert verify(sp.sqrt(x**2), x, [x > 1, x < 1 + tiny]).answer == "proved"
+
+
+def test_bounds_are_compared_by_balls():
+    # sympy takes s for negative, and would drop a bound or a point
+    assert verify(sp.Abs(x - 70), 70 - x, {x: (s, 67)}).answer == "proved"
+    assert verify(sp.Abs(x - 66), x - 66, sp.Gt(x, s, evaluate=False)).answer == "proved"
+    found = verify(p, 0, sp.Gt(p, s, evaluate=False))
+    assert found.answer == "refuted" and float(sp.Rational(found.counterexample["p"])) > 66
 
 
 def test_complex_symbols_are_refused():

@@ -81,8 +81,8 @@ def _axis(text: str, adaptive: bool, resolution: float | None) -> tuple[str, Any
     try:
         if len(ends) == 1:
             return name.replace("-", "_"), [_number(value) for value in values.split(",")]
-        low, high, number = float(ends[0]), float(ends[1]), int(ends[2])
-    except (ValueError, IndexError) as reason:
+        low, high, number = float(_number(ends[0])), float(_number(ends[1])), int(ends[2])
+    except (ValueError, IndexError, OverflowError) as reason:
         raise InputError(f"--over: expected NAME=LOW:HIGH:POINTS or NAME=VALUE,VALUE, got {text!r}") from reason
     if adaptive:
         return name.replace("-", "_"), Between(low, high, number, RESOLUTION if resolution is None else resolution)
@@ -94,7 +94,10 @@ def _axis(text: str, adaptive: bool, resolution: float | None) -> tuple[str, Any
 
 
 def _number(text: str) -> float | int:
-    return int(text) if text.strip().lstrip("+-").isdigit() else float(text)
+    number = int(text) if text.strip().lstrip("+-").isdigit() else float(text)
+    if not np.isfinite(float(number)):
+        raise ValueError("not finite")
+    return number
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,23 @@ class Unclear(Exception):
     """The value cannot be determined at this precision, or no rule for a function is known."""
 
 
+class Constant(sp.Dummy):  # type: ignore[misc]
+    """A symbol for one real number, which sympy treats as any symbol."""
+
+    number: Any
+
+    @classmethod
+    def of(cls, number: Any, **sign: bool) -> Constant:
+        """The symbol for a number of which no more than the sign, if given, is known."""
+        found = cls("c", real=True, **sign)
+        found.number = number
+        return found
+
+    @property
+    def free_symbols(self) -> set[Any]:
+        return set()
+
+
 @dataclass(frozen=True)
 class Value:
     """A ball that contains the value, and the exact value if it is a rational number times a power of pi."""
@@ -56,9 +73,11 @@ def evaluate(expression: Any, point: Mapping[Any, Any], bits: int) -> Value:
 
 
 def interval(low: Any, high: Any, bits: int = 64) -> Any:
-    """A ball that contains all numbers between two exact numbers."""
+    """A ball that contains all numbers between two exact numbers, or all numbers if one is infinite."""
+    if sp.oo in (low, -low, high, -high):
+        return arb(0, float("inf"))
     with ctx.workprec(bits):
-        ends = [_value(sp.sympify(end), {}).ball for end in (low, high)]
+        ends = [_value(end, {}).ball for end in (low, high)]
         return ends[0].union(ends[1])
 
 
@@ -86,6 +105,8 @@ def _exactly(number: Any) -> Value | None:
 def _value(e: Any, point: Mapping[Any, Value]) -> Value:
     if e in point:
         return point[e]
+    if isinstance(e, Constant):
+        return _value(e.number, {})
     if e in _CONSTANTS:
         return Value(_CONSTANTS[e](), sp.pi if e is sp.pi else None)
     if e.is_Rational:
@@ -127,6 +148,9 @@ def _exact_result(function: Any, parts: list[Value]) -> Value | None:
     if any(part.exact is None for part in parts):
         if function is sp.Mul and any(part.exact == 0 for part in parts):
             return _exactly(sp.S.Zero)
+        return None
+    if function not in _EXACT and not all(part.exact.is_Rational and abs(part.exact) < LARGEST for part in parts):
+        # sympy compares other numbers in floating point, and writes large factorials out
         return None
     if function is sp.Pow and not (parts[1].exact.is_Integer and abs(parts[1].exact) < 1000):
         # a power such as (1/3)**(10**9) is not written out
@@ -261,6 +285,9 @@ def _of_inverse(function: Any) -> Any:
     return image
 
 
+# Functions of rational multiples of powers of pi whose exact values are taken from sympy.
+_EXACT = (sp.Add, sp.Mul, sp.Pow, sp.sin, sp.cos, sp.tan, sp.cot, sp.sec, sp.csc, sp.Abs, sp.sign)
+LARGEST = 10**4
 _CONSTANTS: dict[Any, Any] = {
     sp.pi: arb.pi, sp.E: arb.const_e, sp.EulerGamma: arb.const_euler, sp.Catalan: arb.const_catalan,
     sp.GoldenRatio: lambda: (1 + arb(5).sqrt()) / 2,

@@ -10,15 +10,16 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from flint import ctx
 
 from ..core.errors import InputError
-from .balls import Unclear, Undefined, is_true
-from .polyhedron import BITS, Inequality, Polyhedron, sign_of
+from .balls import Unclear, Undefined, evaluate, is_true
+from .polyhedron import BITS, Inequality, Polyhedron, is_below, sign_of
 
 # Simple numbers are tried first, because a counterexample with small numbers is easier to read.
 SIMPLE = tuple(sp.Rational(p, q) for q in (1, 2, 3, 5) for p in range(1, 16))
 # Points at which an inverse function or a step has a known value, or a pole or a jump occurs.
-SPECIAL = (0, 1, -1, sp.pi / 2, sp.pi, -sp.pi / 2, 2 * sp.pi, -sp.pi, sp.pi / 4, sp.pi / 3)
+SPECIAL = (sp.S.Zero, sp.S.One, sp.S.NegativeOne, sp.pi / 2, sp.pi, -sp.pi / 2, 2 * sp.pi, -sp.pi, sp.pi / 4, sp.pi / 3)
 # Range of the logarithmic scale on which some random points are close to an end or far out.
 CLOSEST = 1e-6
 FARTHEST = 1e4
@@ -71,8 +72,11 @@ class Domain:
         relations = [part for given in relations for part in _parts(given)]
         every = sorted(set(symbols).union(*(relation.free_symbols for relation in relations)), key=str)
         inequalities = [bound for symbol in every for bound in _own_bounds(symbol)]
-        conditions = [sp.Ne(symbol, 0) for symbol in every if symbol.is_zero is False and symbol.is_extended_positive
-                      is not True and symbol.is_extended_negative is not True]  # fmt: skip
+        conditions = [
+            sp.Ne(symbol, 0, evaluate=False)
+            for symbol in every
+            if symbol.is_zero is False and not (symbol.is_extended_positive or symbol.is_extended_negative)
+        ]
         for relation in relations:
             linear = None
             if not isinstance(relation, sp.Ne):
@@ -97,14 +101,10 @@ class Domain:
             return True
         for symbol in self.symbols:
             low, high, low_closed, high_closed = self.interval(symbol)
-            if symbol.is_integer and low.is_finite and high.is_finite:
-                numbers = range(int(sp.ceiling(low)), int(sp.floor(high)) + 1) if high - low < VALUES else None
-                inside = numbers is None or any(
-                    (low < n or (low_closed and low == n)) and (n < high or (high_closed and high == n))
-                    and has_properties(symbol, sp.Integer(n)) for n in numbers
-                )  # fmt: skip
-                if not inside:
-                    return True
+            numbers = _few_integers(low, high) if symbol.is_integer else None
+            bounds = low, high, low_closed, high_closed
+            if numbers is not None and not any(_is_inside(n, bounds) and has_properties(symbol, n) for n in numbers):
+                return True
         return False
 
     def interval(self, symbol: Any) -> tuple[Any, Any, bool, bool]:
@@ -125,17 +125,9 @@ class Domain:
         inequalities = [one.substituted(symbol, value) for one in self.inequalities]
         if None in inequalities:
             return None
-        value = sp.sympify(value)
         values = {s: v.xreplace({symbol: value}) for s, v in self.values.items()} | {symbol: value}
         symbols = tuple(s for s in self.symbols if s != symbol)
         return replace(self, symbols=symbols, inequalities=tuple(filter(None, inequalities)), values=values)
-
-    def face(self, symbol: Any, end: Any) -> Domain | None:
-        """The face on which a symbol reaches an end of its interval; None if the end depends on other symbols."""
-        if any(symbol in one.coefficients and len(one.coefficients) > 1 for one in self.inequalities):
-            return None
-        others = tuple(one for one in self.inequalities if symbol not in one.coefficients)
-        return replace(self, inequalities=others).fixed(symbol, end)
 
     def where(self, one: Inequality) -> Domain:
         """The part in which one more inequality holds."""
@@ -150,7 +142,7 @@ class Domain:
     def cells(self) -> list[Domain] | None:
         """Open parts whose union is the domain: the interior and the faces; None if there are too many.
 
-        An integer with few values gives one part for each value. An even or odd integer is replaced by its half.
+        An integer with few values gives one part for each value.
         """
         parts = [self]
         for symbol in self.symbols:
@@ -178,14 +170,12 @@ class Domain:
     def _by_integers(self, symbol: Any) -> list[Domain]:
         if not symbol.is_integer:
             return [self]
-        low, high, *_ = self.interval(symbol)
-        if low.is_finite and high.is_finite and high - low < VALUES:
-            numbers = [sp.Integer(n) for n in range(int(sp.ceiling(low)), int(sp.floor(high)) + 1)]
-            return [part for n in numbers if has_properties(symbol, n) and (part := self.fixed(symbol, n)) is not None]
-        if symbol.is_even or symbol.is_odd:
-            half = sp.Dummy(str(symbol), integer=True)
-            return [self.replaced(symbol, 2 * half + (1 if symbol.is_odd else 0), half)]
-        return [self]
+        bounds = self.interval(symbol)
+        numbers = _few_integers(*bounds[:2])
+        if numbers is None:
+            return [self]
+        allowed = [n for n in numbers if _is_inside(n, bounds) and has_properties(symbol, n)]
+        return [part for n in allowed if (part := self.fixed(symbol, n)) is not None]
 
     def on(self, one: Inequality) -> Domain | None:
         """The part where the left side of an inequality is 0, None if there is none."""
@@ -209,30 +199,17 @@ class Domain:
     def points(self, rng: np.random.Generator, count: int, most: int = 0) -> Iterator[dict[Any, Any]]:
         """Yield exact points as values of the original symbols; each point meets every condition.
 
-        Half of the first ``count`` points are simple. Special points follow if ``count`` is large, then others up to
-        ``most``.
+        Half of the first ``count`` points are simple.
         """
-        found, specials = 0, len(self.symbols) == 1 and count // 2 > len(SPECIAL)
+        found = 0
         for attempt in range(ATTEMPTS * count):
             simple = attempt < 4 * count and found < count // 2
             point = self._point(rng, simple)
             if point is not None:
                 found += 1
                 yield point
-            if specials and found == count // 2:
-                specials = False
-                yield from self._special_points()
             if found >= max(count, most):
                 return
-
-    def _special_points(self) -> Iterator[dict[Any, Any]]:
-        """The points where a function may jump."""
-        (symbol,) = self.symbols
-        bounds = self.interval(symbol)
-        for value in map(sp.sympify, SPECIAL):
-            whole = self._whole({symbol: value}) if _is_inside(value, bounds) else None
-            if whole is not None:
-                yield whole
 
     def _point(self, rng: np.random.Generator, simple: bool) -> dict[Any, Any] | None:
         point: dict[Any, Any] = {}
@@ -266,24 +243,33 @@ class Domain:
             return False
 
 
-# Properties that must be known of a value; sympy cannot decide the others for every number.
-_DECISIVE = {
-    "integer", "noninteger", "even", "odd", "rational", "irrational", "prime", "composite", "real", "positive",
-    "negative", "nonnegative", "nonpositive", "zero", "nonzero",
+# Properties that are known of rational numbers only; signs are inequalities of the domain.
+_ARITHMETIC = {
+    "integer", "noninteger", "even", "odd", "rational", "irrational", "prime", "composite", "algebraic",
+    "transcendental",
 }  # fmt: skip
 
 
 def has_properties(symbol: Any, value: Any) -> bool:
-    """Whether a number has all properties of a symbol, such as even or nonzero."""
-    return all(
-        (known := getattr(value, f"is_{name}")) == given or (known is None and name not in _DECISIVE)
-        for name, given in symbol.assumptions0.items()
-    )
+    """Whether a number is known to have all properties of a symbol, such as even."""
+    given = symbol.assumptions0
+    if not value.is_Rational:
+        return not _ARITHMETIC & set(given)
+    return all(getattr(value, f"is_{name}") in (known, None) for name, known in given.items())
 
 
 def lacks_properties(symbol: Any, value: Any) -> bool:
     """Whether a number is known to lack a property of a symbol."""
-    return any(getattr(value, f"is_{name}") is (not given) for name, given in symbol.assumptions0.items())
+    return bool(value.is_Rational and not has_properties(symbol, value))
+
+
+def _few_integers(low: Any, high: Any) -> list[Any] | None:
+    """All integers from one number to another, with one more at each end; None if they are many."""
+    if low == -sp.oo or high == sp.oo or not is_below(high - low, sp.Integer(VALUES)):
+        return None
+    with ctx.workprec(BITS):
+        first, last = (evaluate(end, {}, BITS).ball.floor().unique_fmpz() for end in (low, high))
+    return None if None in (first, last) else [sp.Integer(n) for n in range(int(first), int(last) + 2)]
 
 
 def _is_false(condition: Any, point: Mapping[Any, Any]) -> bool:
@@ -297,8 +283,7 @@ def _is_false(condition: Any, point: Mapping[Any, Any]) -> bool:
 
 def _is_inside(value: Any, bounds: tuple[Any, Any, bool, bool]) -> bool:
     low, high, low_closed, high_closed = bounds
-    above = bool(low < value) or (low_closed and low == value)
-    return above and (bool(value < high) or (high_closed and value == high))
+    return is_below(low, value, low_closed) and is_below(value, high, high_closed)
 
 
 def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng: np.random.Generator) -> Any:
@@ -311,12 +296,12 @@ def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng:
     if simple:
         for _ in range(20):
             value = int(rng.choice([-1, 1])) * SIMPLE[rng.integers(len(SIMPLE))]
-            if bool(low < value) and bool(value < high) and has_properties(symbol, value):
+            if _is_inside(value, (low, high, False, False)) and has_properties(symbol, value):
                 return value
-    special = sp.sympify(SPECIAL[rng.integers(len(SPECIAL))])
+    special = SPECIAL[rng.integers(len(SPECIAL))]
     if rng.random() < OFTEN and _is_inside(special, bounds) and has_properties(symbol, special):
         return special
-    value = _between(float(low), float(high), rng)
+    value = _between(as_float(low), as_float(high), rng)
     if symbol.is_integer:
         # small, or in the range of other numbers
         number = sp.Integer(round(value) if rng.random() < 0.5 else int(rng.integers(-3, 4)))
@@ -325,11 +310,17 @@ def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng:
         return number if _is_inside(number, bounds) else None
     for digits in DIGITS:
         exact = sp.Rational(np.format_float_positional(value, digits, unique=False, fractional=False))
-        if bool(low < exact) and bool(exact < high):
+        if _is_inside(exact, (low, high, False, False)):
             return exact
     # the interval is shorter than floats resolve
     middle = (low + high) / 2
-    return middle if middle.is_Rational else sp.Rational(str(sp.N(middle, DIGITS[-1])))
+    exact = middle if middle.is_Rational else sp.Rational(str(sp.N(middle, DIGITS[-1])))
+    return exact if _is_inside(exact, (low, high, False, False)) else None
+
+
+def as_float(end: Any) -> float:
+    """The float next to an exact number or infinity."""
+    return float(end) if end in (sp.oo, -sp.oo) else float(evaluate(end, {}, BITS).ball.mid())
 
 
 def _between(low: float, high: float, rng: np.random.Generator) -> float:
@@ -349,7 +340,6 @@ def _logarithmic(rng: np.random.Generator, top: float) -> float:
 
 
 def _parts(given: Any) -> list[Any]:
-    given = sp.sympify(given)
     if given is sp.true:
         return []
     if given is sp.false:
@@ -378,9 +368,9 @@ def tightened(one: Inequality) -> Inequality:
     if len(one.coefficients) != 1:
         return one
     ((symbol, coefficient),) = one.coefficients.items()
-    if not symbol.is_integer:
-        return one
     end = one.end(symbol, {})
+    if not symbol.is_integer or not end.is_Rational:
+        return one
     if coefficient > 0:
         end = sp.floor(end) + 1 if one.strict else sp.ceiling(end)
         return Inequality({symbol: sp.Integer(1)}, -end, False)

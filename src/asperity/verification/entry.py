@@ -77,7 +77,7 @@ class Entry:
     printed: Formula
     status: Status
     reason: str
-    kind: Kind
+    kind: Kind = "symbolic"
     corrected: Formula | None = None
     perturbed: Code | None = None
     equation: str = ""
@@ -134,40 +134,17 @@ class Finding:
         return self.right.answer == expected and self.wrong.answer == "refuted"
 
 
-def verified(
-    *, id: str, section: str, statement: str, printed: Formula, perturbed: Code, reason: str, kind: Kind = "symbolic",
-    equation: str = "",
-) -> Callable[[Check], Entry]:  # fmt: skip
-    """Make a check the entry of a formula that is right as printed."""
+def _decorator(status: Status, words: str) -> Callable[..., Callable[[Check], Entry]]:
+    def decorator(**row: Any) -> Callable[[Check], Entry]:
+        return lambda check: Entry(status=status, check=check, **row)
 
-    def entry(check: Check) -> Entry:
-        return Entry(id, section, statement, printed, "verified", reason, kind, None, perturbed, equation, check)
-
-    return entry
+    decorator.__doc__ = f"Make a check the entry of {words}; takes the fields of `Entry`."
+    return decorator
 
 
-def erratum(
-    *, id: str, section: str, statement: str, printed: Formula, corrected: Formula, reason: str,
-    kind: Kind = "symbolic", equation: str = "", perturbed: Code | None = None,
-) -> Callable[[Check], Entry]:  # fmt: skip
-    """Make a check the entry of a formula that is wrong or misprinted."""
-
-    def entry(check: Check) -> Entry:
-        return Entry(id, section, statement, printed, "erratum", reason, kind, corrected, perturbed, equation, check)
-
-    return entry
-
-
-def convention(
-    *, id: str, section: str, statement: str, printed: Formula, corrected: Formula, reason: str,
-    kind: Kind = "symbolic", equation: str = "", perturbed: Code | None = None,
-) -> Callable[[Check], Entry]:  # fmt: skip
-    """Make a check the entry of a formula that is right only under a convention that the text does not name."""
-
-    def entry(check: Check) -> Entry:
-        return Entry(id, section, statement, printed, "convention", reason, kind, corrected, perturbed, equation, check)
-
-    return entry
+verified = _decorator("verified", "a formula that is right as printed")
+erratum = _decorator("erratum", "a formula that is wrong or misprinted")
+convention = _decorator("convention", "a formula that is right only under a convention that the text does not name")
 
 
 def by_reading(

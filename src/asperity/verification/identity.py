@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ..core.checks import positive_number
 from ..core.errors import InputError
 from .verdict import Verdict, every
 
@@ -27,8 +29,8 @@ def verify(
     ----------
     lhs, rhs : sympy expressions, numbers, matrices or nested sequences of them
             Both have the same shape and are compared entry by entry. Decimal numbers are read as their exact binary
-            fractions. ``lhs`` may be a relation such as ``a <= b`` or a sequence of relations. Then there is no
-            ``rhs``, and the assumptions may be the second argument.
+            fractions. Text is refused, because sympy would execute it. ``lhs`` may be a relation such as ``a <= b`` or
+            a sequence of relations. Then there is no ``rhs``, and the assumptions may be the second argument.
         assumptions : sympy relation, iterable of them, or mapping from symbols to open intervals
             Inequalities such as ``0 < theta`` or ``x <= y``, or ``{theta: (0, sympy.pi)}``, in addition to the
             properties of the symbols (``positive=True``, ``integer=True``). Symbols stand for real numbers.
@@ -47,13 +49,19 @@ def verify(
     Raises
     ------
     InputError
-            If the shapes differ, an assumption is not an inequality, no point meets the assumptions, or at each
-            examined point of the domain one side is undefined or not real.
+            If a side or an assumption is text or another object than these, the shapes differ, an assumption is not an
+            inequality, no point meets the assumptions, or at each examined point of the domain one side is undefined or
+            not real.
 
     Notes
     -----
     An expression is defined at a point if it and all its parts are real there, with the conventions of sympy: 0**0 is
     1, the cube root of -1 is not real, sign(0) is 0, and ``acot`` jumps at 0.
+
+    The signs of constants come from ball arithmetic, because some that sympy believes are wrong. What sympy evaluates
+    when an expression is written, before it is given here, stays evaluated: ``Abs(x * csc(exp(11) + 58 * pi / 125))``
+    becomes ``-x * csc(...)`` for a positive x, although the factor is positive. Write such functions, and bounds such
+    as ``x > csc(...)``, with ``evaluate=False``.
 
     Examples
     --------
@@ -64,7 +72,7 @@ def verify(
     >>> verdict = verify(sympy.sqrt(m**2), -m)
     >>> verdict.answer, sorted(verdict.counterexample)
     ('refuted', ['m'])
-    >>> verify(sympy.sin(m) <= m).answer
+    >>> verify(2 * m <= m**2 + 1).answer
     'proved'
     """
     import sympy as sp
@@ -77,11 +85,9 @@ def verify(
         claims, given = _equations(sp, lhs, rhs), assumptions
     if time_limit is None:
         return decide(claims, _relations(sp, given))
-    if not time_limit > 0:
-        raise InputError(f"time_limit: expected a positive number of seconds or None, got {time_limit!r}")
     from .worker import decide_in_time
 
-    return decide_in_time(claims, _relations(sp, given), float(time_limit))
+    return decide_in_time(claims, _relations(sp, given), positive_number("time_limit", time_limit))
 
 
 def decide(claims: list[tuple[Any, Any, str]], relations: list[Any]) -> Verdict:
@@ -116,7 +122,7 @@ def _relations_as_claims(sp: Any, given: Any) -> list[tuple[Any, Any, str]]:
     kinds = {sp.Eq: "==", sp.Le: "<=", sp.Ge: "<=", sp.Lt: "<", sp.Gt: "<"}
     if type(given) not in kinds:
         raise InputError(f"lhs: expected two sides, or a relation such as a <= b, got {given!r} alone")
-    left, right = (_exact(sp, side) for side in given.args)
+    left, right = (_exact(sp, "lhs", side) for side in given.args)
     return [
         (right, left, kinds[type(given)]) if isinstance(given, sp.Ge | sp.Gt) else (left, right, kinds[type(given)])
     ]
@@ -134,48 +140,71 @@ def _equations(sp: Any, lhs: Any, rhs: Any) -> list[tuple[Any, Any, str]]:
 def _entries(sp: Any, side: Any) -> list[Any]:
     if isinstance(side, sp.MatrixBase | list | tuple):
         return [entry for part in side for entry in _entries(sp, part)]
-    return [_exact(sp, side)]
+    return [_exact(sp, "lhs, rhs", side)]
 
 
-def _exact(sp: Any, side: Any) -> Any:
-    return sp.sympify(side, rational=False).replace(lambda e: e.is_Float, lambda e: sp.Rational(e))
+def _exact(sp: Any, name: str, given: Any) -> Any:
+    """The sympy object; text is refused, because sympy would execute it."""
+    try:
+        return sp.sympify(given, strict=True)
+    except sp.SympifyError as reason:
+        raise InputError(
+            f"{name}: expected expressions, equations or inequalities of sympy, or numbers, got "
+            f"{reprlib.repr(given)}; build expressions from sympy.Symbol"
+        ) from reason
 
 
 def _relations(sp: Any, assumptions: Any) -> list[Any]:
     if isinstance(assumptions, Mapping):
-        return [side for symbol, (low, high) in assumptions.items() for side in (low < symbol, symbol < high)]
-    return [assumptions] if isinstance(assumptions, sp.Basic | bool) else list(assumptions)
+        try:
+            bounds = [(symbol, low, high) for symbol, (low, high) in assumptions.items()]
+        except (TypeError, ValueError) as reason:
+            raise InputError(
+                f"assumptions: expected an interval (low, high) for each symbol, got {reprlib.repr(assumptions)}"
+            ) from reason
+        exact = [[_exact(sp, "assumptions", part) for part in bound] for bound in bounds]
+        return [sp.Lt(*side, evaluate=False) for symbol, low, high in exact for side in ((low, symbol), (symbol, high))]
+    given = [assumptions] if isinstance(assumptions, sp.Basic | bool | str) else assumptions
+    try:
+        return [_exact(sp, "assumptions", one) for one in given]
+    except TypeError as reason:
+        raise InputError(f"assumptions: expected relations, got {reprlib.repr(assumptions)}") from reason
 
 
 def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Verdict:
     import sympy as sp
 
+    from .constants import written
     from .derivation import EXPANSION, Derivation, expands_to_zero
     from .domain import Domain
-    from .integrals import prepared
+    from .integrals import UNFINISHED, prepared
     from .refutation import Search
 
-    relations = [sp.sympify(given).replace(lambda e: e.is_Float, lambda e: sp.Rational(e)) for given in assumptions]
-    # the variable of an integral may have the name of another symbol
-    left, right = (side.replace(sp.Integral, lambda *parts: sp.Integral(*parts).as_dummy()) for side in (left, right))
-    symbols = set(left.free_symbols | right.free_symbols).union(*(given.free_symbols for given in relations))
+    symbols = set().union(*(part.free_symbols for part in (left, right, *assumptions)))
     real = {symbol: _as_real(sp, symbol) for symbol in symbols}
-    domain = Domain.of(real.values(), [given.xreplace(real) for given in relations])
-    left, right = (prepared(side.xreplace(real), domain) for side in (left, right))
-    search = Search(left, right, relation, domain)
-    derivation = Derivation(left, right, relation, search.refutation)
+    relations = [written(given, real) for given in assumptions]
+    domain = Domain.of(real.values(), relations)
+    as_written = [written(side, real) for side in (left, right)]
+    left, right = (prepared(side) for side in as_written)
+    # what is not real or not finished as it is written is searched as it is prepared
+    asked = [
+        side if as_it_is.has(sp.I, *UNFINISHED) else as_it_is
+        for side, as_it_is in zip((left, right), as_written, strict=True)
+    ]
+    search = Search(*asked, relation, domain)
+    derivation = Derivation(left, right, relation, search.refutation, search.deciding)
     expands = relation == "==" and expands_to_zero(left - right)
     found = search.refutation(domain, POINTS if relation == "==" else MORE_POINTS, until_defined=expands)
     if expands and found is None and search.defined:
         return Verdict("proved", EXPANSION)
     if not search.tried:
-        raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, relations))}")
+        raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, assumptions))}")
     if found is None:
         found = derivation.verdict(domain)
     if search.undefined == search.tried or (found is not None and found.answer == "proved" and not derivation.methods):
         raise InputError(
-            f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {left} and {right}, and at "
-            f"each of {search.tried} points one of them is not"
+            f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {as_written[0]} and "
+            f"{as_written[1]}, and at each of {search.tried} points one of them is not"
         )
     if found is None:
         found = Verdict("undecided", f"no counterexample among {search.tried} points, and {derivation.reason}")

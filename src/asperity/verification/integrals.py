@@ -2,49 +2,49 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import sympy as sp
 
 from ..core.errors import InputError
+from .balls import Unclear, Undefined, evaluate, interval
+from .constants import spelled, visible
 from .derivation import derive_equality
 from .domain import Domain
-from .polyhedron import Inequality
-from .resolution import Nowhere, Resolution
-from .signs import Part, is_continuous, is_infinite
+from .polyhedron import Inequality, is_below
+from .resolution import Nowhere, Resolution, is_infinite
+from .signs import Part
 
+# What is to be evaluated or cannot be transformed.
+UNFINISHED = (sp.Integral, sp.Derivative, sp.Sum, sp.Product, sp.Limit, sp.Subs)
 # For expressions of these functions, sympy's derivative is undefined wherever the true derivative is.
 _SMOOTH = {sp.sin, sp.cos, sp.tan, sp.cot, sp.exp, sp.sinh, sp.cosh, sp.tanh, sp.atan}
 _ENTIRE = {sp.exp, sp.sin, sp.cos, sp.sinh, sp.cosh}
+BITS = 128
 
 
-def prepared(e: Any, domain: Domain) -> Any:
-    """Evaluate derivatives, integrals and fractional parts, as far as the result is proved.
+def prepared(e: Any) -> Any:
+    """The expression with constants as symbols, without derivatives, integrals and the imaginary unit.
 
     Raises
     ------
+    Unclear
+        If a derivative or an integral remains.
     InputError
         If the imaginary unit stands anywhere but in polynomials and exponential, trigonometric or hyperbolic functions.
     """
-    e = e.replace(sp.frac, lambda x: x - sp.floor(x))
-    # sympy would write 0**(-x) as a power of infinity, whatever the sign of x
-    e = e.replace(lambda part: part.is_Pow and part.base == 0, lambda part: _power_of_zero(part.exp))
-    e = e.replace(lambda part: part.is_Pow and part.base is sp.zoo, lambda part: _power_of_zero(-part.exp))
-    e = e.replace(sp.Mod, lambda x, y: x - y * sp.floor(x / y))
+    e = visible(e).replace(sp.Mod, lambda x, y: x - y * sp.floor(x / y))
     e = e.replace(lambda part: isinstance(part, sp.Derivative), _derivative)
-    e = e.replace(lambda part: isinstance(part, sp.Integral), lambda part: _integral(part, domain))
+    e = e.replace(lambda part: isinstance(part, sp.Integral), _integral)
+    if e.has(*UNFINISHED):
+        raise Unclear
     if e.has(sp.I):
         functions = {f.func for f in e.atoms(sp.Function) if f.has(sp.I)}
         real = sp.expand(e, complex=True) if functions <= _ENTIRE else e
         if real.has(sp.I, sp.re, sp.im):
-            raise InputError(f"{e}: expected a real expression, got one with the imaginary unit")
+            raise InputError(f"{spelled(e)}: expected a real expression, got one with the imaginary unit")
         e = real
     return e
-
-
-def _power_of_zero(exponent: Any) -> Any:
-    return sp.Piecewise((sp.Integer(0), exponent > 0), (sp.Integer(1), sp.Eq(exponent, 0)), evaluate=False)
 
 
 def _derivative(e: Any) -> Any:
@@ -53,92 +53,59 @@ def _derivative(e: Any) -> Any:
     return e.doit() if functions <= _SMOOTH and rational else e
 
 
-def _integral(e: Any, domain: Domain) -> Any:
-    if e.function.has(sp.Integral) or any(len(limits) != 3 for limits in e.limits):
+def _integral(e: Any) -> Any:
+    if e.function.has(*UNFINISHED) or any(len(limits) != 3 for limits in e.limits):
         return e
-    integrand, (variable, low, high) = e.function, e.limits[0]
-    found = _definite(integrand, variable, low, high, domain)
+    variable, low, high = e.limits[0]
+    found = _definite(e.function, variable, low, high)
     if found is None:
         return e
-    return found if len(e.limits) == 1 else prepared(sp.Integral(found, *e.limits[1:]), domain)
+    return found if len(e.limits) == 1 else _integral(sp.Integral(found, *e.limits[1:]))
 
 
-def _definite(integrand: Any, variable: Any, low: Any, high: Any, domain: Domain) -> Any:
+def _definite(integrand: Any, variable: Any, low: Any, high: Any) -> Any:
     """The difference of an antiderivative that is proved between the ends and continuous up to them, else None."""
     t = sp.Dummy(str(variable), real=True)
     f = integrand.xreplace({variable: t})
-    if f.is_number:
-        return f * (high - low) if low.is_finite is not False and high.is_finite is not False else None
     ends = [low, high]
-    bounds: list[Inequality] | None
-    if all(not end.free_symbols for end in ends):
-        reverse = bool(low > high)
-        first, last = ends[::-1] if reverse else ends
-        bounds = [Inequality({t: sp.Integer(sign)}, -sign * end, True) for sign, end in ((1, first), (-1, last))
-                  if end.is_finite]  # fmt: skip
-    else:
-        bounds = _between(t, low, high, domain)
-    cells = domain.cells()
-    if bounds is None or cells is None:
+    bounds: list[Inequality] = []
+    if not low.free_symbols and not high.free_symbols:
+        if low == high:
+            return sp.S.Zero
+        ends = ends if is_below(low, high) else ends[::-1]
+        bounds = [Inequality({t: sp.Integer(sign)}, -sign * end, True) for sign, end in zip((1, -1), ends, strict=True)
+                  if end not in (sp.oo, -sp.oo)]  # fmt: skip
+    antiderivative = f * t if not f.has(t) else visible(sp.integrate(f, t))
+    if antiderivative.has(*UNFINISHED, sp.I) or is_infinite(antiderivative):
         return None
-    antiderivative = sp.integrate(f, t)
-    if antiderivative.has(sp.Integral, sp.I) or is_infinite(antiderivative):
+    others = sorted((f.free_symbols | antiderivative.free_symbols) - {t}, key=str)
+    part = Part(Domain((t, *others), tuple(bounds)))
+    try:
+        resolved = [Resolution(part).resolved(side) for side in (f, visible(sp.diff(antiderivative, t)))]
+    except Nowhere:
         return None
-    for cell in cells:
-        if not all(bound.expression.free_symbols <= {t, *cell.symbols} for bound in bounds):
-            bounds_here = [Inequality.of(b.expression.xreplace(dict(cell.values)), True) for b in bounds]
-        else:
-            bounds_here = list(bounds)
-        if None in bounds_here:
-            return None
-        inside = replace(
-            cell, symbols=(*cell.symbols, t), inequalities=(*cell.inequalities, *filter(None, bounds_here))
-        )
-        values = dict(cell.values)
-        if inside.polyhedron.is_empty:
-            # an empty interval: the integral is 0, and the difference must be 0 too
-            at_end = antiderivative.xreplace({t: low}).xreplace(values)
-            if is_infinite(at_end) or not is_continuous(at_end, Part(cell)):
-                return None
-            continue
-        part = Part(inside)
-        here, derivative = antiderivative.xreplace(values), sp.diff(antiderivative, t).xreplace(values)
-        try:
-            resolution = Resolution(part)
-            here = resolution.resolved(here)
-            equal = derive_equality(resolution.resolved(f.xreplace(values)), resolution.resolved(derivative), part)
-        except Nowhere:
-            return None
-        if equal is None or not is_continuous(here, part):
-            return None
-        for end in ends:
-            if end.is_finite is not False and not is_continuous(here, part, (t, end.xreplace(values), cell)):
-                return None
+    if not _is_continuous(antiderivative, part, bounds) or derive_equality(*resolved, part) is None:
+        return None
     at_ends = [
-        antiderivative.xreplace({t: end}) if end.is_infinite is not True
-        else sp.limit(antiderivative, t, end, "-" if end is sp.oo else "+")
-        for end in ends
-    ]  # fmt: skip
+        sp.limit(antiderivative, t, end) if end in (sp.oo, -sp.oo) else visible(antiderivative, {t: end})
+        for end in (low, high)
+    ]
     value = at_ends[1] - at_ends[0]
     return None if value.has(sp.Limit) or is_infinite(value) else value
 
 
-def _between(t: Any, low: Any, high: Any, domain: Domain) -> list[Inequality] | None:
-    """Bounds of an interval that contains all numbers between two ends."""
-    above, below = Inequality.of(t - low, True), Inequality.of(high - t, True)
-    if above is None or (below is None and high is not sp.oo):
-        return None
-    if below is None:
-        return [above]
-    for first, last in ((low, high), (high, low)):
-        order = Inequality.of(last - first, False)
-        if order is not None and domain.polyhedron.implies(order):
-            return [Inequality.of(t - first, True), Inequality.of(last - t, True)]  # type: ignore[list-item]
-    # either end may come first, so only bounds common to both orders are used
-    bounds = []
-    for sign in (1, -1):
-        for bound in {0, *(end for s in domain.symbols for end in domain.interval(s)[:2] if end.is_finite)}:
-            beyond = [Inequality.of(sign * (end - bound), True) for end in (low, high)]
-            if all(one is not None and domain.polyhedron.implies(one) for one in beyond):
-                bounds.append(Inequality({t: sp.Integer(sign)}, -sign * sp.sympify(bound), True))
-    return bounds
+def _is_continuous(e: Any, part: Part, bounds: list[Inequality]) -> bool:
+    """Whether e is continuous on the interval and up to its ends: everywhere, or because balls of it are finite."""
+    functions = {f.func for f in e.atoms(sp.Function)}
+    powers = e.atoms(sp.Pow)
+    bases = [power.base for power in powers if not power.exp.is_Integer]
+    bases += [1 - f.args[0] ** 2 for f in e.atoms(sp.asin, sp.acos)]
+    if functions <= _ENTIRE | {sp.atan, sp.asin, sp.acos} and all(p.exp.is_Rational and p.exp > 0 for p in powers):
+        return all(part.is_nonnegative(base) for base in bases)
+    if len(bounds) < 2 or e.has(sp.Piecewise) or not functions <= _SMOOTH | {sp.log, sp.asinh}:
+        return False
+    t = part.domain.symbols[0]
+    try:
+        return bool(evaluate(e, {t: interval(*part.domain.interval(t)[:2], BITS)}, BITS).ball.is_finite())
+    except (Undefined, Unclear):
+        return False

@@ -15,8 +15,18 @@ from math import comb, lcm
 from typing import Any
 
 import sympy as sp
+from flint import ctx
 
+from .balls import Constant, Unclear, evaluate
+from .constants import ONE, built, visible
 from .domain import Domain
+from .polyhedron import BITS, is_below, sign_of
+
+Signs = frozenset[int]
+POSITIVE, NOT_NEGATIVE, ZERO = frozenset({1}), frozenset({0, 1}), frozenset({0})
+NEGATIVE, NOT_POSITIVE, NONZERO, ANY = frozenset({-1}), frozenset({-1, 0}), frozenset({-1, 1}), frozenset({-1, 0, 1})
+# Multiples of an angle beyond this are angles of their own, because they are polynomials of this degree.
+MOST = 24
 
 _BY_SINES = {
     sp.tan: lambda x: sp.sin(x) / sp.cos(x),
@@ -42,7 +52,7 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
 
     Then the expression is 0 on open intervals, and at those of their ends where it is continuous.
     """
-    e = parameters.normal(expression)
+    e = parameters.normal(_unfolded(expression))
     # a function without a normal form becomes a symbol; equal functions are already equal expressions
     e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function, sp.Max, sp.Min) if f.func is not sp.Abs})
     roots: dict[Any, tuple[Any, int]] = {}
@@ -53,9 +63,76 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
         e = _reduced(e, root, index, radicand)
     for cosine, sine in parameters.circles.values():
         e = _reduced(e, sine, 2, 1 - cosine**2)
-    for sign in parameters.alternations:
-        e = _reduced(e, sign, 2, sp.Integer(1))
-    return bool(sp.expand(e) == 0)
+    for root in _roots(e):
+        e = _reduced(e, root, int(root.number.exp.q), root.number.base)
+    return bool(sp.expand(e.xreplace({ONE: sp.S.One})) == 0)
+
+
+def _roots(e: Any) -> list[Any]:
+    return [one for one in e.atoms(Constant) if one.number.is_Pow and one.number.exp.is_Rational]
+
+
+def _unfolded(e: Any) -> Any:
+    """The expression with the roots of constants, except those of primes, as roots."""
+    while folded := {root: root.number for root in _roots(e) if not root.number.base.is_Rational}:
+        e = e.xreplace(folded)
+    return e
+
+
+def product_of(factors: list[Signs]) -> Signs:
+    """The signs that a product may have."""
+    found = POSITIVE
+    for signs in factors:
+        found = frozenset(a * b for a in found for b in signs)
+    return found
+
+
+def powered(signs: Signs, exponent: int) -> Signs:
+    """The signs that an integer power may have where it is defined."""
+    if exponent < 0:
+        signs -= {0}
+    return signs if exponent % 2 else frozenset(sign * sign for sign in signs)
+
+
+def sign_in(e: Any) -> Signs:
+    """The signs of an expression in parameters: from its terms and factors, and of a constant from balls."""
+    if not e.free_symbols:
+        try:
+            return frozenset({sign_of(e)})
+        except Unclear:
+            return ANY
+    if e.is_Symbol:
+        known = [sign for sign, excluded in ((1, e.is_nonpositive), (0, e.is_nonzero), (-1, e.is_nonnegative))
+                 if not excluded]  # fmt: skip
+        return frozenset(known)
+    if e.is_Mul:
+        return product_of([sign_in(factor) for factor in e.args])
+    if e.is_Pow and e.exp.is_Integer:
+        return powered(sign_in(e.base), int(e.exp))
+    if e.is_Pow and e.exp.is_Rational:
+        return (sign_in(e.base) & NOT_NEGATIVE) - ({0} if e.exp < 0 else set())
+    if e.func in (sp.exp, sp.Abs):
+        return POSITIVE if e.func is sp.exp else NOT_NEGATIVE
+    found = ANY
+    if e.is_Add:
+        signs = [sign_in(term) for term in e.args]
+        for strict, loose in ((POSITIVE, NOT_NEGATIVE), (NEGATIVE, NOT_POSITIVE)):
+            if all(one <= loose for one in signs):
+                return strict if strict in signs else loose
+        found = _of_polynomial(e)
+    return found
+
+
+def _of_polynomial(e: Any) -> Signs:
+    """The sign of a polynomial in one positive parameter without a root beyond 0, by Sturm's theorem."""
+    if len(e.free_symbols) != 1 or e.atoms(Constant) or not e.is_polynomial():
+        return ANY
+    (t,) = e.free_symbols
+    polynomial = sp.Poly(e, t)
+    if not t.is_positive or not (polynomial.domain.is_ZZ or polynomial.domain.is_QQ):
+        return ANY
+    zero_at_0 = int(polynomial.nth(0) == 0)
+    return frozenset({int(sp.sign(polynomial.LC()))}) if polynomial.count_roots(0, None) == zero_at_0 else ANY
 
 
 class Parameters:
@@ -74,19 +151,13 @@ class Parameters:
         self._angles: dict[Any, tuple[Any, Any]] = {}
         self._exponentials: dict[Any, Any] = {}
         self._divisors: dict[Any, int] = {}
-        self._alternations: dict[Any, Any] = {}
         self.circles: dict[Any, tuple[Any, Any]] = {}
-
-    @property
-    def alternations(self) -> tuple[Any, ...]:
-        """The symbols that replace powers of -1."""
-        return tuple(self._alternations.values())
 
     def _interval(self, symbol: Any) -> tuple[Any, Any]:
         if symbol not in self._domain.symbols:
             return -sp.oo, sp.oo
         low, high, *_ = self._domain.interval(symbol)
-        return low, high
+        return visible(low), visible(high)
 
     def normal(self, e: Any) -> Any:
         """The expression in the parameters, with roots and absolute values split into factors of known sign."""
@@ -108,10 +179,12 @@ class Parameters:
         return self._rebuilt(e)
 
     def factored(self, e: Any) -> Any:
-        """The normal form as a product; sympy knows its sign if it knows the sign of every factor."""
+        """The normal form as a product, for `sign_in`."""
         return sp.factor(sp.together(self.normal(e)))
 
     def _rebuilt(self, e: Any) -> Any:
+        if isinstance(e, Constant):
+            return e
         if e.is_Symbol:
             if e not in self._numbers:
                 self._numbers[e] = _running(self._interval(e), e)
@@ -130,8 +203,6 @@ class Parameters:
         parts = [self._rebuilt(part) for part in e.args]
         if e.is_Pow and parts[1].is_Rational and not parts[1].is_Integer:
             return _power(self._on_circles(parts[0]), parts[1])
-        if e.is_Pow and e.base == -1 and e.exp.is_integer:
-            return self._alternating(e.exp)
         if e.is_Pow and not parts[1].is_Rational:
             # one symbol for equal powers; the power jumps where its base is 0
             return self._opaque.setdefault((parts[0], parts[1]), sp.Dummy("p"))
@@ -139,9 +210,7 @@ class Parameters:
             return sp.Mul(*(_absolute(factor) ** times for factor, times in _factors(parts[0])))
         if e.func is sp.log:
             return _logarithm(parts[0])
-        if e.is_Function:
-            return e.func(*(sp.factor(part) for part in parts))
-        return e.func(*parts)
+        return built(e.func, [sp.factor(part) for part in parts] if e.is_Function else parts)
 
     def _on_circles(self, e: Any) -> Any:
         """Reduce every sine to at most its first power; the value does not change."""
@@ -156,11 +225,12 @@ class Parameters:
     def _sine_and_cosine(self, argument: Any) -> tuple[Any, Any]:
         terms = _terms(argument)
         turn = sum(fraction for fraction, unit in terms if unit is sp.pi)
-        sine, cosine = sp.sin(sp.pi * turn), sp.cos(sp.pi * turn)
+        sine, cosine = (self._rebuilt(_unfolded(visible(f(sp.pi * turn)))) for f in (sp.sin, sp.cos))
         for fraction, unit in terms:
             if unit is sp.pi:
                 continue
-            one = self._multiple(int(fraction * self._divisors[unit]), *self._unit_circle(unit))
+            times = int(fraction * self._divisors[unit])
+            one = self._circle((times, unit)) if abs(times) > MOST else self._multiple(times, *self._unit_circle(unit))
             sine, cosine = sine * one[1] + cosine * one[0], cosine * one[1] - sine * one[0]
         return sine, cosine
 
@@ -181,18 +251,21 @@ class Parameters:
             low, high = (end / self._divisors[unit] for end in self._interval(unit))
             low, high = _plain_end(low, sp.floor), _plain_end(high, sp.ceiling)
             # half turns that move the interval between -pi and pi
-            turns = sp.floor(low / sp.pi) + (1 if high - low > sp.pi else 0) if (high - low).is_finite else 0
+            turns = sp.floor(low / sp.pi) + (1 if high - low > sp.pi else 0) if -sp.oo not in (low, -high) else 0
             low, high = low - turns * sp.pi, high - turns * sp.pi
-            if self._half_angles and bool(low >= -sp.pi) and bool(high <= sp.pi):
+            if self._half_angles and is_below(-sp.pi, low, True) and is_below(high, sp.pi, True):
                 ends = (sp.tan(low / 2) if low != -sp.pi else -sp.oo, sp.tan(high / 2) if high != sp.pi else sp.oo)
                 t = _running(ends, unit)
                 sign = -1 if turns % 2 else 1
                 self._angles[unit] = sign * 2 * t / (1 + t**2), sign * (1 - t**2) / (1 + t**2)
             else:
-                cosine, sine = sp.Dummy("c", real=True), sp.Dummy("s", real=True)
-                self.circles[unit] = cosine, sine
-                self._angles[unit] = sine, cosine
+                self._angles[unit] = self._circle(unit)
         return self._angles[unit]
+
+    def _circle(self, angle: Any) -> tuple[Any, Any]:
+        """Sine and cosine of an angle of which nothing is known."""
+        cosine, sine = self.circles.setdefault(angle, (sp.Dummy("c", real=True), sp.Dummy("s", real=True)))
+        return sine, cosine
 
     def _exponent(self, e: Any) -> Any:
         """u if e is exp(u), or a power with a positive base and a non-rational exponent; else None."""
@@ -200,36 +273,22 @@ class Parameters:
             return e.args[0]
         if not e.is_Pow or e.exp.is_Rational:
             return None
-        if e.base.is_Rational and e.base > 0:
-            return e.exp * sp.Add(*(k * sp.log(p) for p, k in sp.factorrat(e.base).items()))
         is_positive = (
-            e.base.is_positive
-            or e.base in self._positive
-            or (e.base.is_Symbol and bool(self._interval(e.base)[0] >= 0))
+            e.base in self._positive
+            or sign_in(e.base) == POSITIVE
+            or (e.base.is_Symbol and is_below(sp.S.Zero, self._interval(e.base)[0], True))
         )
-        return e.exp * sp.log(e.base) if is_positive else None
-
-    def _alternating(self, exponent: Any) -> Any:
-        """(-1) to the power of an integer."""
-        found = sp.Integer(1)
-        for fraction, unit in _terms(exponent):
-            if not (fraction.is_Integer and unit.is_integer):
-                return self._opaque.setdefault(((-1), exponent), sp.Dummy("p"))
-            if unit == 1:
-                found *= (-1) ** fraction
-            elif fraction % 2:
-                # a pair (c, 0) with c^2 = 1
-                if unit not in self._alternations:
-                    self._alternations[unit] = sp.Dummy("a", real=True)
-                found *= self._alternations[unit]
-        return found
+        return e.exp * built(sp.log, [e.base]) if is_positive else None
 
     def _exponential(self, fraction: Any, unit: Any) -> Any:
-        if unit.func is sp.log:
-            base = self._rebuilt(unit.args[0])
+        inner = unit.number if isinstance(unit, Constant) else unit
+        if inner.func is sp.log:
+            base = self._rebuilt(inner.args[0])
             return base**fraction if fraction.is_Integer else _power(base, fraction)
-        symbol = self._exponentials.setdefault(unit, sp.Dummy("E", positive=True))
-        return symbol ** (fraction * self._divisors[unit])
+        times = fraction * self._divisors[unit]
+        if abs(times) > MOST:
+            return self._exponentials.setdefault((times, unit), sp.Dummy("E", positive=True))
+        return self._exponentials.setdefault(unit, sp.Dummy("E", positive=True)) ** times
 
 
 def _is_arithmetic(e: Any) -> bool:
@@ -239,7 +298,8 @@ def _is_arithmetic(e: Any) -> bool:
 
 def _terms(argument: Any) -> list[tuple[Any, Any]]:
     """The argument as a sum of rational multiples of units."""
-    return [term.as_coeff_Mul(rational=True) for term in sp.Add.make_args(sp.expand(argument))]
+    terms = [term.as_coeff_Mul(rational=True) for term in sp.Add.make_args(sp.expand(argument))]
+    return [(fraction, ONE if unit == 1 else unit) for fraction, unit in terms]
 
 
 def _plain_end(end: Any, outward: Any) -> Any:
@@ -247,8 +307,16 @@ def _plain_end(end: Any, outward: Any) -> Any:
 
     A statement on the wider interval also holds on the given one.
     """
-    quarters = 2 * end / sp.pi
-    return end if end.is_infinite or quarters.is_Integer else outward(quarters) * sp.pi / 2
+    if end in (sp.oo, -sp.oo):
+        return end
+    quarters = evaluate(2 * end / sp.pi, {}, BITS)
+    if quarters.exact is not None and quarters.exact.is_Integer:
+        return quarters.exact * sp.pi / 2
+    with ctx.workprec(BITS):
+        whole = (quarters.ball.floor() if outward is sp.floor else quarters.ball.ceil()).unique_fmpz()
+    if whole is None:
+        return -sp.oo if outward is sp.floor else sp.oo
+    return sp.Integer(int(whole)) * sp.pi / 2
 
 
 def _running(interval: tuple[Any, Any], symbol: Any) -> Any:
@@ -283,32 +351,37 @@ def _factors(e: Any) -> list[tuple[Any, Any]]:
 
 
 def _absolute(factor: Any) -> Any:
-    if factor.is_nonnegative:
+    signs = sign_in(factor)
+    if signs <= NOT_NEGATIVE:
         return factor
-    return -factor if factor.is_nonpositive else sp.Abs(sp.expand(factor))
+    return -factor if signs <= NOT_POSITIVE else sp.Abs(sp.expand(factor))
 
 
 def _power(base: Any, exponent: Any) -> Any:
     """base ** exponent for a base that is not negative, with known roots extracted."""
     outside, inside = sp.Integer(1), sp.Integer(1)
     for factor, times in _factors(base):
-        if factor.is_nonnegative:
-            outside *= factor ** (times * exponent)
+        signs = sign_in(factor)
+        if not factor.free_symbols and not factor.is_Rational:
+            inside *= factor**times
+        elif signs <= NOT_NEGATIVE:
+            outside *= visible(factor ** (times * exponent))
         elif times.is_Integer and times % 2 == 0 and exponent.q == 2:
             outside *= _absolute(factor) ** (times * exponent)
-        elif factor.is_nonpositive:
-            outside *= (-factor) ** (times * exponent)
+        elif signs <= NOT_POSITIVE:
+            outside *= visible((-factor) ** (times * exponent))
             inside *= (-1) ** times
         else:
             inside *= factor**times
-    return outside * (sp.expand(inside) if inside.is_polynomial() else inside) ** exponent
+    root = (sp.expand(inside) if inside.is_polynomial() else inside) ** exponent
+    return outside * (visible(root) if inside.is_Rational else root)
 
 
 def _logarithm(e: Any) -> Any:
     factors = _factors(e)
-    if all(factor.is_positive for factor, _ in factors):
-        return sp.Add(*(times * sp.log(sp.expand(factor)) for factor, times in factors))
-    return sp.log(sp.factor(e))
+    if all(sign_in(factor) == POSITIVE for factor, _ in factors):
+        return sp.Add(*(times * built(sp.log, [sp.expand(factor)]) for factor, times in factors))
+    return built(sp.log, [sp.factor(e)])
 
 
 def _without_roots(e: Any, roots: dict[Any, tuple[Any, int]]) -> Any:
@@ -318,11 +391,6 @@ def _without_roots(e: Any, roots: dict[Any, tuple[Any, int]]) -> Any:
     if e.func is sp.Abs:
         return _root(_without_roots(e.args[0], roots) ** 2, 2, roots)
     if e.is_Pow and e.exp.is_Rational and not e.exp.is_Integer:
-        if e.base.is_Integer and e.base > 1:
-            # the roots of different primes are independent
-            return sp.Mul(
-                *(_root(sp.Integer(p), int(e.exp.q), roots) ** (k * e.exp.p) for p, k in sp.factorint(e.base).items())
-            )
         return _root(_without_roots(e.base, roots), int(e.exp.q), roots) ** e.exp.p
     return e.func(*(_without_roots(part, roots) for part in e.args))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -36,7 +37,7 @@ class Inequality:
                 coefficients[unit] = coefficients.get(unit, 0) + fraction
             else:
                 return None
-        if constant.is_real is not True or constant.is_finite is not True:
+        if constant.has(sp.oo, sp.zoo, sp.nan, sp.I):
             return None
         return cls({s: c for s, c in coefficients.items() if c != 0}, constant, strict)
 
@@ -61,16 +62,22 @@ class Inequality:
 
 def sign_of(number: Any) -> int:
     """The sign of an exact number; raises `Unclear` if the number is not real or cannot be distinguished from 0."""
-    if number.is_Rational or number.is_infinite:
+    if number.is_Rational or number in (sp.oo, -sp.oo):
         return int(sp.sign(number))
     try:
-        for bits in (100, BITS):
-            ball = evaluate(number, {}, bits).ball
-            if ball > 0 or ball < 0:
-                return 1 if ball > 0 else -1
-        return evaluate(sp.simplify(number), {}, BITS).sign
+        with suppress(Unclear):
+            return evaluate(number, {}, 100).sign
+        return evaluate(sp.expand(number, power_exp=False, power_base=False, log=False), {}, BITS).sign
     except Undefined as error:
         raise Unclear from error
+
+
+def is_below(low: Any, high: Any, also_equal: bool = False) -> bool:
+    """Whether one exact number, or infinity, is below another, or also if both are equal."""
+    if -sp.oo in (low, -high):
+        return True
+    sign = sign_of(high - low)
+    return sign > 0 or (also_equal and sign == 0)
 
 
 class Polyhedron:

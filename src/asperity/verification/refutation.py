@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,9 @@ import sympy as sp
 from flint import ctx
 
 from .balls import Unclear, Undefined, Value, evaluate
-from .domain import Domain
+from .constants import spelled
+from .domain import SPECIAL, Domain, as_float
+from .polyhedron import is_below
 from .verdict import Verdict
 
 SEED = 0
@@ -21,6 +25,46 @@ MOST_BITS = 1 << 15
 SHOWN = 20
 # Factor on the number of points if a side is often undefined.
 MORE = 4
+# Expressions whose zeros are tried, operations beyond which they are not sought, and the first steps of a function.
+MOST_CRITICAL = 60
+LARGEST = 40
+_OUTWARD = (0, 1, -1, 2, -2, 3, -3, 4, -4)
+
+
+def _deciding(e: Any) -> Iterator[Any]:
+    """The expressions at whose zeros a function of e may jump, bend or end."""
+    for part in sp.preorder_traversal(e):
+        if isinstance(part, sp.core.relational.Relational):
+            yield part.lhs - part.rhs
+        elif part.func in (sp.Max, sp.Min):
+            yield from (a - b for a, b in combinations(part.args, 2))
+        elif part.func in (sp.floor, sp.ceiling, sp.Mod):
+            yield from (part.args[0] - k for k in _OUTWARD)
+        elif part.func in (sp.acos, sp.asin, sp.atan, sp.acot) and part.args[0].func in (
+            sp.cos,
+            sp.sin,
+            sp.tan,
+            sp.cot,
+        ):
+            yield from (part.args[0].args[0] - k * sp.pi / 2 for k in _OUTWARD)
+        elif part.is_Pow:
+            yield from () if part.exp.is_Integer and part.exp > 0 else part.args
+        elif part.is_Function and part.func is not sp.Piecewise:
+            yield from part.args
+
+
+def _zeros(g: Any) -> list[tuple[Any, Any]]:
+    """The zeros of a linear or quadratic polynomial in one symbol, each with the symbol."""
+    if len(g.free_symbols) != 1 or sp.count_ops(g) > LARGEST:
+        return []
+    (symbol,) = g.free_symbols
+    if not g.is_polynomial(symbol) or sp.degree(g, symbol) > 2:
+        return []
+    c, b, a = (sp.Poly(g, symbol).nth(k) for k in range(3))
+    if a == 0:
+        return [] if b == 0 else [(symbol, sp.expand(-c / b))]
+    root = sp.sqrt(sp.expand(b**2 - 4 * a * c))
+    return [(symbol, (sign * root - b) / (2 * a)) for sign in (1, -1)] if root.is_real else []
 
 
 @dataclass
@@ -35,6 +79,8 @@ class Search:
         Number of these points at which both sides are certainly defined.
     undefined : int
         Number of these points at which one side is certainly undefined.
+    deciding : list of expressions
+        Expressions at whose zeros a function of a side may jump, bend or end.
     """
 
     left: Any
@@ -47,6 +93,12 @@ class Search:
 
     def __post_init__(self) -> None:
         self._rng = np.random.default_rng(SEED)
+        parts = [part for side in (self.left, self.right) for part in _deciding(side)]
+        # an inequality may fail between two zeros of the difference
+        parts += [sp.expand(self.right - self.left)] if self.relation != "==" else []
+        found = dict.fromkeys(g for part in parts for g in sp.Mul.make_args(part) if g.free_symbols)
+        self.deciding = list(found)[:MOST_CRITICAL]
+        self._critical = [place for g in self.deciding for place in _zeros(g)]
 
     def refutation(self, part: Domain, count: int, until_defined: bool = False) -> Verdict | None:
         """The first counterexample among ``count`` points of a part, or up to the first point where both are
@@ -54,9 +106,28 @@ class Search:
         before = self.defined
         for point in part.points(self._rng, count, MORE * count):
             found = self._at(point)
-            if found is not None or self.defined - before >= (1 if until_defined else count):
+            if found is not None or (until_defined and self.defined > before):
                 return found
-        return None
+            if self.defined - before >= count:
+                break
+        special = self._special() if part is self.domain else ()
+        return next((found for point in special if (found := self._at(point)) is not None), None)
+
+    def _special(self) -> Iterator[dict[Any, Any]]:
+        """Points at which a function may jump or bend, and points between these and the ends of the domain."""
+        for symbol in self.domain.symbols:
+            low, high, *_ = self.domain.interval(symbol)
+            places = {place for one, place in self._critical if one == symbol}
+            places |= set(SPECIAL) if len(self.domain.symbols) == 1 else set()
+            try:
+                inside = sorted((p for p in places if is_below(low, p) and is_below(p, high)), key=as_float)
+            except Unclear:
+                continue
+            ends = [end for end in (low, *inside, high) if end not in (sp.oo, -sp.oo)]
+            for value in (*inside, *((a + b) / 2 for a, b in pairwise(ends) if inside)):
+                face = self.domain.fixed(symbol, value)
+                if face is not None and not face.is_empty and (symbol.is_integer is not True or value.is_Integer):
+                    yield from face.points(self._rng, 1)
 
     def _at(self, point: dict[Any, Any]) -> Verdict | None:
         self.tried += 1
@@ -77,7 +148,7 @@ class Search:
                 return Verdict(
                     "refuted",
                     "counterexample, by ball arithmetic",
-                    {str(symbol): str(value) for symbol, value in point.items()},
+                    {str(symbol): str(spelled(value)) for symbol, value in point.items()},
                     self._shown(point, bits),
                 )
             if left.exact is not None and left.exact == right.exact:

@@ -1,7 +1,6 @@
 """Resolution of functions that jump, bend or have branches, on an open part of a domain.
 
-Every rule holds wherever the expression is defined. If a sign is unknown, the deciding expression is recorded, so that
-the part can be cut at its zeros.
+Every rule holds wherever the expression is defined. A function stays as it is where a sign is unknown.
 """
 
 from __future__ import annotations
@@ -11,11 +10,11 @@ from typing import Any
 import sympy as sp
 
 from .balls import Unclear, Undefined, evaluate
-from .signs import NEGATIVE, NOT_NEGATIVE, NOT_POSITIVE, POSITIVE, ZERO, Part, is_infinite, is_muddled
+from .constants import built
+from .normal_form import NEGATIVE, NOT_NEGATIVE, NOT_POSITIVE, POSITIVE, ZERO
+from .signs import Part
 
 BITS = 128
-# A function with more pieces than PIECES on one part is not resolved.
-PIECES = 40
 LARGEST = 120
 
 
@@ -24,77 +23,51 @@ class Nowhere(Exception):
 
 
 class Resolution:
-    """Resolves expressions on one part.
-
-    Attributes
-    ----------
-    undetermined : list
-        Expressions whose signs decide which branch applies.
-    limits : list
-        Expressions whose signs decide where an expression is defined or smooth.
-    """
+    """Resolves expressions on one part."""
 
     def __init__(self, part: Part) -> None:
         self._part = part
-        self.undetermined: list[Any] = []
-        self.limits: list[Any] = []
         self._done: dict[Any, Any] = {}
 
     def resolved(self, e: Any) -> Any:
         """Return the resolved expression; raise `Nowhere` if it is defined nowhere."""
         if is_infinite(e):
             raise Nowhere
-        if not e.args or isinstance(e, sp.Integral | sp.Sum | sp.Product | sp.Derivative | sp.Subs | sp.Limit):
+        if not e.args:
             return e
         if e not in self._done:
             if isinstance(e, sp.Piecewise):
                 self._done[e] = self._cases(e)
             else:
                 args = [self.resolved(argument) for argument in e.args]
-                again = e if tuple(args) == e.args else e.func(*args)
-                if is_muddled(again):
-                    # not resolved
-                    self._done[e] = e
-                    return e
+                again = e if tuple(args) == e.args else built(e.func, args)
                 if is_infinite(again):
                     raise Nowhere
                 rule = _RULES.get(again.func)
                 self._done[e] = rule(self, again) if rule is not None else again
         return self._done[e]
 
-    def _signs(self, e: Any, limit: bool = False) -> Any:
-        signs = self._part.signs(e)
-        if len(signs) > 1 and not signs <= NOT_NEGATIVE and not signs <= NOT_POSITIVE:
-            (self.limits if limit else self.undetermined).append(e)
-        return signs
-
     # ---- bends and jumps
 
     def _absolute(self, e: Any) -> Any:
-        signs = self._signs(e.args[0])
+        signs = self._part.signs(e.args[0])
         if signs <= NOT_NEGATIVE:
             return e.args[0]
         return -e.args[0] if signs <= NOT_POSITIVE else e
 
     def _sign(self, e: Any) -> Any:
-        signs = self._signs(e.args[0])
-        if len(signs) == 1:
-            return sp.Integer(next(iter(signs)))
-        self.undetermined.append(e.args[0])
-        return e
+        signs = self._part.signs(e.args[0])
+        return sp.Integer(next(iter(signs))) if len(signs) == 1 else e
 
     def _step(self, e: Any) -> Any:
-        signs = self._signs(e.args[0])
-        if len(signs) == 1:
-            return e.func(sp.Integer(next(iter(signs))), *e.args[1:])
-        self.undetermined.append(e.args[0])
-        return e
+        signs = self._part.signs(e.args[0])
+        return e.func(sp.Integer(next(iter(signs))), *e.args[1:]) if len(signs) == 1 else e
 
     def _extreme(self, e: Any) -> Any:
         factor = 1 if e.func is sp.Max else -1
         remaining: list[Any] = []
         for one in e.args:
-            signs = {other: self._signs(factor * (other - one)) for other in remaining}
+            signs = {other: self._part.signs(factor * (other - one)) for other in remaining}
             if not any(found <= NOT_NEGATIVE for found in signs.values()):
                 remaining = [other for other in remaining if not signs[other] <= NOT_POSITIVE] + [one]
         return remaining[0] if len(remaining) == 1 else e.func(*remaining)
@@ -106,11 +79,6 @@ class Resolution:
     def _ceiling(self, e: Any) -> Any:
         found = self._piece(-e.args[0], sp.Integer(0), sp.Integer(1))
         return e if found is None else -sp.Integer(found)
-
-    def _remainder(self, e: Any) -> Any:
-        x, y = e.args
-        whole = self.resolved(sp.floor(x / y))
-        return e if whole.has(sp.floor) else x - y * whole
 
     def _piece(self, e: Any, start: Any, length: Any) -> int | None:
         """k with start + k length <= e < start + (k + 1) length on the whole part; None if there is none or it is
@@ -126,23 +94,9 @@ class Resolution:
             if k is None:
                 continue
             low, high = start + int(k) * length, start + (int(k) + 1) * length
-            if self._part.signs(e - low) <= NOT_NEGATIVE and self._part.signs(high - e) == POSITIVE:
-                return int(k)
-            self._cut_at_levels(e, start, length)
-            return None
+            is_inside = self._part.signs(e - low) <= NOT_NEGATIVE and self._part.signs(high - e) == POSITIVE
+            return int(k) if is_inside else None
         return None
-
-    def _cut_at_levels(self, e: Any, start: Any, length: Any) -> None:
-        try:
-            reach = evaluate((e - start) / length, self._part.box(), BITS).ball
-        except (Undefined, Unclear):
-            return
-        first, last = float(reach.lower()), float(reach.upper())
-        if last - first < PIECES:
-            levels = range(int(first // 1), int(last // 1) + 2)
-            self.undetermined += [
-                g for k in levels if len(self._part.signs(g := e - start - k * length)) > 1
-            ]  # fmt: skip
 
     # ---- cases
 
@@ -172,17 +126,14 @@ class Resolution:
         if not isinstance(condition, sp.core.relational.Relational):
             return None
         difference = self.resolved(condition.lhs) - self.resolved(condition.rhs)
-        truths = {bool(condition.func(sp.Integer(sign), 0)) for sign in self._signs(difference)}
-        if len(truths) == 1:
-            return truths.pop()
-        self.undetermined.append(difference)
-        return None
+        truths = {bool(condition.func(sp.Integer(sign), 0)) for sign in self._part.signs(difference)}
+        return truths.pop() if len(truths) == 1 else None
 
     # ---- inverse functions
 
     def _direction(self, e: Any) -> Any:
         y, x = e.args
-        across, along = self._signs(y), self._signs(x)
+        across, along = self._part.signs(y), self._part.signs(x)
         if along == POSITIVE:
             return self.resolved(sp.atan(y / x))
         if across == POSITIVE:
@@ -191,7 +142,6 @@ class Resolution:
             return -sp.pi / 2 - self.resolved(sp.atan(x / y))
         if along == NEGATIVE and across <= NOT_NEGATIVE:
             return sp.pi + self.resolved(sp.atan(y / x))
-        self.undetermined += [y, x]
         return e
 
     def _arcsine(self, e: Any) -> Any:
@@ -238,29 +188,27 @@ class Resolution:
         return self._piece(angle, start, sp.pi)
 
     def _arccotangent(self, e: Any) -> Any:
-        signs = self._signs(e.args[0])
+        signs = self._part.signs(e.args[0])
         if signs == ZERO:
             return sp.pi / 2
         if 0 not in signs:
-            return self.resolved(sp.atan(1 / e.args[0]))
-        self.undetermined.append(e.args[0])
+            (w,) = e.args
+            return self.resolved(sp.atan(sp.tan(*w.args) if w.func is sp.cot else 1 / w))
         return e
 
     # ---- where an expression is defined, and products under roots and logarithms
 
     def _limit(self, *expressions: Any) -> None:
-        """Record expressions that must not be negative; raise `Nowhere` if one is negative."""
+        """Raise `Nowhere` if an expression that must not be negative is negative."""
         for expression in expressions:
-            if self._signs(expression, limit=True) <= NEGATIVE:
+            if self._part.signs(expression) <= NEGATIVE:
                 raise Nowhere
 
     def _power(self, e: Any) -> Any:
         base, exponent = e.base, e.exp
         if exponent.is_Integer and exponent > 0:
             return e
-        signs = self._signs(base, limit=True)
-        if 0 in signs and len(signs) > 1 and (exponent.is_negative or not exponent.is_Rational):
-            self.limits.append(base)
+        signs = self._part.signs(base)
         if exponent.is_Integer:
             if signs <= ZERO:
                 raise Nowhere
@@ -276,12 +224,11 @@ class Resolution:
         return e
 
     def _power_of_zero(self, e: Any) -> Any:
-        signs = self._signs(e.exp)
+        signs = self._part.signs(e.exp)
         if signs <= NEGATIVE:
             raise Nowhere
         if len(signs) == 1:
             return sp.Integer(0 if signs == POSITIVE else 1)
-        self.undetermined.append(e.exp)
         return e
 
     def _root_of_product(self, e: Any) -> Any:
@@ -289,14 +236,14 @@ class Resolution:
         outside, inside = sp.Integer(1), sp.Integer(1)
         for factor in sp.Mul.make_args(sp.factor(e.base)):
             base, times = factor.as_base_exp()
-            if times.is_Integer and times % 2 == 0 and base.free_symbols:
+            if times.is_Integer and times % 2 == 0 and not base.is_number:
                 outside *= self._absolute(sp.Abs(base, evaluate=False)) ** (times * e.exp)
             else:
                 inside *= factor
-        return e if outside == 1 else outside * inside**e.exp
+        return e if outside == 1 else outside * built(sp.Pow, [inside, e.exp])
 
     def _logarithm(self, e: Any) -> Any:
-        if self._signs(e.args[0], limit=True) <= NOT_POSITIVE:
+        if self._part.signs(e.args[0]) <= NOT_POSITIVE:
             raise Nowhere
         if sp.count_ops(e.args[0]) > LARGEST:
             return e
@@ -304,15 +251,15 @@ class Resolution:
         for factor in sp.Mul.make_args(sp.factor(e.args[0])):
             base, times = factor.as_base_exp()
             # no factor is 0 where the logarithm is defined
-            signs = self._signs(base) - {0}
+            signs = self._part.signs(base) - {0}
             if times.is_Rational and signs == POSITIVE:
-                total += times * sp.log(base)
+                total += times * built(sp.log, [base])
             elif times.is_Integer and signs == NEGATIVE:
-                total += times * sp.log(-base)
+                total += times * built(sp.log, [-base])
                 rest *= (-1) ** times
             else:
                 rest *= factor
-        return total if rest == 1 else total + sp.log(rest)
+        return total if rest == 1 else total + built(sp.log, [rest])
 
     def _reciprocal(self, e: Any) -> Any:
         return self.resolved((sp.acos if e.func is sp.asec else sp.asin)(1 / e.args[0]))
@@ -320,16 +267,19 @@ class Resolution:
     def _hyperbolic(self, e: Any) -> Any:
         (x,) = e.args
         if e.func is sp.asinh:
-            return sp.log(x + sp.sqrt(x**2 + 1))
+            return self.resolved(sp.log(x + sp.sqrt(x**2 + 1)))
         if e.func is sp.acosh:
             self._limit(x - 1)
-            return sp.log(x + sp.sqrt(x**2 - 1))
+            return self.resolved(sp.log(x + sp.sqrt(x**2 - 1)))
         self._limit(1 - x, 1 + x)
-        return sp.log((1 + x) / (1 - x)) / 2
+        return self.resolved(sp.log((1 + x) / (1 - x))) / 2
 
-    def _pole(self, e: Any) -> Any:
-        self._signs(sp.cos(e.args[0]) if e.func in (sp.tan, sp.sec) else sp.sin(e.args[0]), limit=True)
-        return e
+
+def is_infinite(e: Any) -> bool:
+    """Whether a part that every value requires is undefined, infinite or imaginary."""
+    if isinstance(e, sp.Piecewise):
+        return False
+    return e in (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I) or isinstance(e, sp.AccumBounds) or any(map(is_infinite, e.args))
 
 
 _RULES: dict[Any, Any] = {
@@ -340,7 +290,6 @@ _RULES: dict[Any, Any] = {
     sp.Min: Resolution._extreme,
     sp.floor: Resolution._floor,
     sp.ceiling: Resolution._ceiling,
-    sp.Mod: Resolution._remainder,
     sp.atan2: Resolution._direction,
     sp.asin: Resolution._arcsine,
     sp.acos: Resolution._arccosine,
@@ -353,8 +302,4 @@ _RULES: dict[Any, Any] = {
     sp.atanh: Resolution._hyperbolic,
     sp.Pow: Resolution._power,
     sp.log: Resolution._logarithm,
-    sp.tan: Resolution._pole,
-    sp.sec: Resolution._pole,
-    sp.cot: Resolution._pole,
-    sp.csc: Resolution._pole,
 }

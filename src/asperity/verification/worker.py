@@ -6,6 +6,7 @@ The process is a fresh interpreter, because a copy of this process might have th
 from __future__ import annotations
 
 import atexit
+import io
 import os
 import pickle
 import signal
@@ -54,6 +55,19 @@ class _Worker:
             self.process.wait()
 
 
+def _pickled(question: Any) -> bytes:
+    """The expressions as they are written: sympy's own pickles are evaluated when they are read."""
+    from .constants import without_evaluation
+
+    class Pickler(pickle.Pickler):
+        def reducer_override(self, e: Any) -> Any:
+            return without_evaluation(e)
+
+    stream = io.BytesIO()
+    Pickler(stream).dump(question)
+    return stream.getvalue()
+
+
 _lock = threading.Lock()
 _worker: _Worker | None = None
 
@@ -62,7 +76,7 @@ def decide_in_time(claims: list[Any], relations: list[Any], seconds: float) -> V
     """The verdict of `identity.decide`, or *undecided* after ``seconds``."""
     global _worker
     try:
-        question = pickle.dumps((claims, relations, seconds))
+        question = _pickled((claims, relations, seconds))
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise InputError(
             f"lhs, rhs: expected expressions that can be pickled ({error}); pass time_limit=None"
