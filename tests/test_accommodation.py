@@ -229,6 +229,7 @@ def test_angles_at_which_the_tolerance_is_missed_are_named():
     assert found.tangential_missed.tolist() == found.normal_missed.tolist() == [True, False]
     # the mean over so few rays has an error all the same, and it holds
     assert 0.0 < found.tangential_errors[0] < 0.2 * found.tangential_at[0]
-    sampled = spec.accommodation(law @ law, 1e-3, theta=[0.5])
+    law = ker.WallLaw(geo.dispersing_arcs(0.5))
+    sampled = spec.accommodation(law @ law @ law, 1e-3, theta=[0.5])
     assert sampled.tangential_missed.all()
     assert not spec.accommodation(ker.specular(), theta=[0.5]).tangential_missed.any()
