@@ -31,13 +31,13 @@ SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 WEIGHT_TOLERANCE = 1e-12
 # `apply` of a composition refuses more evaluations than this: for one incoming angle, and for all. A density takes some
 # microseconds for each.
-MOST_EVALUATIONS, MOST_AT_ONCE = 10**6, 4 * 10**6
+MOST_EVALUATIONS, MOST_AT_ONCE = 2 * 10**5, 4 * 10**6
 # Entry points of a driven law that `distribution` uses, each an atom.
 ENTRY_POINTS = 4096
 # Limit on nested calls of `apply`; more would exceed Python's recursion limit.
 DEEPEST_POWER = 100
 # Limits on the exponents of powers of which branches are listed, and of which rays are drawn, some seconds of work.
-LONGEST_CHAIN, LONGEST_SAMPLE = 1000, 10**5
+LONGEST_CHAIN, LONGEST_SAMPLE = 10**4, 10**5
 
 # A map from uniform numbers and incoming angles to the outgoing angles and, for traced rays, whether each ray escaped.
 RandomMap: TypeAlias = Callable[[Floats, Floats], tuple[Floats, "NDArray[np.bool_] | None"]]
@@ -603,8 +603,8 @@ class Composition(Law):
 class Power(Law):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
-    `apply` evaluates its function at ``law.evaluations ** n`` angles. It raises InputError above 10^6 angles, above 4 10^6 for
-    all incoming angles, or for n > 100; use ``discretise(law, basis) ** n`` then.
+    `apply` evaluates its function at ``law.evaluations ** n`` angles. It raises InputError above 2 10^5 angles, above
+    4 10^6 for all incoming angles, or for n > 100; use ``discretise(law, basis) ** n`` then.
 
     Examples
     --------
@@ -635,7 +635,7 @@ class Power(Law):
         return chained((self.law,) * self.exponent, angles("theta", theta))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        if self.exponent > LONGEST_CHAIN:
+        if self.exponent > DEEPEST_POWER:
             return np.empty(0), math.inf
         return chained_breakpoints((self.law,) * self.exponent, limit)
 

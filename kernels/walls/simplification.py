@@ -29,8 +29,9 @@ LONGEST_WORD = 100
 
 
 def words_of(law: Law) -> Sum | None:
-    """The law as a weighted sum of words, in the paper's frame; None if there are more than `MOST_WORDS` words or one is
-    longer than `LONGEST_WORD`.
+    """The law as a weighted sum of words, in the paper's frame; None if there are more than `MOST_WORDS` words.
+
+    Also None if a word is longer than `LONGEST_WORD`.
 
     Raises an InputError if a sum in the law has negative weights or weights that do not sum to 1.
 
