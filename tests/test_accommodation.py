@@ -1,5 +1,8 @@
 """Momentum accommodation: closed forms, weighted means, and the nearest Maxwell law."""
 
+from itertools import pairwise
+
+import mpmath as mp
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -131,3 +134,102 @@ def test_shallow_walls_have_the_coefficients_of_the_billiard_laplacian():
     assert found.tangential.value / flatness == pytest.approx(4.0, rel=2e-3)
     # the Dirichlet form of sin(theta) over its variance
     assert found.normal.value / flatness == pytest.approx(1.0 / (1.0 - 3.0 * np.pi**2 / 32.0), rel=1e-2)
+
+
+def random_polygon(steepest, rng):
+    """The vertices of a closed path from (0, 0) to (1, 0) below y = 0, with slopes of about this size."""
+    x = np.concatenate([[0.0], np.sort(rng.uniform(0.05, 0.95, 4)), [1.0]])
+    y = np.concatenate([[0.0], -rng.uniform(0.2, 1.0, 4), [0.0]])
+    slope = np.abs(np.diff(y) / np.diff(x)).max()
+    return list(zip(x.tolist(), (y * 0.99 * steepest / slope).tolist(), strict=True))
+
+
+def exact_coefficients(vertices, theta):
+    """Both coefficients in 50 digits, each side weighted with the entry points of its rays, which meet no other."""
+    with mp.workdps(50):
+        angle, along, raised = mp.mpf(float(theta)), mp.mpf(0), mp.mpf(0)
+        for (x, y), (x2, y2) in pairwise(vertices):
+            width, rise = mp.mpf(x2) - mp.mpf(x), mp.mpf(y2) - mp.mpf(y)
+            share = width - rise * mp.cot(angle)
+            outgoing = mp.pi - angle + 2 * mp.atan2(rise, width)
+            along += share * mp.cos(outgoing)
+            raised += share * mp.sin(outgoing)
+        complete = mp.sin(angle) - mp.pi / 4
+        return float(1 + along / mp.cos(angle)), float((mp.sin(angle) - raised) / complete)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.09])
+@pytest.mark.parametrize("diffuse", [0.0, 1e-9])
+def test_coefficients_of_random_shallow_walls_have_the_digits_of_sums_in_fifty_digits(size, diffuse):
+    rng = np.random.default_rng(int(-np.log10(size)))
+    for _ in range(3):
+        vertices = random_polygon(size, rng)
+        law = ker.WallLaw(geo.Wall([geo.Segment(*ends) for ends in pairwise(vertices)]))
+        law = diffuse * ker.lambertian() + (1.0 - diffuse) * law if diffuse else law
+        theta = np.concatenate([rng.uniform(3.1 * size, np.pi - 3.1 * size, 6), [3.1 * size, np.pi - 3.1 * size]])
+        found = spec.accommodation(law, theta=theta)
+        exact = np.array([exact_coefficients(vertices, angle) for angle in theta]) * (1.0 - diffuse) + diffuse
+        assert np.all(np.abs(found.tangential_at - exact[:, 0]) <= found.tangential_errors + 1e-12 * exact[:, 0])
+        assert np.all(np.abs(found.normal_at - exact[:, 1]) <= found.normal_errors + 1e-12 * np.abs(exact[:, 1]))
+        assert np.all(found.tangential_errors <= 1e-8 * found.tangential_at) and not found.tangential_missed.any()
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-4, 1e-2, 0.05, 0.3, 1.0])
+def test_the_mean_accommodation_of_walls_is_four_times_their_mean_squared_slope(size):
+    """With the mean of sin(slope)^2 in closed form; the next order is below 40 s^4 ln(1/s)."""
+    walls = (
+        (geo.dispersing_arcs(size), size**2 / 12.0, 0.5 * size),
+        (geo.focusing_arcs(size), np.sin(size) ** 2 / 3.0, size),
+        (geo.triangular_teeth(np.pi - 2.0 * size), np.sin(size) ** 2, size),
+    )
+    for wall, square, steepest in walls:
+        found = spec.accommodation(ker.WallLaw(wall), theta=[0.6, 1.2])
+        beyond = 40.0 * steepest**4 * (1.0 - np.log(min(steepest, 1.0)))
+        # pi - 2 s has an error of half a unit in the last place of pi
+        rounding = 2e-15 * steepest
+        assert abs(found.tangential.value - 4.0 * square) <= found.tangential.error + beyond + rounding
+        assert found.tangential.error <= 1e-5 * found.tangential.value
+        if size < 0.1:
+            assert np.all(np.abs(found.tangential_at / (4.0 * square) - 1.0) < 1e-9 + rounding / square)
+
+
+@pytest.mark.parametrize("wall", [geo.dispersing_arcs(1e-3), geo.focusing_arcs(0.02), geo.triangular_teeth(3.1)])
+def test_averages_of_shallow_walls_are_mean_squared_changes_of_rays(wall):
+    law, number, rng = ker.WallLaw(wall), 400_000, np.random.default_rng(8)
+    found = spec.accommodation(law)
+    theta = ker.SINE.sample(number, rng)
+    onward = np.pi - law.sample(theta, rng)
+    for function, square, value in (
+        (np.cos, 1.0 / 3.0, found.tangential), (np.sin, 2.0 / 3.0 - np.pi**2 / 16.0, found.normal)
+    ):  # fmt: skip
+        drawn = 0.5 * (function(onward) - function(theta)) ** 2 / square
+        assert abs(drawn.mean() - value.value) < 4.5 * drawn.std() / np.sqrt(number) + value.error
+        assert value.error < 1e-3 * value.value
+
+
+def test_the_misfit_of_very_shallow_teeth_is_that_of_their_exact_changes():
+    size = 1e-5
+    vertices = [(0.0, 0.0), (0.5, -0.5 * size), (1.0, 0.0)]
+    law = ker.WallLaw(geo.Wall([geo.Segment(*ends) for ends in pairwise(vertices)]))
+    found = spec.accommodation(law)
+    edges = np.concatenate([np.geomspace(3.0 * size, 0.3, 20), np.linspace(0.3, 0.5 * np.pi, 6)[1:]])
+    angle, weight = ker.SINE.quadrature(edges, 6)
+    complete = np.stack([np.cos(angle), np.sin(angle) - np.pi / 4.0], axis=1)
+    rest = np.array([exact_coefficients(vertices, one) for one in angle]) - found.maxwell_fraction.value
+    # less steep rays, 4.5 s^2 of all, change by 5 s at most
+    steep, grazing = 2.0 * float(weight @ np.sum((rest * complete) ** 2, axis=1)), 4.5 * 25.0 * size**4
+    low, high = np.sqrt(steep), np.sqrt(steep + grazing)
+    assert low - found.misfit.error <= found.misfit.value <= high + found.misfit.error
+    assert found.misfit.error < 0.05 * found.misfit.value
+
+
+def test_angles_at_which_the_tolerance_is_missed_are_named():
+    law = ker.WallLaw(geo.dispersing_arcs(1e-4))
+    found = spec.accommodation(law, theta=[1e-4, 1.0])
+    assert found.tangential_missed.tolist() == found.normal_missed.tolist() == [True, False]
+    # the mean over so few rays has an error all the same, and it holds
+    assert 0.0 < found.tangential_errors[0] < 0.2 * found.tangential_at[0]
+    law = ker.WallLaw(geo.dispersing_arcs(0.5))
+    sampled = spec.accommodation(law @ law @ law, 1e-3, theta=[0.5])
+    assert sampled.tangential_missed.all()
+    assert not spec.accommodation(ker.specular(), theta=[0.5]).tangential_missed.any()

@@ -569,3 +569,64 @@ def test_the_error_of_cells_to_the_power_p_is_convex():
             errors.append(cells_error(law, order, False))
         np.testing.assert_allclose(errors, errors[0] * np.array([1.0, 0.5, 0.03]) ** (1.0 / order), rtol=1e-12)
         assert errors[0] > 0.0
+
+
+DISK = geo.Disk(1.0, 0.5)
+SMOOTH, NO_SLIP = ker.smooth(DISK), ker.no_slip(DISK)
+
+
+@pytest.mark.parametrize("kind", ["rows", "sup", "joint"])
+@pytest.mark.parametrize("order", [1, 2])
+def test_collision_laws_that_both_flip_psi_have_the_distance_of_their_laws_of_theta(kind, order):
+    """Also of disks with other masses: angles are compared. Smooth and no-slip outcomes are |pi - 2 theta| apart."""
+    rough = ker.CollisionLaw(ker.maxwell(0.5), DISK)
+    for first, second in ((SMOOTH, NO_SLIP), (SMOOTH, ker.no_slip(geo.Disk(3.0, 3.0))), (rough, SMOOTH)):
+        found = ker.distance(first, second, order, kind, tolerance=1e-2)
+        assert found == ker.distance(first.law, second.law, order, kind, tolerance=1e-2)
+    if kind != "joint":
+        exact = {"sup": np.pi, "rows": np.pi - 2.0 if order == 1 else np.sqrt(np.pi**2 - 8.0)}[kind]
+        assert abs(float(ker.distance(SMOOTH, NO_SLIP, order, kind)) - exact) < 1e-6
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("moved", [1.0, 0.25])
+def test_collision_laws_that_flip_psi_with_other_probabilities_are_apart_in_both_angles(order, moved):
+    """psi' = pi - psi, theta' = pi - theta against the identity: atoms at a known distance, some mass stays."""
+    other = moved * (SMOOTH @ SMOOTH) + (1.0 - moved) * SMOOTH if moved < 1.0 else SMOOTH @ SMOOTH
+    found = ker.distance(SMOOTH, other, order)
+    theta, psi = np.meshgrid(*[np.pi * (np.arange(2000) + 0.5) / 2000] * 2)
+    apart = np.hypot(np.pi - 2.0 * theta, np.pi - 2.0 * psi) ** order
+    power = np.average(apart, weights=np.sin(theta) * np.sin(psi) ** 2)
+    assert abs(found.value - (moved * power) ** (1.0 / order)) <= found.error < 0.01
+    largest = ker.distance(SMOOTH, other, order, "sup")
+    assert abs(largest.value - moved ** (1.0 / order) * np.pi * np.sqrt(2.0)) <= largest.error < 0.25
+
+
+def test_the_distance_of_collision_laws_is_that_of_transport_between_sampled_velocities():
+    """Rows at one incoming velocity after another, sampled as velocities and moved by POT on their angles."""
+    first = ker.CollisionLaw(ker.henyey_greenstein(0.3), DISK)
+    second = 0.4 * first + 0.6 * (NO_SLIP @ ker.CollisionLaw(ker.lambertian(), DISK))
+    found = ker.distance(first, second)
+    rng = np.random.default_rng(4)
+    number, size, distances = 300, 200, []
+    theta, psi = ker.SINE.sample(number, rng), np.arccos(2.0 * rng.beta(1.5, 1.5, number) - 1.0)
+    for one, other in zip(theta, psi, strict=True):
+        incoming = -np.repeat(DISK.from_angles(one, other)[None], size, axis=0)
+        points = [np.column_stack(DISK.to_angles(law.sample(incoming, rng))) for law in (first, second)]
+        distances.append(ot.emd2([], [], ot.dist(*points, metric="euclidean")))
+    # samples of 200 are farther apart than their laws, in the mean by less than their noise
+    noise = 0.15
+    error = 4.5 * np.std(distances) / np.sqrt(number)
+    assert found.value - found.error - error < np.mean(distances) < found.value + found.error + error + noise
+
+
+def test_what_is_not_defined_for_collision_laws_is_refused_with_a_remedy():
+    for other in (ker.specular(), ker.discretise(ker.lambertian(), ker.Bins(4))):
+        with pytest.raises(InputError, match="two collision laws"):
+            ker.distance(SMOOTH, other)
+        with pytest.raises(InputError, match="two collision laws"):
+            ker.distance(other, SMOOTH)
+    with pytest.raises(InputError, match="expected 'rows', 'sup' or 'joint'"):
+        ker.distance(SMOOTH, NO_SLIP, kind="pseudometric")
+    with pytest.raises(InputError, match="'rows' is an upper bound"):
+        ker.distance(SMOOTH, SMOOTH @ SMOOTH, kind="joint")

@@ -1,5 +1,6 @@
 """The front door: what an import loads, what a wheel holds, what the pages say."""
 
+import ast
 import doctest
 import json
 import re
@@ -9,6 +10,7 @@ import sys
 import tarfile
 import tomllib
 import zipfile
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -187,3 +189,58 @@ def test_no_function_bears_the_name_of_its_file():
     for room in ("geometry", "kernels", "spectral"):
         for file in (ROOT / room).rglob("*.py"):
             assert not re.search(rf"^def {file.stem}\(", file.read_text(encoding="utf-8"), re.MULTILINE), file
+
+
+# Methods that change their object and return None.
+RETURNS_NONE = {"sort", "append", "extend", "reverse", "update", "add", "clear", "insert", "setflags", "fill"}
+
+
+def idle_checks(tree: ast.AST) -> list[int]:
+    """Lines of assertions that hold of any code: compared with itself, of a tuple, of None, of a lone `approx`."""
+
+    def returns_none(node: ast.AST) -> bool:
+        return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in RETURNS_NONE
+
+    def draws(node: ast.AST) -> bool:
+        # a call may differ from itself: of code that is to repeat, or of a state
+        return any(isinstance(part, (ast.Call, ast.Await)) for part in ast.walk(node))
+
+    lines = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            sides = [node.left, *node.comparators]
+            # that `x is x` holds may be the point: of a property that keeps its value
+            equal = (
+                []
+                if isinstance(node.ops[0], ast.Is)
+                else [ast.dump(one) == ast.dump(other) for one, other in pairwise(sides)]
+            )
+            if any(map(returns_none, sides)) or (any(equal) and not any(map(draws, sides))):
+                lines.append(node.lineno)
+        elif isinstance(node, ast.Assert):
+            test = node.test
+            alone = isinstance(test, ast.Call) and ast.unparse(test.func) in ("approx", "pytest.approx")
+            if isinstance(test, (ast.Tuple, ast.List, ast.GeneratorExp, ast.Constant)) or alone or returns_none(test):
+                lines.append(node.lineno)
+        elif isinstance(node, ast.With) and any("pytest.raises" in ast.unparse(item) for item in node.items):
+            if all(isinstance(line, ast.Pass) for line in node.body):
+                lines.append(node.lineno)
+        elif isinstance(node, ast.For) and isinstance(node.iter, (ast.List, ast.Tuple)) and not node.iter.elts:
+            lines.append(node.lineno)
+    return lines
+
+
+def test_assertions_that_cannot_fail_are_found():
+    for text in (
+        "assert a.sort() == b.sort()", "assert (a, 'b')", "assert pytest.approx(1.0)", "assert x == x",
+        "assert None is a.append(1)", "for x in ():\n    assert x", "with pytest.raises(E):\n    pass",
+        "assert (x for x in y)",
+    ):  # fmt: skip
+        assert idle_checks(ast.parse(text)), text
+    for text in ("assert sorted(a) == sorted(b)", "assert f(x) == f(x)", "with pytest.raises(E):\n    f()"):
+        assert not idle_checks(ast.parse(text)), text
+
+
+def test_no_assertion_of_the_tests_holds_of_any_code():
+    found = {path.name: idle_checks(ast.parse(path.read_text(encoding="utf-8"))) for path in ROOT.glob("tests/*.py")}
+    assert not {name: lines for name, lines in found.items() if lines}

@@ -156,5 +156,5 @@ def test_unsuitable_entries_are_refused_in_words():
 def test_the_page_has_every_row_and_the_errata_first():
     page = page_of(ROWS)
     assert page.index("## Errata") < page.index("## Conventions") < page.index("## Verified")
-    assert re.findall(r"^\*\*(S\d\.\d\d)\*\*", page, flags=re.MULTILINE).sort() == [e.id for e in ROWS].sort()
+    assert sorted(re.findall(r"^\*\*(S\d\.\d\d)\*\*", page, flags=re.MULTILINE)) == sorted(e.id for e in ROWS)
     assert page.count("$$") == 2 * sum(1 + (entry.corrected is not None) for entry in ROWS)

@@ -14,7 +14,7 @@ from .bezier import Bezier
 from .curve import Curve
 from .segment import Segment
 
-# Relative errors of a Bezier piece's largest curvature that are tried, and limit on the intervals of a proof.
+# Relative errors of a Bezier piece's largest curvature that are tried, and limit on the intervals of a check.
 WIDTHS, MOST_INTERVALS = tuple(10.0**-k for k in range(12, 1, -1)), 2000
 # Rounding error of the polynomials of a Bezier piece, relative to their largest coefficient, and of a closed formula.
 ROUNDED = 64.0 * EPS
@@ -81,7 +81,7 @@ def _polynomials(piece: Bezier) -> tuple[Floats, Floats, Floats]:
 
 
 def _largest_of_bezier(piece: Bezier) -> tuple[float, float]:
-    """Return the largest curvature at the critical points, and the least of the tried errors that is proved.
+    """Return the largest curvature at the critical points, and the least of the tried errors that holds.
 
     With N = b' x b'' and q = |b'|^2 the curvature is at most K exactly if K^2 q^3 - N^2 is nowhere negative.
     """
@@ -105,7 +105,7 @@ def _largest_of_bezier(piece: Bezier) -> tuple[float, float]:
 
 
 def _is_positive(polynomial: Floats) -> bool:
-    """Return whether a polynomial is proved, to rounding, to be positive on [0, 1]: by its Bernstein coefficients."""
+    """Return whether a polynomial is positive on [0, 1], to rounding: by its Bernstein coefficients."""
     degree = len(polynomial) - 1
     room = ROUNDED * float(np.abs(polynomial).sum())
     todo = [

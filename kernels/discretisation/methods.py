@@ -15,7 +15,7 @@ from ..laws.law import Law, retroreflection, specular
 from ..laws.structure import Rules, fold, has_chain
 from ..matrices.defects import SymmetryDefect
 from ..matrices.matrix import KernelMatrix
-from ..walls.simplification import law_of, words_of
+from ..walls.simplification import LONGEST_WORD, law_of, words_of
 from .actions import Actions
 from .arcs import Arcs
 from .auto_wall import AutoWall, rays_of_whole
@@ -201,6 +201,11 @@ class _Mirrored:
 
 def _chain(parts: Sequence[_Law]) -> Recipe:
     factors = [factor for part in parts for factor in part.factors]
+    if len(factors) > LONGEST_WORD:
+        raise InputError(
+            f"law: expected compositions of at most {LONGEST_WORD} laws, got {len(factors)}; compose the matrices: "
+            "discretise(law, basis) ** n"
+        )
     return Chain(factors) if factors else _Law(retroreflection())
 
 

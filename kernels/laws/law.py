@@ -29,12 +29,15 @@ SMALLEST_DRAW = 2.0**-54
 SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 # Decimal weights such as 0.1, ..., 0.4 sum to 1 within a few roundings; a sum with a forgotten term differs by more.
 WEIGHT_TOLERANCE = 1e-12
-# `apply` refuses more evaluations than this for one incoming angle.
-MOST_EVALUATIONS = 10**7
+# `apply` of a composition refuses more evaluations than this: for one incoming angle, and for all. A density takes some
+# microseconds for each.
+MOST_EVALUATIONS, MOST_AT_ONCE = 2 * 10**5, 4 * 10**6
 # Entry points of a driven law that `distribution` uses, each an atom.
 ENTRY_POINTS = 4096
 # Limit on nested calls of `apply`; more would exceed Python's recursion limit.
 DEEPEST_POWER = 100
+# Limits on the exponents of powers of which branches are listed, and of which rays are drawn, some seconds of work.
+LONGEST_CHAIN, LONGEST_SAMPLE = 10**4, 10**5
 
 # A map from uniform numbers and incoming angles to the outgoing angles and, for traced rays, whether each ray escaped.
 RandomMap: TypeAlias = Callable[[Floats, Floats], tuple[Floats, "NDArray[np.bool_] | None"]]
@@ -586,7 +589,7 @@ class Composition(Law):
         return theta
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        _check_cost(self)
+        _check_cost(self, theta.size)
         for law in reversed(self.laws[1:]):
             function = _pulled_back(law, function)
         return self.laws[0].apply(function, theta)
@@ -600,8 +603,8 @@ class Composition(Law):
 class Power(Law):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
-    `apply` evaluates its function at ``law.evaluations ** n`` angles. It raises InputError above 10^7 angles or for
-    n > 100; use ``discretise(law, basis) ** n`` then.
+    `apply` evaluates its function at ``law.evaluations ** n`` angles. It raises InputError above 2 10^5 angles, above
+    4 10^6 for all incoming angles, or for n > 100; use ``discretise(law, basis) ** n`` then.
 
     Examples
     --------
@@ -628,9 +631,12 @@ class Power(Law):
         return self if self.reversible else Power(self.law.adjoint(), self.exponent)
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        _check_length("branches", self.exponent, LONGEST_CHAIN)
         return chained((self.law,) * self.exponent, angles("theta", theta))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        if self.exponent > DEEPEST_POWER:
+            return np.empty(0), math.inf
         return chained_breakpoints((self.law,) * self.exponent, limit)
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
@@ -638,6 +644,7 @@ class Power(Law):
         return atoms_of(self, theta, edges) or super().distribution(theta, edges)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        _check_length("sample", self.exponent, LONGEST_SAMPLE)
         for _ in range(self.exponent):
             theta = self.law.sample(theta, rng)
         return theta.copy() if self.exponent == 0 else theta
@@ -645,12 +652,8 @@ class Power(Law):
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         if self.exponent == 0:
             return np.asarray(function(theta), dtype=np.float64)
-        _check_cost(self)
-        if self.exponent > DEEPEST_POWER:
-            raise InputError(
-                f"apply: expected a power of at most {DEEPEST_POWER}, got {self.exponent}; use "
-                "discretise(law, basis) ** n"
-            )
+        _check_cost(self, theta.size)
+        _check_length("apply", self.exponent, DEEPEST_POWER)
         for _ in range(self.exponent - 1):
             function = _pulled_back(self.law, function)
         return self.law.apply(function, theta)
@@ -673,12 +676,19 @@ def as_base(law: Law) -> str:
     return f"({law!r})" if isinstance(law, Power) else as_factor(law)
 
 
-def _check_cost(law: Law) -> None:
-    if law.evaluations > MOST_EVALUATIONS:
+def _check_cost(law: Law, incoming: int) -> None:
+    if law.evaluations > MOST_EVALUATIONS or law.evaluations * incoming > MOST_AT_ONCE:
         raise InputError(
-            f"apply: {law!r} needs {law.evaluations:.1e} evaluations for each angle (at most "
-            f"{MOST_EVALUATIONS:.0e}); use "
-            "discretise() and compose the matrices"
+            f"apply: {law!r} needs {law.evaluations:.1e} evaluations for each of {incoming} angles (at most "
+            f"{MOST_EVALUATIONS:.0e}, and {MOST_AT_ONCE:.0e} for all); use discretise() and compose the matrices, or "
+            "fewer angles at a time"
+        )
+
+
+def _check_length(method: str, exponent: int, most: int) -> None:
+    if exponent > most:
+        raise InputError(
+            f"{method}: expected a power of at most {most}, got {exponent}; use discretise(law, basis) ** n"
         )
 
 

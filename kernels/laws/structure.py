@@ -13,6 +13,8 @@ from .law import Combination, Composition, Law, Power, SpecularFrame
 Fact = TypeVar("Fact")
 # Breakpoint limit and incoming angle (in radians) of the test whether a law lists isometries.
 FEW_BREAKPOINTS, PROBE = 8, 1.0
+# Limit on the factors of a power whose facts are combined.
+MOST_FACTORS = 10**6
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,10 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     if isinstance(law, Composition):
         return rules.whole(law, rules.chain([fold(part, rules) for part in law.laws]))
     if isinstance(law, Power):
+        if law.exponent > MOST_FACTORS:
+            raise InputError(
+                f"law: expected a power of at most {MOST_FACTORS}, got {law.exponent}; use discretise(law, basis) ** n"
+            )
         return rules.whole(law, rules.chain([fold(law.law, rules)] * law.exponent))
     if isinstance(law, SpecularFrame):
         return rules.whole(law, rules.mirrored(fold(law.law, rules)))

@@ -12,6 +12,8 @@ from ..bases.tensor import TensorBasis
 from ..matrices.matrix import KernelMatrix
 from .law import Law
 
+# Weight, law of theta, and whether psi becomes pi - psi (else it is unchanged).
+Term: TypeAlias = tuple[float, Law, bool]
 # `discretise` with all its arguments but law and basis.
 Discretiser: TypeAlias = Callable[[Law, Basis], KernelMatrix]
 
@@ -19,6 +21,10 @@ Discretiser: TypeAlias = Callable[[Law, Basis], KernelMatrix]
 @explained_class
 class TensorLaw(ABC):
     """A law of the angles (theta, psi), computed from laws of the single angles."""
+
+    @abstractmethod
+    def parts_checked(self) -> tuple[Term, ...]:
+        """The terms, of which the law is the sum; raises InputError if their weights do not sum to 1 within 1e-12."""
 
     @abstractmethod
     def matrix_on(self, basis: TensorBasis, discretise: Discretiser) -> KernelMatrix:

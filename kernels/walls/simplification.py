@@ -24,10 +24,14 @@ Sum = dict[Word, float]
 
 # Compositions of sums are multiplied out if the result has at most this many words.
 MOST_WORDS = 24
+# Limit on the laws of a word; each is compared with its neighbours whenever one is added.
+LONGEST_WORD = 100
 
 
 def words_of(law: Law) -> Sum | None:
     """The law as a weighted sum of words, in the paper's frame; None if there are more than `MOST_WORDS` words.
+
+    Also None if a word is longer than `LONGEST_WORD`.
 
     Raises an InputError if a sum in the law has negative weights or weights that do not sum to 1.
 
@@ -79,7 +83,7 @@ def _chain(parts: Sequence[Sum | None]) -> Sum | None:
             for other, fraction in words.items():
                 longer = reduced(word + other)
                 product[longer] = product.get(longer, 0.0) + weight * fraction
-        if len(product) > MOST_WORDS:
+        if len(product) > MOST_WORDS or max(map(len, product)) > LONGEST_WORD:
             return None
         total = product
     return total

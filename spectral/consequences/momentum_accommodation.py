@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, angles, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, ErrorKind, Estimate
 from ...core.kinds import explained
 from ...core.rounding import EPS
-from ...kernels import SINE, KernelMatrix, Law, Panels, discretise
+from ...kernels import SINE, Combination, Law, Panels, discretise
 from ...kernels.bases.basis import Basis
 from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
+from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
+from ...kernels.expectations.basis_means import Means
+from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.structure import has_chain
+from ...kernels.walls.simplification import law_of, words_of
 from ..bounds.operator_residuals import image_rule
+from ..gap.shallow import ROUNDING, Slopes, slopes_of
 
 # cos(theta) and sin(theta) are polynomials of this degree on so many panels, to 1e-14.
 PANELS, DEGREE = 4, 10
@@ -30,7 +37,11 @@ DRAWS = 2**12
 # Panels of the coarser rule of the misfit, the nodes on each, and breakpoints of the law that are edges too.
 MISFIT_PANELS, MISFIT_NODES, BREAKPOINTS = 8, 4, 16
 # E cos(theta)^2 and E (sin(theta) - pi/4)^2 for sin(theta)/2 d theta: weights of the two coefficients in the fraction.
-TANGENTIAL_WEIGHT, NORMAL_WEIGHT = 1.0 / 3.0, SINE_NORM**2
+WEIGHTS = np.array([1.0 / 3.0, SINE_NORM**2])
+# Rays that graze a shallow wall, for averages. The misfit of such a wall has so many more edges below this angle.
+GRAZING_DRAWS, GRADED, GRADED_UP_TO = 2**14, 16, 0.4
+# Tolerance of conditional means as a fraction of the wanted error, and the least one that tracing can reach.
+RULE_SHARE, LEAST_TOLERANCE = 0.1, 1e-13
 
 
 @dataclass(frozen=True)
@@ -52,6 +63,8 @@ class Accommodation:
         The coefficients at these angles.
     tangential_errors, normal_errors : array of shape (n,)
         Their errors, of the kind ``kind_at``.
+    tangential_missed, normal_missed : array of bool, shape (n,)
+        Where such an error is larger than the tolerance times the coefficient.
     kind_at : {"bound", "estimate"}
     """
 
@@ -62,8 +75,10 @@ class Accommodation:
     theta: Floats
     tangential_at: Floats
     tangential_errors: Floats
+    tangential_missed: NDArray[np.bool_]
     normal_at: Floats
     normal_errors: Floats
+    normal_missed: NDArray[np.bool_]
     kind_at: ErrorKind
 
 
@@ -76,7 +91,8 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
     law : Law
         In either convention; it is converted to the paper's.
     tolerance : float
-        Wanted error of the law's matrix and of its conditional means.
+        Wanted error of the law's matrix, and of each coefficient at an angle as a fraction of it; where the latter is
+        missed, the result says so.
     theta : array_like, optional
         Angles at which the coefficients are given; by default the midpoints of 32 cells of equal measure.
     rng : None, int or numpy.random.Generator
@@ -107,7 +123,12 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
     mean reflected velocity, for the same measure of angles, has the mean of the two coefficients with the weights
     1/3 and 2/3 - pi^2/16, cut to [0, 1]. The speed is kept, so that no energy is accommodated.
 
-    Means that a law knows with errors are used; of other laws each angle is sampled.
+    Changes of momentum are computed as such, without cancellation, for sums of the ideal laws and of walls with slopes
+    below 0.1. With s the slope, an angle, under dx, rays steeper than three times the steepest slope have
+
+    sigma_t(theta) = 4 E sin(s)^2 - 4 cot(2 theta) E tan(s) sin(s)^2,
+
+    exactly. Of other laws the means that a law knows with errors are used, or else each angle is sampled.
 
     Source: C. Cercignani, The Boltzmann Equation and Its Applications (1988), section III.6, in two dimensions.
 
@@ -131,17 +152,15 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
     wanted = positive_number("tolerance", tolerance)
     incoming = _default_angles() if theta is None else _checked(theta)
-    source = generator(rng, 0)
     paper = law.in_specular_frame() if law.frame == "specular" else law
-    basis: Basis = Panels(np.linspace(0.0, np.pi, PANELS + 1), DEGREE) if has_chain(paper) else Directions()
-    matrix = discretise(paper, basis, tolerance=wanted, rng=source)
-    tangential, normal, fraction = _averaged(matrix)
-    means = _Means(paper, 0.1 * wanted, source)
-    tangential_at, tangential_errors, normal_at, normal_errors = _coefficients(means, incoming)
-    return Accommodation(
-        tangential, normal, fraction, _misfit(paper, means, fraction), frozen(incoming), frozen(tangential_at),
-        frozen(tangential_errors), frozen(normal_at), frozen(normal_errors), means.kind,
-    )  # fmt: skip
+    parts = _parts(paper, wanted, generator(rng, 0))
+    tangential, normal, fraction = _averaged(parts)
+    values, errors, missed = _coefficients(parts, incoming, wanted)
+    missed.setflags(write=False)
+    at = (column for pair in zip(frozen(values.T), frozen(errors.T), missed.T, strict=True) for column in pair)
+    kind: ErrorKind = "bound" if all(part.kind == "bound" for _, part in parts) else "estimate"
+    misfit = _misfit(paper, parts, fraction, wanted)
+    return Accommodation(tangential, normal, fraction, misfit, frozen(incoming), *at, kind)
 
 
 def _default_angles() -> Floats:
@@ -162,24 +181,29 @@ def _checked(theta: ArrayLike) -> Floats:
     return incoming
 
 
-def _averaged(matrix: KernelMatrix) -> tuple[Estimate, Estimate, Estimate]:
-    """The mean coefficients and the Maxwell fraction, from the matrix on functions that contain cos and sin."""
-    along, across = (matrix.basis.project(function) for function in (_cosine, _sine))
-    # both have norm 1: the projections are exact to rounding
-    error = float(matrix.error) + PANELS_MISS
-    tangential = 1.0 + float(along @ matrix.symmetric @ along)
-    normal = 1.0 - float(across @ matrix.symmetric @ across)
-    how = f"{matrix.method} on {matrix.basis!r} ({matrix.error.method})"
-    kind = matrix.error.kind
-    whole = TANGENTIAL_WEIGHT + NORMAL_WEIGHT
-    mean = (TANGENTIAL_WEIGHT * tangential + NORMAL_WEIGHT * normal) / whole
-    # a sum of two entries of an error of this Frobenius norm; cutting moves no two numbers apart
-    spread = error * float(np.hypot(TANGENTIAL_WEIGHT, NORMAL_WEIGHT)) / whole
-    return (
-        Estimate(tangential, error, kind, how),
-        Estimate(normal, error, kind, how),
-        Estimate(min(max(mean, 0.0), 1.0), spread + PANELS_MISS, kind, f"nearest mean velocities; {how}"),
-    )
+def _parts(law: Law, tolerance: float, rng: np.random.Generator) -> list[tuple[float, _Changes]]:
+    """The law as a weighted sum of laws; sums of coefficients then have the relative accuracy of their parts."""
+    if isinstance(law, Combination):
+        terms = [(weight, _parts(term, tolerance, rng)) for weight, term in law.terms_checked() if weight > 0.0]
+        return [(outer * weight, part) for outer, parts in terms for weight, part in parts]
+    slopes = slopes_of(law)
+    slopes = slopes if slopes is not None and slopes.steepest > 0.0 else None
+    words = None if slopes or not (has_chain(law) or law.frame == "specular") else words_of(law)
+    found = {law: 1.0} if words is None else {law_of(word): weight for word, weight in words.items()}
+    return [(weight, _Changes(one, slopes, tolerance, rng)) for one, weight in found.items()]
+
+
+def _averaged(parts: list[tuple[float, _Changes]]) -> tuple[Estimate, Estimate, Estimate]:
+    """The mean coefficients and the Maxwell fraction."""
+    found = [(weight, *part.averages()) for weight, part in parts]
+    values = sum(weight * value for weight, value, _, _ in found)
+    errors = sum(weight * error for weight, _, error, _ in found) + 4.0 * EPS * np.abs(values)
+    how = "; ".join(dict.fromkeys(method for *_, method in found))
+    kind: ErrorKind = "bound" if all(part.averages_kind == "bound" for _, part in parts) else "estimate"
+    mean, spread = (float(WEIGHTS @ pair / WEIGHTS.sum()) for pair in (values, errors))
+    tangential, normal = (Estimate(float(v), float(e), kind, how) for v, e in zip(values, errors, strict=True))
+    # cutting moves no two numbers apart
+    return tangential, normal, Estimate(min(max(mean, 0.0), 1.0), spread, kind, f"nearest mean velocities; {how}")
 
 
 def _cosine(theta: Floats) -> Floats:
@@ -192,62 +216,141 @@ def _sine(theta: Floats) -> Floats:
     return np.asarray((np.sin(theta) - MEAN_SINE) / SINE_NORM)
 
 
-class _Means:
-    """E[cos(theta') | theta] and E[sin(theta') | theta] with an error each, from what the law knows or from draws."""
+class _Changes:
+    """E[cos(theta') + cos(theta) | theta] and E[sin(theta) - sin(theta') | theta] of one law, with an error each."""
 
-    def __init__(self, law: Law, tolerance: float, rng: np.random.Generator) -> None:
-        self.law, self.tolerance, self.rng = law, tolerance, rng
-        self.panels = Panels(np.linspace(0.0, np.pi, PANELS + 1), DEGREE)
-        vectors = np.stack([self.panels.project(np.cos), self.panels.project(np.sin)], axis=1)
-        self.kind: ErrorKind = "bound" if law.exact_apply else "estimate"
-        costly = law.expectations(self.panels).are_costly()
+    def __init__(self, law: Law, slopes: Slopes | None, tolerance: float, rng: np.random.Generator) -> None:
+        self.law, self.slopes, self.tolerance, self.rng = law, slopes, tolerance, rng
+        # of specular reflection, retroreflection and the Lambertian law: factors of the complete change
+        self.ideal = np.array([1.0, 1.0]) if isinstance(law, LambertianLaw) else None
+        if isinstance(law, IsometryLaw):
+            self.ideal = np.array([2.0 if law.retro else 0.0, 0.0])
+        exact = self.ideal is not None or (law.exact_apply and slopes is None)
+        self.kind: ErrorKind = "bound" if exact else "estimate"
+        self.averages_kind: ErrorKind = self.kind
+
+    @cached_property
+    def rule(self) -> Means | None:
+        """The conditional means of cos and sin with their error; None if it is unknown or too slow to compute."""
+        panels = Panels(np.linspace(0.0, np.pi, PANELS + 1), DEGREE)
+        vectors = np.stack([panels.project(np.cos), panels.project(np.sin)], axis=1)
         try:
-            self.rule = None if costly else image_rule(law, self.panels, vectors)
+            return None if self.law.expectations(panels).are_costly() else image_rule(self.law, panels, vectors)
         except InputError:
-            self.rule = None
+            return None
 
-    @property
-    def how(self) -> str:
-        """In words."""
-        return "conditional means" if self.rule else f"{DRAWS} draws an angle"
+    def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+        """The changes and their errors, both of shape (angles, 2)."""
+        complete = np.stack([np.cos(theta), np.sin(theta) - MEAN_SINE], axis=1)
+        if self.ideal is not None:
+            return self.ideal * complete, 4.0 * EPS * np.abs(self.ideal * complete)
+        found, errors = np.zeros_like(complete), np.zeros_like(complete)
+        rest = np.ones(theta.size, dtype=bool)
+        if self.slopes is not None:
+            rest = np.minimum(theta, np.pi - theta) < self.slopes.once
+            found[~rest], errors[~rest] = self.slopes.changes(theta[~rest])
+        if rest.any():
+            found[rest], errors[rest] = self._of_rays(theta[rest], tolerance)
+        return found, errors
 
-    def __call__(self, theta: Floats) -> tuple[Floats, Floats]:
-        """The means and their errors, both of shape (angles, 2)."""
+    def _of_rays(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+        found, errors = np.zeros((theta.size, 2)), np.full((theta.size, 2), np.inf)
         if self.rule is not None:
-            found, errors = self.rule(theta, self.tolerance)
-            if np.isfinite(errors).all():
-                # rounding of the sums over branches or panels, and the panels' own miss
-                return found, errors[:, None] + np.full(found.shape, PANELS_MISS + 16.0 * EPS)
-        outgoing = self._drawn(theta)
-        drawn = np.stack([np.cos(outgoing), np.sin(outgoing)], axis=2)
-        spread = drawn.std(axis=1, ddof=1) / np.sqrt(DRAWS)
-        return drawn.mean(axis=1), NORMAL_95 * spread + 16.0 * EPS
+            means, doubt = self.rule(theta, tolerance)
+            found = np.stack([np.cos(theta) + means[:, 0], np.sin(theta) - means[:, 1]], axis=1)
+            # rounding of the sums over branches or panels, and the panels' own miss
+            errors = np.nan_to_num(doubt, nan=np.inf)[:, None] + np.full(found.shape, PANELS_MISS + 16.0 * EPS)
+        drawn = self.slopes is not None or not np.isfinite(errors).all()
+        if drawn:
+            each = self._drawn(np.repeat(theta[:, None], DRAWS, axis=1))
+            doubt = NORMAL_95 * each.std(axis=1, ddof=1) / np.sqrt(DRAWS) + 4.0 * EPS
+            better = doubt < errors
+            found, errors = np.where(better, each.mean(axis=1), found), np.where(better, doubt, errors)
+        return found, errors
 
     def _drawn(self, theta: Floats) -> Floats:
-        """Outgoing angles, shape (angles, draws)."""
-        return self.law.sample(np.repeat(theta[:, None], DRAWS, axis=1), self.rng)
+        """The changes of drawn rays, shape ``theta.shape + (2,)``, by products."""
+        onward = np.pi - self.law.sample(theta, self.rng)
+        middle, half = 0.5 * (theta + onward), 0.5 * (onward - theta)
+        return np.asarray(2.0 * np.stack([np.sin(middle) * np.sin(half), -np.cos(middle) * np.sin(half)], axis=-1))
+
+    def averages(self) -> tuple[Floats, Floats, str]:
+        """The mean coefficients, their errors, and the method."""
+        if self.ideal is not None:
+            return self.ideal, np.zeros(2), f"{self.law!r} in closed form"
+        values, errors, how = np.zeros(2), np.full(2, np.inf), ""
+        if self.slopes is not None:
+            values, errors = self._of_slopes(self.slopes)
+            how = f"squared changes, from the slopes and {GRAZING_DRAWS} grazing rays"
+            if np.all(errors <= self.tolerance * values):
+                return values, errors, how
+        basis: Basis = Panels(np.linspace(0.0, np.pi, PANELS + 1), DEGREE) if has_chain(self.law) else Directions()
+        matrix = discretise(self.law, basis, tolerance=self.tolerance, rng=self.rng)
+        along, across = (basis.project(function) for function in (_cosine, _sine))
+        entries = np.array([1.0 + along @ matrix.symmetric @ along, 1.0 - across @ matrix.symmetric @ across])
+        # both have norm 1: the projections are exact to rounding
+        error = float(matrix.error) + PANELS_MISS
+        self.averages_kind = matrix.error.kind
+        better = error < errors
+        own = f"{matrix.method} on {matrix.basis!r} ({matrix.error.method})"
+        how = how if not better.any() else own if better.all() else f"{how}; {own}"
+        return np.where(better, entries, values), np.where(better, error, errors), how
+
+    def _of_slopes(self, slopes: Slopes) -> tuple[Floats, Floats]:
+        """Half the mean squared changes, <f, (1 - P) f>, over the mean squares of cos and of sin - pi/4."""
+        steep = slopes.squared_changes()
+        fraction = 2.0 * np.sin(0.5 * slopes.once) ** 2
+        grazing = 2.0 * np.arcsin(np.sin(0.5 * slopes.once) * np.sqrt(self.rng.random(GRAZING_DRAWS)))
+        grazing = np.where(self.rng.random(GRAZING_DRAWS) < 0.5, grazing, np.pi - grazing)
+        square = self._drawn(np.clip(grazing, SMALLEST_ANGLE, LARGEST_ANGLE)) ** 2
+        spread = NORMAL_95 * square.std(axis=0, ddof=1) / np.sqrt(GRAZING_DRAWS)
+        values = 0.5 * (steep + fraction * square.mean(axis=0)) / WEIGHTS
+        return values, 0.5 * fraction * spread / WEIGHTS + ROUNDING * values
 
 
-def _coefficients(means: _Means, theta: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    found, errors = means(theta)
-    along, raised = np.cos(theta), np.sin(theta) - MEAN_SINE
-    tangential, normal = 1.0 + found[:, 0] / along, (np.sin(theta) - found[:, 1]) / raised
-    return tangential, errors[:, 0] / np.abs(along), normal, errors[:, 1] / np.abs(raised)
+def _summed(parts: list[tuple[float, _Changes]], theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+    """The changes under a weighted sum of laws, and their errors."""
+    found = [(weight, *part(theta, tolerance)) for weight, part in parts]
+    changes = np.asarray(sum(weight * change for weight, change, _ in found))
+    return changes, np.asarray(sum(weight * error for weight, _, error in found)) + 4.0 * EPS * np.abs(changes)
 
 
-def _misfit(law: Law, means: _Means, fraction: Estimate) -> Estimate:
+def _coefficients(
+    parts: list[tuple[float, _Changes]], theta: Floats, wanted: float
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """The coefficients, their errors, and where an error exceeds the wanted one, relative to the coefficient."""
+    complete = np.stack([np.cos(theta), np.sin(theta) - MEAN_SINE], axis=1)
+    changes, errors = _summed(parts, theta, RULE_SHARE * wanted)
+    missed = errors > wanted * np.abs(changes)
+    again = missed.any(axis=1)
+    if again.any():
+        # the rule's tolerance is absolute: the least change tells which one is needed
+        least = max(RULE_SHARE * wanted * float(np.abs(changes[again]).min()), LEAST_TOLERANCE)
+        finer = _summed(parts, theta[again], least)
+        better = finer[1] < errors[again]
+        changes[again], errors[again] = (
+            np.where(better, new, old[again]) for new, old in zip(finer, (changes, errors), strict=True)
+        )
+        missed = errors > wanted * np.abs(changes)
+    return changes / complete, errors / np.abs(complete), missed
+
+
+def _misfit(law: Law, parts: list[tuple[float, _Changes]], fraction: Estimate, wanted: float) -> Estimate:
     """The root mean square of E[v' | theta] less that of Maxwell's law, by two Gauss rules."""
     breakpoints, _ = law.breakpoints(BREAKPOINTS)
+    once = [part.slopes.once for _, part in parts if part.slopes is not None]
+    # the change of the normal momentum grows towards grazing like 1/sin(theta)
+    graded = np.geomspace(min(once), GRADED_UP_TO, GRADED) if once else np.empty(0)
     least = []
     for panels in (MISFIT_PANELS, 2 * MISFIT_PANELS):
-        edges = np.unique(np.concatenate([np.linspace(0.0, np.pi, panels + 1), breakpoints]))
+        uniform = np.linspace(0.0, np.pi, panels + 1)
+        edges = np.unique(np.concatenate([uniform, breakpoints, graded, np.pi - graded]))
         angle, weight = SINE.quadrature(edges, MISFIT_NODES)
-        found, errors = means(angle)
-        keeps = 1.0 - fraction.value
-        maxwell = np.stack([-keeps * np.cos(angle), MEAN_SINE + keeps * (np.sin(angle) - MEAN_SINE)], axis=1)
-        least.append(float(np.sqrt(weight @ np.sum((found - maxwell) ** 2, axis=1))))
+        changes, errors = _summed(parts, angle, RULE_SHARE * wanted)
+        complete = np.stack([np.cos(angle), np.sin(angle) - MEAN_SINE], axis=1)
+        least.append(float(np.sqrt(weight @ np.sum((changes - fraction.value * complete) ** 2, axis=1))))
     # a norm: what the means are wrong by, and what the fraction is, change it by no more than their own norms
     doubt = float(np.sqrt(weight @ np.sum(errors**2, axis=1)))
-    doubt += fraction.error * float(np.sqrt(TANGENTIAL_WEIGHT + NORMAL_WEIGHT))
-    method = f"Gauss rules on {panels} panels and half of them, {means.how}"
+    doubt += fraction.error * float(np.sqrt(WEIGHTS.sum()))
+    method = f"Gauss rules on {panels} panels and half of them"
     return Estimate(least[1], abs(least[1] - least[0]) + doubt, "estimate", method)

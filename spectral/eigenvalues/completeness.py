@@ -1,4 +1,4 @@
-"""Proof, by norms or by factorisation, that a symmetric matrix has no eigenvalues beyond the known ones."""
+"""Check, in floating point with rounding bounds, that a symmetric matrix has no eigenvalues beyond the known ones."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def _norm_of_block(block: Floats) -> float:
 def margin_below(matrix: Deflated, sign: float, vectors: Floats, values: Floats, threshold: float) -> float | None:
     r"""A bound of the distance by which eigenvalues of sign * matrix off the ``vectors`` can exceed ``threshold``.
 
-    None if the proof fails, because an eigenvalue is above the threshold or closer to it than rounding.
+    None if the check fails, because an eigenvalue is above the threshold or closer to it than rounding.
 
     Notes
     -----

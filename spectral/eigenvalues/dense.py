@@ -1,4 +1,4 @@
-"""Extremal eigenvalues of a dense symmetric matrix, with a proof of completeness."""
+"""Extremal eigenvalues of a dense symmetric matrix, with a check of completeness."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ LARGEST_RESIDUAL = 1e-11
 # Additional values. For a compact operator the Frobenius norm of the rest may then be below the last wanted value, and
 # no factorisation is needed.
 GUARDS = 6
-# Number of searches, and additional values per search, if the proof shows that values are missing.
+# Number of searches, and additional values per search, if the check shows that values are missing.
 SEARCHES, MORE_VALUES = 2, 8
-# Distance from the last value to the threshold of the proof, in backward errors n u of a factorisation.
+# Distance from the last value to the threshold of the check, in backward errors n u of a factorisation.
 CLEARANCE = 2.0
 # Norms of blocks overestimate by more than this factor; they are tried where the known values leave so much room.
 BLOCK_ROOM = 2.0
@@ -141,7 +141,7 @@ class ExtremalEigenvalues:
     errors : array of shape (m,)
         Bounds, to rounding, of the distance of every value from the eigenvalue of its rank.
     method : str
-        The method of computation, and the proof of completeness.
+        The method of computation, and the check of completeness.
     """
 
     values: Floats
@@ -187,7 +187,7 @@ def extremal(array: Floats, constant: Floats | None, k: int, which: Which = "mod
 def end_values(array: Floats, constant: Floats | None, top: int, bottom: int) -> tuple[Floats, Floats]:
     """The ``top`` largest eigenvalues, descending, and the ``bottom`` least ones, ascending; fewer of a small matrix.
 
-    There is no proof of completeness; the values serve to compare two grids, an estimate.
+    There is no check of completeness; the values serve to compare two grids, an estimate.
     """
     if len(array) >= SMALL and max(top, bottom) <= LARGEST_FRACTION * len(array):
         matrix = Deflated.of(array, constant)

@@ -1,4 +1,4 @@
-"""The largest eigenvalues of large symmetric matrices, with a proof of completeness by a count."""
+"""The largest eigenvalues of large symmetric matrices, complete by a count."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class LeadingEigenvalues:
     error : float
         Bound, to rounding, of the distance of every value from the eigenvalue of its rank.
     complete : bool
-        Whether it is proved that no larger eigenvalue is missing.
+        Whether no larger eigenvalue is missing, by a check in floating point with rounding bounds.
     counted : int
         Number of eigenvalues above ``threshold``, by the signs of a factorisation; -1 without a factorisation. For
         dense matrices the number of listed values: no others are above ``threshold``, the last value, plus ``margin``.
@@ -74,7 +74,7 @@ class LeadingEigenvalues:
 def leading_eigenvalues(
     matrix: KernelMatrix | Floats | LinearOperator | Any, k: int, rng: Rng = None
 ) -> LeadingEigenvalues:
-    r"""The k largest eigenvalues of a symmetric matrix of norm about 1, with a proof of completeness.
+    r"""The k largest eigenvalues of a symmetric matrix of norm about 1, with a check of completeness.
 
     Parameters
     ----------

@@ -144,7 +144,8 @@ class Spectrum:
         Parities of the eigenfunctions under theta -> pi - theta; "none" if the law is not known to be mirror-symmetric.
         In the other convention the odd eigenvalues have the opposite sign.
     completeness : str
-        The proof that no eigenvalue of larger modulus off the constants is missing: for the matrix, or for the law if
+        The check, in floating point with rounding bounds, that no eigenvalue of larger modulus off the constants is
+        missing: for the matrix, or for the law if
         the values are enclosed.
     verdict : {"isolated", "essential edge", "no gap", "undecided"}
         Verdict on the gap of a law, as in `SpectralGap`; "undecided" for a matrix.

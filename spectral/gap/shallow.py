@@ -63,6 +63,31 @@ class Slopes:
         """The mean of sin(angle)^2; to leading order the gap is 4 times this mean."""
         return float(self.weight @ np.sin(self.angle) ** 2)
 
+    @property
+    def once(self) -> float:
+        """Rays at this angle to the horizontal and steeper ones meet the wall once."""
+        return ONCE * self.steepest
+
+    def changes(self, theta: Floats) -> tuple[Floats, Floats]:
+        """E[cos(theta') + cos(theta)] and E[sin(theta) - sin(theta')] of rays that hit once, and errors, (angles, 2).
+
+        They are the means of 2 sin(theta - s) sin(s) and 2 cos(theta - s) sin(s) with the weight 1 - tan(s) cot(theta)
+        of the slope s, in which E tan(s) = 0.
+        """
+        square, cube = self.mean_square, float(self.weight @ (np.tan(self.angle) * np.sin(self.angle) ** 2))
+        sine, cosine = np.sin(2.0 * theta), np.cos(2.0 * theta)
+        terms = np.stack([sine * square, -cosine * cube, -cosine * square, -sine * cube]).reshape(2, 2, -1)
+        terms *= 2.0 / np.sin(theta)
+        rounding = np.abs(terms[:, 0]) + self.steepest * square * np.abs(2.0 / np.sin(theta))
+        return terms.sum(axis=1).T, ROUNDING * rounding.T
+
+    def squared_changes(self) -> Floats:
+        """Means of the squares of these changes over the flux, of rays that hit once; shape (2,)."""
+        theta, weight = gauss_rule(np.linspace(self.once, np.pi - self.once, ANGLE_PANELS + 1), ANGLE_NODES)
+        onward = theta[:, None] - self.angle
+        flux = 0.5 * np.sin(onward) * (self.weight * 4.0 * np.sin(self.angle) ** 2 / np.cos(self.angle))
+        return np.array([weight @ (flux * function(onward) ** 2).sum(axis=1) for function in (np.sin, np.cos)])
+
     def shrinkage(self, frequency: Floats) -> Floats:
         """The damping 1 - |E exp(2 i t angle)| of cos(t theta + phase) for large t, without cancellation."""
         centred = self.angle - float(self.weight @ self.angle) / float(self.weight.sum())
@@ -109,7 +134,7 @@ def shallow_gap(law: Law, edge: EssentialEdge) -> SpectralGap | None:
     """
     if not law.reversible:
         return None
-    slopes = _slopes_of(law)
+    slopes = slopes_of(law)
     if slopes is None or not 0.0 < slopes.steepest <= STEEPEST or slopes.least_turn < LEAST_TURN * slopes.steepest:
         return None
     parities = (1, 0) if law.frame == "specular" else (0,)
@@ -210,11 +235,12 @@ def _frequencies(slopes: Slopes, slowest: float) -> Floats:
     return np.concatenate([np.geomspace(slowest, fastest, 200), np.arange(slowest, fastest, step)])
 
 
-def _slopes_of(law: Law) -> Slopes | None:
+def slopes_of(law: Law) -> Slopes | None:
+    """The slopes of a law of shallow walls, whose rays meet them once unless they graze; None for other laws."""
     if isinstance(law, SpecularFrame):
-        return _slopes_of(law.law)
+        return slopes_of(law.law)
     if isinstance(law, Combination):
-        parts = [(weight, _slopes_of(term)) for weight, term in law.terms_checked()]
+        parts = [(weight, slopes_of(term)) for weight, term in law.terms_checked()]
         known = [(weight, part) for weight, part in parts if part is not None]
         if len(known) < len(parts):
             return None

@@ -1,0 +1,72 @@
+"""What nested products and powers cost: every method of every kind of law ends soon, with a result or a refusal."""
+
+import time
+
+import numpy as np
+import pytest
+
+from asperity import InputError
+from asperity import geometry as geo
+from asperity import kernels as ker
+
+THETA, EDGES = np.array([0.3, 1.0, 2.0]), np.linspace(0.0, np.pi, 9)
+HG = ker.henyey_greenstein(0.3)
+LAWS = {
+    "Henyey-Greenstein": HG,
+    "specular": ker.specular(),
+    "retroreflection": ker.retroreflection(),
+    "Lambertian": ker.lambertian(),
+    "Maxwell": ker.maxwell(0.3),
+    "rectangles": ker.RectangularTeethLaw(2.0),
+    "triangles": ker.TriangularTeethLaw(0.7),
+    "arcs": ker.CircularArcLaw(1.2),
+    "traced wall": ker.WallLaw(geo.dispersing_arcs(0.5)),
+    "polygon": ker.WallLaw(geo.triangular_teeth(0.7)),
+    "matrix": ker.MatrixLaw(ker.discretise(HG, ker.Bins(8))),
+    "least resistance": ker.LeastResistanceLaw(),
+    "sum": 0.5 * HG + 0.5 * ker.RectangularTeethLaw(2.0),
+    "composition": HG @ ker.TriangularTeethLaw(0.7),
+}
+METHODS = {
+    "sample": lambda law: law.sample(THETA, rng=0),
+    "apply": lambda law: law.apply(np.cos, THETA),
+    "branches": lambda law: law.branches(THETA),
+    "breakpoints": lambda law: law.breakpoints(8),
+    "distribution": lambda law: law.distribution(THETA, EDGES),
+    "isometry_table": lambda law: law.isometry_table(),
+    "expectations": lambda law: law.expectations(ker.Bins(4))(THETA, 1e-3),
+    "adjoint": lambda law: law.adjoint(),
+    "in_specular_frame": lambda law: law.in_specular_frame(),
+    "repr": repr,
+    "density_cuts": lambda law: law.density_cuts(THETA),
+    "discretise": lambda law: ker.discretise(law, ker.Bins(4), tolerance=1e-2),
+}
+# Seconds of this process, of which the largest permitted apply takes a third; the first call may compile.
+LONGEST = 45.0
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("exponents", [(3,), (3, 3), (2**31 - 1,)], ids=str)
+def test_powers_end_soon_or_are_refused(method, exponents):
+    for name, law in LAWS.items():
+        for exponent in exponents:
+            law = law**exponent
+        start = time.process_time()
+        try:
+            METHODS[method](law)
+        except InputError as reason:
+            assert "expected" in str(reason) or "needs" in str(reason) or "use " in str(reason), (name, reason)
+        assert time.process_time() - start < LONGEST, name
+
+
+def test_the_advice_for_large_powers_works():
+    law = ker.RectangularTeethLaw(2.0)
+    for call in (
+        lambda: ker.discretise(law ** (2**31 - 1), ker.Bins(8)),
+        lambda: (law ** (2**31 - 1)).sample(THETA, rng=0),
+        lambda: (ker.CircularArcLaw(1.2) ** 500).apply(np.cos, THETA),
+    ):
+        with pytest.raises(InputError, match="discretise"):
+            call()
+    power = ker.discretise(law, ker.Bins(8)) ** (2**31 - 1)
+    assert np.allclose(power.array.sum(axis=1), 1.0, atol=1e-6)
