@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import (
     Floats,
     angles,
+    common_shape,
     finite_array,
     finite_number,
     instance,
@@ -186,7 +187,7 @@ def trace(
     """
     _check_wall(wall)
     rays = numbers("x", x), numbers("theta", theta)
-    shape = np.broadcast_shapes(*(array.shape for array in rays))
+    shape = common_shape(x=rays[0], theta=rays[1])
     whole_number("max_collisions", max_collisions, 1)
     # the compiled functions take arrays of one kind: aligned, contiguous and writable
     full = (array if array.shape == shape else np.broadcast_to(array, shape) for array in rays)

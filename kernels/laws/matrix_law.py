@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, frozen
+from ...core.checks import Floats, common_shape, finite_array, frozen
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ..bases.angles import clipped_inside
@@ -97,12 +97,14 @@ class MatrixLaw(DensityLaw):
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
+        theta, theta_out = finite_array("theta", theta), finite_array("theta_out", theta_out)
+        common_shape(theta=theta, theta_out=theta_out)
         source, target = cell_among(self.edges, theta), cell_among(self.edges, theta_out)
         return np.asarray(self.array[source, target] * SINE.density(theta_out) / self._masses[target])
 
     def panels(self, theta: Floats) -> Floats:
         """The edges of the bins."""
-        return np.broadcast_to(self.edges, (*theta.shape, self.edges.size))
+        return np.broadcast_to(self.edges, (*finite_array("theta", theta).shape, self.edges.size))
 
     def adjoint(self) -> MatrixLaw:
         """The law of W^-1 P^T W with bin masses W; raises InputError if P does not preserve sin(theta) d theta."""

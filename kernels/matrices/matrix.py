@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, number_between, whole_number
+from ...core.checks import Floats, finite_array, finite_number, foreign, frozen, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.frames import data_array, data_frame
@@ -289,7 +289,7 @@ class KernelMatrix:
             raise InputError(f"error: expected an Estimate, got {self.error!r}")
         object.__setattr__(self, "symmetric", frozen(symmetric))
         if self.counts is not None:
-            counts = np.array(self.counts, dtype=np.int64)
+            counts = finite_array("counts", self.counts).astype(np.int64)
             if counts.shape != (n, n):
                 raise InputError(f"counts: expected shape {(n, n)}, got {counts.shape}")
             counts.setflags(write=False)
@@ -384,10 +384,10 @@ class KernelMatrix:
         return -1.0 * self
 
     def __add__(self, other: KernelMatrix) -> KernelMatrix:
-        return added(self, other) if isinstance(other, KernelMatrix) else NotImplemented
+        return added(self, other) if isinstance(other, KernelMatrix) else foreign(other)
 
     def __sub__(self, other: KernelMatrix) -> KernelMatrix:
-        return added(self, -1.0 * other) if isinstance(other, KernelMatrix) else NotImplemented
+        return added(self, -1.0 * other) if isinstance(other, KernelMatrix) else foreign(other)
 
     def __pow__(self, exponent: int) -> KernelMatrix:
         return to_power(self, whole_number("exponent", exponent, 0))
@@ -520,7 +520,7 @@ class KernelMatrix:
         if callable(other):
             return np.asarray(self.basis.normalisation * self.basis.project(other))
         values = finite_array(name, other)
-        if values.ndim == 0 or values.shape[axis] != self.size:
+        if values.ndim not in (1, 2) or values.shape[axis] != self.size:
             raise InputError(f"{name}: expected {self.size} entries for {self.basis!r}, got shape {values.shape}")
         return values
 

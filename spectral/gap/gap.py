@@ -141,6 +141,7 @@ def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6
     (0.176041, 'essential edge')
     """
     positive_number("tolerance", tolerance)
+    rng = generator(rng, 0)
     if isinstance(law, CollisionLaw):
         law = law.law
     if isinstance(law, KernelMatrix):
@@ -149,12 +150,12 @@ def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6
         raise InputError(f"law: expected a Law, a CollisionLaw or a KernelMatrix, got {law!r}")
     other = self_adjoint_elsewhere(law)
     if other is not None:
-        return _contraction(law, other, tolerance, generator(rng, 0))
+        return _contraction(law, other, tolerance, rng)
     refuse_unless_self_adjoint(law)
     power = as_power(law)
     if power is not None:
-        return _of_power(law, *power, tolerance, generator(rng, 0))
-    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(generator(rng, 0)))
+        return _of_power(law, *power, tolerance, rng)
+    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng))
 
 
 @explained
