@@ -250,7 +250,7 @@ def test_laws_that_differ_along_a_body_add_their_parts():
     along, across = body.force(0.0)
     assert along == pytest.approx(2.0 + 4.0 / 3.0, abs=1e-4)
     assert across == pytest.approx(-2.0 / 3.0, abs=1e-3)
-    u, v, n = body.sample(4_000, RNG)
+    u, v, n = body.sample(4_000, rng=RNG)
     turned = np.abs(np.angle(np.exp(1j * (u - v)))) < 1e-9
     assert np.array_equal(turned[np.abs(n - np.pi) > 1e-3], (n < np.pi)[np.abs(n - np.pi) > 1e-3])
 

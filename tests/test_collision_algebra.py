@@ -59,11 +59,11 @@ def test_psi_is_flipped_by_odd_products_and_kept_by_even_ones():
         value = (TEETH**n).apply(lambda _, p: p, 1.1, psi)
         assert np.allclose(value, psi if n % 2 == 0 else np.pi - psi, atol=1e-14)
     before = velocities(500)
-    after = (TEETH @ DIFFUSE).sample(before, RNG)
+    after = (TEETH @ DIFFUSE).sample(before, rng=RNG)
     # the rolling momentum of minus the incoming velocity
     assert np.allclose(DISK.rolling_momentum(after), -DISK.rolling_momentum(before), atol=1e-13)
     assert np.allclose(DISK.inner(after, after), DISK.inner(before, before), rtol=1e-13)
-    odd = (TEETH @ DIFFUSE @ TEETH).sample(before, RNG)
+    odd = (TEETH @ DIFFUSE @ TEETH).sample(before, rng=RNG)
     assert np.allclose(DISK.rolling_momentum(odd), DISK.rolling_momentum(before), atol=1e-13)
 
 
@@ -83,7 +83,7 @@ def test_a_sum_with_and_without_flip_draws_both_in_proportion():
     law = 0.3 * TEETH + 0.7 * (TEETH @ TEETH)
     n = 20_000
     before = np.tile(-DISK.from_angles(1.1, 0.8), (n, 1))
-    _, psi = angles_of(law.sample(before, RNG))
+    _, psi = angles_of(law.sample(before, rng=RNG))
     kept = np.abs(psi - 0.8) < 1e-9
     assert np.all(kept | (np.abs(psi - (np.pi - 0.8)) < 1e-9))
     assert abs(kept.mean() - 0.7) < 4.5 * np.sqrt(0.21 / n)
@@ -145,9 +145,9 @@ def test_the_symmetry_defect_of_a_product_is_that_of_its_matrix():
 def test_states_keep_their_position():
     rng = np.random.default_rng(RNG)
     position, before = rng.normal(size=(300, 2)), velocities(300)
-    at, after = TEETH.sample_states(position, before, RNG)
+    at, after = TEETH.sample_states(position, before, rng=RNG)
     assert np.array_equal(at, position) and at is not position
-    assert np.array_equal(after, TEETH.sample(before, RNG))
+    assert np.array_equal(after, TEETH.sample(before, rng=RNG))
     points = np.array([[0.5, 2.0], [-1.0, 3.0], [0.5, 2.0]])
     theta, psi = np.array([0.4, 1.0, 2.0]), np.array([0.3, 1.0, 2.0])
     value = TEETH.apply_to_states(lambda y, t, p: y[..., 0] * np.cos(t) + y[..., 1] * p, points, theta, psi)

@@ -103,7 +103,7 @@ def test_a_position_law_is_symmetric_and_keeps_the_position():
     assert law.reversible and law.at(0.4) == ker.TriangularTeethLaw(0.9)
     assert law.weights.tolist() == [0.25, 0.75]
     incoming = np.full(20_000, 1.0)
-    drawn = law.sample(np.linspace(0.0, 2.0, 20_000), incoming, RNG)
+    drawn = law.sample(np.linspace(0.0, 2.0, 20_000), incoming, rng=RNG)
     mean = float(law.mean().apply(np.cos, 1.0))
     assert abs(np.cos(drawn).mean() - mean) < 4.5 * np.cos(drawn).std() / np.sqrt(20_000)
 

@@ -82,12 +82,12 @@ def test_outgoing_velocities_agree_with_a_plain_march_in_time():
 def test_a_plate_at_rest_conserves_energy_and_a_heavy_one_is_a_mirror():
     mirror = ker.SpringWall(1e-12, 1e-12, frequency=1e-3)
     v = np.array([[0.3, -1.0], [-2.0, -0.1]])
-    assert np.allclose(mirror.sample(v, RNG), v * [1.0, -1.0], atol=1e-5)
+    assert np.allclose(mirror.sample(v, rng=RNG), v * [1.0, -1.0], atol=1e-5)
     exchange = ker.SpringWall(1.0, 0.0, frequency=2.0, depth=0.5)
-    assert np.allclose(exchange.sample(v, RNG), v * [1.0, -1.0], atol=1e-12)
+    assert np.allclose(exchange.sample(v, rng=RNG), v * [1.0, -1.0], atol=1e-12)
     # after one contact with a heavier plate at rest the particle leaves with (1 - m/M)/(1 + m/M) of its pace
     heavy = ker.SpringWall(0.25, 0.0, frequency=0.01)
-    assert np.allclose(heavy.sample([[0.0, -1.0]], RNG)[:, 1], 0.6, atol=1e-12)
+    assert np.allclose(heavy.sample([[0.0, -1.0]], rng=RNG)[:, 1], 0.6, atol=1e-12)
 
 
 def test_the_component_along_the_wall_is_unchanged_and_polar_form_agrees():

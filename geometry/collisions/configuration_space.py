@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, positive_number
+from ...core.checks import Floats, finite_array, positive_number, shaped
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ..disk import rolling
@@ -179,16 +179,11 @@ class ConfigurationSpace:
         >>> ConfigurationSpace(geo.flat(), Disk(4.0), 0.01).normal(0.0, 0, [0.0, 1.0]).tolist()
         [0.0, 0.5, 0.0]
         """
-        k = finite_array("wall_normal", wall_normal)
-        if k.ndim == 0 or k.shape[-1] != 2:
-            raise InputError(f"wall_normal: expected an array of shape (..., 2), got shape {k.shape}")
-        angle = finite_array("alpha", alpha) + np.asarray(number) * self.spacing
+        k = shaped("wall_normal", wall_normal, "...", 2)
+        angle = finite_array("alpha", alpha) + finite_array("number", number) * self.spacing
         n = contact_normal(self.disk.mass, self.disk.inertia, (k[..., 0], k[..., 1]), angle)
         return np.stack(np.broadcast_arrays(*n), axis=-1)
 
 
 def _configurations(value: ArrayLike) -> Floats:
-    array = finite_array("configuration", value)
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise InputError(f"configuration: expected (x1, x2, alpha) of shape (..., 3), got shape {array.shape}")
-    return array
+    return shaped("configuration", value, "...", 3)

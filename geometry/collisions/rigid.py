@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, instance, positive_number, whole_number
+from ...core.checks import Floats, instance, positive_number, shaped, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
 from ..disk.disk import Disk
@@ -196,11 +196,7 @@ def check_kinds(disk: Disk, wall: Wall) -> None:
 
 def checked_states(position: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
     """Return positions (n, 2) and incoming velocities (n, 3) as contiguous arrays of the same length."""
-    at, moving = finite_array("position", position), finite_array("velocity", velocity)
-    if at.ndim != 2 or at.shape[1] != 2:
-        raise InputError(f"position: expected shape (n, 2) for (x1, alpha), got {at.shape}")
-    if moving.ndim != 2 or moving.shape[1] != 3:
-        raise InputError(f"velocity: expected shape (n, 3) for (v1, v2, omega), got {moving.shape}")
+    at, moving = shaped("position", position, "n", 2), shaped("velocity", velocity, "n", 3)
     if len(at) != len(moving) and 1 not in (len(at), len(moving)):
         raise InputError(f"position and velocity: expected equally many rows, got {len(at)} and {len(moving)}")
     away = ~(moving[:, 1] < 0.0)

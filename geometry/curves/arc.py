@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats
+from ...core.checks import Floats, finite_array
 from ...core.errors import WallError
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
@@ -140,7 +140,7 @@ class Arc(Curve):
 
     def point(self, s: ArrayLike) -> Floats:
         """Return the points at the parameters ``s`` in [0, 1] (uniform in t), shape ``s.shape + (2,)``."""
-        s = np.asarray(s, dtype=np.float64)
+        s = finite_array("s", s)
         if abs(self.end_angle - self.start_angle) > CHORD_SPAN:
             return self._point_by_angle(s)
         dx, dy, chord = self._chord
@@ -172,7 +172,7 @@ class Arc(Curve):
 
     def tangent(self, s: ArrayLike) -> Floats:
         """Return the unit tangents at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
-        s = np.asarray(s, dtype=np.float64)
+        s = finite_array("s", s)
         a, b = self.semi_axes
         if abs(self.end_angle - self.start_angle) > CHORD_SPAN:
             t = self.start_angle + s * (self.end_angle - self.start_angle)
@@ -244,6 +244,7 @@ class Arc(Curve):
 
     def moved(self, dx: float, dy: float) -> Arc:
         """Return the arc shifted by (dx, dy)."""
+        dx, dy = as_point("moved", (dx, dy))
         center, start, end = ((x + dx, y + dy) for x, y in (self.center, self.start, self.end))
         return self._with(center, self.semi_axes, (self.start_angle, self.end_angle), start, end, self.rounding)
 

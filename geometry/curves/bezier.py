@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats
+from ...core.checks import Floats, finite_array
 from ...core.errors import WallError
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
@@ -71,7 +71,7 @@ class Bezier(Curve):
 
     def point(self, s: ArrayLike) -> Floats:
         """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
-        return _bernstein(np.array(self.control_points), np.asarray(s, dtype=np.float64))
+        return _bernstein(np.array(self.control_points), finite_array("s", s))
 
     def _derivative(self) -> Floats:
         """Return the control points of the derivative."""
@@ -79,7 +79,7 @@ class Bezier(Curve):
 
     def tangent(self, s: ArrayLike) -> Floats:
         """Return the unit tangents at the parameters ``s`` in [0, 1]; at a stationary point, one from 1e-6 inside."""
-        s = np.asarray(s, dtype=np.float64)
+        s = finite_array("s", s)
         velocity = _bernstein(self._derivative(), s)
         speed = np.hypot(velocity[..., 0], velocity[..., 1])
         still = speed <= 8.0 * EPS * float(np.abs(self._derivative()).max())
@@ -134,6 +134,7 @@ class Bezier(Curve):
 
     def moved(self, dx: float, dy: float) -> Bezier:
         """Return the curve shifted by (dx, dy)."""
+        dx, dy = as_point("moved", (dx, dy))
         return Bezier([(x + dx, y + dy) for x, y in self.control_points])
 
     def pinned(self, start: Point, end: Point) -> Bezier:

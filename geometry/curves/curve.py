@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, shortened
+from ...core.checks import Floats, finite_number, numbers, shortened
 from ...core.errors import WallError
 from ...core.kinds import explained_class
 
@@ -107,8 +107,8 @@ def point_array(points: Iterable[Point]) -> Floats:
 def as_point(name: str, value: Any) -> Point:
     """Return ``value`` as a pair of floats of at most 1e100, or raise a WallError that begins with ``name``."""
     try:
-        x, y = value
-        point = float(x), float(y)
+        x, y = value if isinstance(value, tuple) else numbers(name, value)
+        point = as_float(name, x), as_float(name, y)
     except (TypeError, ValueError, OverflowError) as reason:
         raise WallError(f"{name}: expected a point (x, y), got {shortened(value)}") from reason
     if not (abs(point[0]) <= LARGEST_COORDINATE and abs(point[1]) <= LARGEST_COORDINATE):
@@ -116,17 +116,22 @@ def as_point(name: str, value: Any) -> Point:
     return point
 
 
+def as_float(name: str, value: Any) -> float:
+    """Return a coordinate as a float."""
+    return float(value) if isinstance(value, (float, int)) else finite_number(name, value)
+
+
 def stretch_factors(x_factor: float, y_factor: float) -> tuple[float, float]:
     """Return both factors as floats; raise WallError unless both are finite and other than 0."""
-    factors = float(x_factor), float(y_factor)
-    if not all(math.isfinite(f) and f != 0.0 for f in factors):
+    factors = as_point("stretched", (x_factor, y_factor))
+    if 0.0 in factors:
         raise WallError(f"stretched: expected two finite factors other than 0, got {factors}")
     return factors
 
 
 def uniform_parameters(tolerance: float, steps: float) -> Floats:
     """Return parameters from 0 to 1 in at least ``steps`` equal steps; ``tolerance`` must be positive."""
-    if not tolerance > 0.0:
+    if not finite_number("tolerance", tolerance) > 0.0:
         raise WallError(f"flattened: expected a tolerance greater than 0, got {tolerance!r}")
     if not steps <= MOST_STEPS:
         raise WallError(f"flattened: expected a tolerance for at most {MOST_STEPS:g} points, got {steps:.3g}")

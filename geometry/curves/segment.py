@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats
+from ...core.checks import Floats, finite_array, shaped
 from ...core.errors import WallError
 from ...core.kinds import explained_class
 from .curve import Box, Curve, Point, as_point, stretch_factors
@@ -59,8 +59,9 @@ class Segment(Curve):
         >>> [piece.length for piece in Segment.path(np.array([[0.0, 0.0], [3.0, -4.0], [3.0, 0.0]]))]
         [5.0, 4.0]
         """
+        corners = shaped("vertices", vertices, "n", 2)
         pieces, assign = [], object.__setattr__
-        for start, end in pairwise(zip(*vertices.T.tolist(), strict=True)):
+        for start, end in pairwise(zip(*corners.T.tolist(), strict=True)):
             # without the checks of the constructor, which take longer than all else in a wall of many pieces
             piece = object.__new__(cls)
             assign(piece, "start", start)
@@ -70,7 +71,7 @@ class Segment(Curve):
 
     def point(self, s: ArrayLike) -> Floats:
         """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
-        along = np.asarray(s, dtype=np.float64)[..., np.newaxis]
+        along = finite_array("s", s)[..., np.newaxis]
         points: Floats = (1.0 - along) * np.array(self.start) + along * np.array(self.end)
         return points
 
@@ -79,7 +80,7 @@ class Segment(Curve):
         dx, dy = self.end[0] - self.start[0], self.end[1] - self.start[1]
         speed = math.hypot(dx, dy)
         direction = np.array([dx / speed, dy / speed])
-        return np.array(np.broadcast_to(direction, (*np.shape(s), 2)), dtype=np.float64)
+        return np.array(np.broadcast_to(direction, (*finite_array("s", s).shape, 2)), dtype=np.float64)
 
     @property
     def length(self) -> float:
@@ -107,6 +108,7 @@ class Segment(Curve):
 
     def moved(self, dx: float, dy: float) -> Segment:
         """Return the segment shifted by (dx, dy)."""
+        dx, dy = as_point("moved", (dx, dy))
         return Segment((self.start[0] + dx, self.start[1] + dy), (self.end[0] + dx, self.end[1] + dy))
 
     def pinned(self, start: Point, end: Point) -> Segment:

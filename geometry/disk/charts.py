@@ -96,7 +96,7 @@ class RollingCharts:
         [[2.0, 0.0], [2.0, 2.0]]
         """
         x1, x2, alpha = _split("configuration", configuration, 3)
-        bar = alpha + np.asarray(number) * (self.spacing / self.scale)
+        bar = alpha + finite_array("number", number) * (self.spacing / self.scale)
         return _join(rolling.satellite(x1, x2, bar, self.scale))
 
     def contact(self, configuration: ArrayLike) -> Floats:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, finite_array, frozen, of_one_shape, positive_number
+from ...core.checks import Floats, angles, broadcast, finite_array, frozen, positive_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 
@@ -206,12 +206,7 @@ class Disk:
         norms = finite_array("speed", speed)
         if not np.all(norms > 0.0):
             raise InputError(f"speed: expected numbers greater than 0, got {float(np.min(norms))!r}")
-        try:
-            theta, psi, norms = of_one_shape(theta=angles("theta", theta), psi=angles("psi", psi), norm=norms)
-        except ValueError as reason:
-            if isinstance(reason, InputError):
-                raise
-            raise InputError(f"theta, psi, speed: expected shapes that broadcast ({reason})") from reason
+        theta, psi, norms = broadcast(theta=angles("theta", theta), psi=angles("psi", psi), speed=norms)
         parts = norms[..., np.newaxis] * np.stack(direction(theta, psi), axis=-1)
         # a sum instead of a matrix product preserves the relative accuracy of each component
         return np.asarray(np.sum(parts[..., :, np.newaxis] * self.frame, axis=-2))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, frozen, instance, positive_number, whole_number
+from ...core.checks import Floats, finite_array, finite_number, frozen, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained_class
 from .disk import Disk
@@ -132,7 +132,7 @@ class SatelliteDisk:
 
     def arms(self, alpha: float) -> Floats:
         """Return the positions (count, 2) of the satellites relative to the centre of the disk."""
-        turn = alpha + self.turns
+        turn = finite_number("alpha", alpha) + self.turns
         found = np.empty((self.count, 2))
         found[:, 0], found[:, 1] = self.radii * np.cos(turn), self.radii * np.sin(turn)
         return found

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, number_between, positive_number
+from ...core.checks import Floats, finite_array, number_between, positive_number
 from ...core.errors import InputError
 from ...core.kinds import explained
 from ..collisions.configuration_space import ConfigurationSpace
@@ -59,7 +59,7 @@ def collision_path(
     >>> path.shape, bool(path[0, 1] == 0.0), bool(path[1, 1] < 0.0), abs(float(path[-1, 1])) < 1e-15
     ((4, 3), True, True, True)
     """
-    start, moving = np.array([position], dtype=float), np.array([velocity], dtype=float)
+    start, moving = finite_array("position", position)[None], finite_array("velocity", velocity)[None]
     whole = collide(disk, wall, scale, start, moving, spacing)
     contacts = int(whole.contacts[0])
     if not whole.escaped[0] or contacts > MOST_CONTACTS:

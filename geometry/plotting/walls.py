@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, finite_array, of_one_shape
+from ...core.checks import Floats, angles, broadcast, finite_array
 from ...core.html import verbatim
 from ...core.kinds import explained
 
@@ -67,7 +67,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     >>> draw_wall(geo.triangular_teeth(3.1)).get_ylabel()
     'y (stretched 29.1 times against x)'
     """
-    entries, incoming = of_one_shape(x=finite_array("x", x), theta=angles("theta", theta))
+    entries, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
     if ax is None:
         from matplotlib import pyplot
 

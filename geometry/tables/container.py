@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, frozen, number_between, positive_number
+from ...core.checks import Floats, finite_array, frozen, indices, number_between, positive_number, shaped
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
@@ -236,10 +236,8 @@ class Container:
 
     def distances(self, position: ArrayLike) -> Floats:
         """Return the signed distances (n, k) of points (n, 2) from the endless straight walls, negative outside."""
-        positions = finite_array("position", position)
-        if positions.ndim != 2 or positions.shape[1] != 2:
-            raise InputError(f"position: expected shape (n, 2), got {positions.shape}")
-        return np.asarray(np.einsum("nki,ki->nk", positions[:, None, :] - self.points, self.normals))
+        points = shaped("position", position, "n", 2)
+        return np.asarray(np.einsum("nki,ki->nk", points[:, None, :] - self.points, self.normals))
 
     @property
     def wall_count(self) -> int:
@@ -303,6 +301,8 @@ class Container:
         (time, wall, status)
             The time is inf and the wall -1 where no wall is ahead, with the status ``FREE``.
         """
+        last = indices("last", shaped("last", last, "n"), self.wall_count, -1)
+        position, velocity = shaped("position", position, last.size, 2), shaped("velocity", velocity, last.size, "k")
         times = np.full((len(position), self.wall_count), np.inf)
         straight = len(self.points)
         if straight:
@@ -358,12 +358,15 @@ class Container:
 
         The inside is on the left of the tangent; seen with the wall below, the tangent points to the right.
         """
+        position, (wall,) = shaped("position", position, "n", 2), indices("wall", [wall], self.wall_count).tolist()
         if wall >= len(self.points):
             return boundary.touch(self.curves[wall - len(self.points)], position)
         return boundary.Touch(position, np.broadcast_to(self.tangents[wall], position.shape), np.zeros(len(position)))
 
     def frames(self, position: Floats, wall: NDArray[np.int64]) -> tuple[Floats, Floats]:
         """Return the unit tangents (n, 2) and inner unit normals (n, 2) at points (n, 2) of these walls (n,)."""
+        position = shaped("position", position, "n", 2)
+        wall = indices("wall", shaped("wall", wall, len(position)), self.wall_count)
         tangent = np.empty((len(position), 2))
         for k in np.unique(wall):
             here = wall == k
@@ -382,9 +385,7 @@ class Container:
         ([[-0.5, -1.0], [0.0, 1.0]], [0, 2])
         """
         ends = self._ends()
-        along = finite_array("length", length) % ends[-1]
-        if along.ndim != 1:
-            raise InputError(f"length: expected shape (n,), got {along.shape}")
+        along = shaped("length", length, "n") % ends[-1]
         wall = np.minimum(np.searchsorted(ends, along, side="right") - 1, len(self.curves) - 1)
         points = np.empty((len(along), 2))
         for k, curve in enumerate(self.curves):
@@ -394,7 +395,8 @@ class Container:
 
     def length_at(self, position: ArrayLike, wall: NDArray[np.int64]) -> Floats:
         """Return the arc lengths (n,), from 0 to `perimeter`, of points (n, 2) on these walls (n,)."""
-        points, ends = finite_array("position", position), self._ends()
+        points, ends = shaped("position", position, "n", 2), self._ends()
+        wall = indices("wall", shaped("wall", wall, len(points)), self.wall_count)
         length = np.empty(len(points))
         for k, curve in enumerate(self.curves):
             here = wall == k
@@ -403,7 +405,8 @@ class Container:
 
     def length_on(self, wall: int, position: Floats) -> Floats:
         """Return the arc lengths (n,) of points (n, 2) from the start of a curve, whose number is ``wall``."""
-        return boundary.length_at(self.curves[wall - len(self.points)], position)
+        (curve,) = indices("wall", [wall - len(self.points)], len(self.curves)).tolist()
+        return boundary.length_at(self.curves[curve], shaped("position", position, "n", 2))
 
     def _ends(self) -> Floats:
         """The arc lengths at the ends of the curves, 0 before the first."""

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, finite_array, finite_number, number_between, of_one_shape, whole_number
+from ...core.checks import Floats, angles, broadcast, finite_array, finite_number, number_between, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ..walls.mushroom import SHORTEST_STEM, mushrooms
@@ -173,7 +173,7 @@ class MushroomGenerations:
         >>> rays.x.tolist(), rays.collisions.tolist()
         ([0.5, 0.09375], [1, 1])
         """
-        x_all, theta_all = of_one_shape(x=finite_array("x", x), theta=angles("theta", theta))
+        x_all, theta_all = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
         whole_number("max_collisions", max_collisions, 1)
         start, incoming = x_all.flatten(), theta_all.flatten()
         numbers, inside = self._looked_up(start)

@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import (
     Floats,
     angles,
+    common_shape,
     finite_array,
     finite_number,
     instance,
     number_between,
     numbers,
-    of_one_shape,
     whole_number,
 )
 from ...core.kinds import explained
@@ -192,7 +192,7 @@ def trace(
     """
     _check_wall(wall)
     rays = numbers("x", x), numbers("theta", theta)
-    shape = of_one_shape(x=rays[0], theta=rays[1])[0].shape
+    shape = common_shape(x=rays[0], theta=rays[1])
     whole_number("max_collisions", max_collisions, 1)
     # the compiled functions take arrays of one kind: aligned, contiguous and writable
     full = (array if array.shape == shape else np.broadcast_to(array, shape) for array in rays)

@@ -71,6 +71,7 @@ class HeightCorrelation:
 
     def powers(self, points: int, period: float) -> Floats:
         """The power of each frequency 0, ..., points//2 up to a factor: the transform of the correlations."""
+        period = positive_number("period", period)
         correlation = self.shape if callable(self.shape) else CORRELATIONS[self.shape]
         periods = int(np.ceil(SPAN * self.length / period))
         images = period * (np.arange(points) / points + np.arange(-periods, periods + 1)[:, None])
@@ -124,6 +125,7 @@ class SelfAffine:
 
     def powers(self, points: int, period: float) -> Floats:
         """The power of each frequency 0, ..., points//2 up to a factor."""
+        period = positive_number("period", period)
         wavelength = np.append(np.inf, period / np.arange(1, points // 2 + 1))
         capped = np.minimum(wavelength, period if self.longest is None else self.longest)
         powers = np.where(np.isinf(wavelength), 0.0, (capped / (2.0 * np.pi)) ** (1.0 + 2.0 * self.hurst))

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, instance, positive_number
+from ...core.checks import Floats, instance, numbers, positive_number
 from ...core.errors import InputError, WallError
 from ...core.html import html_table
 from ...core.kinds import explained, explained_class
@@ -119,8 +119,8 @@ class Wall(Cell):
         0.4
         """
         try:
-            points = np.array(vertices, dtype=np.float64)
-        except (TypeError, ValueError) as reason:
+            points = numbers("vertices", vertices)
+        except InputError as reason:
             raise WallError(f"vertices: expected points (x, y), got {vertices!r}") from reason
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
             raise WallError(f"vertices: expected an array of shape (n, 2) with n >= 2, got shape {points.shape}")

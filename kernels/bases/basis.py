@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats
+from ...core.checks import Floats, finite_array, whole_number
 from ...core.kinds import explained_class
+from .given import Vectorised
 from .intervals import cell_among
 from .measure import AngularMeasure, gauss_rule
 
@@ -30,6 +31,9 @@ class Basis(ABC):
     In every basis the matrix S with entries <e_i, P e_j> represents a kernel P. Two bases are equal if they are of the
     same class with the same parameters.
     """
+
+    # numpy would take a basis for an entry of an array
+    __array_ufunc__ = None
 
     @property
     def is_partition(self) -> bool:
@@ -105,7 +109,7 @@ class Basis(ABC):
 
     def index(self, angle: ArrayLike) -> NDArray[np.int64]:
         """The index of the interval between edges that contains each angle."""
-        return cell_among(self.edges, np.asarray(angle, dtype=np.float64))
+        return cell_among(self.edges, finite_array("angle", angle))
 
     def add_products(self, total: Floats, incoming: Floats, outgoing: Floats, weight: Floats) -> bool:
         """Add the sum of weight e_i(incoming) e_j(outgoing) to ``total``, or return False if the basis cannot.
@@ -148,8 +152,9 @@ class Basis(ABC):
 
     def project(self, function: Callable[[Floats], Floats], order: int | None = None) -> Floats:
         """Coefficients <e_i, f> of a vectorised function of the angle, shape (n,)."""
-        angle, weight = self.measure.quadrature(self.edges, order or self.nodes_per_interval)
-        return np.asarray(self.evaluate(angle).T @ (weight * np.asarray(function(angle), dtype=np.float64)))
+        order = self.nodes_per_interval if order is None else whole_number("order", order, 1)
+        angle, weight = self.measure.quadrature(self.edges, order)
+        return np.asarray(self.evaluate(angle).T @ (weight * Vectorised(function, scalar=True)(angle)))
 
 
 def largest(angle: Floats, squares: Floats) -> tuple[Floats, Floats]:

@@ -106,7 +106,7 @@ class Bins(Basis):
 
     def index(self, angle: ArrayLike) -> NDArray[np.int64]:
         """Index of the bin that contains each angle; a bin contains its left edge, and the last bin contains pi."""
-        angle = np.asarray(angle, dtype=np.float64)
+        angle = finite_array("angle", angle)
         if not self._equal or self._measure != SINE:
             return cell_among(self._edges, angle)
         # Bins of equal measure: the cdf gives the bin up to rounding; the comparison with the edges corrects it.

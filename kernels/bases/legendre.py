@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, whole_number
+from ...core.checks import Floats, finite_array, whole_number
 from ...core.kinds import explained, explained_class
 from .basis import Basis
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
@@ -85,7 +85,7 @@ class Legendre(Basis):
         return (self.n, self.weight)
 
     def evaluate(self, angle: ArrayLike) -> Floats:
-        angle = np.asarray(angle, dtype=np.float64)
+        angle = finite_array("angle", angle)
         # The recurrence for e_(l + 1) - e_l in 1 - cos = 2 sin^2(angle/2) has no cancellation near 0. Angles beyond
         # pi/2 are mirrored: e_l(pi - angle) = (-1)^l e_l(angle).
         mirrored = angle > 0.5 * np.pi

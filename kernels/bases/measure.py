@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, check_memory, generator, whole_number
+from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shaped, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained_class
 
@@ -42,14 +42,17 @@ class AngularMeasure:
 
     name: WeightName
 
+    # numpy would take a measure for an entry of an array
+    __array_ufunc__ = None
+
     def density(self, angle: ArrayLike) -> Floats:
         """Density with respect to d angle."""
-        sine = np.sin(np.asarray(angle, dtype=np.float64))
+        sine = np.sin(finite_array("angle", angle))
         return np.asarray(0.5 * sine if self.name == "sin" else (2.0 / np.pi) * sine * sine)
 
     def mass(self, low: ArrayLike, high: ArrayLike) -> Floats:
         """Measure of the interval (low, high), without cancellation for short intervals and near 0."""
-        low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+        low, high = finite_array("low", low), finite_array("high", high)
         if self.name == "sin":
             return np.asarray(np.sin(0.5 * (low + high)) * np.sin(0.5 * (high - low)))
         width = high - low
@@ -62,7 +65,7 @@ class AngularMeasure:
 
     def quantile(self, probability: ArrayLike) -> Floats:
         """The angle below which a fraction ``probability`` in [0, 1] of the measure lies."""
-        fraction = np.asarray(probability, dtype=np.float64)
+        fraction = finite_array("probability", probability)
         if self.name == "sin":
             # arcsin of the smaller of p and 1 - p gives full relative accuracy at both ends of (0, pi)
             lower = 2.0 * np.arcsin(np.sqrt(np.minimum(fraction, 0.5)))
@@ -114,7 +117,7 @@ def gauss_rule(edges: ArrayLike, order: int) -> tuple[Floats, Floats]:
     >>> angle.shape, round(float(weight @ angle), 12)
     ((4,), 4.5)
     """
-    edges = np.asarray(edges, dtype=np.float64)
+    edges = shaped("edges", edges, "n")
     return gauss_on_intervals(edges[:-1], edges[1:], order)
 
 

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, check_memory, frozen, number_between, whole_number
+from ...core.checks import (
+    Floats,
+    check_memory,
+    common_shape,
+    finite_array,
+    frozen,
+    indices,
+    number_between,
+    shaped,
+    whole_number,
+)
 from ...core.kinds import explained, explained_class
 from .basis import Basis, largest
 from .bins import Bins
@@ -67,7 +77,7 @@ class Panels(Basis):
 
     @explained
     def __init__(self, edges: ArrayLike, degree: int, weight: WeightName = "sin") -> None:
-        cells = Bins(np.atleast_1d(edges), weight)
+        cells = Bins(np.atleast_1d(finite_array("edges", edges)), weight)
         object.__setattr__(self, "_cells", cells)
         object.__setattr__(self, "degree", whole_number("degree", degree, 0))
         check_memory("degree", "the basis", cells.size * (self.degree + 1) ** 2)
@@ -141,7 +151,7 @@ class Panels(Basis):
 
     def local(self, angle: ArrayLike) -> tuple[NDArray[np.int64], Floats]:
         """The panel of each angle and the values of this panel's functions, shape ``angle.shape + (degree + 1,)``."""
-        angle = np.asarray(angle, dtype=np.float64)
+        angle = finite_array("angle", angle)
         panel = self._cells.index(angle)
         polynomials, owner = self.legendre(angle, panel).reshape(-1, self.degree + 1), panel.ravel()
         values = np.empty_like(polynomials)
@@ -153,6 +163,8 @@ class Panels(Basis):
 
     def legendre(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
         """The Legendre polynomials of the given panels at the angles, shape ``angle.shape + (degree + 1,)``."""
+        angle, panel = finite_array("angle", angle), indices("panel", panel, self._cells.size)
+        common_shape(angle=angle, panel=panel)
         low, high = self.edges[panel], self.edges[panel + 1]
         return np.asarray(np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), self.degree))
 
@@ -161,16 +173,18 @@ class Panels(Basis):
 
         These integrals, ``moments``, have shape (..., panels, degree + 1).
         """
+        moments = shaped("moments", moments, "...", self._cells.size, self.degree + 1)
         flat = moments.reshape(-1, *moments.shape[-2:])
         transformed = np.matmul(np.moveaxis(flat, 1, 0), self._coefficients)
         return np.asarray(np.moveaxis(transformed, 0, 1).reshape((*moments.shape[:-2], self.size)))
 
     def legendre_series(self, vectors: Floats) -> Floats:
         """Coefficients in the panels' Legendre polynomials, (panels, degree + 1, k), from ``vectors``, (size, k)."""
-        return np.asarray(np.matmul(self._coefficients, vectors.reshape(-1, self.degree + 1, vectors.shape[1])))
+        table = shaped("vectors", vectors, self.size, "k")
+        return np.asarray(np.matmul(self._coefficients, table.reshape(-1, self.degree + 1, table.shape[1])))
 
     def evaluate(self, angle: ArrayLike) -> Floats:
-        angle = np.asarray(angle, dtype=np.float64)
+        angle = finite_array("angle", angle)
         panel, local = self.local(angle)
         values = np.zeros((*angle.shape, self._cells.size, self.degree + 1))
         np.put_along_axis(values, panel[..., None, None], local[..., None, :], axis=-2)

@@ -9,10 +9,11 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats
+from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from .basis import Basis
+from .given import Vectorised
 from .measure import AngularMeasure
 
 
@@ -98,7 +99,7 @@ class TensorBasis(Basis):
 
     def evaluate(self, angle: ArrayLike) -> Floats:
         """Values of all products, shape ``(..., n)``, at points whose last axis holds one angle per factor."""
-        angle = np.asarray(angle, dtype=np.float64)
+        angle = finite_array("angle", angle)
         if angle.ndim == 0 or angle.shape[-1] != len(self.factors):
             raise InputError(f"angle: expected a last axis of length {len(self.factors)}, got shape {angle.shape}")
         values = self.factors[0].evaluate(angle[..., 0])
@@ -111,7 +112,8 @@ class TensorBasis(Basis):
         """Coefficients, shape (n,), of a function of points whose last axis holds one angle per factor."""
         rules = [f.measure.quadrature(f.edges, order or f.nodes_per_interval) for f in self.factors]
         grid = np.stack(np.meshgrid(*[rule[0] for rule in rules], indexing="ij"), axis=-1)
-        values = np.asarray(function(grid), dtype=np.float64)
+        # a function of points: its values have the shape of one of their coordinates
+        values = Vectorised(lambda *_: function(grid), scalar=True)(grid[..., 0])
         for factor, (angle, weight) in zip(self.factors, rules, strict=True):
             # Contract the first remaining axis. The new axis goes to the end, which preserves the order of factors.
             values = np.tensordot(values, weight[:, None] * factor.evaluate(angle), axes=(0, 0))

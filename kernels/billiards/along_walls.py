@@ -12,6 +12,7 @@ from ...core.checks import Floats, Rng, finite_array, generator, instance
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ...geometry import Disk
+from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
 from ..positions.position_law import PositionLaw
 
@@ -63,6 +64,7 @@ class CollisionAlongWall:
         object.__setattr__(self, "parts", tuple(CollisionLaw(law, self.disk) for law in self.law.laws))
 
     @explained
+    @seed_by_name
     def sample_at(self, x: ArrayLike, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity (n, 3) for every incoming one with v2 < 0 at the positions x (n,)."""
         at, incoming = finite_array("x", x), finite_array("velocity", velocity)
@@ -90,7 +92,7 @@ class CollisionAlongWall:
 
     def coordinate(self, container: Container, wall: int, position: Floats) -> Floats:
         """The coordinates x (n,) of points (n, 2) on a wall, within the edges of the law."""
-        first, last = self.law.edges[[0, -1]]
+        (first, last), position = self.law.edges[[0, -1]], finite_array("position", position)
         if wall < len(container.points):
             along = (position - container.points[wall]) @ container.tangents[wall]
             return np.asarray(first + np.mod(along - first, last - first))
@@ -111,4 +113,4 @@ class Located:
 
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Outgoing velocities, one for each position."""
-        return self.law.sample_at(self.x, velocity, rng)
+        return self.law.sample_at(self.x, velocity, rng=rng)

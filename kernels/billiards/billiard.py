@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checkpoints import Stored
-from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
+from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shaped, shortened, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ...core.long_runs import Engine, all_parts
@@ -112,7 +112,7 @@ class BilliardRecord:
 
     def extent(self, direction: ArrayLike = (1.0, 0.0)) -> Floats:
         """Range, shape (n,), of the collision positions along a direction, without the start."""
-        along = self.position[1:] @ finite_array("direction", direction)
+        along = self.position[1:] @ shaped("direction", direction, 2)
         return np.asarray(np.ptp(along, axis=0))
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, check_memory, finite_array, generator, instance, whole_number
+from ...core.checks import Floats, Rng, check_memory, finite_array, generator, instance, number_between, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
 from ...core.kinds import explained, explained_class
@@ -85,8 +85,7 @@ class GasRecord(BilliardRecord):
         InputError
             If ``burn_in`` is not in [0, 1).
         """
-        if not 0.0 <= burn_in < 1.0:
-            raise InputError(f"burn_in: expected a number in [0, 1), got {burn_in!r}")
+        burn_in = number_between("burn_in", burn_in, 0.0, 1.0, closed="low")
         duration, rotation = np.diff(self.time[:, 0]), self.rotational_energy[:-1] / float(self.energy[0].sum())
         first = int(burn_in * len(duration))
         duration, rotation = duration[first:], rotation[first:]

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, finite_array, instance, positive_number
+from ...core.checks import Floats, Rng, common_shape, finite_array, instance, positive_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ...geometry import Disk, Wall
+from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
 from ..laws.law import Law, specular
 
@@ -105,6 +106,7 @@ class PairLaw:
         return CollisionLaw(self.law, self.reduced_disk)
 
     @explained
+    @seed_by_name
     def sample(
         self, normal: ArrayLike, first_velocity: ArrayLike, second_velocity: ArrayLike, rng: Rng = None
     ) -> tuple[Floats, Floats]:
@@ -137,7 +139,7 @@ class PairLaw:
         if not np.all(before[..., 1] < 0.0):
             raise InputError("velocities: expected disks that approach each other along the normal; check its sign")
         mass = self.reduced_disk.mass
-        change = mass * (self.reduced_law.sample(before, rng)[..., :2] - before[..., :2])
+        change = mass * (self.reduced_law.sample(before, rng=rng)[..., :2] - before[..., :2])
         impulse = change[..., :1] * along + change[..., 1:] * up
         spun = change[..., :1]
         return (
@@ -156,8 +158,5 @@ class PairLaw:
                 raise InputError(f"{name}: expected shape (..., {width}), got {array.shape}")
         if np.any(np.abs(np.hypot(up[..., 0], up[..., 1]) - 1.0) > UNIT_TOLERANCE):
             raise InputError("normal: expected unit vectors from the second to the first centre")
-        try:
-            shape = np.broadcast_shapes(up.shape[:-1], one.shape[:-1], two.shape[:-1])
-        except ValueError as reason:
-            raise InputError(f"normal, velocities: expected shapes that broadcast ({reason})") from reason
+        shape = common_shape(normal=up[..., 0], first_velocity=one[..., 0], second_velocity=two[..., 0])
         return tuple(np.broadcast_to(a, (*shape, a.shape[-1])) for a in (up, one, two))  # type: ignore[return-value]

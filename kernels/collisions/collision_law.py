@@ -16,11 +16,13 @@ from ...core.checks import (
     Floats,
     Rng,
     angles,
-    finite_array,
+    broadcast,
+    common_shape,
     finite_number,
+    foreign,
     generator,
     instance,
-    of_one_shape,
+    shaped,
     shortened,
     whole_number,
 )
@@ -29,9 +31,10 @@ from ...core.kinds import explained, explained_class
 from ...geometry import Disk, Wall
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
+from ..bases.given import Vectorised, seed_by_name
 from ..bases.legendre import Legendre
 from ..bases.tensor import TensorBasis
-from ..laws.law import Combination, Law, retroreflection, specular
+from ..laws.law import Combination, Law, as_weight, retroreflection, specular
 from ..laws.tensor_law import Discretiser, TensorLaw
 from ..walls.isometry_branches import isometries
 from .velocity_matrices import isometry_matrix
@@ -83,6 +86,7 @@ class VelocityLaw(TensorLaw):
 
     # ---- states and velocities -------------------------------------------------------------------------------
     @explained
+    @seed_by_name
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity for every incoming one.
 
@@ -103,9 +107,7 @@ class VelocityLaw(TensorLaw):
         InputError
             If the shape is wrong or some v2 is not negative.
         """
-        incoming = finite_array("velocity", velocity)
-        if incoming.ndim == 0 or incoming.shape[-1] != 3:
-            raise InputError(f"velocity: expected shape (..., 3) for (v1, v2, omega), got {incoming.shape}")
+        incoming = shaped("velocity", velocity, "...", 3)
         if not np.all(incoming[..., 1] < 0.0):
             worst = np.argwhere(~(incoming[..., 1] < 0.0))[0].tolist()
             raise InputError(f"velocity: expected incoming velocities with v2 < 0, got v2 >= 0 at row {worst}")
@@ -133,6 +135,7 @@ class VelocityLaw(TensorLaw):
         return outgoing, np.where(first, terms[0][2], terms[1][2])
 
     @explained
+    @seed_by_name
     def sample_states(self, position: ArrayLike, velocity: ArrayLike, rng: Rng = None) -> tuple[Floats, Floats]:
         """Draw an outgoing state (y', w') for every incoming one; y' = y.
 
@@ -165,7 +168,7 @@ class VelocityLaw(TensorLaw):
         from ...geometry.collisions.rigid import checked_states
 
         at, moving = checked_states(position, velocity)
-        return at.copy(), self.sample(moving, rng)
+        return at.copy(), self.sample(moving, rng=rng)
 
     # ---- expectations ----------------------------------------------------------------------------------------
     def apply(self, function: VelocityFunction, theta: ArrayLike, psi: ArrayLike) -> Floats:
@@ -174,8 +177,9 @@ class VelocityLaw(TensorLaw):
         ``theta`` and ``psi`` in (0, pi) are the angles of minus the incoming velocity; they broadcast. Psi' is
         pi - psi, and psi in a term without flip.
         """
-        pairs = of_one_shape(theta=angles("theta", theta), psi=angles("psi", psi))
-        terms = [weight * _expectation(law, flip, function, *pairs) for weight, law, flip in self.parts_checked()]
+        pairs = broadcast(theta=angles("theta", theta), psi=angles("psi", psi))
+        checked = Vectorised(function, scalar=True)
+        terms = [weight * _expectation(law, flip, checked, *pairs) for weight, law, flip in self.parts_checked()]
         return np.asarray(sum(terms[1:], terms[0]))
 
     def apply_to_states(self, function: StateFunction, position: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Floats:
@@ -203,11 +207,9 @@ class VelocityLaw(TensorLaw):
         >>> round(float(value), 9)
         2.0
         """
-        at = finite_array("position", position)
-        if at.ndim == 0 or at.shape[-1] != 2:
-            raise InputError(f"position: expected shape (..., 2), got {at.shape}")
+        at = shaped("position", position, "...", 2)
         first, second = angles("theta", theta), angles("psi", psi)
-        shape = np.broadcast_shapes(at.shape[:-1], first.shape, second.shape)
+        shape = common_shape(position=at[..., 0], theta=first, psi=second)
         points = np.broadcast_to(at, (*shape, 2)).reshape(-1, 2)
         first, second = np.broadcast_to(first, shape).ravel(), np.broadcast_to(second, shape).ravel()
         value = np.empty(first.size)
@@ -310,7 +312,7 @@ class VelocityLaw(TensorLaw):
     def __matmul__(self, other: VelocityLaw) -> VelocityLaw:
         """This law, then the other on minus the outgoing velocity: the composition of operators."""
         if not isinstance(other, VelocityLaw):
-            return NotImplemented
+            return foreign(other)
         self._check_disk(other, "compose")
         pairs = [
             (weight * other_weight, law @ other_law, flip != other_flip)
@@ -332,15 +334,16 @@ class VelocityLaw(TensorLaw):
         return half @ half if exponent % 2 == 0 else half @ half @ self
 
     def __rmul__(self, weight: float) -> VelocityLaw:
-        if isinstance(weight, bool) or not isinstance(weight, (int, float, np.integer, np.floating)):
-            return NotImplemented
-        return _law_of([(float(weight) * own, law, flip) for own, law, flip in self.parts()], self.disk)
+        factor = as_weight(weight)
+        if factor is None:
+            return foreign(weight)
+        return _law_of([(factor * own, law, flip) for own, law, flip in self.parts()], self.disk)
 
     __mul__ = __rmul__
 
     def __add__(self, other: VelocityLaw) -> VelocityLaw:
         if not isinstance(other, VelocityLaw):
-            return NotImplemented
+            return foreign(other)
         self._check_disk(other, "add")
         return _law_of([*self.parts(), *other.parts()], self.disk)
 
@@ -500,7 +503,7 @@ def _expectation(law: Law, flip: bool, function: VelocityFunction, theta_all: Fl
     rolled = np.pi - psi_values if flip else psi_values
     if theta_values.size * psi_values.size <= GRID_EXCESS * theta_all.size:
         # one call for the grid, with psi as an additional axis of the function's values
-        grid = law.apply(lambda outgoing: _on_grid(function, outgoing[..., None], rolled), theta_values)
+        grid = law.apply(lambda outgoing: function(outgoing[..., None], rolled), theta_values)
         return np.asarray(grid[theta_index, psi_index].reshape(theta_all.shape))
     value = np.empty(theta_all.shape)
     for k, angle in enumerate(rolled):
@@ -509,14 +512,8 @@ def _expectation(law: Law, flip: bool, function: VelocityFunction, theta_all: Fl
     return value
 
 
-def _on_grid(function: VelocityFunction, theta: Floats, psi: Floats) -> Floats:
-    """The values in the joint shape of both angles, also of a function that ignores one of them."""
-    values = np.asarray(function(theta, psi), dtype=np.float64)
-    return np.broadcast_to(values, np.broadcast_shapes(theta.shape, psi.shape))
-
-
 def _with_psi(function: VelocityFunction, psi: Floats, theta: Floats) -> Floats:
-    return _on_grid(function, theta, np.asarray(psi))
+    return function(theta, np.asarray(psi))
 
 
 @explained

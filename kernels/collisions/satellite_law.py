@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, finite_array, generator
 from ...core.errors import AccuracyError
-from ...core.kinds import explained_class
+from ...core.kinds import explained, explained_class
+from ..bases.given import seed_by_name
 
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall
@@ -58,6 +59,8 @@ class SatelliteLaw:
 
         object.__setattr__(self, "spacing", ConfigurationSpace(self.wall, self.disk, self.scale, self.spacing).spacing)
 
+    @explained
+    @seed_by_name
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity (n, 3) for every incoming one with v2 < 0.
 

@@ -163,6 +163,7 @@ def discretise(
                 **engine,
             ),
         )
+    source = generator(rng, SEED_WITHOUT_RNG)
     if not isinstance(law, Law):
         raise not_a_law("law", "a law such as WallLaw(wall)", law)
     if not isinstance(basis, Basis):
@@ -177,7 +178,6 @@ def discretise(
     if finite_number("tolerance", tolerance) < 0.0:
         raise InputError(f"tolerance: expected a number of at least 0, got {tolerance!r}")
     number = DEFAULT_SAMPLES if samples is None else whole_number("samples", samples, 2 * PARTS)
-    source = generator(rng, SEED_WITHOUT_RNG)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
     if engine and method not in SAMPLING:

@@ -100,7 +100,7 @@ class _HalfOfEntries(Law):
     law: Law
     first: int
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         found = self.law.distribution(theta, edges)
         return Distribution(found.below, found.position[:, self.first :: 2], 2.0 * found.mass[:, self.first :: 2])
 
@@ -118,7 +118,7 @@ class _OnCells(Composition):
     # the last matrix used, for its error
     last: KernelMatrix | None = field(default=None, compare=False, repr=False)
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         atoms = atoms_of(self, theta, edges)
         if atoms is not None:
             return atoms

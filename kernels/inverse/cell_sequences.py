@@ -100,6 +100,7 @@ def dichotomy(
     """
     from ...geometry import Disk, Wall
 
+    rng = generator(rng, 0)
     if len(cells) < FEWEST_CELLS or not all(isinstance(cell, Wall) for cell in cells):
         raise InputError(f"cells: expected at least {FEWEST_CELLS} walls, got {cells!r}")
     positive_number("tolerance", tolerance)
@@ -107,7 +108,6 @@ def dichotomy(
     if eps.size < 3 or eps[-1] <= 0.0:
         raise InputError(f"scales: expected at least 3 numbers greater than 0, got {scales!r}")
     disk = disk or Disk()
-    rng = generator(rng, 0)
     laws = [WallLaw(cell.foreshorten(disk)) for cell in cells]
     count = len(laws)
     values, errors = np.zeros((count, count)), np.zeros((count, count))

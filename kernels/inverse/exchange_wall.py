@@ -14,6 +14,7 @@ from ...core.checks import Floats, Rng, generator, instance, number_between, pos
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.kinds import explained, explained_class
+from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.interval_exchange import IntervalExchangeLaw
 from ..laws.law import Law, mixture, specular
@@ -152,6 +153,7 @@ class ExchangeHollow:
         >>> round(found.value, 3), found.error < 1e-4
         (0.989, True)
         """
+        function, unfollowed = Vectorised(function, scalar=True), Estimate(unfollowed, 0.0, "bound", "given").value
         ends = np.append(self.exchange.starts, 1.0)
         rough, fine = (self._mean_over_pieces(function, SINE.quantile(ends), order) for order in PIECE_NODES)
         theta, traced = self._traced(samples, rng)

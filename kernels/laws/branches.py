@@ -63,7 +63,7 @@ def chained(laws: Sequence[Branching], theta: Floats) -> tuple[Floats, Floats]:
     probability, outgoing = np.ones((*theta.shape, 1)), theta[..., None]
     for law in laws:
         step, angle = law.branches(outgoing)
-        shape = (*theta.shape, -1)
+        shape = (*theta.shape, step.shape[-2] * step.shape[-1])
         probability = (probability[..., None] * step).reshape(shape)
         outgoing = angle.reshape(shape)
         probability, outgoing = _compressed(*merged(*_compressed(probability, outgoing)))

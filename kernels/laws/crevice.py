@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...core.checks import Floats
+from ...core.checks import Floats, whole_number
 from ..bases.measure import SINE
 
 # d = 2 r |cot theta|, with r depth over width, has a relative error of about 2 eps in float64. Above the first limit
@@ -58,7 +58,7 @@ def crevice_retro(height_to_width: float, theta: Floats) -> Floats:
 
 def crevice_breakpoints(height_to_width: float, limit: int) -> tuple[Floats, float]:
     """The angles where d is a whole number, about ``limit`` at most, and the measure of the angles beyond them."""
-    last = max((limit - 1) // 2, 0)
+    last = max((whole_number("limit", limit, 0) - 1) // 2, 0)
     if last == 0:
         return np.empty(0), 1.0
     steep = np.arctan(2.0 * height_to_width / np.arange(last, 0, -1))

@@ -9,12 +9,13 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, frozen
+from ...core.checks import Floats, common_shape, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
+from ..bases.given import Vectorised
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from .distribution import Distribution
@@ -108,16 +109,9 @@ class DensityLaw(Law):
     # ---- methods that a subclass with its own formula overrides -----------------------------------------------
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
-        theta, theta_out = np.asarray(theta, dtype=np.float64), np.asarray(theta_out, dtype=np.float64)
-        shape = np.broadcast_shapes(theta.shape, theta_out.shape)
-        value = finite_array("density", self._function(theta, theta_out))
-        try:
-            value = np.broadcast_to(value, shape)
-        except ValueError as reason:
-            raise InputError(
-                f"density: expected a vectorised function, values of shape {shape} for arguments of shapes "
-                f"{theta.shape} and {theta_out.shape}, got {value.shape}"
-            ) from reason
+        theta, theta_out = finite_array("theta", theta), finite_array("theta_out", theta_out)
+        shape = common_shape(theta=theta, theta_out=theta_out)
+        value = finite_array("density", Vectorised(self._function, scalar=True)(theta, theta_out))
         if value.size and value.min() < -NEGATIVE_TOLERANCE * max(1.0, float(value.max())):
             worst = np.unravel_index(int(np.argmin(value)), shape)
             where_worst = np.broadcast_to(theta, shape)[worst], np.broadcast_to(theta_out, shape)[worst]
@@ -130,7 +124,7 @@ class DensityLaw(Law):
     def panels(self, theta: Floats) -> Floats:
         """Increasing edges from 0 to pi, shape ``theta.shape + (m,)``, between which p(theta, .) is resolved."""
         edges = self._grid(self._panel_count)
-        return np.broadcast_to(edges, (*theta.shape, edges.size))
+        return np.broadcast_to(edges, (*finite_array("theta", theta).shape, edges.size))
 
     @property
     def resolution(self) -> float:
@@ -139,13 +133,14 @@ class DensityLaw(Law):
 
     def incoming_edges(self, edges: Floats) -> Floats:
         """Angles theta between which the integrals of p(theta, .) between the given edges vary smoothly."""
+        finite_array("edges", edges)
         return self._grid(self._panel_count)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The outgoing breakpoints, which by detailed balance are incoming ones too; there may be others."""
         return self.outgoing_breakpoints, math.inf
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """Cell masses by Gauss rules between the edges; if the law's panels are narrower, their edges cut the cells."""
         step = max(1, CHUNK // (CELL_NODES * edges.size))
         parts = [self._cell_masses(theta[start : start + step], edges) for start in range(0, theta.size, step)]

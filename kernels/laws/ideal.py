@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, number_between
+from ...core.checks import Floats, common_shape, finite_array, number_between
 from ...core.kinds import explained
 from ..bases.basis import Basis
 from ..bases.measure import SINE
@@ -29,14 +29,14 @@ class LambertianLaw(DensityLaw):
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """sin(theta')/2, in the shape to which the two arguments broadcast."""
-        shape = np.broadcast_shapes(np.shape(theta), np.shape(theta_out))
-        return np.broadcast_to(SINE.density(theta_out), shape)
+        density = SINE.density(theta_out)
+        return np.broadcast_to(density, common_shape(theta=finite_array("theta", theta), theta_out=density))
 
-    def density_cuts(self, theta: Floats) -> Floats:
+    def _density_cuts(self, theta: Floats) -> Floats:
         """None are needed, because the density is smooth."""
         return np.empty((theta.size, 0))
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The same distribution function at every incoming angle."""
         return Distribution.without_atoms(np.broadcast_to(SINE.cdf(edges), (theta.size, edges.shape[-1])))
 

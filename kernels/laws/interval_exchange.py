@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, frozen
+from ...core.checks import Floats, angles, frozen
 from ...core.errors import InputError
 from ...core.kinds import explained_class
 from ..bases.angles import clipped_inside
@@ -92,6 +92,7 @@ class IntervalExchangeLaw(Law):
 
     def image(self, theta: Floats) -> Floats:
         """The outgoing angle of every incoming angle."""
+        theta = angles("theta", theta)
         fraction = SINE.cdf(theta)
         piece = np.clip(np.searchsorted(self.starts, fraction, side="right") - 1, 0, self.starts.size - 1)
         moved = fraction + (self.starts[self.partner[piece]] - self.starts[piece])
@@ -102,7 +103,7 @@ class IntervalExchangeLaw(Law):
         """All angles between two pieces; none are left out."""
         return np.asarray(SINE.quantile(self.starts[1:])), 0.0
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """One atom at the image of each angle."""
         return Distribution.of_atoms(edges, self.image(theta)[:, None], np.ones((theta.size, 1)))
 

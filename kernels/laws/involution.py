@@ -120,7 +120,7 @@ class InvolutionLaw(Law):
         """The angles where the map jumps or reverses direction, as far as 4096 probes show them."""
         return jumps_of_map(self.map), 0.0
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """One atom at the image of each angle."""
         image = np.asarray(self.map(theta), dtype=np.float64)
         return Distribution.of_atoms(edges, clipped_inside(image)[:, None], np.ones((theta.size, 1)))

@@ -256,7 +256,7 @@ class IsometryTable:
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles of the branches of `conditionals`."""
         probability, sign, offset = self.conditionals(theta)
-        return probability, clipped_inside(sign * np.asarray(theta, dtype=np.float64)[..., None] + offset)
+        return probability, clipped_inside(sign * angles("theta", theta)[..., None] + offset)
 
     def _entries(self, theta: Floats) -> tuple[Whole, Whole, Floats]:
         """All (angle, isometry, probability); pieces with the same isometry are not yet merged."""
@@ -271,7 +271,7 @@ class IsometryTable:
         bucket = np.clip((theta * (buckets / np.pi)).astype(np.int64), 0, buckets - 1)
         size = first[bucket + 1] - first[bucket]
         step = max(CHUNK // max(int(size.max(initial=1)), 1), 1)
-        for begin in range(0, theta.size, step):
+        for begin in range(0, max(theta.size, 1), step):
             part = slice(begin, begin + step)
             owner, group = joined_lists(size[part])
             query = begin + owner

@@ -11,12 +11,25 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, angles, finite_array, generator, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    angles,
+    common_shape,
+    finite_array,
+    foreign,
+    generator,
+    numbers,
+    shaped,
+    shortened,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.html import html_table
 from ...core.kinds import explained, explained_class
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Basis, Frame
+from ..bases.given import Vectorised, seed_by_name
 from ..bases.mirror import is_mirror_symmetric
 from ..expectations.basis_means import ByApply, Expectations, Mirrored, Weighted
 from .branches import chained, chained_breakpoints, joined, merged
@@ -34,6 +47,8 @@ WEIGHT_TOLERANCE = 1e-12
 MOST_EVALUATIONS, MOST_AT_ONCE = 2 * 10**5, 4 * 10**6
 # Entry points of a driven law that `distribution` uses, each an atom.
 ENTRY_POINTS = 4096
+# Edges begin at 0 and end at pi within a few roundings.
+ENDS_TOLERANCE = 1e-14
 # Limit on nested calls of `apply`; more would exceed Python's recursion limit.
 DEEPEST_POWER = 100
 # Limits on the exponents of powers of which branches are listed, and of which rays are drawn, some seconds of work.
@@ -82,14 +97,20 @@ class Law(ABC):
 
     # ---- sampling and expectations ---------------------------------------------------------------------------
     @explained
+    @seed_by_name
     def sample(self, theta: ArrayLike, rng: Rng = None) -> Floats:
-        """Draw one outgoing angle for every incoming angle ``theta``; the same shape, radians in (0, pi)."""
-        return self._sample(angles("theta", theta), generator(rng))
+        """Draw one outgoing angle for every incoming angle ``theta``; the same shape, radians in (0, pi).
+
+        A whole number as ``rng``, the seed, is given by name: ``law.sample(0.7, rng=1)`` draws one angle, and
+        ``law.sample(np.full(1000, 0.7))`` draws 1000 of them.
+        """
+        source = generator(rng)
+        return self._sample(angles("theta", theta), source)
 
     @explained
     def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
         """The expectation E[f(Theta') | theta] of a vectorised f, whose values have shape ``theta.shape + extra``."""
-        return self._apply(function, angles("theta", theta))
+        return self._apply(Vectorised.of(function), angles("theta", theta))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles of a law made of isometries theta' = +-theta + const.
@@ -157,12 +178,16 @@ class Law(ABC):
         """The known outgoing angles at which densities jump or have a kink for every incoming angle."""
         return np.empty(0)
 
-    def density_cuts(self, theta: Floats) -> Floats | None:
+    def density_cuts(self, theta: ArrayLike) -> Floats | None:
         """Outgoing angles between which the density of P~(theta_k, .) is smooth, shape (angles, any), in any order.
 
         The narrowest pieces may be left out. None if the law does not know them for every incoming angle; else
         `distribution` takes other edges for each incoming angle, of shape (angles, edges).
         """
+        return self._density_cuts(shaped("theta", angles("theta", theta), "n"))
+
+    def _density_cuts(self, theta: Floats) -> Floats | None:
+        """`density_cuts` for checked angles; the default knows none."""
         return None
 
     def random_map(self) -> RandomMap | None:
@@ -173,12 +198,21 @@ class Law(ABC):
         """All isometries of the law with their probabilities; None if the law is no such mixture or cannot list it."""
         return None
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def distribution(self, theta: ArrayLike, edges: ArrayLike) -> Distribution:
         """P~(theta_k, .) for every theta_k, with its atoms if the law knows them; ``edges`` go from 0 to pi.
 
         A law that knows its `density_cuts` also takes edges of shape (angles, edges).
-        The default computes the expectations of indicator functions.
         """
+        angle, cells = shaped("theta", angles("theta", theta), "n"), finite_array("edges", edges)
+        own = cells.ndim == 2 and len(cells) == angle.size and self._density_cuts(angle) is not None
+        if not (cells.ndim == 1 or own) or cells.shape[-1] < 2 or np.any(np.diff(cells) < 0.0):
+            raise InputError(f"edges: expected increasing angles in a row, got {shortened(edges)}")
+        if np.any(np.abs(cells[..., [0, -1]] - [0.0, np.pi]) > ENDS_TOLERANCE):
+            raise InputError(f"edges: expected angles from 0 to pi, got {cells.min():g} to {cells.max():g}")
+        return self._distribution(angle, cells)
+
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """`distribution` for checked arguments; the default computes the expectations of indicator functions."""
         below = self.apply(lambda angle: (angle[..., None] < edges).astype(np.float64), theta)
         return Distribution.without_atoms(np.maximum.accumulate(below, axis=1))
 
@@ -203,7 +237,7 @@ class Law(ABC):
     def __matmul__(self, other: Law) -> Law:
         """This law followed by the other."""
         if not isinstance(other, Law):
-            return NotImplemented
+            return foreign(other)
         return Composition.of(self, other)
 
     def __pow__(self, exponent: int) -> Law:
@@ -212,15 +246,14 @@ class Law(ABC):
         return Power(self, int(exponent))
 
     def __rmul__(self, weight: float) -> Combination:
-        if isinstance(weight, bool) or not isinstance(weight, (int, float, np.integer, np.floating)):
-            return NotImplemented
-        return Combination(((float(weight), self),))
+        factor = as_weight(weight)
+        return foreign(weight) if factor is None else Combination(((factor, self),))
 
     __mul__ = __rmul__
 
     def __add__(self, other: Law) -> Combination:
         if not isinstance(other, Law):
-            return NotImplemented
+            return foreign(other)
         return Combination.of(self) + Combination.of(other)
 
 
@@ -248,7 +281,7 @@ class BranchLaw(Law):
         """Increasing angles in (0, pi) where the branches change, at most about ``limit`` of them, and the measure
         under sin(theta)/2 d theta of the angles, mostly near grazing, whose breakpoints were left out."""
 
-    def density_cuts(self, theta: Floats) -> Floats:
+    def _density_cuts(self, theta: Floats) -> Floats:
         """None are needed, because there is no density."""
         return np.empty((theta.size, 0))
 
@@ -259,7 +292,7 @@ class BranchLaw(Law):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self._branch_taken(rng.random(theta.shape), theta)
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The branches as atoms."""
         probability, outgoing = self.branches(theta)
         return Distribution.of_atoms(edges, outgoing, probability)
@@ -299,7 +332,7 @@ class DrivenLaw(Law):
         """The map `reflect`."""
         return lambda x, theta: (self.reflect(x, theta), None)
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """One atom for each of 4096 equally spaced entry points."""
         x = (np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS
         outgoing = self.reflect(x, theta[:, None])
@@ -314,6 +347,12 @@ class DrivenLaw(Law):
         return np.asarray(np.mean(np.asarray(function(outgoing), dtype=np.float64), axis=0))
 
 
+def as_weight(weight: object) -> float | None:
+    """The factor of a law as a float; None for what is no number, with which Python raises a TypeError."""
+    is_number = isinstance(weight, (int, float, np.integer, np.floating)) and not isinstance(weight, bool)
+    return float(numbers("weight", weight)) if is_number else None  # type: ignore[arg-type]
+
+
 def entry_inside(x: Floats) -> Floats:
     """Clip uniform numbers to the open interval (0, 1)."""
     return np.asarray(np.clip(x, SMALLEST, LARGEST))
@@ -323,6 +362,13 @@ def set_properties(law: Law, **properties: object) -> None:
     """Set attributes of an immutable law during its construction."""
     for name, value in properties.items():
         object.__setattr__(law, name, value)
+
+
+def entries(x: ArrayLike, theta: ArrayLike) -> tuple[Floats, Floats]:
+    """Return entry points and incoming angles as float64, whose shapes broadcast."""
+    at, incoming = entry_points(x), angles("theta", theta)
+    common_shape(x=at, theta=incoming)
+    return at, incoming
 
 
 def entry_points(x: ArrayLike) -> Floats:
@@ -407,14 +453,14 @@ class Combination(Law):
 
     def __add__(self, other: Law) -> Combination:
         if not isinstance(other, Law):
-            return NotImplemented
+            return foreign(other)
         return Combination(self.terms + Combination.of(other).terms)
 
     def __rmul__(self, weight: float) -> Combination:
-        scale = super().__rmul__(weight)
-        if not isinstance(scale, Combination):
-            return NotImplemented
-        return Combination(tuple((scale.terms[0][0] * own, law) for own, law in self.terms))
+        factor = as_weight(weight)
+        if factor is None:
+            return foreign(weight)
+        return Combination(tuple((factor * own, law) for own, law in self.terms))
 
     __mul__ = __rmul__
 
@@ -435,7 +481,7 @@ class Combination(Law):
     def outgoing_breakpoints(self) -> Floats:
         return np.unique(np.concatenate([law.outgoing_breakpoints for _, law in self.terms]))
 
-    def density_cuts(self, theta: Floats) -> Floats | None:
+    def _density_cuts(self, theta: Floats) -> Floats | None:
         cuts = [law.density_cuts(theta) for _, law in self.terms]
         known = [found for found in cuts if found is not None]
         return np.concatenate(known, axis=1) if len(known) == len(cuts) else None
@@ -446,7 +492,7 @@ class Combination(Law):
         tables = [table.scaled(weight) for weight, table in terms if table is not None]
         return IsometryTable.joined(tables) if len(tables) == len(terms) else None
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         terms = self.terms_checked()
         return Distribution.mixed([(weight, law.distribution(theta, edges)) for weight, law in terms])
 
@@ -485,7 +531,7 @@ def mixture(laws: Sequence[Law], weights: ArrayLike) -> Combination:
     >>> mixture([specular(), retroreflection()], [0.5, 0.5])
     0.5*specular() + 0.5*retroreflection()
     """
-    weight = np.asarray(weights, dtype=np.float64)
+    weight = finite_array("weights", weights)
     if weight.shape != (len(laws),):
         raise InputError(f"weights: expected one for each of {len(laws)} laws, got an array of shape {weight.shape}")
     total = Combination(tuple(zip(weight.tolist(), laws, strict=True)))
@@ -579,9 +625,9 @@ class Composition(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return chained_breakpoints(self.laws, limit)
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The branches, if there are any that can be listed, as atoms; else by `apply`."""
-        return atoms_of(self, theta, edges) or super().distribution(theta, edges)
+        return atoms_of(self, theta, edges) or super()._distribution(theta, edges)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         for law in self.laws:
@@ -639,9 +685,9 @@ class Power(Law):
             return np.empty(0), math.inf
         return chained_breakpoints((self.law,) * self.exponent, limit)
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The branches, if there are any that can be listed, as atoms; else by `apply`."""
-        return atoms_of(self, theta, edges) or super().distribution(theta, edges)
+        return atoms_of(self, theta, edges) or super()._distribution(theta, edges)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         _check_length("sample", self.exponent, LONGEST_SAMPLE)
@@ -752,7 +798,7 @@ class SpecularFrame(Law):
     def outgoing_breakpoints(self) -> Floats:
         return np.asarray(np.pi - self.law.outgoing_breakpoints[::-1])
 
-    def density_cuts(self, theta: Floats) -> Floats | None:
+    def _density_cuts(self, theta: Floats) -> Floats | None:
         cuts = self.law.density_cuts(theta)
         return None if cuts is None else np.asarray(np.pi - cuts)
 
@@ -771,7 +817,7 @@ class SpecularFrame(Law):
         table = self.law.isometry_table()
         return None if table is None else table.in_specular_frame()
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         return self.law.distribution(theta, (np.pi - edges)[..., ::-1]).mirrored()
 
     def expectations(self, basis: Basis) -> Expectations:

@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ...core.checks import Floats
+from ...core.checks import Floats, finite_array
 from ...core.kinds import explained_class
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
@@ -66,7 +66,7 @@ class LeastResistanceLaw(Law):
 
     def images(self, theta: Floats) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles, shape ``theta.shape + (2,)``; the specular outcome is the first."""
-        x = np.asarray(theta, dtype=np.float64) - 0.5 * np.pi
+        x = finite_array("theta", theta) - 0.5 * np.pi
         size = np.abs(x)
         away = np.clip(np.where(size < self.split_ends, -3.0 * np.cos(3.0 * size) / np.cos(size), 1.0), 0.0, 1.0)
         away = np.where(size < SPLIT_BEGINS, 0.0, away)
@@ -79,14 +79,14 @@ class LeastResistanceLaw(Law):
         x = np.array([SPLIT_BEGINS, self.split_ends, np.pi - 3.0 * self.split_ends])
         return 0.5 * np.pi + np.concatenate((-x[::-1], x)), 0.0
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """Two atoms at each incoming angle."""
         probability, outgoing = self.images(theta)
         return Distribution.of_atoms(edges, outgoing, probability)
 
     def potential(self, theta: Floats) -> Floats:
         """The potential phi: phi(theta) + phi(theta') <= cos(theta' - theta), with equality on the law's support."""
-        size = np.abs(np.asarray(theta, dtype=np.float64) - 0.5 * np.pi)
+        size = np.abs(finite_array("theta", theta) - 0.5 * np.pi)
         b = self.split_ends
         last = np.pi - 3.0 * b
         # Cumulative integral of sin(x - x') over the sorted x from b to pi - 3 b; beyond, the integral is elementary.

@@ -8,7 +8,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, frozen, shortened
+from ...core.checks import Floats, common_shape, finite_array, frozen, shortened
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
@@ -112,12 +112,14 @@ class MatrixLaw(DensityLaw):
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
+        theta, theta_out = finite_array("theta", theta), finite_array("theta_out", theta_out)
+        common_shape(theta=theta, theta_out=theta_out)
         source, target = cell_among(self.edges, theta), cell_among(self.edges, theta_out)
         return np.asarray(self.array[source, target] * SINE.density(theta_out) / self._masses[target])
 
     def panels(self, theta: Floats) -> Floats:
         """The edges of the bins."""
-        return np.broadcast_to(self.edges, (*theta.shape, self.edges.size))
+        return np.broadcast_to(self.edges, (*finite_array("theta", theta).shape, self.edges.size))
 
     def density_cuts(self, theta: Floats) -> Floats:
         """The edges of the bins."""

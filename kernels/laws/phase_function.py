@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, number_between, whole_number
+from ...core.checks import Floats, common_shape, finite_array, number_between, shaped, whole_number
 from ...core.kinds import explained
 from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.measure import SINE
@@ -64,7 +64,8 @@ class HenyeyGreensteinLaw(DensityLaw):
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
         from scipy.special import elliprg
 
-        theta, theta_out = np.asarray(theta, dtype=np.float64), np.asarray(theta_out, dtype=np.float64)
+        theta, theta_out = finite_array("theta", theta), finite_array("theta_out", theta_out)
+        common_shape(theta=theta, theta_out=theta_out)
         weight = 2.0 * SINE.density(theta_out)
         # g < 0 is g > 0 followed by theta' -> pi - theta'. As sums of squares, A - B and A + B have no cancellation.
         g, target = abs(self.g), theta_out if self.g >= 0.0 else np.pi - theta_out
@@ -77,6 +78,7 @@ class HenyeyGreensteinLaw(DensityLaw):
     def panels(self, theta: Floats) -> Floats:
         """Edges whose distances from the peak double; the width of the peak is about 1 - |g|."""
         distance = (1.0 - abs(self.g)) * 2.0 ** np.arange(self._doublings())
+        theta = finite_array("theta", theta)
         peak = (theta if self.g >= 0.0 else np.pi - theta)[..., None]
         ends = np.zeros_like(peak)
         edges = [ends, peak - distance[::-1], peak, peak + distance, ends + np.pi]
@@ -89,6 +91,7 @@ class HenyeyGreensteinLaw(DensityLaw):
 
     def incoming_edges(self, edges: Floats) -> Floats:
         """Angles whose distances from the edges double, because the integrals change where the peak passes an edge."""
+        edges = shaped("edges", edges, "n")
         centre = edges if self.g >= 0.0 else np.pi - edges[::-1]
         distance = self.resolution * 2.0 ** np.arange(self._doublings())
         # Distances end at the middle between two edges, beyond which the next edge is nearer.

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, instance, number_between, whole_number
+from ...core.checks import Floats, finite_array, finite_number, foreign, frozen, instance, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.frames import data_array, data_frame
@@ -302,6 +302,7 @@ class KernelMatrix:
             )
         object.__setattr__(self, "symmetric", frozen(symmetric))
         if self.counts is not None:
+            finite_array("counts", self.counts)
             counts = np.array(self.counts)
             if counts.shape != (n, n) or counts.dtype.kind not in "iu" or counts.min() < 0 or counts.max() > MOST:
                 raise InputError(
@@ -430,10 +431,10 @@ class KernelMatrix:
         return -1.0 * self
 
     def __add__(self, other: KernelMatrix) -> KernelMatrix:
-        return added(self, other) if isinstance(other, KernelMatrix) else NotImplemented
+        return added(self, other) if isinstance(other, KernelMatrix) else foreign(other)
 
     def __sub__(self, other: KernelMatrix) -> KernelMatrix:
-        return added(self, -1.0 * other) if isinstance(other, KernelMatrix) else NotImplemented
+        return added(self, -1.0 * other) if isinstance(other, KernelMatrix) else foreign(other)
 
     def __pow__(self, exponent: int) -> KernelMatrix:
         return to_power(self, whole_number("exponent", exponent, 0))
@@ -570,7 +571,7 @@ class KernelMatrix:
         if callable(other):
             return np.asarray(self.basis.normalisation * self.basis.project(other))
         values = finite_array(name, other)
-        if values.ndim == 0 or values.shape[axis] != self.size:
+        if values.ndim not in (1, 2) or values.shape[axis] != self.size:
             raise InputError(f"{name}: expected {self.size} entries for {self.basis!r}, got shape {values.shape}")
         return values
 

@@ -9,10 +9,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, angles, finite_array, finite_number, frozen, generator, whole_number
+from ...core.checks import Floats, Rng, angles, broadcast, finite_array, finite_number, frozen, generator, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ...geometry import Wall
+from ..bases.given import Vectorised, seed_by_name
 from ..laws.law import Combination, Law
 from ..walls.wall_law import WallLaw
 
@@ -129,9 +130,10 @@ class PositionLaw:
         return Combination(tuple(zip(self.weights.tolist(), self.laws, strict=True)))
 
     @explained
+    @seed_by_name
     def sample(self, x: ArrayLike, theta: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing angle for every state (x, theta); the arrays broadcast. The position stays x."""
-        at, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
+        at, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
         source = generator(rng)
         where, outgoing = self.interval(at), np.empty(at.shape)
         for k, law in enumerate(self.laws):
@@ -143,17 +145,18 @@ class PositionLaw:
     @explained
     def apply(self, function: PositionFunction, x: ArrayLike, theta: ArrayLike) -> Floats:
         """The expectation E[f(x', Theta') | x, theta] of a vectorised f(x, theta), with x' = x."""
-        at, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
+        at, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
         flat, value = at.ravel(), np.empty(at.size)
         where, directions = self.interval(flat), incoming.ravel()
         for position in np.unique(flat):
             here = flat == position
             law = self.laws[int(where[here][0])]
-            value[here] = law.apply(partial(function, position), directions[here])
+            value[here] = law.apply(Vectorised(partial(function, position), scalar=True), directions[here])
         return value.reshape(at.shape)
 
     def interval(self, x: Floats) -> NDArray[np.intp]:
         """The index of the interval of every position; raises InputError outside of the piece."""
+        x = finite_array("x", x)
         outside = (x < self.edges[0]) | (x > self.edges[-1])
         if np.any(outside):
             worst = float(np.atleast_1d(x)[np.atleast_1d(outside)][0])

@@ -12,17 +12,19 @@ from ...core.checks import (
     Floats,
     Rng,
     angles,
+    broadcast,
     finite_array,
     finite_number,
     generator,
-    of_one_shape,
     positive_number,
+    shaped,
     whole_number,
 )
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
+from ..bases.given import seed_by_name
 from ..matrices.defects import SymmetryDefect, relative_asymmetry, reversibility_z_score
 
 # A contact is found when the distance of plate and particle is this many roundings of the size of the motion.
@@ -100,6 +102,7 @@ class SpringWall:
 
     # ---- sampling --------------------------------------------------------------------------------------------
     @explained
+    @seed_by_name
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity (n, 2) with v2 > 0 for every incoming one with v2 < 0.
 
@@ -110,9 +113,7 @@ class SpringWall:
         AccuracyError
             If a particle has not left after 10^5 steps.
         """
-        incoming = finite_array("velocity", velocity)
-        if incoming.ndim != 2 or incoming.shape[1] != 2:
-            raise InputError(f"velocity: expected shape (n, 2), got {incoming.shape}")
+        incoming = shaped("velocity", velocity, "n", 2)
         if not np.all(incoming[:, 1] < 0.0):
             raise InputError(f"velocity: expected v2 < 0, got {float(incoming[:, 1].max())!r}")
         outgoing = incoming.copy()
@@ -126,6 +127,7 @@ class SpringWall:
         return outgoing
 
     @explained
+    @seed_by_name
     def sample_polar(self, speed: ArrayLike, theta: ArrayLike, rng: Rng = None) -> tuple[Floats, Floats]:
         """Draw speed and angle of the outgoing velocity from those of *minus* the incoming one, as laws of angles do.
 
@@ -135,11 +137,11 @@ class SpringWall:
         >>> round(float(speed), 12), round(float(theta + 0.5), 12) == round(np.pi, 12)
         (2.0, True)
         """
-        size, angle = of_one_shape(speed=finite_array("speed", speed), theta=angles("theta", theta))
+        size, angle = broadcast(speed=finite_array("speed", speed), theta=angles("theta", theta))
         if not np.all(size > 0.0):
             raise InputError("speed: expected numbers greater than 0")
         velocity = -np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1).reshape(-1, 2)
-        out = self.sample(velocity, rng)
+        out = self.sample(velocity, rng=rng)
         shape = size.shape
         return np.hypot(out[:, 0], out[:, 1]).reshape(shape), np.arctan2(out[:, 1], out[:, 0]).reshape(shape)
 

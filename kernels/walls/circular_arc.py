@@ -7,17 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, number_between
+from ...core.checks import Floats, angles, number_between, whole_number
 from ...core.kinds import explained_class
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
 from ..bases.basis import AngleFunction, Basis
+from ..bases.given import Vectorised
 from ..bases.intervals import joined_lists
 from ..bases.measure import SINE, gauss_on_intervals
 from ..bases.panels import Panels
 from ..expectations.arcs import ArcMeans, ArcPieces, PiecesOfAngles, arc_images, outgoing_lines
 from ..expectations.basis_means import Expectations, Means
 from ..laws.distribution import Distribution
-from ..laws.law import DrivenLaw, entry_points
+from ..laws.law import DrivenLaw, entries
 
 # Each interval with a constant number of hits N <= MOST_HITS has its own Gauss rule. Rays with more hits are a fraction
 # of about 1/(4 N^2), for theta within xi/N of xi. Their outgoing angle lies within xi/N of pi - xi (or xi), and its
@@ -82,20 +83,20 @@ class CircularArcLaw(DrivenLaw):
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
-        right, base, chord, hits = self._rotation(entry_points(x), angles("theta", theta))
+        right, base, chord, hits = self._rotation(*entries(x, theta))
         outgoing = clipped_inside(np.pi + base - 2.0 * hits * chord)
         return np.where(right, mirrored_angle(outgoing), outgoing)
 
     def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
         """Number of reflections of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
-        return np.asarray(self._rotation(entry_points(x), angles("theta", theta))[3].astype(np.int64))
+        return np.asarray(self._rotation(*entries(x, theta))[3].astype(np.int64))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Incoming angles at which an interval of X appears or disappears, and the probability near the omitted ones.
 
         They are xi (1 + 1/k), xi k/(k + 1), xi, pi/2 -+ xi and their mirror images, and accumulate at xi and pi - xi.
         """
-        count = max((limit - 4) // 4, 1)
+        count = max((whole_number("limit", limit, 0) - 4) // 4, 1)
         k = np.arange(1.0, count + 1.0)
         left = self.half_angle * np.concatenate([[1.0], 1.0 + 1.0 / k, k / (k + 1.0)])
         left = np.concatenate([left, [0.5 * np.pi - self.half_angle]])
@@ -105,7 +106,7 @@ class CircularArcLaw(DrivenLaw):
             float(2.0 * SINE.mass(low, min(high, np.pi))), 1.0
         )
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The masses between the edges, by integrals of a sine."""
         step = max(1, CHUNK // edges.shape[-1])
         parts = [np.empty((0, edges.shape[-1]))]
@@ -114,7 +115,7 @@ class CircularArcLaw(DrivenLaw):
             parts.append(self._below(theta[part], edges if edges.ndim == 1 else edges[part]))
         return Distribution.without_atoms(np.concatenate(parts))
 
-    def density_cuts(self, theta: Floats) -> Floats:
+    def _density_cuts(self, theta: Floats) -> Floats:
         """The ends of the pieces with a constant number of hits, up to 24 of them."""
         ray, mirrored, lower, upper, hits, rest, _ = self.pieces(theta, HITS_IN_CUTS)
         base = np.where(mirrored, np.pi - theta[ray], theta[ray])
@@ -144,6 +145,8 @@ class CircularArcLaw(DrivenLaw):
 
     def means(self, function: AngleFunction, theta: Floats, nodes: int = NODES, most_hits: int = MOST_HITS) -> Floats:
         """E[f(Theta') | theta] by Gauss rules with ``nodes`` nodes where N is constant, for N up to ``most_hits``."""
+        theta, function = angles("theta", theta), Vectorised.of(function)
+        whole_number("nodes", nodes, 1)
         flat = theta.reshape(-1)
         starts = range(0, max(flat.size, 1), CHUNK)
         parts = [self._means(function, flat[start : start + CHUNK], nodes, most_hits) for start in starts]
@@ -202,7 +205,7 @@ class CircularArcLaw(DrivenLaw):
 
     def pieces(self, theta: Floats, most_hits: int = MOST_HITS) -> ArcPieces:
         """The intervals of delta on which N is constant, for every theta and both sides, sorted by incoming angle."""
-        xi = self.half_angle
+        xi, theta, most_hits = self.half_angle, angles("theta", theta).ravel(), whole_number("most_hits", most_hits, 1)
         base = np.stack([theta, np.pi - theta], axis=-1).reshape(-1)
         total = xi + base
         low, high = np.abs(base - xi), np.minimum(np.pi - np.abs(np.pi - total), 0.5 * np.pi)

@@ -8,12 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, finite_number, instance
+from ...core.checks import Floats, angles, finite_array, finite_number, instance, whole_number
 from ...core.errors import InputError
 from ...core.rounding import EPS
 from ...geometry import Wall
 from ...geometry.itineraries.hollow import NO_LIMIT, HollowConditionals
 from ..bases.basis import AngleFunction
+from ..bases.given import Vectorised
 from ..expectations.basis_means import Expectations, means_of_basis
 
 # Up to this number of pieces of a wall one conditional distribution takes a few milliseconds.
@@ -58,7 +59,7 @@ class AdaptiveConditionals:
 
     def mean(self, function: AngleFunction) -> Floats:
         """E[f(Theta') | theta] for every angle, shape ``(angles,) + extra`` if f has values ``theta.shape + extra``."""
-        values = np.asarray(function(self.nodes), dtype=np.float64)
+        values = Vectorised.of(function)(self.nodes)
         weighted = self.weights.reshape((-1,) + (1,) * (values.ndim - 1)) * values
         return np.add.reduceat(weighted, self.starts[:-1], axis=0)
 
@@ -114,7 +115,7 @@ def adaptive_conditionals(
     if finite_number("tolerance", tolerance) < EPS:
         raise InputError(f"tolerance: expected a number of at least {EPS:.2g}, the rounding, got {tolerance!r}")
     incoming = np.atleast_1d(angles("theta", theta)).ravel()
-    return WallConditionals(wall, int(degree), np.asarray(edges, dtype=np.float64))(incoming, tolerance)
+    return WallConditionals(wall, whole_number("degree", degree, 0), finite_array("edges", edges))(incoming, tolerance)
 
 
 class WallConditionals:
@@ -204,8 +205,8 @@ class WallConditionals:
                 weights[k].append(np.array([flat]))
         return AdaptiveConditionals(
             theta,
-            np.concatenate([part for k in group.tolist() for part in nodes[k]]),
-            np.concatenate([part for k in group.tolist() for part in weights[k]]),
+            np.concatenate([np.empty(0), *(part for k in group.tolist() for part in nodes[k])]),
+            np.concatenate([np.empty(0), *(part for k in group.tolist() for part in weights[k])]),
             np.cumsum([0, *(sum(map(len, nodes[k])) for k in group.tolist())]),
             error[group],
             unresolved[group],

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, instance, of_one_shape
+from ...core.checks import Floats, instance
 from ...core.errors import AccuracyError
 from ...core.kinds import explained_class
 from ...geometry import MushroomGenerations
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction
 from ..laws.distribution import Distribution
-from ..laws.law import DrivenLaw, RandomMap, entry_points
+from ..laws.law import DrivenLaw, RandomMap, entries
 from .traced_map import UNRESOLVED_TOLERANCE, traced_reflection
 from .wall_law import WallLaw
 
@@ -64,7 +64,7 @@ class MushroomLaw(DrivenLaw):
 
         The openings are moved to the left: ``x`` below ``wall.opened`` enters a mushroom.
         """
-        x, theta = of_one_shape(x=entry_points(x), theta=angles("theta", theta))
+        x, theta = np.broadcast_arrays(*entries(x, theta))
         left, right = self.wall.opening
         inside = x < self.wall.opened
         outgoing, escaped = np.array(np.pi - theta), np.ones(theta.shape, dtype=np.bool_)
@@ -88,7 +88,7 @@ class MushroomLaw(DrivenLaw):
             )
         return outgoing
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The distributions of generation 1 by quadrature, its flat tops reduced to those of the last generation."""
         left, right = self.wall.opening
         found = WallLaw(self.wall.mushroom).distribution(theta, edges)

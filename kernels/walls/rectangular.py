@@ -12,7 +12,7 @@ from ...core.kinds import explained_class
 from ..bases.angles import mirrored_angle
 from ..laws.crevice import crevice_breakpoints, crevice_retro, crossings_modulo_two
 from ..laws.isometry_table import IsometryTable
-from ..laws.law import BranchLaw, entry_points
+from ..laws.law import BranchLaw, entries
 
 LARGEST_COUNT = 2.0**62
 
@@ -83,7 +83,7 @@ class RectangularTeethLaw(BranchLaw):
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left end of the flat top."""
-        x, theta = entry_points(x), angles("theta", theta)
+        x, theta = entries(x, theta)
         sides = _sides_hit(x, theta, crossings_modulo_two(self.height_to_width, theta))
         return np.where(np.mod(sides, 2.0) == 0.0, mirrored_angle(theta), theta)
 
@@ -92,7 +92,7 @@ class RectangularTeethLaw(BranchLaw):
 
         The parity is always right. Beyond 2^52 the number has the rounding error of float64.
         """
-        x, theta = entry_points(x), angles("theta", theta)
+        x, theta = entries(x, theta)
         rest = crossings_modulo_two(self.height_to_width, theta)
         # counted in pairs, so that the parity is right where d has more digits than a float64
         pairs = np.rint(0.5 * (np.minimum(self.crossings(theta), LARGEST_COUNT) - rest)).astype(np.int64)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, of_one_shape
+from ...core.checks import Floats
 from ...core.errors import AccuracyError
-from ..laws.law import entry_points
+from ..laws.law import entries
 
 if TYPE_CHECKING:
     from ...geometry import Wall
@@ -26,7 +26,7 @@ def traced_reflection(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Float
     """
     from ...geometry.tracing.tracing import trace
 
-    x, theta = of_one_shape(x=entry_points(x), theta=angles("theta", theta))
+    x, theta = np.broadcast_arrays(*entries(x, theta))
     traced = trace(wall, x * wall.period, theta)
     escaped = np.asarray(traced.escaped)
     return np.where(escaped, traced.theta, theta), escaped

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, number_between
+from ...core.checks import Floats, angles, number_between, whole_number
 from ...core.kinds import explained_class
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
 from ..bases.intervals import without_extremal
 from ..laws.branches import merged
 from ..laws.isometry_table import IsometryTable
-from ..laws.law import BranchLaw, entry_points
+from ..laws.law import BranchLaw, entries
 
 # Breakpoints closer than this are one breakpoint computed by two formulas.
 BREAKPOINT_SPACING = 16.0 * EPS
@@ -97,7 +97,7 @@ class TriangularTeethLaw(BranchLaw):
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The angles where N or an active bound on X changes; if there are too many, the ones nearest to pi/2."""
-        psi = self.angle
+        psi, limit = self.angle, whole_number("limit", limit, 0)
         # No ray with theta >= (pi + psi)/2 passes on the left, so larger multiples of psi/2 are no breakpoints.
         last = int(np.ceil((np.pi + psi) / psi))
         first = max(1, last - limit)
@@ -143,13 +143,13 @@ class TriangularTeethLaw(BranchLaw):
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
-        right, base, count = self._unfolded(entry_points(x), angles("theta", theta))
+        right, base, count = self._unfolded(*entries(x, theta))
         outgoing = clipped_inside(self._reflected(base, count))
         return np.where(right, mirrored_angle(outgoing), outgoing)
 
     def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
         """Number of reflections of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
-        return np.asarray(self._unfolded(entry_points(x), angles("theta", theta))[2].astype(np.int64))
+        return np.asarray(self._unfolded(*entries(x, theta))[2].astype(np.int64))
 
     def _unfolded(self, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], Floats, Floats]:
         """Whether the ray passes right of the bottom, its angle (mirrored in this case), and its number of hits."""

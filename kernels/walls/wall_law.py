@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, angles, instance
+from ...core.checks import Floats, angles, instance
 from ...core.errors import AccuracyError
 from ...core.kinds import explained_class
 from ...core.rounding import EPS
@@ -183,7 +183,7 @@ class WallLaw(DrivenLaw):
         """Breakpoints of the exact law; none are known without one."""
         return super().breakpoints(limit) if self.exact_law is None else self.exact_law.breakpoints(limit)
 
-    def density_cuts(self, theta: Floats) -> Floats | None:
+    def _density_cuts(self, theta: Floats) -> Floats | None:
         known = self.exact_law or self.replacement
         return None if known is None else known.density_cuts(theta)
 
@@ -191,7 +191,7 @@ class WallLaw(DrivenLaw):
         """The table of the exact law, or None."""
         return None if self.exact_law is None else self.exact_law.isometry_table()
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The distributions of the exact law or of the hollows, or else by quadrature in the entry point.
 
         Flat tops are atoms. The quadrature is adaptive for walls with few pieces and equally spaced for others.
@@ -200,7 +200,7 @@ class WallLaw(DrivenLaw):
         if known is not None:
             return known.distribution(theta, edges)
         if not is_few(self.wall):
-            return super().distribution(theta, edges)
+            return super()._distribution(theta, edges)
         found = WallConditionals(self.wall, 0, edges[1:-1])(theta, CELL_TOLERANCE)
         owner = np.repeat(np.arange(theta.size), np.diff(found.starts))
         level = found.nodes == (np.pi - theta)[owner]
@@ -226,19 +226,19 @@ class WallLaw(DrivenLaw):
             return ByApply(basis, self.apply, self.evaluations, traced=True)
         return TracedExpectations(basis, self.wall)
 
-    def sample(self, theta: ArrayLike, rng: Rng = None) -> Floats:
-        return super().sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        return super()._sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
 
-    def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
+    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         if self.closed_form is not None:
             return self.closed_form.apply(function, theta)
-        incoming, few = angles("theta", theta), is_few(self.wall)
-        if incoming.size == 0:
-            return super().apply(function, incoming)
+        few = is_few(self.wall)
+        if theta.size == 0:
+            return super()._apply(function, theta)
         if not few and self.exact_law is not None:
-            return self.exact_law.apply(function, incoming)
-        mean = self.conditionals(incoming, APPLY_TOLERANCE if few else MANY_TOLERANCE).mean(function)
-        return mean.reshape(incoming.shape + mean.shape[1:])
+            return self.exact_law.apply(function, theta)
+        mean = self.conditionals(theta, APPLY_TOLERANCE if few else MANY_TOLERANCE).mean(function)
+        return mean.reshape(theta.shape + mean.shape[1:])
 
     def conditionals(
         self, theta: ArrayLike, tolerance: float = APPLY_TOLERANCE, degree: int = APPLY_DEGREE

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, whole_number
+from ...core.checks import Floats, positive_number, whole_number
 from ...core.estimates import ErrorKind
 from ...core.frames import data_frame
 from ...core.html import html_table
@@ -189,6 +189,7 @@ def enclosures(
     True
     """
     whole_number("k", k, 1)
+    positive_number("tolerance", tolerance)
     if isinstance(law, CollisionLaw):
         law = law.law
     if not isinstance(law, Law):

@@ -156,7 +156,7 @@ def spectral_gap(
     (0.176041, 'essential edge')
     """
     positive_number("tolerance", tolerance)
-    seconds = positive_number("time_limit", time_limit)
+    seconds, rng = positive_number("time_limit", time_limit), generator(rng, 0)
     if isinstance(law, CollisionLaw):
         law = law.law
     if isinstance(law, KernelMatrix):
@@ -165,12 +165,12 @@ def spectral_gap(
         raise not_a_law("law", "a Law, a CollisionLaw or a KernelMatrix", law)
     other = self_adjoint_elsewhere(law)
     if other is not None:
-        return _contraction(law, other, tolerance, generator(rng, 0), seconds)
+        return _contraction(law, other, tolerance, rng, seconds)
     refuse_unless_self_adjoint(law)
     power = as_power(law)
     if power is not None:
-        return _of_power(law, *power, tolerance, generator(rng, 0), seconds)
-    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(generator(rng, 0), seconds))
+        return _of_power(law, *power, tolerance, rng, seconds)
+    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng, seconds))
 
 
 @explained

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers as kinds_of_numbers
 import os
 from typing import Any, TypeAlias
 
@@ -11,23 +12,55 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import InputError
 
 Floats = NDArray[np.float64]
-# What numpy.random.default_rng takes.
+# What `generator` takes.
 Rng: TypeAlias = np.random.Generator | np.random.BitGenerator | np.random.SeedSequence | int | None
 # Characters of a value that a message repeats.
 SHOWN = 80
 # Bytes of a double.
 DOUBLE = 8
+# Whole numbers beyond do not fit into arrays.
+LARGEST = 2**63 - 1
+# Seeds are below this number, the size of numpy's own.
+SEEDS = 2**128
 
 
 def numbers(name: str, value: ArrayLike) -> Floats:
-    """Return ``value`` as float64, finite or not."""
+    """Return ``value`` as float64, finite or not: a plain array in the order of C and the byte order of this machine.
+
+    Masked entries, complex numbers, texts, dates and None are refused, also in arrays of objects.
+
+    Examples
+    --------
+    >>> numbers("x", [[1, 2]])
+    array([[1., 2.]])
+    >>> numbers("x", np.ma.array([1.0, 2.0], mask=[False, True]))    # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    asperity.errors.InputError: x: expected numbers without a mask, got masked_array(...
+    """
     try:
         array = np.asarray(value)
-        if array.dtype.kind in "cSUmMV":
+        masked = _is_masked(value)
+        objects = array.dtype.kind == "O"
+        if masked or array.dtype.kind not in "biufO" or (objects and not all(map(_is_real, array.flat))):
             raise TypeError("of another kind")
-        return array.astype(np.float64, copy=False)
+        return np.asarray(array, dtype=np.float64, order="C")
     except Exception as reason:  # foreign objects fail in their own way
-        raise InputError(f"{name}: expected numbers, got {shortened(value)}") from reason
+        what = "numbers without a mask" if _is_masked(value) else "numbers"
+        raise InputError(f"{name}: expected {what}, got {shortened(value)}") from reason
+
+
+def _is_masked(value: object) -> bool:
+    """Whether an array, or one in a list, has masked entries."""
+    if isinstance(value, (list, tuple)):
+        return not set(map(type, value)) <= {float, int} and any(map(_is_masked, value))
+    return bool(np.ma.is_masked(value))
+
+
+def _is_real(entry: object) -> bool:
+    """Whether an object is a real number; numpy converts its complex numbers, spans of time and None too."""
+    if isinstance(entry, np.generic):
+        return isinstance(entry, (np.floating, np.integer)) and not isinstance(entry, np.timedelta64)
+    return isinstance(entry, kinds_of_numbers.Real) or hasattr(type(entry), "__float__")
 
 
 def finite_array(name: str, value: ArrayLike) -> Floats:
@@ -46,29 +79,34 @@ def finite_array(name: str, value: ArrayLike) -> Floats:
     return array
 
 
+def shaped(name: str, value: ArrayLike, *axes: int | str) -> Floats:
+    """Return ``value`` as finite float64 of a shape: an axis is a length, or a name for any, "..." for any number.
+
+    Examples
+    --------
+    >>> shaped("velocity", [1.0, 2.0], "...", 3)
+    Traceback (most recent call last):
+    asperity.errors.InputError: velocity: expected shape (..., 3), got (2,)
+    """
+    array = finite_array(name, value)
+    wanted = axes[1:] if axes[0] == "..." else axes
+    last = array.shape[max(array.ndim - len(wanted), 0) :]
+    if (
+        len(last) < len(wanted)
+        or (wanted is axes and array.ndim != len(axes))
+        or any(isinstance(axis, int) and axis != length for axis, length in zip(wanted, last, strict=True))
+    ):
+        text = ", ".join(map(str, axes)) + ("," if len(axes) == 1 else "")
+        raise InputError(f"{name}: expected shape ({text}), got {array.shape}")
+    return array
+
+
 def finite_number(name: str, value: Any) -> float:
     """Return ``value`` as a finite float."""
     array = finite_array(name, value)
     if array.ndim:
         raise InputError(f"{name}: expected one number, got an array of shape {array.shape}")
     return float(array)
-
-
-def of_one_shape(**arrays: Floats) -> tuple[Floats, ...]:
-    """Return the arrays in their common shape, or raise an InputError that names them.
-
-    Examples
-    --------
-    >>> of_one_shape(x=np.zeros(3), theta=np.zeros(4))
-    Traceback (most recent call last):
-    asperity.errors.InputError: x and theta: expected equal shapes, got (3,) and (4,); for all pairs pass x[:, None]
-    """
-    try:
-        return tuple(np.broadcast_arrays(*arrays.values()))
-    except ValueError as reason:
-        shapes = " and ".join(str(array.shape) for array in arrays.values())
-        pairs = f"for all pairs pass {next(iter(arrays))}[:, None]"
-        raise InputError(f"{' and '.join(arrays)}: expected equal shapes, got {shapes}; {pairs}") from reason
 
 
 def instance(name: str, value: object, kind: type, example: str) -> None:
@@ -105,13 +143,21 @@ def number_between(name: str, value: Any, low: float, high: float, *, closed: st
 
 
 def whole_number(name: str, value: Any, low: int, *, most: int | None = None) -> int:
-    """Return ``value`` as an int of at least ``low``, and at most ``most``."""
+    """Return ``value`` as an int of at least ``low``, and at most ``most``, else the largest that arrays hold."""
     # numpy counts spans of time among its integers
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
-    if not whole or value < low or (most is not None and value > most):
+    if not whole or value < low or value > (LARGEST if most is None else most):
         allowed = f"of at least {low}" if most is None else f"from {low} to {most}"
         raise InputError(f"{name}: expected a whole number {allowed}, got {shortened(value)}")
     return int(value)
+
+
+def indices(name: str, value: ArrayLike, size: int, low: int = 0) -> NDArray[np.int64]:
+    """Return ``value`` as int64, every one a whole number from ``low`` to ``size`` - 1."""
+    given = numbers(name, value)
+    if not np.all((given >= low) & (given < size) & (given == np.floor(given))):
+        raise InputError(f"{name}: expected whole numbers from {low} to {size - 1}, got {shortened(value)}")
+    return given.astype(np.int64)
 
 
 def shortened(value: object) -> str:
@@ -127,6 +173,13 @@ def shortened(value: object) -> str:
     except Exception:  # of foreign objects, and of integers with thousands of digits
         return f"a value of type {type(value).__name__}"
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+
+
+def foreign(operand: object) -> Any:
+    """What an operator returns for an operand that is not its own, so that Python raises a TypeError."""
+    if isinstance(operand, np.ma.MaskedArray):  # it would take the other operand for an array of entries
+        raise TypeError(f"a masked array is no operand here, got {shortened(operand)}")
+    return NotImplemented
 
 
 def check_memory(name: str, what: str, numbers: int) -> None:
@@ -160,13 +213,38 @@ def angles(name: str, value: ArrayLike) -> Floats:
     return array
 
 
+def common_shape(**arrays: Floats) -> tuple[int, ...]:
+    """The shape to which the arrays broadcast; an InputError names those that do not.
+
+    Examples
+    --------
+    >>> common_shape(x=np.ones(3), theta=np.ones(2))
+    Traceback (most recent call last):
+    asperity.errors.InputError: x, theta: expected shapes that broadcast, got (3,), (2,); for all pairs pass x[:, None]
+    """
+    shapes = [array.shape for array in arrays.values()]
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError as reason:
+        raise InputError(
+            f"{', '.join(arrays)}: expected shapes that broadcast, got {', '.join(map(str, shapes))}; for all pairs "
+            f"pass {next(iter(arrays))}[:, None]"
+        ) from reason
+
+
+def broadcast(**arrays: Floats) -> tuple[Floats, ...]:
+    """The arrays, each a view in their `common_shape`."""
+    shape = common_shape(**arrays)
+    return tuple(np.broadcast_to(array, shape) for array in arrays.values())
+
+
 def generator(rng: Rng, default: int | None = None) -> np.random.Generator:
     """The source of random numbers that ``rng`` means: a Generator as it is, or a new one.
 
     Parameters
     ----------
-    rng : None, int or Generator
-        What numpy.random.default_rng takes (SPEC 7).
+    rng : None, int, SeedSequence, BitGenerator or Generator
+        SPEC 7; an int is a seed of at least 0, below 2^128.
     default : int, optional
         The seed that None stands for, where results repeat by default; else None is a fresh seed.
 
@@ -177,14 +255,16 @@ def generator(rng: Rng, default: int | None = None) -> np.random.Generator:
     """
     if isinstance(rng, np.random.Generator):
         return rng
-    try:
-        if isinstance(rng, (bool, np.random.RandomState)):
-            raise TypeError("it is of another kind")
-        return np.random.default_rng(default if rng is None else rng)
-    except (TypeError, ValueError) as reason:
-        raise InputError(
-            f"rng: expected None, a whole number of at least 0 or a numpy.random.Generator, got {shortened(rng)}"
-        ) from reason
+    seed: Any = default if rng is None else rng
+    if seed is not None and not isinstance(seed, (np.random.SeedSequence, np.random.BitGenerator)):
+        try:
+            seed = whole_number("rng", seed, 0, most=SEEDS - 1)
+        except InputError as reason:
+            raise InputError(
+                f"rng: expected None, a whole number from 0 to 2^128 - 1, a numpy.random.SeedSequence, BitGenerator or "
+                f"Generator, got {shortened(rng)}"
+            ) from reason
+    return np.random.default_rng(seed)
 
 
 def frozen(array: ArrayLike) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Literal
 
+from .checks import numbers
 from .errors import InputError
 from .html import html_table
 
@@ -95,10 +96,10 @@ class Estimate:
 
 
 def _number(name: str, value: Any) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError) as reason:
-        raise InputError(f"{name}: expected a number, got {value!r}") from reason
+    found = numbers(name, value)
+    if found.ndim:
+        raise InputError(f"{name}: expected a number, got {value!r}")
+    return float(found)
 
 
 def compact(number: Estimate) -> str:

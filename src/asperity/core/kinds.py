@@ -15,7 +15,7 @@ from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin
 
 import numpy as np
 
-from .checks import finite_array, shortened
+from .checks import LARGEST, finite_array, shortened
 from .errors import AsperityError, InputError
 
 P = ParamSpec("P")
@@ -24,8 +24,6 @@ C = TypeVar("C", bound=type)
 
 # Methods that operators and brackets call.
 OPERATORS = ("__call__", "__getitem__", "__matmul__", "__add__", "__sub__", "__mul__", "__rmul__", "__pow__")
-# Whole numbers beyond do not fit into arrays.
-LARGEST = 2**63 - 1
 NUMBERS = ("ArrayLike", "Floats")
 FUNCTIONS = ("AngleFunction", "DensityFunction", "CostFunction", "Objective")
 # What is asked for last: numbers of other kinds, such as fractions, and lists do where they are converted.
