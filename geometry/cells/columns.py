@@ -225,7 +225,7 @@ def _unit(name: str) -> str:
 def _two_columns(table: Floats) -> tuple[int, int]:
     """The likeliest columns of x and of height: not the first if it counts lines beside positions."""
     steps = np.diff(table, axis=0)
-    rising = (steps > 0.0).all(axis=0) | (steps < 0.0).all(axis=0)
+    rising = np.asarray((steps > 0.0).all(axis=0) | (steps < 0.0).all(axis=0))
     counts = (steps[:, 0] == 1.0).all() and table[0, 0] in (0.0, 1.0) and bool(rising[1])
     x = 1 if counts else int(np.argmax(rising[:-1]))
     return x, table.shape[1] - 1 if table.shape[1] == 3 else x + 1

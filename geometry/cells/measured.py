@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -135,10 +136,10 @@ FIT_ROUNDING = 1e-14
 def heights_of(name: str, value: ArrayLike) -> Floats:
     """Numbers of which some may be undefined: masked and infinite ones become nan."""
     try:
-        array = np.ma.asarray(value)
-        if array.dtype.kind in "cSUmMV":
+        given: Any = np.ma.asarray(value)
+        if given.dtype.kind in "cSUmMV":
             raise TypeError("of another kind")
-        array = np.ma.filled(array.astype(np.float64), np.nan)
+        array = np.ma.filled(given.astype(np.float64), np.nan)
     except (TypeError, ValueError, OverflowError) as reason:
         raise InputError(f"{name}: expected numbers, got {value!r}") from reason
     return np.where(np.isfinite(array), array, np.nan)

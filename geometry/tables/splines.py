@@ -65,7 +65,7 @@ def arrival(
         fresh = np.where(own[:, np.newaxis], time > 0.0, time * approach >= -slack)
         hit = np.isfinite(roots) & (approach > 0.0) & fresh
     first = np.where(hit, np.maximum(time, 0.0), np.inf).min(axis=1)
-    return np.minimum(first, _tangency(curve, position, v, own, slack, turn))
+    return np.asarray(np.minimum(first, _tangency(curve, position, v, own, slack, turn)))
 
 
 def _tangency(curve: Bezier, position: Floats, v: Floats, own: NDArray[np.bool_], slack: float, turn: float) -> Floats:

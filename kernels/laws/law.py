@@ -459,7 +459,7 @@ class Combination(Law):
     def __rmul__(self, weight: float) -> Combination:
         factor = as_weight(weight)
         if factor is None:
-            return foreign(weight)
+            return foreign(weight)  # type: ignore[no-any-return]
         return Combination(tuple((factor * own, law) for own, law in self.terms))
 
     __mul__ = __rmul__

@@ -213,7 +213,7 @@ def angles(name: str, value: ArrayLike) -> Floats:
     return array
 
 
-def common_shape(**arrays: Floats) -> tuple[int, ...]:
+def common_shape(**arrays: NDArray[Any]) -> tuple[int, ...]:
     """The shape to which the arrays broadcast; an InputError names those that do not.
 
     Examples

@@ -187,11 +187,11 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
     as_written = [written(side, real) for side in (left, right)]
     left, right = (prepared(side) for side in as_written)
     # what is not real or not finished as it is written is searched as it is prepared
-    asked = [
+    first, second = (
         side if as_it_is.has(sp.I, *UNFINISHED) else as_it_is
         for side, as_it_is in zip((left, right), as_written, strict=True)
-    ]
-    search = Search(*asked, relation, domain)
+    )
+    search = Search(first, second, relation, domain)
     derivation = Derivation(left, right, relation, search.refutation, search.deciding)
     expands = relation == "==" and expands_to_zero(left - right)
     found = search.refutation(domain, POINTS if relation == "==" else MORE_POINTS, until_defined=expands)

@@ -81,10 +81,10 @@ def _definite(integrand: Any, variable: Any, low: Any, high: Any) -> Any:
     others = sorted((f.free_symbols | antiderivative.free_symbols) - {t}, key=str)
     part = Part(Domain((t, *others), tuple(bounds)))
     try:
-        resolved = [Resolution(part).resolved(side) for side in (f, visible(sp.diff(antiderivative, t)))]
+        first, second = (Resolution(part).resolved(side) for side in (f, visible(sp.diff(antiderivative, t))))
     except Nowhere:
         return None
-    if not _is_continuous(antiderivative, part, bounds) or derive_equality(*resolved, part) is None:
+    if not _is_continuous(antiderivative, part, bounds) or derive_equality(first, second, part) is None:
         return None
     at_ends = [
         sp.limit(antiderivative, t, end) if end in (sp.oo, -sp.oo) else visible(antiderivative, {t: end})
