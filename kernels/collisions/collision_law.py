@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,7 +35,7 @@ from ..bases.given import Vectorised, seed_by_name
 from ..bases.legendre import Legendre
 from ..bases.tensor import TensorBasis
 from ..laws.law import Combination, Law, as_weight, retroreflection, specular
-from ..laws.tensor_law import Discretiser, TensorLaw
+from ..laws.tensor_law import Discretiser, TensorLaw, Term
 from ..walls.isometry_branches import isometries
 from .velocity_matrices import isometry_matrix
 
@@ -52,8 +52,6 @@ WEIGHT_TOLERANCE = 1e-12
 
 VelocityFunction = Callable[[Floats, Floats], Floats]
 StateFunction = Callable[[Floats, Floats, Floats], Floats]
-# Weight, law of theta, and whether psi becomes pi - psi (else it is unchanged).
-Term: TypeAlias = tuple[float, Law, bool]
 
 
 @explained_class

@@ -157,10 +157,13 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
     tangential, normal, fraction = _averaged(parts)
     values, errors, missed = _coefficients(parts, incoming, wanted)
     missed.setflags(write=False)
-    at = (column for pair in zip(frozen(values.T), frozen(errors.T), missed.T, strict=True) for column in pair)
+    (tangential_at, normal_at), (tangential_errors, normal_errors) = frozen(values.T), frozen(errors.T)
     kind: ErrorKind = "bound" if all(part.kind == "bound" for _, part in parts) else "estimate"
     misfit = _misfit(paper, parts, fraction, wanted)
-    return Accommodation(tangential, normal, fraction, misfit, frozen(incoming), *at, kind)
+    return Accommodation(
+        tangential, normal, fraction, misfit, frozen(incoming), tangential_at, tangential_errors, missed[:, 0],
+        normal_at, normal_errors, missed[:, 1], kind,
+    )  # fmt: skip
 
 
 def _default_angles() -> Floats:
@@ -196,8 +199,8 @@ def _parts(law: Law, tolerance: float, rng: np.random.Generator) -> list[tuple[f
 def _averaged(parts: list[tuple[float, _Changes]]) -> tuple[Estimate, Estimate, Estimate]:
     """The mean coefficients and the Maxwell fraction."""
     found = [(weight, *part.averages()) for weight, part in parts]
-    values = sum(weight * value for weight, value, _, _ in found)
-    errors = sum(weight * error for weight, _, error, _ in found) + 4.0 * EPS * np.abs(values)
+    values = np.asarray(sum(weight * value for weight, value, _, _ in found))
+    errors = np.asarray(sum(weight * error for weight, _, error, _ in found)) + 4.0 * EPS * np.abs(values)
     how = "; ".join(dict.fromkeys(method for *_, method in found))
     kind: ErrorKind = "bound" if all(part.averages_kind == "bound" for _, part in parts) else "estimate"
     mean, spread = (float(WEIGHTS @ pair / WEIGHTS.sum()) for pair in (values, errors))
