@@ -334,7 +334,7 @@ class VelocityLaw(TensorLaw):
     def __rmul__(self, weight: float) -> VelocityLaw:
         factor = as_weight(weight)
         if factor is None:
-            return foreign(weight)
+            return foreign(weight)  # type: ignore[no-any-return]
         return _law_of([(factor * own, law, flip) for own, law, flip in self.parts()], self.disk)
 
     __mul__ = __rmul__

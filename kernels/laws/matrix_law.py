@@ -121,11 +121,11 @@ class MatrixLaw(DensityLaw):
         """The edges of the bins."""
         return np.broadcast_to(self.edges, (*finite_array("theta", theta).shape, self.edges.size))
 
-    def density_cuts(self, theta: Floats) -> Floats:
+    def _density_cuts(self, theta: Floats) -> Floats:
         """The edges of the bins."""
         return np.broadcast_to(self.edges, (theta.size, self.edges.size))
 
-    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The masses of whole bins below an edge, and of its bin the fraction below it."""
         source, target = cell_among(self.edges, theta)[:, None], cell_among(self.edges, edges)
         whole = np.cumsum(self.array, axis=1) - self.array

@@ -104,7 +104,7 @@ class RaySums:
                 "geometry.trace(wall, x, theta).counts() says how they ended",
                 fraction,
             )
-        parts = _WithImages(self.tables, self._mirror_image) if mirrored else self.tables
+        parts: Any = _WithImages(self.tables, self._mirror_image) if mirrored else self.tables
         if self.basis.is_partition:
             array = array_from_counts(parts, self.basis, symmetrise=symmetrise, independent=len(parts) == 1)
         else:
