@@ -14,8 +14,9 @@ from ...core.checks import Floats, Rng, check_memory, finite_array, generator, i
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
 from ...core.kinds import explained, explained_class
+from ...geometry.tables.boundary import FlightStatus
 from ..collisions.collision_law import smooth
-from .billiard import BilliardRecord, FlightStatus, Reflector, laws_of_walls, reflected
+from .billiard import BilliardRecord, Reflector, laws_of_walls, reflected
 from .pair_law import PairLaw
 
 if TYPE_CHECKING:
@@ -179,12 +180,12 @@ def play_gas(
     states = [gas.state()]
     while len(states) <= events and gas.next_event(rng):
         states.append(gas.state())
-    columns = [np.stack(column) for column in zip(*states, strict=True)]
-    wall, partner = columns[4].astype(np.int64), columns[5].astype(np.int64)
+    time, place, angle, moving, walls, partners = (np.stack(column) for column in zip(*states, strict=True))
+    wall, partner = walls.astype(np.int64), partners.astype(np.int64)
     made = np.sum((wall[1:] >= 0) | (partner[1:] >= 0), axis=0)
-    for array in (*columns[:4], wall, partner, made, gas.status):
+    for array in (time, place, angle, moving, wall, partner, made, gas.status):
         array.setflags(write=False)
-    return GasRecord(container, disk, *columns[:4], wall, made, gas.status, partner, pair)
+    return GasRecord(container, disk, time, place, angle, moving, wall, made, gas.status, partner, pair)
 
 
 def _start(container: Container, position: ArrayLike, velocity: ArrayLike, diameter: float) -> tuple[Floats, Floats]:

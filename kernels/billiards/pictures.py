@@ -9,7 +9,8 @@ import numpy as np
 from ...core.checks import Floats, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
-from .billiard import BilliardRecord, FlightStatus
+from ...geometry.tables.boundary import FlightStatus
+from .billiard import BilliardRecord
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation

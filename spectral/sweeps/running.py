@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from ...core.checkpoints import Checkpoint, content, told
 from ...core.checks import finite_number, positive_number
@@ -226,7 +226,7 @@ class _Run:
         names = [name for one in quantities_from(self.study.asked) for name in one.names]
         rows: list[list[Any]] = json.loads(text)
         for row, name in zip(rows, names, strict=True):
-            if key_of(dict(enumerate(row[0]))) != key:
+            if key_of(cast(Point, dict(enumerate(row[0])))) != key:
                 raise ValueError(f"rows of the point {row[0]}")
             SweepRow.of_list(self.grid.names, row).check(name)
         return rows
@@ -285,4 +285,4 @@ def _made(family: Family, point: Point, by_name: bool) -> str:
         law = law_of(family(**point))
     except Exception as reason:  # a refused wall is a row of the table
         return f"refused: {reason}"
-    return told("family", law, by_name=by_name)
+    return str(told("family", law, by_name=by_name))

@@ -144,7 +144,7 @@ class WallFigure:
         from bokeh.models.text import PlainText
 
         # in other text bokeh reads formulas
-        self.plot.title.text = PlainText(title)
+        self.plot.title.text = PlainText(text=title)
         paths, wall = picture.solids, picture.wall
         self._solid.data = {
             "xs": [path[:, 0].tolist() for path in paths], "ys": [path[:, 1].tolist() for path in paths],
@@ -156,8 +156,8 @@ class WallFigure:
         left, right = -MARGIN * wall.period, (1.0 + MARGIN) * wall.period
         self._view.data = {"x": [left, right], "y": list(_heights(wall))}
         self.plot.aspect_scale = vertical_stretch(wall)
-        self.plot.xaxis.axis_label = PlainText(f"x ({wall.unit or 'length units of the wall'})")
-        self.plot.yaxis.axis_label = PlainText(f"y ({wall.unit})" if wall.unit else "y")
+        self.plot.xaxis.axis_label = PlainText(text=f"x ({wall.unit or 'length units of the wall'})")
+        self.plot.yaxis.axis_label = PlainText(text=f"y ({wall.unit})" if wall.unit else "y")
 
     def show_vertices(self, points: list[tuple[float, float]]) -> None:
         """Show handles at these points; none for a wall that is not `editable`."""

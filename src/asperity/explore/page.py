@@ -184,8 +184,9 @@ class Page:
         name, values = self.choice.value, {key: slider.value for key, slider in self.parameters.items()}
         for key, slider in self.parameters.items():
             # what is sent to the server need not come from the slider
-            if isinstance(slider, pn.widgets.IntSlider) and not slider.start <= slider.value <= slider.end:
-                self._refuse(f"{key}: expected {slider.start} to {slider.end}, got {slider.value}; use the slider")
+            start, end = slider.start or 0, slider.end or 0
+            if isinstance(slider, pn.widgets.IntSlider) and not start <= slider.value <= end:
+                self._refuse(f"{key}: expected {start} to {end}, got {slider.value}; use the slider")
                 return
         self.ask(partial(named, name, values), name, of_catalogue=True)
 
