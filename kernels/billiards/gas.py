@@ -180,8 +180,8 @@ def play_gas(
     states = [gas.state()]
     while len(states) <= events and gas.next_event(rng):
         states.append(gas.state())
-    time, place, angle, moving, walls, partners = (np.stack(column) for column in zip(*states, strict=True))
-    wall, partner = walls.astype(np.int64), partners.astype(np.int64)
+    time, place, angle, moving, met, partners = (np.stack(column) for column in zip(*states, strict=True))
+    wall, partner = met.astype(np.int64), partners.astype(np.int64)
     made = np.sum((wall[1:] >= 0) | (partner[1:] >= 0), axis=0)
     for array in (time, place, angle, moving, wall, partner, made, gas.status):
         array.setflags(write=False)

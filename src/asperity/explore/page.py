@@ -185,7 +185,7 @@ class Page:
         for key, slider in self.parameters.items():
             # what is sent to the server need not come from the slider
             start, end = slider.start or 0, slider.end or 0
-            if isinstance(slider, pn.widgets.IntSlider) and not start <= slider.value <= end:
+            if isinstance(slider, pn.widgets.IntSlider) and not start <= (slider.value or 0) <= end:
                 self._refuse(f"{key}: expected {start} to {end}, got {slider.value}; use the slider")
                 return
         self.ask(partial(named, name, values), name, of_catalogue=True)
