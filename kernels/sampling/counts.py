@@ -254,8 +254,8 @@ def _with_constant(arrays: Floats, constant: Floats, both: bool) -> Floats:
 
 def _summed(parts: Sequence[Counts | Floats]) -> Counts | Floats:
     total = np.array(parts[0], dtype=np.result_type(parts[0], np.int64))
-    for part in parts[1:]:
-        total += part
+    for number in range(1, len(parts)):
+        total += parts[number]
     return total
 
 

@@ -35,7 +35,8 @@ class _WithImages(Sequence[Any]):
         return len(self.tables)
 
     def __getitem__(self, number: Any) -> Any:
-        return self.tables[number] + self.image(self.tables[number])
+        table = self.tables[int(number)]
+        return table + self.image(table)
 
 
 class RaySums:
