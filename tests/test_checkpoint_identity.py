@@ -186,7 +186,7 @@ def test_use_does_not_change_the_content():
     for law in laws():
         before = content(law)
         ker.discretise(law, ker.Bins(4), tolerance=0.1, samples=2**12)
-        law.sample(np.linspace(0.5, 2.5, 5), 1)
+        law.sample(np.linspace(0.5, 2.5, 5), rng=1)
         repr(law), law.reversible, law.mirror_symmetric
         assert content(law) == before, law
 
@@ -386,7 +386,7 @@ def array_changes(arrays, rng):
     elif choice == 2 and array.dtype.kind == "f":
         array = np.full_like(array, np.nan)
     elif choice == 3 and array.dtype.kind in "iu":
-        array = np.full_like(array, -5)
+        array = np.full_like(array, -5 if array.dtype.kind == "i" else np.iinfo(array.dtype).max)
     elif choice == 4:
         return {key: value for key, value in arrays.items() if key != name}
     else:

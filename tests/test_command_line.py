@@ -174,7 +174,7 @@ def test_a_wall_that_is_none_is_refused_in_one_line(command, wall, words):
         ("wall.toml", "period = 1.0\nvertices = [[0, 0], [0.5, 0.5], [1, 0]]", "0.5"),
         ("profile.txt", "0 1\n1 2 3\n", "line 2"),
         ("profile.txt", "0 1\n0 2\n", "strictly increasing"),
-        ("profile.txt", "", "at least two rows"),
+        ("profile.txt", "", "0 bytes"),
     ],
 )
 def test_a_malformed_file_is_refused_with_its_name(tmp_path, name, text, words):

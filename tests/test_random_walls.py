@@ -22,7 +22,9 @@ FAR = 3.9
 
 def vertices(count=WALLS, seed=0, **asked):
     """Heights at the vertices of many polygons, shape (count, points + 1), each from its highest point."""
-    return np.array([geo.random_wall(**asked, rng=[seed, k]).vertices[:, 1] for k in range(count)])
+    return np.array(
+        [geo.random_wall(**asked, rng=np.random.default_rng([seed, k])).vertices[:, 1] for k in range(count)]
+    )
 
 
 def centred(heights):
@@ -68,7 +70,9 @@ def test_squared_slopes_of_smooth_walls_have_the_given_mean(points):
     # so coarse that the cubics differ from the polynomial through the heights
     found, (node, weight) = [], np.polynomial.legendre.leggauss(3)
     for k in range(WALLS):
-        wall = geo.random_wall(geo.SelfAffine(0.5), points, rms_slope=0.2, smooth=True, rng=[1, k])
+        wall = geo.random_wall(
+            geo.SelfAffine(0.5), points, rms_slope=0.2, smooth=True, rng=np.random.default_rng([1, k])
+        )
         control = np.array([piece.control_points for piece in wall.pieces])
         difference = 3.0 * np.diff(control, axis=1)
         t = 0.5 + 0.5 * node

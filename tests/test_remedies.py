@@ -12,6 +12,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AsperityError
+from asperity.estimates import Estimate
 
 ROOT = Path(asperity.__file__).parent
 RAISED = {"InputError", "WallError", "FileExistsRefusal", "AccuracyError", "warn"}
@@ -98,6 +99,9 @@ EXPLAINED = {
     "use discretise(law, basis) ** n": "takes a deep power",
     "samples that cover all angles": "no single call",
     "pass invariant=False": "test_streams.py runs it",
+    "write rng={} for a seed": "test_argument_doors.py runs it",
+    'pass key="..."': "test_checkpoint_identity.py runs it",
+    "chmod go-w": "a command of the shell; test_compilation.py makes such folders",
     "which traces with periodic wrap": "as for curves",
     "its symmetric half where it was sampled": "a formula",
     "use law.in_specular_frame()": "in the list above",
@@ -152,7 +156,7 @@ def test_what_is_given_as_an_example_is_one():
     """Code after 'such as' is evaluated."""
     names = {
         **{name: getattr(room, name) for room in (geo, ker) for name in dir(room)},
-        "geo": geo, "ker": ker, "spec": spec, "wall": WALL, "law": LAW, "disk": DISK, "n": 3,
+        "Estimate": Estimate, "geo": geo, "ker": ker, "spec": spec, "wall": WALL, "law": LAW, "disk": DISK, "n": 3,
     }  # fmt: skip
     examples = {
         code for text in messages() for code in re.findall(r"such as ((?:geo\.|ker\.)?[A-Za-z]+\.?\w*\(.*)", text)

@@ -305,7 +305,7 @@ def test_an_example_that_starts_workers_runs_as_a_script_and_says_what_it_lacks_
     assert process.returncode == 0, err
     assert list(tmp_path.glob("*.sweep"))
     head, tail = block.split(GUARD)
-    (tmp_path / "without.py").write_text(head + textwrap.dedent(tail).replace(".sweep", ".other"))
+    (tmp_path / "without.py").write_text(head + textwrap.dedent(tail).replace('.sweep"', '.other"'))
     with started("without.py", cwd=tmp_path) as process:
         _, err = process.communicate(timeout=600)
     assert process.returncode == 1

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.long_runs import count_time
-from ..scene.columns import LEFT, RIGHT
+from ..scene.columns import LEFT, RIGHT, RUN_SINE
 from .pieces import Pieces, samples_between
 
 if TYPE_CHECKING:
@@ -23,6 +23,8 @@ Result = TypeVar("Result")
 
 # A ray is unresolved after MOST_COLLISIONS collisions.
 MOST_COLLISIONS = 100_000
+# Where runs of hits are computed in one step, long rays have many short segments, of which one in this number counts.
+CHEAP_STEPS = 32
 # No limit on the ray segments of one conditional distribution, or on the collisions of a ray in a channel.
 NO_LIMIT = 2**62
 # Rounds in which conditional distributions are recomputed because a neighbour has a piece that they missed.
@@ -99,7 +101,10 @@ class HollowConditionals:
         from .compiled.changes import Limits, setting_of
 
         scene = self.scene
-        limits = Limits(NO_LIMIT if scene.pairs is not None else MOST_COLLISIONS, self.most_segments)
+        has_channels = scene.pairs is not None
+        has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, RUN_SINE] > 0.0)))
+        most = NO_LIMIT if has_channels else MOST_COLLISIONS
+        limits = Limits(most, CHEAP_STEPS if has_runs else 1, self.most_segments)
         return setting_of(scene, self.hollow, limits, self.edges, self.sizes)
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Conditional], set[float]]:
@@ -268,8 +273,6 @@ class HollowConditionals:
                 middle = 0.5 * float(there.low[other[0]] + there.high[other[0]])
                 drift = (0.5 * (low + high) - middle) / (present - beyond)
         piece = np.uint64(label), present, absent, low, high, drift
-        segments = np.zeros(1, np.int64)
-        angle = float(compiled_result(lambda: find_critical(*piece, self._setting, self.degree, segments)))
-        self.segments += int(segments[0])
+        angle = float(compiled_result(lambda: find_critical(*piece, self._setting, self.degree, np.zeros(1, np.int64))))
         self._critical[key] = angle
         return angle

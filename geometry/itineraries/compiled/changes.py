@@ -44,12 +44,18 @@ FIRST_LABEL = np.uint64(4)
 
 # Number of rays traced in one call.
 BLOCK = 32
+# Segments of a ray that count in full; of the others one in `Limits.steps`.
+DEAR_STEPS = np.int64(8)
 
 
 class Limits(NamedTuple):
-    """Limits at one angle: collisions of a ray, and segments of all rays as in `Details.segments`."""
+    """Limits at one angle: collisions of a ray, and segments of all rays.
+
+    They are `Details.segments`, of which from `DEAR_STEPS` on one in ``steps`` counts.
+    """
 
     collisions: int
+    steps: int
     segments: int
 
 
@@ -157,7 +163,8 @@ def outcome(k, task):
     The label combines the itinerary and the outgoing bin. The segments of the ray are added to those of the task.
     """
     edges, results = task.setting.edges, task.setting.tracer.results
-    task.segments[0] += results.details.segments[k]
+    steps = results.details.segments[k]
+    task.segments[0] += min(steps, DEAR_STEPS) + max(steps - DEAR_STEPS, 0) // task.setting.limits.steps
     if results.status[k] != ESCAPED:
         return task.theta, np.uint64(results.status[k])
     # clipped for a ray along y = 0 within rounding
@@ -299,7 +306,7 @@ def example_task() -> Task:
     """Return a task of the types of all tasks, for which functions are compiled to be called by their address."""
     results, stop = results_for(0), np.zeros(1, np.int64)
     tracer = Record(Tracer(0, 0, SLOTS, np.empty(0), results, np.empty(0), stop))
-    setting = Record(Setting(np.empty(0), NO_TABLES, Record(Limits(1, 1)), np.empty(0), np.empty(0), tracer))
+    setting = Record(Setting(np.empty(0), NO_TABLES, Record(Limits(1, 1, 1)), np.empty(0), np.empty(0), tracer))
     return Task(setting, 0.0, 0, stop)
 
 

@@ -82,7 +82,7 @@ def edge_from(x, step, label, task):
 def find_critical(label, present, absent, low, high, drift, setting, degree, spent):
     """Return the critical angle between ``present`` and ``absent`` of the piece [low, high] at the angle ``present``.
 
-    ``drift`` is the estimated derivative of the piece's middle by the angle; ``spent`` counts the segments.
+    ``drift`` is the estimated derivative of the piece's middle by the angle; ``spent``, with one entry, is work space.
     """
     hollow = setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]
