@@ -405,7 +405,7 @@ def test_a_power_has_the_powers_of_the_ends_at_a_smaller_tolerance():
     square, base = spec.enclosures(law**2, 3, tolerance=1e-5), spec.enclosures(law, 3, tolerance=0.5e-5)
     assert square.method == f"power 2; {base.method}"
     assert [(entry.value, entry.index) for entry in square] == [(entry.value**2, entry.index) for entry in base]
-    assert spec.enclosures(ring() ** 2, 3, ker.Bins(8)).method.startswith("power 2; trial functions in Bins(8)")
+    assert spec.enclosures(law**2, 3, ker.Bins(8)).method.startswith("power 2; trial functions in Bins(8)")
 
 
 # ---- words of scatterings ----------------------------------------------------------------------------------------

@@ -44,7 +44,7 @@ SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 WEIGHT_TOLERANCE = 1e-12
 # `apply` of a composition refuses more evaluations than this: for one incoming angle, and for all. A density takes some
 # microseconds for each.
-MOST_EVALUATIONS, MOST_AT_ONCE = 2 * 10**5, 4 * 10**6
+MOST_EVALUATIONS, MOST_AT_ONCE = 3 * 10**6, 3 * 10**7
 # Entry points of a driven law that `distribution` uses, each an atom.
 ENTRY_POINTS = 4096
 # Edges begin at 0 and end at pi within a few roundings.

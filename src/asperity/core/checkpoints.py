@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from .checks import shortened
 from .errors import FileExistsRefusal, InputError
+from .workers import end_if_started_again
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -85,6 +86,7 @@ class Checkpoint:
     def __init__(
         self, path: str | Path, identity: Mapping[str, Any], *, key: str | None = None, overwrite: bool = False
     ) -> None:
+        end_if_started_again()
         self.path = Path(path)
         if key is not None and (not isinstance(key, str) or not key):
             raise InputError(f"key: expected a name for the computation such as 'walls of May', got {shortened(key)}")

@@ -90,6 +90,12 @@ class _Worker:
         self.channel.close()
 
 
+def end_if_started_again() -> None:
+    """End a worker that is being started and reads the script of the process that starts it, up to a long run."""
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        os._exit(STARTED_AGAIN)
+
+
 class Workers:
     """Processes of this machine. Each is at the end of a pipe that no other process has: nothing listens.
 
@@ -98,9 +104,7 @@ class Workers:
     """
 
     def __init__(self, number: int) -> None:
-        if getattr(multiprocessing.current_process(), "_inheriting", False):
-            # a process that is being started reads the script of the one that starts it
-            os._exit(STARTED_AGAIN)
+        end_if_started_again()
         usable = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
         self._processors = [usable[k::number] or usable[k % len(usable) :][:1] if usable else [] for k in range(number)]
         self._workers: list[_Worker] = []
@@ -156,9 +160,9 @@ class Workers:
         lost.process.join(PATIENCE)
         lost.end()
         if lost.process.exitcode == STARTED_AGAIN:
-            raise InputError(STARTED_FROM_A_SCRIPT)
+            raise InputError(STARTED_FROM_A_SCRIPT) from None
         if tries > MOST_ENDED:
-            raise AsperityError("a task ended every worker that tried it; perhaps it needs more memory")
+            raise AsperityError("a task ended every worker that tried it; perhaps it needs more memory") from None
         new = _Worker(lost.processors)
         self._workers[self._workers.index(lost)] = new
         return new
