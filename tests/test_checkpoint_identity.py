@@ -457,8 +457,8 @@ def test_another_schema_is_refused(tmp_path, statement, overwrite):
         with Checkpoint(path, {"wall": "flat"}, overwrite=True) as store:
             assert not dict(store.parts())
         return
-    with pytest.raises(InputError, match="a"), Checkpoint(path, {"wall": "flat"}, overwrite=overwrite):
-        pass
+    with pytest.raises(InputError, match="a"):
+        Checkpoint(path, {"wall": "flat"}, overwrite=overwrite)
 
 
 def test_a_family_that_refuses_its_walls_is_told_by_its_reasons(tmp_path):

@@ -412,8 +412,10 @@ def test_a_basis_that_no_memory_holds_is_refused():
 # random numbers
 
 SAMPLERS = {
-    "Law.sample": lambda rng: ker.lambertian().sample(np.full(4, 1.0), rng),
-    "CollisionLaw.sample": lambda rng: ker.CollisionLaw(ker.lambertian(), geo.Disk()).sample([[0.1, -1.0, 0.2]], rng),
+    "Law.sample": lambda rng: ker.lambertian().sample(np.full(4, 1.0), rng=rng),
+    "CollisionLaw.sample": lambda rng: ker.CollisionLaw(ker.lambertian(), geo.Disk()).sample(
+        [[0.1, -1.0, 0.2]], rng=rng
+    ),
     "discretise": lambda rng: ker.discretise(ker.lambertian(), ker.Bins(2), "monte-carlo", samples=64, rng=rng).array,
     "exit_times": lambda rng: spec.exit_times(ker.lambertian(), [1.0, 2.0, 4.0], 8, rng).times,
 }

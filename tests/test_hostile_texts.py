@@ -187,7 +187,8 @@ def test_hostile_texts_are_refused_or_taken_for_what_they_spell(door, tmp_path, 
         assert time.process_time() - start < SECONDS, text[:80]
         assert not (here / "executed").exists(), text[:80]
         assert CANARY not in sys.modules
-        assert set(sys.modules) - modules == set(), text[:80]
+        # reading a text may load a codec of Python's
+        assert not {name for name in set(sys.modules) - modules if not name.startswith("encodings.")}, text[:80]
 
 
 def test_the_package_has_no_call_that_executes_text():

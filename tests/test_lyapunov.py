@@ -40,7 +40,7 @@ def test_the_triangular_lorentz_gas_has_the_exponent_of_published_runs():
     corners = [(2.0 * math.cos(k * math.pi / 3), 2.0 * math.sin(k * math.pi / 3)) for k in range(6)]
     sides = [geo.Segment(corners[k], corners[(k + 1) % 6]) for k in range(6)]
     hexagon = geo.Container.from_curves([*sides, geo.Arc((0.0, 0.0), 1.0, 2.0 * math.pi, 0.0)])
-    found = ker.lyapunov_exponent(hexagon, SMOOTH, 1000, 200, rng=5)
+    found = ker.lyapunov_exponent(hexagon, SMOOTH, 1000, 600, rng=5)
     assert found.error < 0.01
     # Student's t of three degrees of freedom at 0.99
     assert abs(found.value - published.mean()) < found.error + 5.84 * published.std(ddof=1) / 2.0

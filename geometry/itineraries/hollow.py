@@ -23,8 +23,6 @@ Result = TypeVar("Result")
 
 # A ray is unresolved after MOST_COLLISIONS collisions.
 MOST_COLLISIONS = 100_000
-# Where runs of hits are computed in one step, long rays have many short segments, of which one in this number counts.
-CHEAP_STEPS = 32
 # No limit on the ray segments of one conditional distribution, or on the collisions of a ray in a channel.
 NO_LIMIT = 2**62
 # Rounds in which conditional distributions are recomputed because a neighbour has a piece that they missed.
@@ -104,7 +102,7 @@ class HollowConditionals:
         has_channels = scene.pairs is not None
         has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, RUN_SINE] > 0.0)))
         most = NO_LIMIT if has_channels else MOST_COLLISIONS
-        limits = Limits(most, CHEAP_STEPS if has_runs else 1, self.most_segments)
+        limits = Limits(most, has_runs, self.most_segments)
         return setting_of(scene, self.hollow, limits, self.edges, self.sizes)
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Conditional], set[float]]:

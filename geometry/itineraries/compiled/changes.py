@@ -44,18 +44,19 @@ FIRST_LABEL = np.uint64(4)
 
 # Number of rays traced in one call.
 BLOCK = 32
-# Segments of a ray that count in full; of the others one in `Limits.steps`.
-DEAR_STEPS = np.int64(8)
+# Where runs of hits are computed in one step, the segments of a ray that count in full, and the number beyond which one
+# in CHEAP_STEPS counts: the segments of a long ray are short and take little time.
+DEAR_STEPS, MANY_STEPS, CHEAP_STEPS = np.int64(9), np.int64(1024), np.int64(32)
 
 
 class Limits(NamedTuple):
     """Limits at one angle: collisions of a ray, and segments of all rays.
 
-    They are `Details.segments`, of which from `DEAR_STEPS` on one in ``steps`` counts.
+    They are `Details.segments`, of which few count on long rays if ``has_runs``.
     """
 
     collisions: int
-    steps: int
+    has_runs: bool
     segments: int
 
 
@@ -164,7 +165,9 @@ def outcome(k, task):
     """
     edges, results = task.setting.edges, task.setting.tracer.results
     steps = results.details.segments[k]
-    task.segments[0] += min(steps, DEAR_STEPS) + max(steps - DEAR_STEPS, 0) // task.setting.limits.steps
+    if task.setting.limits.has_runs:
+        steps = min(steps, DEAR_STEPS) + max(steps - MANY_STEPS, 0) // CHEAP_STEPS
+    task.segments[0] += steps
     if results.status[k] != ESCAPED:
         return task.theta, np.uint64(results.status[k])
     # clipped for a ray along y = 0 within rounding
@@ -306,7 +309,7 @@ def example_task() -> Task:
     """Return a task of the types of all tasks, for which functions are compiled to be called by their address."""
     results, stop = results_for(0), np.zeros(1, np.int64)
     tracer = Record(Tracer(0, 0, SLOTS, np.empty(0), results, np.empty(0), stop))
-    setting = Record(Setting(np.empty(0), NO_TABLES, Record(Limits(1, 1, 1)), np.empty(0), np.empty(0), tracer))
+    setting = Record(Setting(np.empty(0), NO_TABLES, Record(Limits(1, False, 1)), np.empty(0), np.empty(0), tracer))
     return Task(setting, 0.0, 0, stop)
 
 
