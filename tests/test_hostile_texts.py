@@ -170,7 +170,7 @@ def test_hostile_texts_are_refused_or_taken_for_what_they_spell(door, tmp_path, 
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
     # what the place needs is loaded: sympy, the readers of instruments, the process of `verify`
-    for text in ("neither a name nor a number", "1e400"):
+    for text in ("neither a name nor a number", "1e400", "words\nin\nlines"):
         with suppress(InputError):
             DOORS[door](text)
     verify(x, x)
