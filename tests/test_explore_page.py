@@ -431,8 +431,8 @@ if __name__ == "__main__":
     server.CLOSED_AFTER = 10**7
     server = server.page_server(port=0)
     server.start()
-    server.io_loop.run_sync(lambda: open_and_close(server, 2))
     tracemalloc.start()
+    server.io_loop.run_sync(lambda: open_and_close(server, 2))
     before = tracemalloc.get_traced_memory()[0]
     server.io_loop.run_sync(lambda: open_and_close(server, 12))
     left = tracemalloc.get_traced_memory()[0] - before
