@@ -25,7 +25,7 @@ from ..eigenvalues.spectra import ONE_MATRIX, UNREFINED, Spectrum, matrix_spectr
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .methods import gap_of_power, law_eigenvalues
-from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
+from .refinement import EIGENVALUES, RAYS_FRACTION, Refinement, SharedMatrices, refined
 from .shallow import shallow_gap
 from .theorems import gap_by_theorem, gap_of_exact, split_gap
 from .verdict import SpectralGap, isolated, made_from
@@ -39,8 +39,6 @@ CLOSER, LARGEST_MISS = 0.25, 1e-3
 # From the tolerance ROUGH on, small sampled matrices are tried for traced walls: sizes with wanted errors, and rays.
 # Larger bases change the gap by at most BEYOND_CHANGE times the last change, if changes decrease like size^-0.6.
 ROUGH, GLANCES, FEW_RAYS, BEYOND_CHANGE = 2e-3, ((24, 1.0), (48, 0.1)), 2**17, 2.0
-# Fraction of the time limit for enclosures; the rest is for the rays if these fail.
-HALF = 0.5
 # Number of eigenvalues computed to find the least one.
 MODULI = 3
 
@@ -315,7 +313,7 @@ def _by_matrices(law: Law, tolerance: float, matrices: SharedMatrices, edge: Ess
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
     found_at_once = rough_gap(law, tolerance, matrices, edge)
     if found_at_once is None:
-        with suppress(OutOfTime), time_limited(HALF * matrices.time_limit):
+        with suppress(OutOfTime), time_limited((1.0 - RAYS_FRACTION) * matrices.time_limit):
             found_at_once = enclosed_gap(law, tolerance, edge)
     if found_at_once is not None:
         return found_at_once

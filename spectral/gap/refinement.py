@@ -23,7 +23,7 @@ ARC_PANELS = ((1, 1e-1), (2, 1e-2), (3, 1e-3), (4, 1e-3), (6, 1e-4))
 # Up to this half angle the eigenfunctions of arcs are close to Legendre polynomials.
 SHALLOW = 0.5
 FIRST_SAMPLES = 2**17
-# Fraction of the time limit for rays.
+# Fraction of the time limit for rays; the rest is for the enclosures that are tried before.
 RAYS_FRACTION = 0.5
 # Nominal time of a ray, and of the product of two basis functions at a ray, in seconds.
 RAY_TIME, PRODUCT_TIME = 1e-6, 4e-10
