@@ -42,9 +42,8 @@ SMALLEST_DRAW = 2.0**-54
 SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 # Decimal weights such as 0.1, ..., 0.4 sum to 1 within a few roundings; a sum with a forgotten term differs by more.
 WEIGHT_TOLERANCE = 1e-12
-# `apply` of a composition refuses more evaluations than this: for one incoming angle, and for all. A density takes some
-# microseconds for each.
-MOST_EVALUATIONS, MOST_AT_ONCE = 3 * 10**6, 3 * 10**7
+# `apply` of a composition takes at most this many values of its function. A density takes some 200 ns for each.
+MOST_VALUES = 3 * 10**7
 # Entry points of a driven law that `distribution` uses, each an atom.
 ENTRY_POINTS = 4096
 # Edges begin at 0 and end at pi within a few roundings.
@@ -305,13 +304,9 @@ class BranchLaw(Law):
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         probability, outgoing = self.branches(theta)
-        total: Floats | None = None
-        for slot in range(outgoing.shape[-1]):
-            value = np.asarray(function(outgoing[..., slot]), dtype=np.float64)
-            weight = probability[..., slot].reshape(theta.shape + (1,) * (value.ndim - theta.ndim))
-            total = weight * value if total is None else total + weight * value
-        assert total is not None  # a law has at least one branch
-        return total
+        value = np.asarray(function(outgoing), dtype=np.float64)
+        weight = probability.reshape(probability.shape + (1,) * (value.ndim - probability.ndim))
+        return np.asarray(np.sum(weight * value, axis=theta.ndim))
 
 
 @explained_class
@@ -635,7 +630,7 @@ class Composition(Law):
         return theta
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        _check_cost(self, theta.size)
+        function = _at_bounded_cost(self, function, theta.size)
         for law in reversed(self.laws[1:]):
             function = _pulled_back(law, function)
         return self.laws[0].apply(function, theta)
@@ -649,8 +644,8 @@ class Composition(Law):
 class Power(Law):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
-    `apply` evaluates its function at ``law.evaluations ** n`` angles. It raises InputError above 2 10^5 angles, above
-    4 10^6 for all incoming angles, or for n > 100; use ``discretise(law, basis) ** n`` then.
+    `apply` evaluates its function at about ``law.evaluations ** n`` angles for each incoming one. It raises InputError
+    above 3 10^7 in all, or for n > 100; use ``discretise(law, basis) ** n`` then.
 
     Examples
     --------
@@ -698,8 +693,8 @@ class Power(Law):
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         if self.exponent == 0:
             return np.asarray(function(theta), dtype=np.float64)
-        _check_cost(self, theta.size)
         _check_length("apply", self.exponent, DEEPEST_POWER)
+        function = _at_bounded_cost(self, function, theta.size)
         for _ in range(self.exponent - 1):
             function = _pulled_back(self.law, function)
         return self.law.apply(function, theta)
@@ -722,13 +717,21 @@ def as_base(law: Law) -> str:
     return f"({law!r})" if isinstance(law, Power) else as_factor(law)
 
 
-def _check_cost(law: Law, incoming: int) -> None:
-    if law.evaluations > MOST_EVALUATIONS or law.evaluations * incoming > MOST_AT_ONCE:
-        raise InputError(
-            f"apply: {law!r} needs {law.evaluations:.1e} evaluations for each of {incoming} angles (at most "
-            f"{MOST_EVALUATIONS:.0e}, and {MOST_AT_ONCE:.0e} for all); use discretise() and compose the matrices, or "
-            "fewer angles at a time"
-        )
+def _at_bounded_cost(law: Law, function: AngleFunction, incoming: int) -> AngleFunction:
+    """The function, of which no more than `MOST_VALUES` values are taken: some angles need more than is declared."""
+    advice = "use discretise() and compose the matrices, or fewer angles at a time"
+    if law.evaluations * incoming > MOST_VALUES:
+        raise InputError(f"apply: {law!r} needs {law.evaluations:.1e} values for each of {incoming} angles; {advice}")
+    taken = 0
+
+    def bounded(angle: Floats) -> Floats:
+        nonlocal taken
+        taken += angle.size
+        if taken > MOST_VALUES:
+            raise InputError(f"apply: {law!r} needs over {MOST_VALUES:.0e} values for {incoming} angles; {advice}")
+        return function(angle)
+
+    return bounded
 
 
 def _check_length(method: str, exponent: int, most: int) -> None:

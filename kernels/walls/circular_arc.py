@@ -28,8 +28,8 @@ MOST_HITS = 500
 HITS_IN_CUTS = 24
 FEWEST_HITS = 8
 NODES = 16
-# Evaluations of the function per block.
-CHUNK = 2**14
+# Incoming angles at once; each has up to 2 MOST_HITS pieces of NODES outgoing angles.
+CHUNK = 2**11
 
 
 @explained_class
