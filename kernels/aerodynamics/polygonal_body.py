@@ -259,9 +259,6 @@ class PolygonalBody:
         ------
         InputError
             If the region is not convex, or does not contain the body.
-        AccuracyError
-            If a particle leaves through a corner of the region, where no wall receives it.
-
         Examples
         --------
         The fraction of particles that meet a convex body is its perimeter over that of the region (Crofton):
@@ -277,22 +274,32 @@ class PolygonalBody:
         source, around = generator(rng), _convex(region)
         if not around.contains(self._starts).all():
             raise InputError(f"region: expected one that contains the body, got {region!r}")
-        before = np.stack([around.perimeter * source.random(n), SINE.sample(n, source)], axis=1)
-        return before, self._through_region(before, around)
+        before, after = np.empty((n, 2)), np.full((n, 2), np.nan)
+        # A particle that leaves through a corner of the region, a null set, is drawn again.
+        while (drawn := np.isnan(after[:, 0])).any():
+            number = int(np.count_nonzero(drawn))
+            before[drawn] = np.stack([around.perimeter * source.random(number), SINE.sample(number, source)], axis=1)
+            after[drawn] = self._through_region(before[drawn], around)
+        return before, after
 
     def _through_region(self, before: Floats, region: Container) -> Floats:
-        """Arc length and angle of exit of the particles that enter the region at an arc length and an angle."""
+        """Arc length and angle of exit of the particles that enter the region at an arc length and an angle.
+
+        Both are NaN where a particle leaves through a corner, because no wall receives it.
+        """
         start, wall = region.point_at(before[:, 0])
         tangent, normal = region.frames(start, wall)
         angle = before[:, 1, None]
         out = self.scatter(start, np.cos(angle) * tangent + np.sin(angle) * normal)
         time, wall, _ = region.next_wall(out.position, out.velocity, np.where(out.reflections > 0, -1, wall))
-        if np.any(wall < 0):
-            raise AccuracyError("region: a particle leaves through a corner; use another rng", float(np.mean(wall < 0)))
-        ends = out.position + time[:, None] * out.velocity
+        left = np.full(before.shape, np.nan)
+        found = wall >= 0
+        velocity, wall = out.velocity[found], wall[found]
+        ends = out.position[found] + time[found, None] * velocity
         tangent, normal = region.frames(ends, wall)
-        angle = np.arctan2(-np.sum(out.velocity * normal, axis=1), -np.sum(out.velocity * tangent, axis=1))
-        return np.stack([region.length_at(ends, wall), angle], axis=1)
+        angle = np.arctan2(-np.sum(velocity * normal, axis=1), -np.sum(velocity * tangent, axis=1))
+        left[found] = np.stack([region.length_at(ends, wall), angle], axis=1)
+        return left
 
 
 def _convex(region: Container) -> Container:

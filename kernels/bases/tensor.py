@@ -50,11 +50,11 @@ class TensorBasis(Basis):
     factors: tuple[Basis, ...]
 
     @explained
-    def __init__(self, factors: tuple[Basis, ...]) -> None:
+    def __init__(self, factors: tuple[Basis, ...], *others: Basis) -> None:
         flat = tuple(
             part for factor in factors for part in (factor.factors if isinstance(factor, TensorBasis) else (factor,))
         )
-        if len(flat) < 2 or not all(isinstance(factor, Basis) for factor in flat):
+        if others or len(flat) < 2 or not all(isinstance(factor, Basis) for factor in flat):
             raise InputError(
                 "factors: expected two bases or more, as in TensorBasis((Bins(16), Bins(8, weight='sin2'))), "
                 f"got {factors!r}"

@@ -98,7 +98,10 @@ class PairLaw:
     def reduced_disk(self) -> Disk:
         """The disk at a fixed wall that behaves like the pair."""
         (one, two), (a1, a2) = self.disks, self.radii
-        return Disk(1.0 / (1.0 / one.mass + 1.0 / two.mass), 1.0 / (a1 * (a1 / one.inertia) + a2 * (a2 / two.inertia)))
+        turning = a1 * (a1 / one.inertia) + a2 * (a2 / two.inertia)
+        if turning == 0.0:
+            raise InputError(f"radii: expected some whose square over the inertia is a float, got {self.radii}")
+        return Disk(1.0 / (1.0 / one.mass + 1.0 / two.mass), 1.0 / turning)
 
     @property
     def reduced_law(self) -> CollisionLaw:

@@ -41,6 +41,7 @@ GRID = 240
 BEYOND_CHANCE, ENTRY_ROUNDING = 10.0, 64.0 * EPS
 # Of samples, and of counts: they are held as int64.
 MOST = 2**63 - 1
+LARGEST_LOGARITHM = float(np.log(np.finfo(np.float64).max))
 # What a file holds as it is.
 PLAIN_FIELDS = (
     "symmetrised", "samples", "method", "law", "reversible", "mirror_symmetric", "frame", "requested_tolerance",
@@ -129,6 +130,8 @@ def to_power(matrix: KernelMatrix, exponent: int) -> KernelMatrix:
         with np.errstate(over="ignore"):
             whole = float(np.expm1(exponent * np.log1p(error)))
     else:
+        if exponent * np.log(bound + error) > LARGEST_LOGARITHM:
+            raise InputError(f"exponent: {exponent} is too large for a matrix of norm {bound:.3g}; divide the matrix by it")
         whole = (bound + error) ** exponent - bound**exponent
     power = frobenius_error(whole, matrix.error.kind, f"power {exponent} of: {matrix.error.method}")
     array = np.linalg.matrix_power(matrix.symmetric, exponent)
