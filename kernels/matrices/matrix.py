@@ -131,7 +131,7 @@ def to_power(matrix: KernelMatrix, exponent: int) -> KernelMatrix:
             whole = float(np.expm1(exponent * np.log1p(error)))
     else:
         if exponent * np.log(bound + error) > LARGEST_LOGARITHM:
-            raise InputError(f"exponent: {exponent} is too large for a matrix of norm {bound:.3g}; divide the matrix by it")
+            raise InputError(f"exponent: {exponent} is too large for norm {bound:.3g}; divide the matrix by it")
         whole = (bound + error) ** exponent - bound**exponent
     power = frobenius_error(whole, matrix.error.kind, f"power {exponent} of: {matrix.error.method}")
     array = np.linalg.matrix_power(matrix.symmetric, exponent)
