@@ -13,11 +13,11 @@ from pathlib import Path
 from asperity.bench.extremes.report import run_extremes
 from asperity.bench.quantities.walls import RANDOM_WALLS
 from asperity.bench.run import BenchRun
-from asperity.bench.savings import savings_table
 from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
 from asperity.spectral import Machine
 
 from .peers import peer_tables
+from .savings import savings_table
 from .speed import speed_and_goals
 
 # Short ladders always: there are many random walls, and only the library's choice matters. The repeats suffice for a

@@ -473,7 +473,6 @@ def warm_up() -> None:
 @click.argument("problem", nargs=-1)
 @click.option("--quick", is_flag=True, help="Short ladders and cheap references: under three minutes.")
 @click.option("--extremes", is_flag=True, help="The stability report instead: stiff and extreme cases.")
-@click.option("--savings", is_flag=True, help="Instead: what each scene leaves out, and what that saves.")
 @click.option(
     "--out", default="bench-results", show_default=True, type=click.Path(path_type=Path), help="Folder for results."
 )
@@ -487,9 +486,7 @@ def warm_up() -> None:
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     help="Compare with the bench.json of an earlier run; exit code 1 if something became slower or less exact.",
 )
-def bench(
-    problem: tuple[str, ...], quick: bool, extremes: bool, savings: bool, out: Path, force: bool, compare: Path | None
-) -> None:
+def bench(problem: tuple[str, ...], quick: bool, extremes: bool, out: Path, force: bool, compare: Path | None) -> None:
     """Error against run time on the standard set, or on PROBLEMs of it: SCENE, QUANTITY or SCENE/QUANTITY.
 
     \b
@@ -500,8 +497,6 @@ def bench(
     """
     from .bench.commands import run_bench
 
-    if extremes and savings:
-        raise click.UsageError("--extremes and --savings are two reports; choose one")
-    if (extremes or savings) and (problem or compare is not None):
-        raise click.UsageError("--extremes and --savings take no PROBLEM and no --compare; leave these out")
-    sys.exit(run_bench(problem, quick=quick, extremes=extremes, savings=savings, out=out, force=force, compare=compare))
+    if extremes and (problem or compare is not None):
+        raise click.UsageError("--extremes takes no PROBLEM and no --compare; leave these out")
+    sys.exit(run_bench(problem, quick=quick, extremes=extremes, out=out, force=force, compare=compare))

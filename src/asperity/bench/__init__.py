@@ -1,1 +1,1 @@
-"""Measurements of the library: error against run time, extreme cases, savings of the tracer, regressions."""
+"""Measurements of the library: error against run time, extreme cases, regressions."""

@@ -16,7 +16,7 @@ from .standard_set import FULL, QUICK, problem_names, run_problems
 
 
 def run_bench(
-    problems: Sequence[str], *, quick: bool, extremes: bool, savings: bool, out: Path, force: bool, compare: Path | None
+    problems: Sequence[str], *, quick: bool, extremes: bool, out: Path, force: bool, compare: Path | None
 ) -> int:
     """Run the requested measurements, print and write the results; return the exit code."""
     names = problem_names(problems)
@@ -25,10 +25,6 @@ def run_bench(
         from .extremes.report import run_extremes
 
         return _show(out / "extremes.md", lambda: run_extremes(quick).table(), force)
-    if savings:
-        from .savings import savings_table
-
-        return _show(out / "savings.md", lambda: savings_table(quick), force)
     prepare_folder(out, names, force=force)
     effort = QUICK if quick else FULL
     reports = list(run_problems(names, effort, out, lambda line: click.echo(line, err=True)))
