@@ -43,7 +43,7 @@ SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 # Decimal weights such as 0.1, ..., 0.4 sum to 1 within a few roundings; a sum with a forgotten term differs by more.
 WEIGHT_TOLERANCE = 1e-12
 # `apply` of a composition takes at most this many values of its function. A density takes some 200 ns for each.
-MOST_VALUES = 3 * 10**7
+MOST_VALUES = 10**8
 # Entry points of a driven law that `distribution` uses, each an atom.
 ENTRY_POINTS = 4096
 # Edges begin at 0 and end at pi within a few roundings.
@@ -645,7 +645,7 @@ class Power(Law):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
     `apply` evaluates its function at about ``law.evaluations ** n`` angles for each incoming one. It raises InputError
-    above 3 10^7 in all, or for n > 100; use ``discretise(law, basis) ** n`` then.
+    above 10^8 in all, or for n > 100; use ``discretise(law, basis) ** n`` then.
 
     Examples
     --------
