@@ -123,3 +123,7 @@ def __getattr__(name: str) -> Any:
     if name == "symbolic":
         return import_module(".disk.symbolic", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -146,3 +146,8 @@ def test_every_file_that_contributing_names_exists():
 def test_no_folder_hides_a_public_name(room):
     folders = {path.stem for path in (ROOT / room.__name__.rpartition(".")[2]).iterdir()}
     assert folders & set(room.__all__) == set()
+
+
+@pytest.mark.parametrize("room", [geometry, kernels, spectral], ids=ROOMS)
+def test_a_room_lists_its_public_names_and_no_others(room):
+    assert set(dir(room)) == set(room.__all__)
