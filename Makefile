@@ -10,7 +10,7 @@ RUN := $(VENV)/.installed
 DEV := $(VENV)/.installed-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help study test test-lowest test-newest check format-check lint types docs bench build format clean distclean
+.PHONY: help study test test-all test-lowest test-newest check format-check lint types docs bench build format clean distclean
 # two installs into one environment must not run side by side
 .NOTPARALLEL:
 
@@ -20,8 +20,11 @@ help: ## list the targets
 study: $(RUN) ## study a wall and draw it into study/ (WALL=NAME or NAME:parameter=value for another)
 	$(VENV)/bin/asperity study $(WALL) --out study --force
 
-test: $(DEV) ## run the tests, on every core
-	$(PY) -m pytest --numprocesses auto --dist worksteal
+test: $(DEV) ## run the tests, but the slow ones, on every core
+	$(PY) -m pytest --numprocesses auto --dist worksteal -m 'not slow'
+
+test-all: $(DEV) ## run all tests, on every core
+	$(PY) -m pytest --numprocesses auto --dist worksteal --durations 50
 
 # pip takes the newest versions by itself, but leaves alone what an environment has: so these two start from nothing.
 test-lowest: ## run the tests with the lowest versions of all dependencies, in .venv-lowest
@@ -34,7 +37,7 @@ test-newest: ## run the tests with the newest versions of all dependencies, in .
 	.venv-newest/bin/python -m pip install --quiet --upgrade --upgrade-strategy eager --editable '.[dev]'
 	.venv-newest/bin/python -m pytest --numprocesses auto --dist worksteal
 
-check: format-check lint types docs test ## everything a change must pass
+check: format-check lint types docs test-all ## everything a change must pass
 
 format-check: $(DEV)
 	$(PY) -m ruff format --check .

@@ -203,6 +203,7 @@ def test_errors_of_kinks_in_the_middle_of_many_panels_are_not_added_as_if_their_
     assert np.linalg.norm(panels.error) < missed <= panels.total_error(basis)
 
 
+@pytest.mark.slow
 def test_errors_of_rectangular_teeth_of_many_depths_hold() -> None:
     """Both causes at once: of these thirteen, three exceeded their errors by up to 95 %."""
     basis, ratios = ker.Bins(8), []

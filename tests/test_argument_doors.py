@@ -175,6 +175,7 @@ def test_operators_refuse_what_is_no_operand_in_words():
             10**400 * law
 
 
+@pytest.mark.slow
 def test_a_sample_of_the_campaign_finds_nothing():
     made = subprocess.run(
         [sys.executable, "-m", "benchmarks.argument_fuzz", "600", "1"],

@@ -34,7 +34,7 @@ WALLS = {"parabolas": PARABOLAS, "waves": WAVES, "still": STILL}
 
 
 @pytest.mark.parametrize("name", WALLS)
-@pytest.mark.parametrize("scale", [1e-1, 1e-2, 1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("scale", [1e-1, 1e-4, 1e-8])
 def test_a_collision_with_bezier_pieces_is_an_involution_that_keeps_the_energy(name, scale):
     position, velocity = states(WALLS[name], scale, 1000)
     out = geo.collide(DISK, WALLS[name], scale, position, velocity)

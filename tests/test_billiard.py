@@ -36,6 +36,7 @@ def in_a_strip(ratio, steps, n=20):
     return record, record.extent() / (np.sqrt(1 / normal**2 - 1) * math.sqrt(1 + ratio))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", IRRATIONAL)
 def test_the_strip_is_filled_up_to_its_bound_where_the_angle_is_irrational(ratio):
     record, widths = in_a_strip(ratio, 1500)

@@ -80,6 +80,7 @@ def test_matrices_of_crevices_with_straight_floors_are_the_exact_ones(floor):
     assert distance < error < 2e-6
 
 
+@pytest.mark.slow
 def test_the_first_moment_and_the_resistance_of_mushrooms_reach_eight_digits():
     # references with K = 113 instead of 80 crossings, agreeing with panels in theta to 4e-8
     law = ker.WallLaw(MUSHROOM)
@@ -91,6 +92,7 @@ def test_the_first_moment_and_the_resistance_of_mushrooms_reach_eight_digits():
     assert float(resistance) == pytest.approx(1.059828846044, abs=resistance.error)
 
 
+@pytest.mark.slow
 def test_integrals_near_grazing_have_the_errors_that_they_report():
     integrals = GrazingIntegrals.of(MUSHROOM, BASIS)
     fine, least = integrals.matrix(1e-8)

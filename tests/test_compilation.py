@@ -221,6 +221,7 @@ main(sys.argv[1:], standalone_mode=False)
 """
 
 
+@pytest.mark.slow
 def test_after_the_warm_up_a_study_compiles_nothing():
     environment = os.environ | {"PYTHONPATH": str(SOURCE.parent)}
 

@@ -90,6 +90,7 @@ def test_a_product_that_would_not_fit_into_memory_says_so() -> None:
 
 
 # words of isometries, of scatterings, with densities, matrices and maps; by all methods and in all kinds of bases
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 3, 5, 7, 9, 11, 12, 14, 16, 20, 23, 30, 33, 37, 1013, 1028, 1030])
 def test_errors_of_composed_laws_hold(seed: int) -> None:
     found = outcome(seed)

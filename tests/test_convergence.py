@@ -49,6 +49,7 @@ def test_the_disk_comes_back_where_it_was_within_the_size_of_a_few_cells(study):
     assert float(study.order("drift", "scales")) > 0.85
 
 
+@pytest.mark.slow
 def test_the_limit_is_the_law_of_the_foreshortened_wall_and_not_of_the_wall():
     # fact 15: 0.0902 and not 0.554
     disk = geo.Disk(1.0, 1.0)

@@ -34,6 +34,7 @@ def is_calibrated(found: Tally) -> bool:
     return binomtest(found.held, found.repeats, LEVEL).pvalue > RARE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("symmetrise", [False, True])
 @pytest.mark.parametrize("basis", [ker.Bins(4), ker.Bins(24), ker.Legendre(6)], ids=repr)
 @pytest.mark.parametrize("method", ["monte-carlo", "qmc"])
@@ -41,6 +42,7 @@ def test_errors_of_sampled_matrices_hold_in_95_of_100_cases(method: str, basis: 
     assert is_calibrated(tally(matrix_once(TEETH, basis, method, 2048, symmetrise), REPEATS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [SCATTERING, MAXWELL], ids=repr)
 def test_errors_hold_against_matrices_that_are_known_by_hand(law: ker.Law) -> None:
     assert is_calibrated(tally(matrix_once(law, ker.Legendre(4), "monte-carlo", 2048, False), REPEATS))
@@ -65,6 +67,7 @@ def test_errors_of_pairs_hold_in_95_of_100_cases(basis: ker.Basis, invariant: bo
     assert is_calibrated(found) or (not invariant and found.coverage > LEVEL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "which"), [("monte-carlo", "gap"), ("qmc", "slem")])
 def test_sampling_errors_of_eigenvalues_hold_in_95_of_100_cases(method: str, which: str) -> None:
     assert is_calibrated(tally(eigenvalue_once(TEETH, ker.Legendre(6), method, 4096, which), REPEATS))

@@ -36,12 +36,14 @@ def test_the_gap_lies_between_the_bounds_which_are_near_each_other(curvature, ga
     assert found.lower > (0.85 if curvature <= 1.0 else 0.7) * gap
 
 
+@pytest.mark.slow
 def test_the_lower_bound_approaches_the_gap_with_more_bins():
     lower = [spec.curvature_gap_bounds(1 / 3, bins).lower for bins in (100, 200, 400)]
     assert lower[0] < lower[1] < lower[2] < GAP - GAP_ERROR
     assert GAP - lower[2] < 0.6 * (GAP - lower[0])
 
 
+@pytest.mark.slow
 def test_the_page_on_spectra_has_the_gaps_and_bounds_that_are_computed():
     """Every number of the table of dispersing arcs but the finest lower bound, which takes minutes."""
     page = (Path(__file__).parents[1] / "docs" / "theory" / "spectra.md").read_text(encoding="utf-8")

@@ -236,6 +236,7 @@ def test_rows_between_cuts_are_the_limit_of_those_on_cells(order):
     assert errors[1] < 3e-5 and errors[1] < 0.05 * errors[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind, order", [("rows", 1), ("rows", 2), ("sup", 1)])
 @pytest.mark.parametrize("other", [ker.maxwell(0.5), ker.TriangularTeethLaw(0.7)], ids=repr)
 def test_errors_of_distances_from_arcs_hold_at_every_tolerance(kind, order, other):
@@ -487,6 +488,7 @@ class KnownByApply(ker.Law):
         return self.law.apply(function, theta)
 
 
+@pytest.mark.slow
 def test_the_error_of_a_product_counts_that_of_its_later_factors():
     # the matrix of the later factor is known to its own error only, which refining the incoming angle does not lower
     teeth, scatter = ker.RectangularTeethLaw(0.8), ker.henyey_greenstein(0.5)
@@ -528,6 +530,7 @@ class SplitByEntryPoints(ker.DrivenLaw):
         return Split.ends[(x > Split().fraction(theta)).astype(int)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sup", [False, True], ids=["rows", "sup"])
 @pytest.mark.parametrize("order", [1.0, 2.0, 4.0, 10.0])
 @pytest.mark.parametrize(
@@ -575,6 +578,7 @@ DISK = geo.Disk(1.0, 0.5)
 SMOOTH, NO_SLIP = ker.smooth(DISK), ker.no_slip(DISK)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rows", "sup", "joint"])
 @pytest.mark.parametrize("order", [1, 2])
 def test_collision_laws_that_both_flip_psi_have_the_distance_of_their_laws_of_theta(kind, order):

@@ -13,8 +13,7 @@ from asperity.errors import AccuracyError, InputError
 EPS = np.finfo(float).eps
 
 
-@pytest.mark.parametrize("k", [1, 4, 10])
-@pytest.mark.parametrize("g", [-0.7, 0.5, 0.9, 0.99, 0.999999])
+@pytest.mark.parametrize(("g", "k"), [(-0.7, 4), (0.5, 10), (0.9, 1), (0.99, 4), (0.999999, 1)])
 def test_every_eigenvalue_of_henyey_greenstein_is_enclosed_and_indexed(g, k):
     found = spec.enclosures(ker.henyey_greenstein(g), k)
     exact = np.sort(g ** np.arange(float(k)))[::-1]

@@ -44,6 +44,7 @@ def deficit(law):
     return Estimate(4.0 * found.flatness, found.error, "estimate", "Legendre(2)")
 
 
+@pytest.mark.slow
 def test_errors_of_mean_and_spread_cover_the_truth_for_a_family_with_a_known_mean():
     means, spreads = [], []
     for trial in range(TRIALS):
@@ -54,6 +55,7 @@ def test_errors_of_mean_and_spread_cover_the_truth_for_a_family_with_a_known_mea
     assert np.mean(spreads) >= LEAST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "least"), [(12, 0.90), (100, 0.92)])
 def test_skew_values_have_larger_errors_than_students(number, least):
     # by Student's t alone they cover 0.907 for 12 values
@@ -95,6 +97,7 @@ def partly_refused(rng):
     return ker.maxwell(2.0 if gap > 0.5 else gap)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:mean and spread of gap are over those that were not")
 def test_where_walls_are_refused_the_mean_is_that_of_the_others_and_its_error_covers_it():
     means, spreads = [], []
@@ -128,6 +131,7 @@ def test_three_accepted_walls_have_no_mean():
         spec.mean_law(lambda rng: ker.maxwell(2.0), 5, ker.Bins(2))
 
 
+@pytest.mark.slow
 def test_the_error_of_a_mean_law_covers_the_law():
     exact = ker.discretise(ker.maxwell(0.5), ker.Bins(4)).symmetric
     covered = []
@@ -171,6 +175,7 @@ def test_the_deficit_of_gentle_gaussian_walls_is_four_times_their_mean_squared_s
     assert 0.005 < ratios[0].value - ratios[1].value < 0.08
 
 
+@pytest.mark.slow
 def test_smooth_gaussian_walls_have_the_gap_of_small_slopes_and_polygons_none():
     pytest.importorskip("SurfaceTopography")
     smooth = spec.ensemble(partial(gentle, 12, 0.1, smooth=True), 4, ["gap_specular", deficit], 4e-4, rng=5)

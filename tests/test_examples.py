@@ -210,6 +210,7 @@ def test_the_pictures_of_the_page_on_true_disks_are_drawn(tmp_path):
         assert f"true-disk/{path.name}" in page and path.stat().st_size < 150_000
 
 
+@pytest.mark.slow
 def test_roughness_reduces_chaos_and_a_gas_comes_to_equipartition(tmp_path):
     found = load("billiards").main(200, 60, 900, tmp_path / "portraits.png")
     assert (tmp_path / "portraits.png").stat().st_size > 20_000

@@ -94,6 +94,7 @@ def test_no_beam_meets_a_third_mirror():
     assert beams > 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "cells"), [(ker.lambertian(), 2), (ker.henyey_greenstein(0.5), 3)])
 def test_the_loss_falls_in_proportion_to_the_opening(law, cells):
     exchange = exchange_of(law, cells)
@@ -139,6 +140,7 @@ def random_exchanges():
     yield np.eye(6)[[1, 0, 3, 2, 5, 4]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("matrix", list(random_exchanges()), ids=lambda matrix: f"{len(matrix)} cells")
 def test_every_symmetric_matrix_has_its_chamber(matrix):
     nothing = Estimate(0.0, 0.0, "bound", "given")
@@ -150,6 +152,7 @@ def test_every_symmetric_matrix_has_its_chamber(matrix):
     assert min(distances) == pytest.approx(1.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_chamber_for_the_least_resistance_has_one_below_0_990():
     exchange = exchange_of(ker.LeastResistanceLaw(), 16)
     hollow = ker.exchange_hollow(exchange, 1e-4)

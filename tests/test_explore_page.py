@@ -440,6 +440,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_closed_tabs_leave_no_memory(tmp_path):
     (tmp_path / "tabs.py").write_text(CLOSED_TABS)
     done = subprocess.run(

@@ -148,6 +148,7 @@ def runs():
     return [gas(LAWS["no-slip"], 1200, seed) for seed in range(32)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["no-slip", "diffuse"])
 def test_translation_and_spin_come_to_equipartition(name, runs):
     records = runs if name == "no-slip" else [gas(LAWS[name], 700, seed) for seed in range(32)]

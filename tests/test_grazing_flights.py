@@ -15,6 +15,7 @@ from asperity import kernels as ker
 DISK = geo.Disk(1.0, 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [ker.smooth(DISK), ker.no_slip(DISK)], ids=["smooth", "no-slip"])
 @pytest.mark.parametrize("number", range(7))
 def test_no_flight_of_the_campaign_is_wrong_or_lost_or_raises(number, law):

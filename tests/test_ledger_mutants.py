@@ -16,6 +16,7 @@ ROWS = {entry.id: entry for entry in ledger.entries() if entry.check is not None
 SAMPLE = {"symbolic": 1, "numeric": 3}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", ROWS.values(), ids=ROWS)
 def test_a_check_refuses_wrong_formulas(entry):
     mutants = [mutant for mutant in mutants_of(entry) if (entry.id, mutant.label) not in EQUIVALENT]

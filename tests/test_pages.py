@@ -90,6 +90,7 @@ def test_sobol_sequences_beat_independent_rays(run):
     assert error["Sobol sequence"] < error["independent rays"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["knudsen_diffusion", "two_laws_compared", "a_sweep"])
 def test_the_slower_examples_agree_with_what_is_known(run, name):
     names = run(name)

@@ -94,6 +94,7 @@ def test_the_reversed_collision_goes_back():
     np.testing.assert_allclose(-back.velocity, velocity, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_close_satellites_collide_like_the_law_of_the_pair():
     # seen from one disk, the other's satellites are arcs of radius s1 + s2 = 3/4 of the spacing
     n = 1500
@@ -109,6 +110,7 @@ def test_close_satellites_collide_like_the_law_of_the_pair():
     assert ks_2samp(found[:, 0], other.sample([0.0, 1.0], one, two, rng)[0][:, 0]).pvalue < 1e-12
 
 
+@pytest.mark.slow
 def test_the_distance_to_the_law_of_the_pair_tends_to_zero():
     limit = ker.PairLaw.from_wall(geo.dispersing_arcs(4.0 / 3.0), *DISKS, RADII)
     rng, n = np.random.default_rng(5), 1500

@@ -150,6 +150,7 @@ print(found.times.tobytes().hex()[:4000] + str(found.times.sum()))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="a signal to another process is sent differently here")
 def test_a_killed_and_an_interrupted_process_go_on_to_the_same_bits(tmp_path):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([SOURCE, os.environ.get("PYTHONPATH", "")])}
