@@ -1,4 +1,4 @@
-"""The proof by factorisation itself: its margin against Higham's theorem, and thresholds on either side of a value."""
+"""The check by factorisation itself: its margin against Higham's theorem, and thresholds on either side of a value."""
 
 from __future__ import annotations
 

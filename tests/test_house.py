@@ -199,7 +199,10 @@ def idle_checks(tree: ast.AST) -> list[int]:
     """Lines of assertions that hold of any code: compared with itself, of a tuple, of None, of a lone `approx`."""
 
     def returns_none(node: ast.AST) -> bool:
-        return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in RETURNS_NONE
+        # np.sort and np.append return arrays
+        if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
+            return False
+        return node.func.attr in RETURNS_NONE and ast.unparse(node.func.value) != "np"
 
     def draws(node: ast.AST) -> bool:
         # a call may differ from itself: of code that is to repeat, or of a state
@@ -222,6 +225,10 @@ def idle_checks(tree: ast.AST) -> list[int]:
             alone = isinstance(test, ast.Call) and ast.unparse(test.func) in ("approx", "pytest.approx")
             if isinstance(test, (ast.Tuple, ast.List, ast.GeneratorExp, ast.Constant)) or alone or returns_none(test):
                 lines.append(node.lineno)
+        elif isinstance(node, (ast.Assign, ast.UnaryOp)):
+            # `x = a.sort()`, to be compared later, and `not a.sort()`
+            if returns_none(node.value if isinstance(node, ast.Assign) else node.operand):
+                lines.append(node.lineno)
         elif isinstance(node, ast.With) and any("pytest.raises" in ast.unparse(item) for item in node.items):
             if all(isinstance(line, ast.Pass) for line in node.body):
                 lines.append(node.lineno)
@@ -234,10 +241,10 @@ def test_assertions_that_cannot_fail_are_found():
     for text in (
         "assert a.sort() == b.sort()", "assert (a, 'b')", "assert pytest.approx(1.0)", "assert x == x",
         "assert None is a.append(1)", "for x in ():\n    assert x", "with pytest.raises(E):\n    pass",
-        "assert (x for x in y)",
+        "assert (x for x in y)", "x = a.sort()", "assert not a.sort()",
     ):  # fmt: skip
         assert idle_checks(ast.parse(text)), text
-    for text in ("assert sorted(a) == sorted(b)", "assert f(x) == f(x)", "with pytest.raises(E):\n    f()"):
+    for text in ("assert sorted(a) == sorted(b)", "x = np.sort(a)", "assert f(x) == f(x)", "f(a.sort)"):
         assert not idle_checks(ast.parse(text)), text
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,6 +37,21 @@ def test_the_distance_is_that_of_rows_from_the_law_of_retroreflection():
     # without any deflection the error says what may be missed
     still = ker.retroreflection_distance(ker.retroreflection(), 300, rng=0)
     assert float(still) == 0.0 and still.error == pytest.approx(math.pi / 100)
+
+
+def test_the_page_on_reflection_has_the_distances_that_are_computed():
+    """Each row of its table but that of 2,000 notches, to the error that the page prints and to that of fewer rays."""
+    page = (Path(__file__).parents[1] / "docs" / "theory" / "reflection.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)\(([\d., ]*)\)` \| ([\d.]+)\((\d+)\) \|$", page, flags=re.MULTILINE)
+    assert len(rows) == 8
+    for name, arguments, value, last in rows:
+        size, _, count = arguments.partition(", ")
+        given = (int(size), float(count)) if name == "tube" else (float(size), int(count)) if count else ()
+        if count == "2000":
+            continue
+        found = ker.retroreflection_distance(getattr(geo, name)(*given), rng=7)
+        printed = int(last) * 10.0 ** -len(value.partition(".")[2])
+        assert abs(float(found) - float(value)) < printed + found.error, (name, arguments)
 
 
 def test_the_notched_angle_approaches_retroreflection_with_finer_notches_and_smaller_angles():

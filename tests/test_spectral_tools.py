@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -120,6 +123,26 @@ def test_the_semicircle_turns_grazing_flights_round():
     zeta = -np.log(9) / 8
     assert abs(found.zeta - zeta) <= found.zeta_error < 1e-7
     assert abs(found.eta - (1 + zeta) / (1 - zeta)) <= found.eta_error
+
+
+def test_the_page_on_diffusion_has_the_means_of_cotangents_that_rays_give():
+    """Every number of its table, to a unit of the last digit."""
+    page = (Path(__file__).parents[1] / "docs" / "theory" / "knudsen-diffusion.md").read_text(encoding="utf-8")
+    walls = {
+        "arcs, half angle 0.3": geo.focusing_arcs(0.3),
+        "bumps, curvature 1": geo.dispersing_arcs(1.0),
+        "triangular teeth, angle 1": geo.triangular_teeth(1.0),
+        "semicircles": geo.focusing_arcs(np.pi / 2),
+        "`koch(2)`": geo.koch(2),
+    }
+    x = (np.arange(100_000) + 0.5) / 100_000
+    for name, wall in walls.items():
+        row = re.search(rf"^\| {re.escape(name)} ((\| -?[\d.]+ ){{4}})\|$", page, flags=re.MULTILINE)
+        assert row is not None, name
+        for theta, text in zip((0.1, 0.01, 0.001, 0.0001), row[1].replace("|", "").split(), strict=True):
+            traced = geo.trace(wall, x * wall.period, np.full(x.size, theta))
+            mean = -float(np.mean(np.tan(theta) / np.tan(traced.theta[traced.escaped])))
+            assert abs(mean - float(text)) < 10.0 ** -len(text.partition(".")[2]), (name, theta, mean)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
+from asperity.kernels.inverse import wall_for_law
 from asperity.kernels.inverse.hull import few_weights, nearest_weights, possible_gain
 
 MOMENTS = 5
@@ -86,6 +87,16 @@ def test_the_joint_distance_falls_with_the_moments():
     law = ker.maxwell(0.5)
     coarse, fine = ker.wall_for(law, moments=3), ker.wall_for(law, moments=8)
     assert float(fine.distance) + fine.distance.error < float(coarse.distance) - coarse.distance.error
+
+
+def test_the_wall_for_retroreflection_is_near_to_it_and_says_how_well_it_is_known(monkeypatch):
+    monkeypatch.setattr(wall_for_law, "ROUNDS", 1)
+    found = ker.wall_for(ker.retroreflection(), moments=4, tolerance=0.05)
+    # the mean of |theta' - theta| is at least the joint distance; that of the double parabola is .058
+    away = ker.retroreflection_distance(found.wall, rng=1)
+    assert float(away) + away.error < 0.02
+    assert 0.0 < float(found.defect) < 0.1 and found.defect.kind == "estimate"
+    assert 0.0 < found.defect.error <= found.bound.error < 0.02
 
 
 def test_few_hollows_have_a_larger_defect_that_is_reported():

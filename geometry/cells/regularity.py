@@ -42,4 +42,5 @@ def largest_curvature_of(paths: Sequence[Sequence[Curve]]) -> Estimate:
     found = [largest_curvature(piece) for path in paths for piece in path]
     value = max(v for v, _ in found)
     error = 0.0 if value == math.inf else max(v + e for v, e in found) - value
-    return Estimate(value, max(0.0, error), "bound", "critical points of the pieces, proved by Bernstein coefficients")
+    method = "critical points of the pieces, checked in floating point by Bernstein coefficients"
+    return Estimate(value, max(0.0, error), "bound", method)

@@ -104,7 +104,7 @@ def collide(
     Notes
     -----
     Positions are computed in units of the wall, relative to its cell. So small scales lose no accuracy except by the
-    rounding of x1 and alpha. The first contact is found by steps that provably pass no root (see `compiled.contact`).
+    rounding of x1 and alpha. The first contact is found by safe steps, which pass no root (see `compiled.contact`).
     Cost: 0.2 to 0.5 microseconds per contact on a wall of few pieces; every piece of a hollow is tested. Where the
     cell is one convex hollow, as of triangular teeth or focusing arcs, 16 disks at once take 0.1 microseconds per
     contact.

@@ -92,14 +92,14 @@ class Shadow:
         begins and ends, and the distance of its end from where that piece ends. More than a period beside the hollow
         the level of the tops counts as solid.
     reaches : array, shape (k,)
-        The true disk has its contact within this distance of the contact on the cylinder; inf if that is not proved.
+        The true disk has its contact within this distance of the contact on the cylinder; inf where no bound is found.
     velocity : array, shape (3,)
         (v1, v2, omega) after the collision on the cylinder.
     error : float
         Bound on the kinetic norm of the difference of the true outgoing velocity from ``velocity``; inf if none is
-        proved.
+        found.
     reason : str
-        Why no bound is proved; empty if one is.
+        Why no bound is found; empty if one is.
     """
 
     points: Floats
@@ -112,7 +112,7 @@ class Shadow:
 
     @property
     def is_licit(self) -> bool:
-        """Whether the true disk is proved to have the same contacts, on the same pieces, with one satellite."""
+        """Whether the bounds show the same contacts of the true disk, on the same pieces, with one satellite."""
         return not self.reason
 
 
@@ -150,7 +150,8 @@ def shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayLike) 
     D <= D_0 + e t apart. With the speed U of the contact and its normal part nu they meet the piece, of curvature
     kappa, within r = D + U s of each other, s = (D + kappa r^2)/nu. The normals differ by at most the square root of
     a^2 + (m/J)(a + X)^2, a = 1.05 kappa r, and d grows by at most twice that. `CollisionConstants` has the paper's,
-    larger, constants. The bounds hold to rounding.
+    larger, constants. The bounds are evaluated in floating point, with room for rounding but without interval
+    arithmetic.
 
     Source: Rudzis 2022, section 5.3.4; the bounds here are of the same form, with the constants that each flight has.
 
@@ -171,7 +172,7 @@ def shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayLike) 
 
 @explained
 def good_fraction(space: ConfigurationSpace, samples: int = 1000, rng: Rng = None) -> Estimate:
-    """Estimate which part of all states at x2 = 0 is proved to collide as on the cylinder: the good set.
+    """Estimate for which part of all states at x2 = 0 bounds show a collision as on the cylinder: the good set.
 
     States are drawn from the invariant measure <w, e2> dx1 dalpha dw over one period and one spacing. The fraction
     tends to 1 as the scale tends to 0; that is why the collision law of the disk is that of the cylinder.
@@ -238,7 +239,7 @@ class _Departure(NamedTuple):
 
 
 class _Refused(Exception):
-    """No bound is proved, for the reason in the message."""
+    """No bound is found, for the reason in the message."""
 
 
 class _Model:
@@ -328,7 +329,7 @@ class _Pair:
             assert piece is not None
             flight = self._flight(k, float(sine), before, apart, difference, self.pieces[piece][1])
             if flight is None or flight.reach >= radii[k]:
-                raise _Refused(f"contact {k + 1} is not proved to be within the radius of transversality")
+                raise _Refused(f"contact {k + 1} may be beyond the radius of transversality")
             self._check_own_pieces(flight, leaving, piece)
             reaches[k] = flight.reach
             self.angle += self.scale * self.most_spin * (flight.time + flight.late + before)
@@ -428,7 +429,7 @@ class _Pair:
             raise _Refused("the disk may not rise after the last contact")
         drift = apart + rate * time + self.slack
         if drift >= radius:
-            raise _Refused("the last flight is not proved to be within the radius of transversality")
+            raise _Refused("the last flight may be beyond the radius of transversality")
         # up to where the drift no longer reaches the tops
         end = (float(-first[1]) + drift) / up
         for number in range(len(self.pieces)):

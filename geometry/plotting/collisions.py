@@ -195,7 +195,8 @@ def draw_shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayL
     -------
     matplotlib Axes
         Lengths are in units of the wall. Each flight on the cylinder has a band as wide as its radius on both sides.
-        Rings have the proved distances of the contacts. The true path is that of the satellite that begins lowest.
+        Rings have the bounds of the distances of the contacts as radii. The true path is that of the satellite that
+        begins lowest.
 
     Raises
     ------

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 MOST_BEAMS, RESOLVED = 3000, 1e-11
 # Error asked of the moments of curved hollows; polygons have theirs to rounding.
 CURVED_TOLERANCE = 1e-9
+# Error asked of the moments of traced hollows in the search.
+TRACED_TOLERANCE = 1e-2
+# Opening angle, radians, and steps a side of the notched angle.
+NOTCHED_ANGLE, NOTCHES = 0.1, 300
 # Depths of drawn vertices are DEEPEST times the 3/2-th power of a uniform number: shallow ones are more often of use.
 DEEPEST, SHALLOWEST, DEPTH_POWER = 2.0, 0.02, 1.5
 # Fraction of drawn polygons whose vertices stand in the order of x, without overhangs.
@@ -39,10 +43,13 @@ class UnitHollow:
     wall : Wall
         Of period 1; its cell, scaled, is put side by side with others.
     label : str
+    traced : bool
+        Whether its moments come from rays: a polygon with too many beams.
     """
 
     wall: Wall
     label: str
+    traced: bool = False
 
     @classmethod
     def polygon(cls, vertices: ArrayLike) -> UnitHollow | None:
@@ -77,10 +84,15 @@ class UnitHollow:
         """Its mirror image."""
         return UnitHollow(self.wall.mirrored(), f"{self.label}, mirrored")
 
+    @property
+    def is_exact(self) -> bool:
+        """Whether its moments come from beams."""
+        return self.wall.is_polygonal and not self.traced
+
     @cached_property
     def law(self) -> Law:
         """The law of the hollow alone."""
-        return PolygonLaw(self.wall, max_beams=MOST_BEAMS) if self.wall.is_polygonal else WallLaw(self.wall)
+        return PolygonLaw(self.wall, max_beams=MOST_BEAMS) if self.is_exact else WallLaw(self.wall)
 
     def moments(self, basis: Legendre) -> Floats | None:
         """<e_l, P e_m> in a basis; None if they are not known to rounding within the limits of a search."""
@@ -88,7 +100,8 @@ class UnitHollow:
         try:
             if isinstance(law, PolygonLaw):
                 return None if float(law.unresolved) > RESOLVED else discretise(law, basis, "exact").symmetric
-            return discretise(law, basis, tolerance=CURVED_TOLERANCE).symmetric
+            tolerance = TRACED_TOLERANCE if self.traced else CURVED_TOLERANCE
+            return discretise(law, basis, tolerance=tolerance).symmetric
         except AsperityError:
             return None
 
@@ -114,6 +127,13 @@ def curved_hollows() -> list[UnitHollow]:
     from ...geometry import double_parabola
 
     return [UnitHollow(double_parabola(), "double parabola")]
+
+
+def retroreflector() -> UnitHollow:
+    """A notched angle, much nearer to a retroreflector than the double parabola, with an error of its moments."""
+    from ...geometry import notched_angle
+
+    return UnitHollow(notched_angle(NOTCHED_ANGLE, NOTCHES), "notched angle", traced=True)
 
 
 def random_polygons(number: int, most_vertices: int, rng: np.random.Generator) -> list[UnitHollow]:

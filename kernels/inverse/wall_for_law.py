@@ -24,7 +24,7 @@ from ..laws.law import Law
 from ..laws.matrix_law import MatrixLaw
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
-from .hollows import UnitHollow, curved_hollows, flat, random_polygons, simple_hollows
+from .hollows import UnitHollow, curved_hollows, flat, random_polygons, retroreflector, simple_hollows
 from .hull import few_weights, nearest_weights, possible_gain
 
 if TYPE_CHECKING:
@@ -46,6 +46,9 @@ TARGET_FRACTION = 0.01
 OUTSIDE = 1e3
 # Curved hollows take seconds each, and a wall that has one is traced: worth it for laws far from those of polygons.
 CURVED_FROM = 0.1
+# The notched angle is traced with an error: it is worth it where a perfect retroreflector would leave at most this
+# fraction of the defect.
+RETROREFLECTED = 0.5
 # A step of the search that makes the defect smaller by less than this fraction is the last.
 LEAST_PROGRESS = 1e-3
 # Joint distances are of interest to two digits.
@@ -175,7 +178,8 @@ def wall_for(
     symmetric law is a limit of such mixtures (Rudzis 2022, theorem 1.23 and corollary 1.8; Plakhov 2012, ch. 4). The
     weights are those of the point of the hull that is nearest; hollows are isosceles triangles, rectangles and random
     polygons of a growing number of vertices, whose laws are known exactly. Where these do not reach, the vertices of
-    the hollows along which the defect falls most are moved: a fully corrective conditional gradient.
+    the hollows along which the defect falls most are moved: a fully corrective conditional gradient. Laws close to
+    retroreflection get a notched angle, whose law is known from rays.
 
     Examples
     --------
@@ -212,7 +216,9 @@ def wall_for(
     if hollows is not None:
         bound = Estimate(excess, ROUNDED * moments, "bound", f"duality gap over {len(search.hollows)} hollows")
     else:
-        bound = Estimate(excess, 0.0, "estimate", "duality gap over the hollows of the last step")
+        # traced hollows have an error, in the search and in the finished wall
+        error = float(finished.error) + abs(value - search.defect)
+        bound = Estimate(excess, error, "estimate", "duality gap over the hollows of the last step")
     return WallForLaw(
         wall,
         tuple(chosen),
@@ -398,16 +404,23 @@ class _Search:
                 return
         if self.defect > CURVED_FROM:
             self.add(curved_hollows())
+            if self.with_retroreflection() < RETROREFLECTED * self.defect:
+                self.add([retroreflector()])
         for _ in range(DESCENTS):
             before = self.defect
             self.add([self.moved(hollow) for hollow in self.promising()])
             if self.is_done or self.defect > (1.0 - LEAST_PROGRESS) * before:
                 return
 
+    def with_retroreflection(self) -> float:
+        """The defect of the nearest mixture of the hollows and retroreflection."""
+        points = np.vstack([self.points, self.row == self.column])
+        return float(np.linalg.norm(nearest_weights(points, self.target) @ points - self.target))
+
     def promising(self) -> list[UnitHollow]:
         """The polygons along which the defect falls most."""
         order = np.argsort(self.points @ (self.weights @ self.points - self.target))
-        polygons = [self.hollows[k] for k in order if self.hollows[k].wall.is_polygonal and self.hollows[k].pieces > 1]
+        polygons = [self.hollows[k] for k in order if self.hollows[k].is_exact and self.hollows[k].pieces > 1]
         return polygons[:MOVED]
 
     def moved(self, hollow: UnitHollow) -> UnitHollow:

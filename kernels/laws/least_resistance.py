@@ -40,7 +40,7 @@ class LeastResistanceLaw(Law):
 
     Notes
     -----
-    A potential proves that the law is optimal. The even function phi with phi(x) = cos(2 x)/2 for 0 <= x < b and
+    A potential shows that the law is optimal. The even function phi with phi(x) = cos(2 x)/2 for 0 <= x < b and
     phi'(x) = -sin(x - x') for x > b satisfies phi(x) + phi(y) <= cos(x - y) for all x and y, with equality exactly on
     the support of the law. `extremal_resistance` checks the inequality. The resistance is 0.987823750351586; A. Plakhov
     (Arch. Ration. Mech. Anal. 194, 2009) published 0.9878.

@@ -1,1 +1,1 @@
-"""Eigenvalues of symmetric matrices, dense and sparse, with proofs of completeness and sampling errors."""
+"""Eigenvalues of symmetric matrices, dense and sparse, with checks of completeness and sampling errors."""

@@ -169,16 +169,16 @@ def extremal(array: Floats, constant: Floats | None, k: int, which: Which = "mod
     -----
     Lanczos computes values and vectors, which are then deflated. What is left has a norm below sigma, just beyond the
     last value, by its Frobenius norm or, as for noise of sampling, by the norms of its blocks. Otherwise a Cholesky
-    factorisation of sigma - S proves that no other eigenvalue is above sigma; sigma + S proves the same for the lower
-    end. This takes a tenth of the time of LAPACK's solver, which is used if Lanczos does not converge. With the vectors
-    V and R = S V - V diag(values), the eigenvalues of S are by Weyl within \|R\| of the values and of the spectrum of
-    the compression to the complement of V, whose upper end is at most sigma plus a margin of rounding. A cluster may
-    be cut: its unlisted eigenvalues are not larger than the listed ones.
+    factorisation of sigma - S shows, in floating point with bounds of its rounding, that no other eigenvalue is above
+    sigma; sigma + S shows the same for the lower end. This takes a tenth of the time of LAPACK's solver, which is used
+    if Lanczos does not converge. With the vectors V and R = S V - V diag(values), the eigenvalues of S are by Weyl
+    within \|R\| of the values and of the spectrum of the compression to the complement of V, whose upper end is at most
+    sigma plus a margin of rounding. A cluster may be cut: its unlisted eigenvalues are not larger than the listed ones.
     """
     size = len(array)
     if size < SMALL or k > LARGEST_FRACTION * size:
         return _by_lapack(array, constant, k, which, "all eigenvalues by LAPACK")
-    found = _proved(Deflated.of(array, constant), k, which)
+    found = _verified(Deflated.of(array, constant), k, which)
     if isinstance(found, str):
         return _by_lapack(array, constant, k, which, f"all eigenvalues by LAPACK, since {found}")
     return found
@@ -211,7 +211,7 @@ def counted_from_above(values: Floats, which: Which) -> int:
     return len(values) if which == "largest" else max(int(np.sum(values > 0.0)), min(1, len(values)))
 
 
-def _proved(matrix: Deflated, k: int, which: Which) -> ExtremalEigenvalues | str:
+def _verified(matrix: Deflated, k: int, which: Which) -> ExtremalEigenvalues | str:
     """Extremal eigenvalues by Lanczos, verified by a Cholesky factorisation; the reason in words if either fails."""
     end: Literal["LM", "LA"] = "LM" if which == "moduli" else "LA"
     none = _nothing(len(matrix.array))

@@ -73,7 +73,8 @@ def spectrum(
 
     Matrices are compressed exactly to the complement of the constants, and to even and odd functions if the law is
     mirror-symmetric. LAPACK solves small matrices completely. For large ones Lanczos finds the wanted eigenvalues, and
-    Cholesky factorisations prove completeness (`asperity.spectral.eigenvalues.dense`). The cost is O(n^3).
+    Cholesky factorisations check, in floating point with rounding bounds, that none is missing
+    (`asperity.spectral.eigenvalues.dense`). The cost is O(n^3).
 
     Examples
     --------
