@@ -52,8 +52,8 @@ docs: $(DEV) ## build the documentation into docs/_build/html, warnings are erro
 	$(PY) -m sphinx -b html -W --keep-going -q -d docs/_build/doctrees docs docs/_build/html
 	@echo "documentation: docs/_build/html/index.html"
 
-bench: $(RUN) ## measure everything and write docs/benchmarks.md and docs/stability.md, up to 45 minutes
-	$(PY) -m benchmarks --peers --write
+bench: $(RUN) ## measure everything, tables and pictures into bench-results/, up to 45 minutes
+	$(PY) -m benchmarks --peers
 
 build: $(DEV) ## build the sdist and the wheel into dist/
 	$(PY) -m build

@@ -1,7 +1,7 @@
 """Goals of a wished tolerance on walls of every kind, of large matrices, and of a user's first commands.
 
 Each is computed once as a user would, after a rough run that compiles. Where no independent value is known, the
-reached error is the reported one, which the campaigns of `docs/checks` test.
+reached error is the reported one, which other campaigns test.
 """
 
 from __future__ import annotations

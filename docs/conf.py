@@ -101,7 +101,7 @@ sphinx_gallery_conf = {
 warnings.filterwarnings("ignore", message="FigureCanvasAgg is non-interactive")
 
 # Pages that list many others: the bar at the side of every page ends with them.
-LISTS = ("api/generated/task-", "decisions/index", "checks/index")
+LISTS = ("api/generated/task-", "decisions/index")
 
 
 def end_the_side_bar(app: Sphinx, env: BuildEnvironment) -> None:

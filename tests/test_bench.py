@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from benchmarks import savings
 from benchmarks.__main__ import begin_or_go_on
+from benchmarks.__main__ import main as measure_everything
 from benchmarks.exact_rows import ArcRow
 from benchmarks.sections import SECTIONS, section_text
 from click.testing import CliRunner
@@ -250,6 +251,23 @@ def test_a_run_of_sections_goes_on_where_it_was_and_a_finished_one_begins_anew(t
     assert section_text(peers, True, tmp_path) == "of now"
     begin_or_go_on(tmp_path, quick=False)
     assert not (tmp_path / "peers.md").exists()
+
+
+def test_all_sections_are_joined_in_the_folder_of_the_run(tmp_path, monkeypatch):
+    begin_or_go_on(tmp_path, quick=True)
+    for section in SECTIONS:
+        (tmp_path / f"{section.name}.md").write_text(f"table of {section.name}\n")
+    (tmp_path / "standard").mkdir()
+    (tmp_path / "standard" / "koch.png").touch()
+    monkeypatch.setattr("sys.argv", ["benchmarks", "--quick", "--out", str(tmp_path)])
+    measure_everything()
+    page = (tmp_path / "benchmarks.md").read_text()
+    assert page.startswith("Measured by `python -m benchmarks --quick`.\n\ntable of speed\n")
+    assert "(standard/koch.png)" in page and "table of peers" not in page and "table of stability" not in page
+    assert "table of stability" in (tmp_path / "extremes.md").read_text()
+    # the next run begins anew
+    begin_or_go_on(tmp_path, quick=True)
+    assert not (tmp_path / "standard" / "koch.png").exists()
 
 
 def test_jobs_side_by_side_are_told_apart_beyond_their_noise():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import re
 import runpy
 import zlib
 from pathlib import Path
@@ -114,6 +115,23 @@ def test_no_line_of_a_page_is_lost_as_a_comment():
     lines = [(page.name, line) for page in pages for line in page.read_text(encoding="utf-8").splitlines()]
     assert len(pages) > 40
     assert not [(name, line) for name, line in lines if line.lstrip().startswith("%")]
+
+
+def test_the_commands_on_the_pages_exist():
+    root = DOCS.parent
+    pages = [root / "README.md", root / "CONTRIBUTING.md", root / "benchmarks" / "README.md", *DOCS.rglob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages if "generated" not in page.parts)
+    campaigns = set(re.findall(r"python -m\s+benchmarks\.([a-z]\w*)", text))
+    assert len(campaigns) > 18
+    assert [name for name in sorted(campaigns) if not (root / "benchmarks" / f"{name}.py").exists()] == []
+
+
+def test_every_campaign_of_the_table_has_a_section():
+    page = (DOCS / "checked.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| \[([^]]+)\]\(#([\w-]+)\) \| [^|]+\| ([^|]+) \| ([^|]+) \| (\d+) \| `", page, re.MULTILINE)
+    assert len(rows) > 20
+    headings = {line[3:].lower().replace(" ", "-") for line in page.splitlines() if line.startswith("## ")}
+    assert {anchor for _, anchor, *_ in rows} == headings
 
 
 def test_every_short_example_is_in_the_story(reference):
