@@ -53,7 +53,7 @@ docs: $(DEV) ## build the documentation into docs/_build/html, warnings are erro
 	@echo "documentation: docs/_build/html/index.html"
 
 bench: $(RUN) ## measure everything, tables and pictures into bench-results/, up to 45 minutes
-	$(PY) -m benchmarks --peers
+	$(PY) -m campaigns --peers
 
 build: $(DEV) ## build the sdist and the wheel into dist/
 	$(PY) -m build

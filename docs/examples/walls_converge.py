@@ -13,7 +13,7 @@ PAGE = Path(__file__).parents[1] / "theory" / "from-a-law-to-a-wall.md"
 
 
 def table() -> dict[str, list[tuple[int, int, float, float]]]:
-    """For each law moments, hollows, joint distance and its error, as ``benchmarks.walls_for_laws`` measured them."""
+    """For each law moments, hollows, joint distance and its error, as ``campaigns.walls_for_laws`` measured them."""
     text = PAGE.read_text(encoding="utf-8").split("<!-- measured -->")[1].split("<!-- end -->")[0]
     found: dict[str, list[tuple[int, int, float, float]]] = {}
     # below the heads and the line under them

@@ -2,7 +2,7 @@
 
 The compiler vectorises loops over rays that call these functions, unlike calls of the mathematical library. The
 functions use sums, products, quotients and selections only, so a ray's result does not depend on other rays. The
-coefficients come from ``tests/precise_polynomials.py``; errors are below 2 ulp of the result, at all angles.
+coefficients come from ``campaigns/judges/precise_polynomials.py``; errors are below 2 ulp of the result, at all angles.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from ..quantities.collision import DISK, sampled_velocities
 from ..running.references import stored
 from .row import ExtremeRow
 
-# Written by tests/precise_collision.py
+# Written by campaigns/judges/precise_collision.py
 DATA = "extreme_disks.json"
 # Measured errors are below 0.4; the limit is the limit for single rays.
 UNITS = 32.0

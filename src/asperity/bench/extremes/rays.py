@@ -1,6 +1,6 @@
 """Single rays on extreme walls and at extreme angles, against 50 digits.
 
-The script ``tests/precise_extremes.py`` writes the rays and their references to ``extreme_rays.json``.
+The script ``campaigns/judges/precise_extremes.py`` writes the rays and their references to ``extreme_rays.json``.
 """
 
 from __future__ import annotations

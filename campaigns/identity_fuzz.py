@@ -1,0 +1,519 @@
+"""Random true and false identities and inequalities, and the answers of `verify`.
+
+In each claim the second expression is the first one rewritten by a rule that holds on some domains, possibly with a
+perturbation, down to 1e-25 or at one point only. The domain is drawn independently of the rule. The judge evaluates
+both sides in 50 digits by mpmath, with its own evaluator. Its points are random points, ends and special points of the
+domain, and neighbours of these. A proof is false if the values differ at a point. A refutation is false if its
+counterexample is not in the domain, or if there the values agree or one is not real.
+
+    python -m campaigns.identity_fuzz [claims] [first seed] [processes]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+import numpy as np
+import sympy as sp
+
+from asperity import InputError, verify
+from asperity.core.tables import table
+
+DIGITS = 50
+# Values that differ only in the last quarter of the digits count as equal.
+SAME = 0.75
+# An argument this close to a jump counts as on the jump.
+ON_A_JUMP = mpmath.mpf(10) ** -40
+POINTS = 80
+SECONDS = 10.0
+
+X, Y = sp.symbols("x y", real=True)
+N, K = sp.Symbol("n", integer=True), sp.Symbol("k", integer=True, even=True)
+PI = sp.pi
+
+
+# ---- the judge
+
+
+class NotReal(Exception):
+    """The expression is not a real number at the point."""
+
+
+class Unsure(Exception):
+    """The judge cannot decide."""
+
+
+def value(e: Any, point: dict[Any, Any]) -> Any:
+    """The value in real arithmetic, part by part, by mpmath."""
+    if e.is_Symbol:
+        return point[e]
+    if e.is_Rational:
+        return mpmath.mpf(int(e.p)) / int(e.q)
+    if e is sp.pi:
+        return +mpmath.pi
+    if e is sp.E:
+        return +mpmath.e
+    if isinstance(e, sp.Piecewise):
+        for branch, condition in e.args:
+            if condition == True or (condition != False and truth(condition, point)):  # noqa: E712
+                return value(branch, point)
+        raise NotReal
+    if isinstance(e, sp.Integral):
+        variable, low, high = e.limits[0]
+        ends = [
+            mpmath.inf if end is sp.oo else -mpmath.inf if end is -sp.oo else value(end, point) for end in (low, high)
+        ]
+        return mpmath.quad(lambda t: value(e.function, {**point, variable: t}), ends)
+    args = [value(argument, point) for argument in e.args]
+    if e.is_Add:
+        return mpmath.fsum(args)
+    if e.is_Mul:
+        return mpmath.fprod(args)
+    if e.is_Pow:
+        return power(args[0], args[1], e.exp)
+    if e.func not in FUNCTIONS:
+        raise Unsure
+    return FUNCTIONS[e.func](*args)
+
+
+def sign_of(x: Any) -> int:
+    return 0 if abs(x) < ON_A_JUMP else 1 if x > 0 else -1
+
+
+def truth(condition: Any, point: dict[Any, Any]) -> bool:
+    if isinstance(condition, sp.And):
+        return all(truth(part, point) for part in condition.args)
+    if isinstance(condition, sp.Or):
+        return any(truth(part, point) for part in condition.args)
+    sign = sign_of(value(condition.lhs, point) - value(condition.rhs, point))
+    return {sp.Gt: sign > 0, sp.Ge: sign >= 0, sp.Lt: sign < 0, sp.Le: sign <= 0, sp.Eq: sign == 0, sp.Ne: sign != 0}[
+        condition.func
+    ]
+
+
+def power(base: Any, exponent: Any, exact: Any) -> Any:
+    if abs(exponent - mpmath.nint(exponent)) < ON_A_JUMP:
+        whole = int(mpmath.nint(exponent))
+        if sign_of(base) == 0:
+            if whole < 0:
+                raise NotReal
+            return mpmath.mpf(0 if whole else 1)
+        return base**whole
+    if sign_of(base) == 0:
+        if exponent < 0:
+            raise NotReal
+        return mpmath.mpf(0)
+    if base < 0:
+        raise NotReal
+    return mpmath.exp(exponent * mpmath.log(base))
+
+
+def floor(x: Any) -> Any:
+    near = mpmath.nint(x)
+    return near if abs(x - near) < ON_A_JUMP else mpmath.floor(x)
+
+
+def inside(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def image(x: Any) -> Any:
+        if abs(x) > 1 + ON_A_JUMP:
+            raise NotReal
+        return function(min(max(x, mpmath.mpf(-1)), mpmath.mpf(1)))
+
+    return image
+
+
+def quotient(a: Any, b: Any) -> Any:
+    if sign_of(b) == 0:
+        raise NotReal
+    return a / b
+
+
+def logarithm(x: Any) -> Any:
+    if sign_of(x) <= 0:
+        raise NotReal
+    return mpmath.log(x)
+
+
+def direction(y: Any, x: Any) -> Any:
+    if sign_of(y) == 0:
+        if sign_of(x) == 0:
+            raise NotReal
+        return mpmath.mpf(0) if x > 0 else +mpmath.pi
+    return mpmath.atan2(y, x)
+
+
+FUNCTIONS: dict[Any, Any] = {
+    sp.sin: mpmath.sin, sp.cos: mpmath.cos, sp.exp: mpmath.exp, sp.atan: mpmath.atan,
+    sp.sinh: mpmath.sinh, sp.cosh: mpmath.cosh, sp.tanh: mpmath.tanh, sp.asinh: mpmath.asinh,
+    sp.tan: lambda x: quotient(mpmath.sin(x), mpmath.cos(x)), sp.cot: lambda x: quotient(mpmath.cos(x), mpmath.sin(x)),
+    sp.sec: lambda x: quotient(1, mpmath.cos(x)), sp.csc: lambda x: quotient(1, mpmath.sin(x)),
+    sp.asin: inside(mpmath.asin), sp.acos: inside(mpmath.acos), sp.log: logarithm, sp.Abs: abs,
+    sp.sign: lambda x: mpmath.mpf(sign_of(x)), sp.floor: floor, sp.ceiling: lambda x: -floor(-x),
+    sp.Max: max, sp.Min: min, sp.atan2: direction, sp.Mod: lambda x, y: x - y * floor(quotient(x, y)),
+    sp.Heaviside: lambda x, at_zero=0.5: at_zero if sign_of(x) == 0 else mpmath.mpf(1 if x > 0 else 0),
+}  # fmt: skip
+
+
+def compared(claim: Claim, point: dict[Any, Any]) -> bool | None:
+    """Whether the relation holds at a point, None if a side is not real or the judge is unsure.
+
+    A difference is checked with more digits, because terms may cancel and a sine may have a large argument.
+    """
+    sides = _sides(claim, point, DIGITS)
+    if sides is None:
+        return None
+    return _agree(claim, sides, DIGITS) or compared_in_more_digits(claim, point)
+
+
+def compared_in_more_digits(claim: Claim, point: dict[Any, Any]) -> bool | None:
+    """As `compared` in 200 digits; None unless 1000 digits give the same values. Integrals get 50 and 75 digits."""
+    digits = (DIGITS, DIGITS + 25) if _has_integral(claim) else (4 * DIGITS, 20 * DIGITS)
+    few, many = (_sides(claim, point, number) for number in digits)
+    if few is None or many is None:
+        return None
+    if any(_far(a, b, digits[0]) for a, b in zip(few, many, strict=True)):
+        return None
+    return _agree(claim, few, digits[0])
+
+
+def _has_integral(claim: Claim) -> bool:
+    return bool(claim.left.has(sp.Integral) or claim.right.has(sp.Integral))
+
+
+def _sides(claim: Claim, point: dict[Any, Any], digits: int) -> tuple[Any, Any] | None:
+    """Both values; None if a relation of the domain fails or a side is not real."""
+    with mpmath.workdps(digits):
+        try:
+            numbers = {s: value(v, {}) for s, v in point.items()}
+            if not all(truth(relation, numbers) for relation in claim.domain):
+                return None
+            return value(claim.left, numbers), value(claim.right, numbers)
+        except (NotReal, Unsure, OverflowError, ZeroDivisionError, ValueError):
+            return None
+
+
+def _far(a: Any, b: Any, digits: int) -> bool:
+    with mpmath.workdps(digits):
+        return bool(abs(a - b) > mpmath.mpf(10) ** (-SAME * digits) * max(1, abs(a), abs(b)))
+
+
+def _agree(claim: Claim, sides: tuple[Any, Any], digits: int) -> bool:
+    a, b = sides
+    return not _far(a, b, digits) or (claim.relation == "<=" and bool(a < b))
+
+
+# ---- claims
+
+
+@dataclass(frozen=True)
+class Claim:
+    """left relation right wherever both sides are real, for symbols that satisfy the relations of the domain."""
+
+    kind: str
+    left: Any
+    right: Any
+    relation: str
+    domain: tuple[Any, ...]
+
+    @property
+    def symbols(self) -> list[Any]:
+        every = set().union(*(part.free_symbols for part in (self.left, self.right, *self.domain)))
+        return sorted(every, key=str)
+
+
+NICE = [sp.Rational(p, q) for p in range(-3, 4) for q in (1, 2)] + [k * PI / 2 for k in range(-4, 7)]
+
+
+class Maker:
+    """Draws claims."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+
+    def pick(self, values: Any) -> Any:
+        return values[int(self.rng.integers(len(values)))]
+
+    def linear(self) -> Any:
+        a = self.pick([1, 1, 1, 2, -1, sp.Rational(1, 2), 3, -2])
+        b = self.pick([0, 0, 0, 1, -1, sp.Rational(1, 3), PI / 2, -PI, PI / 4])
+        return a * self.pick([X, X, X, Y]) + b
+
+    def inner(self) -> Any:
+        return self.pick([
+            lambda: self.linear(), lambda: self.linear(), lambda: self.linear(), lambda: X - Y, lambda: X * Y,
+            lambda: X**2, lambda: sp.sin(X), lambda: 1 - X**2, lambda: N, lambda: X + N, lambda: X**2 - Y**2,
+            lambda: sp.cos(X) + 1, lambda: K / 2, lambda: sp.exp(X), lambda: N * X, lambda: sp.Abs(X) - 1,
+        ])()  # fmt: skip
+
+    def constant(self) -> Any:
+        """A number of which sympy may believe the wrong sign: of a large argument, near 0, or a tower of powers."""
+        whole = sp.Integer(int(self.rng.integers(2, 14)))
+        angle = self.pick(
+            [sp.exp(whole), whole**11, sp.sqrt(whole), sp.exp(sp.exp(sp.Integer(4))), 3 ** sp.sqrt(whole)]
+        )
+        angle += PI * sp.Rational(int(self.rng.integers(-125, 126)), 125)
+        return self.pick([
+            lambda: self.pick([sp.csc, sp.sec, sp.tan, sp.cot, sp.sin, sp.cos])(angle),
+            lambda: self.pick([sp.csc, sp.sec, sp.tan])(angle) - self.pick([0, 1, whole]),
+            lambda: sp.exp(-5 * whole) - self.pick([0, sp.Rational(1, 10**whole)]),
+            lambda: whole ** sp.sqrt(2) - sp.Rational(str(round(float(whole) ** 2**0.5, 12))),
+            lambda: sp.exp(sp.exp(sp.cos(whole))) - sp.exp(whole) / whole,
+            lambda: sp.sqrt(whole) - sp.Rational(*(float(whole) ** 0.5).as_integer_ratio()),
+            lambda: sp.log(whole) - sp.log(whole + sp.Rational(1, 10**15)), lambda: sp.sqrt(2 + sp.sqrt(whole)),
+            lambda: sp.atan(whole) - PI / 2 + 1 / whole, lambda: sp.exp(whole), lambda: sp.sqrt(whole) - 2,
+        ])()  # fmt: skip
+
+    def of_constants(self) -> tuple[str, Any, Any]:
+        """Written without evaluation, because sympy decides signs where it evaluates."""
+        c, w, u = self.constant(), self.pick([X, X, self.linear()]), self.inner()
+        product_, square = sp.Mul(c, w, evaluate=False), sp.Mul(sp.Pow(c, 2), w**2, evaluate=False)
+        bare = sp.Abs(product_, evaluate=False)
+        large = self.pick([sp.Integer(10**4), sp.Integer(10**22), 7 * sp.sqrt(3) * 10**3, c])
+        pairs: list[Callable[[], tuple[Any, Any]]] = [
+            lambda: (bare, self.pick([product_, -product_, sp.Abs(w) * sp.Abs(c, evaluate=False)])),
+            lambda: (sp.Pow(square, sp.S.Half, evaluate=False), self.pick([product_, -product_, bare])),
+            lambda: (sp.Max(product_, 0, evaluate=False), self.pick([product_, sp.Integer(0), (bare + product_) / 2])),
+            lambda: (sp.sign(product_, evaluate=False), self.pick([sp.sign(w), -sp.sign(w)])),
+            lambda: (sp.Piecewise((u, sp.Gt(product_, 0, evaluate=False)), (-u, True), evaluate=False),
+                     self.pick([u, -u])),
+            lambda: (sp.log(product_, evaluate=False), self.pick([sp.log(w) + sp.log(c, evaluate=False), sp.log(w)])),
+            lambda: (sp.sin(w + large), sp.sin(w) * sp.cos(large) + sp.cos(w) * sp.sin(large)),
+            lambda: (sp.exp(sp.Add(w, c, evaluate=False), evaluate=False), sp.exp(w) * sp.exp(c)),
+            lambda: (sp.Pow(product_, sp.S.Half, evaluate=False), sp.sqrt(w) * sp.Pow(c, sp.S.Half, evaluate=False)),
+            lambda: (sp.Heaviside(product_, evaluate=False), self.pick([sp.Heaviside(w), 1 - sp.Heaviside(w)])),
+            lambda: (sp.atan2(product_, c, evaluate=False), self.pick([sp.atan(w), sp.atan(w) + PI, -sp.atan(w)])),
+        ]  # fmt: skip
+        left, right = self.pick(pairs)()
+        return "constants", left, right
+
+    def rule(self) -> tuple[str, Any, Any]:
+        if self.rng.random() < 0.15:
+            return self.of_constants()
+        u, v = self.inner(), self.inner()
+        w = self.linear()
+        t = sp.Symbol("t", real=True)
+        end = self.pick([X, Y, sp.Integer(1), PI, sp.Rational(1, 2)])
+        rules: list[tuple[str, Callable[[], tuple[Any, Any]]]] = [
+            ("roots", lambda: (sp.sqrt(sp.expand(u**2)), self.pick([u, -u, sp.Abs(u)]))),
+            ("roots", lambda: (sp.sqrt(u) * sp.sqrt(v), sp.sqrt(u * v))),
+            ("roots", lambda: (sp.sqrt(u / v), sp.sqrt(u) / sp.sqrt(v))),
+            ("roots", lambda: ((u**3) ** sp.Rational(1, 3), self.pick([u, sp.Abs(u)]))),
+            ("roots", lambda: (sp.sqrt(1 - sp.cos(w) ** 2), self.pick([sp.sin(w), -sp.sin(w), sp.Abs(sp.sin(w))]))),
+            ("roots", lambda: (sp.sqrt((1 + sp.cos(w)) / 2), self.pick([sp.cos(w / 2), sp.Abs(sp.cos(w / 2))]))),
+            ("absolute values", lambda: (sp.Abs(u * v), self.pick([u * v, -u * v, sp.Abs(u) * sp.Abs(v)]))),
+            ("absolute values", lambda: (sp.Abs(u) / u, self.pick([sp.Integer(1), sp.Integer(-1), sp.sign(u)]))),
+            ("absolute values", lambda: (sp.sign(u) ** 2, sp.Integer(1))),
+            ("absolute values", lambda: (sp.Max(u, v), self.pick([u, v, (u + v + sp.Abs(u - v)) / 2]))),
+            ("absolute values", lambda: (sp.Min(u, v), self.pick([u, u + v - sp.Max(u, v)]))),
+            ("acos(cos)", lambda: (sp.acos(sp.cos(w)), self.pick([w, -w, 2 * PI - w, w - 2 * PI, sp.Abs(w)]))),
+            ("acos(cos)", lambda: (sp.asin(sp.sin(w)), self.pick([w, PI - w, -PI - w, w - 2 * PI]))),
+            ("acos(cos)", lambda: (sp.atan(sp.tan(w)), self.pick([w, w - PI, w + PI]))),
+            ("acos(cos)", lambda: (sp.acos(sp.sin(w)), self.pick([PI / 2 - w, w - PI / 2, sp.Abs(w - PI / 2)]))),
+            ("acos(cos)", lambda: (sp.asin(sp.cos(w)), self.pick([PI / 2 - w, PI / 2 - sp.acos(sp.cos(w))]))),
+            ("atan2", lambda: (sp.atan2(sp.sin(w), sp.cos(w)), self.pick([w, w - 2 * PI, w + 2 * PI]))),
+            ("atan2", lambda: (sp.atan2(u, v), self.pick([sp.atan(u / v), sp.atan(u / v) + PI]))),
+            ("inverse functions", lambda: (2 * sp.acos(u), self.pick(
+                [sp.acos(2 * u**2 - 1), 2 * PI - sp.acos(2 * u**2 - 1)]))),
+            ("inverse functions", lambda: (sp.sin(sp.acos(u)), sp.sqrt(1 - u**2))),
+            ("inverse functions", lambda: (sp.asin(u) + sp.acos(u), PI / 2)),
+            ("inverse functions", lambda: (sp.atan(u) + sp.atan(1 / u), self.pick([PI / 2, sp.sign(u) * PI / 2]))),
+            ("inverse functions", lambda: (sp.atan(u) + sp.atan(v), sp.atan((u + v) / (1 - u * v)))),
+            ("inverse functions", lambda: (sp.tan(sp.asin(u)), u / sp.sqrt(1 - u**2))),
+            ("logarithms", lambda: (sp.log(sp.expand(u * v)), sp.log(u) + sp.log(v))),
+            ("logarithms", lambda: (sp.log(sp.expand(u**2)), self.pick([2 * sp.log(u), 2 * sp.log(sp.Abs(u))]))),
+            ("logarithms", lambda: (sp.asinh(u), sp.log(u + sp.sqrt(u**2 + 1)))),
+            ("steps", lambda: (sp.floor(u) + sp.floor(-u), self.pick([sp.Integer(-1), sp.Integer(0)]))),
+            ("steps", lambda: (sp.ceiling(u), self.pick([sp.floor(u) + 1, sp.floor(u)]))),
+            ("steps", lambda: (sp.Mod(u, 1), self.pick([u - sp.floor(u), u]))),
+            ("steps", lambda: (sp.floor(w), self.pick([sp.Integer(0), sp.Integer(1), sp.Integer(-1)]))),
+            ("steps", lambda: (sp.Heaviside(u), self.pick([(1 + sp.sign(u)) / 2, sp.Integer(1)]))),
+            ("cases", lambda: (sp.Piecewise((u, u > v), (v, True)), self.pick([sp.Max(u, v), u, v]))),
+            ("cases", lambda: (sp.Piecewise((u, self.pick(NICE) > X), (v, True)), self.pick([u, v]))),
+            ("cases", lambda: (sp.Piecewise((u, X > Y), (-u, X < Y)), self.pick([u, -u]))),
+            ("powers", lambda: (sp.Pow(0, u), sp.Integer(0))),
+            ("powers", lambda: (sp.Pow(0, sp.Abs(u)), self.pick([sp.Integer(0), 1 - sp.sign(u) ** 2]))),
+            ("powers", lambda: (u**v * u, u ** (v + 1))),
+            ("powers", lambda: ((u**2) ** sp.Rational(1, 4), self.pick([sp.sqrt(u), sp.sqrt(sp.Abs(u))]))),
+            ("powers", lambda: (sp.exp(v * sp.log(u)), u**v)),
+            ("integers", lambda: (sp.cos(PI * (N + X)), self.pick([(-1) ** N * sp.cos(PI * X), sp.cos(PI * X)]))),
+            ("integers", lambda: (sp.Abs(sp.sin(PI * N / 2)), self.pick([1 - (-1) ** N, (1 - (-1) ** N) / 2]))),
+            ("integers", lambda: (sp.floor(K / 2 + sp.Rational(1, 3)), K / 2)),
+            ("integers", lambda: (N * (N - 1) * (N - 2), self.pick([sp.Integer(0), N**3 - 3 * N**2 + 2 * N]))),
+            ("integers", lambda: (sp.floor(N / 2) + sp.ceiling(N / 2), N)),
+            ("angles", lambda: (sp.sin(u + v), sp.sin(u) * sp.cos(v) + sp.cos(u) * sp.sin(v))),
+            ("angles", lambda: (sp.tan(w / 2), (1 - sp.cos(w)) / sp.sin(w))),
+            ("angles", lambda: (sp.sin(w) / sp.tan(w), sp.cos(w))),
+            ("angles", lambda: (sp.tanh(2 * w), 2 * sp.tanh(w) / (1 + sp.tanh(w) ** 2))),
+            ("integrals", lambda: (sp.Integral(self.pick([t**2, sp.sin(t), sp.exp(-t), 1 / (1 + t**2), t * sp.cos(t)]),
+                                               (t, 0, end)), self.pick([end**3 / 3, 1 - sp.cos(end), 1 - sp.exp(-end),
+                                                                       sp.atan(end)]))),
+            ("integrals", lambda: (sp.Integral(1 / t, (t, 1, end)), sp.log(end))),
+            ("integrals", lambda: (sp.Integral(t * sp.cos(t), (t, 0, end)), end * sp.sin(end) + sp.cos(end) - 1)),
+        ]  # fmt: skip
+        name, make = self.pick(rules)
+        left, right = make()
+        return name, left, right
+
+    def inequality(self) -> tuple[str, Any, Any]:
+        u, v, w = self.inner(), self.inner(), self.linear()
+        tiny = sp.Rational(1, 10**25)
+        pairs: list[tuple[Any, Any]] = [
+            (sp.sin(w), w), (w - w**3 / 6, sp.sin(w)), (1 - w**2 / 2, sp.cos(w)), (1 + w, sp.exp(w)),
+            (sp.log(u), u - 1), (2 * u * v, u**2 + v**2), (sp.Abs(u + v), sp.Abs(u) + sp.Abs(v)), (w, sp.tan(w)),
+            (sp.atan(w), w), (sp.sqrt(u * v), (u + v) / 2), (sp.sin(w) ** 2, sp.Integer(1)), (u, sp.Max(u, v)),
+            (sp.floor(u), u), (u - 1, sp.floor(u)), (2 * w / PI, sp.sin(w)), (tiny, w**2), (w**2, w**4 + 1),
+            (sp.cos(w), 1 - w**2 / 4), (u, u + tiny), (u, u - tiny), (sp.acos(w), PI), (X**2, X), (X * Y, X),
+        ]  # fmt: skip
+        return "inequalities", *self.pick(pairs)
+
+    def domain(self) -> tuple[Any, ...]:
+        relations: list[Any] = []
+        for symbol in (X, Y):
+            shape = self.rng.integers(6)
+            low, high = sorted((self.pick(NICE), self.pick(NICE)), key=float)
+            if low == high:
+                high = low + 1
+            above = symbol > low if self.rng.random() < 0.5 else symbol >= low
+            below = symbol < high if self.rng.random() < 0.5 else symbol <= high
+            relations += [[above, below], [above, below], [above, below], [above], [below], []][shape]
+        if self.rng.random() < 0.35:
+            relations.append(self.pick([X < Y, X >= Y, X + Y > 0, X * Y < 1, sp.Ne(X, self.pick(NICE)), X > 2 * Y,
+                                        X**2 + Y**2 < 9, X > Y**2]))  # fmt: skip
+        if self.rng.random() < 0.5:
+            first = int(self.rng.integers(-3, 4))
+            relations += self.pick([[first <= N], [first < N, first + int(self.rng.integers(1, 5)) >= N], [first > N]])
+        return tuple(relations)
+
+    def claim(self) -> Claim:
+        relation = "<=" if self.rng.random() < 0.15 else "=="
+        kind, left, right = self.inequality() if relation == "<=" else self.rule()
+        change = self.rng.random()
+        tiny = sp.Rational(1, 10**25)
+        if relation == "==" and change < 0.35:
+            right = self.pick([
+                lambda: right + tiny, lambda: right - tiny, lambda: right * (1 + tiny), lambda: right + X * tiny,
+                lambda: -right, lambda: right + sp.Rational(1, 7),
+                lambda: sp.Piecewise((right + 1, sp.Eq(X, self.pick(NICE))), (right, True)),
+                lambda: right + sp.Pow(0, sp.Abs(X - self.pick(NICE))),
+                lambda: right + tiny * sp.Heaviside(X - self.pick(NICE)),
+            ])()  # fmt: skip
+        elif relation == "==" and change < 0.5:
+            outer = self.pick([sp.exp, sp.cos, lambda z: z**2, lambda z: z + self.linear(), lambda z: z * self.linear(),
+                               sp.atan, lambda z: 1 / z, sp.sqrt])  # fmt: skip
+            left, right = outer(left), outer(right)
+        symbols = set(left.free_symbols | right.free_symbols)
+        domain = tuple(r for r in self.domain() if r not in (True, False) and r.free_symbols <= symbols)
+        return Claim(kind, sp.sympify(left, strict=True), sp.sympify(right, strict=True), relation, domain)
+
+
+def places(claim: Claim, rng: np.random.Generator) -> Iterator[dict[Any, Any]]:
+    """Random and simple points and neighbours of simple points, inside and outside the domain."""
+    named = {atom for part in (claim.left, claim.right, *claim.domain) for atom in part.atoms(sp.Rational)}
+    nice = list(dict.fromkeys([*NICE, *named]))
+    ends = {s: (max([-12.0, *_bounds(claim, s, sp.Gt, sp.Ge)]), min([12.0, *_bounds(claim, s, sp.Lt, sp.Le)]))
+            for s in claim.symbols}  # fmt: skip
+    # the judge's integrals take seconds
+    for _ in range(1 if not claim.symbols else POINTS // 4 if _has_integral(claim) else POINTS):
+        point = {}
+        for symbol in claim.symbols:
+            choice = rng.random()
+            if symbol.is_integer:
+                number = sp.Integer(int(rng.integers(-8, 9)))
+                point[symbol] = 2 * number if symbol.is_even else number
+            elif choice < 0.4:
+                point[symbol] = nice[int(rng.integers(len(nice)))]
+            elif choice < 0.6:
+                step = sp.Rational(int(rng.choice([-1, 1])), 10 ** int(rng.integers(1, 9)))
+                point[symbol] = nice[int(rng.integers(len(nice)))] + step
+            else:
+                low, high = ends[symbol]
+                point[symbol] = sp.Rational(round(10**6 * (low + (high - low) * rng.random())), 10**6)
+        yield point
+
+
+def _bounds(claim: Claim, symbol: Any, *kinds: Any) -> list[float]:
+    return [float(r.rhs) for r in claim.domain if r.func in kinds and r.lhs == symbol and r.rhs.is_number]
+
+
+def judged(claim: Claim, seed: int) -> tuple[str, str, str, float]:
+    """The kind, the verdict from values, the answer of `verify`, and its seconds."""
+    rng = np.random.default_rng(seed)
+    outcomes = [compared(claim, point) for point in places(claim, rng)]
+    broken, seen = outcomes.count(False), outcomes.count(True)
+    label = "false" if broken else "true" if seen else "nowhere"
+    start = time.perf_counter()
+    try:
+        if claim.relation == "==":
+            verdict = verify(claim.left, claim.right, claim.domain, time_limit=SECONDS)
+        else:
+            verdict = verify(sp.Le(claim.left, claim.right), claim.domain, time_limit=SECONDS)
+    except InputError:
+        answer = "error"
+    else:
+        answer = verdict.answer
+        if "time limit" in verdict.evidence:
+            answer = "out of time"
+        if answer == "refuted" and verdict.counterexample:
+            point = {s: sp.sympify(verdict.counterexample.get(str(s), 0)) for s in claim.symbols}
+            if (
+                not all(has_its_properties(s, v) for s, v in point.items())
+                or compared_in_more_digits(claim, point) is not False
+            ):
+                answer = "FALSE refutation"
+        if answer == "proved" and broken:
+            answer = "FALSE proof"
+    if answer == "error" and broken + seen > 0:
+        answer = "FALSE error"
+    return claim.kind, label, answer, time.perf_counter() - start
+
+
+def has_its_properties(symbol: Any, number: Any) -> bool:
+    return (not symbol.is_integer or number.is_integer is True) and (not symbol.is_even or number.is_even is True)
+
+
+def run(seed: int) -> tuple[int, str, str, str, float]:
+    return seed, *judged(Maker(seed).claim(), seed)
+
+
+def main(claims: int = 5000, first: int = 0, processes: int = 1) -> list[tuple[int, str, str, str, float]]:
+    """Run the campaign, print its table, and return every outcome."""
+    seeds = range(first, first + claims)
+    if processes > 1:
+        with ProcessPoolExecutor(processes) as pool:
+            found = list(pool.map(run, seeds, chunksize=20))
+    else:
+        found = [run(seed) for seed in seeds]
+    print(table_of(found))
+    for seed, kind, label, answer, _ in found:
+        if "FALSE" in answer:
+            print(seed, kind, label, answer, Maker(seed).claim())
+    return found
+
+
+COLUMNS = ("proved", "refuted", "error", "undecided", "out of time", "FALSE proof", "FALSE refutation", "FALSE error")
+
+
+def table_of(found: list[tuple[int, str, str, str, float]]) -> str:
+    """Counts by kind and by the verdict from values."""
+    rows = [(kind, [one for one in found if one[1] == kind]) for kind in sorted({one[1] for one in found})]
+    rows += [
+        (f"values say: {label}", [one for one in found if one[2] == label]) for label in ("true", "false", "nowhere")
+    ]
+    rows.append(("all", found))
+    lines: list[tuple[object, ...]] = []
+    for name, ones in rows:
+        counts = Counter(one[3] for one in ones)
+        decided = sum(counts[answer] for answer in ("proved", "refuted", "error")) / max(len(ones), 1)
+        lines.append((name, len(ones), *(counts[column] for column in COLUMNS), f"{100 * decided:.1f} %"))
+    return table(" | ".join(("claims about", "number", *COLUMNS, "decided")), lines)
+
+
+if __name__ == "__main__":
+    main(*(int(argument) for argument in sys.argv[1:]))

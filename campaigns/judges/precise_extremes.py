@@ -1,0 +1,202 @@
+"""Rays on the extreme walls, and where they go in 50 digits.
+
+``python -m campaigns.judges.precise_extremes [CASE]`` writes the data. The stability report reads
+``src/asperity/bench/running/extreme_rays.json``. Walls with a closed form are judged by it (`precise_rays`), the
+others by the tracer in 50 digits (`precise_tracer`); neither shares code with the library.
+
+Of each ray the file has the position, the angle, the outgoing angle rounded once, the number of hits, the condition (1
++ the moduli of the derivatives of the outgoing state by the incoming one, positions in cells), whether it is known to
+pass a corner too closely, and what becomes of it when it is moved by up to 32 ulps, where that is something else.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from math import pi
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+from campaigns.judges.precise_rays import arc, cap, cap_clearance, crevice, tooth
+from campaigns.judges.precise_tracer import DIGITS, trace_precisely
+
+from asperity.bench.extremes import walls as walls
+from asperity.bench.extremes.rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
+
+FILE = Path(__file__).parents[2] / "src/asperity/bench/running" / DATA
+RAYS, FEW, FEWEST = 64, 24, 4
+# Stems so narrow that none of the rays misses them after its first hit, the one that the closed form is about.
+SMALL_STEMS = walls.STEMS[:2]
+LOWEST_ANGLE, ISLAND_ANGLE = 1e-12, 1e-3
+EPS = mp.mpf(2) ** -52
+# Where the ray goes another way than the traced one, does one moved by so many ulps go the tracer's?
+MOVES = tuple((dx * 2.0**k, dt * 2.0**k) for k in range(-1, 6) for dx in (-1, 0, 1) for dt in (-1, 0, 1) if dx or dt)
+FEW_MOVES = tuple(
+    (dx * size, dt * size) for size in (0.5, 2.0, 8.0) for dx in (-1, 0, 1) for dt in (-1, 0, 1) if dx or dt
+)
+# An error of this size is enough to look at the ray's neighbours, where that takes the tracer.
+SEEN = 1e-6
+AIM_ULPS = 2
+STEP = mp.mpf(10) ** -30
+# The wall's own rounding errors, a few in each coordinate of its joints, in units of the cell.
+WALL_ERROR = 4 * EPS
+# A ray that makes more than these one by one would take hours.
+MOST_HITS = 10**15
+# Of rays that the rounding of the wall decides, those that leave later are left unknown.
+MOST_STORED_HITS = 100_000
+# Flights after which the tracer gives a ray up (MOST_STEPS of `geometry/tracing/compiled/rays.py`).
+MOST_FLIGHTS = 1_000_000
+
+
+def spread_rays(count, low, seed):
+    """Positions in (0, 1); half the angles from the flux, half log-uniform from ``low``, from either side."""
+    rng = np.random.default_rng(seed)
+    grazing = 10.0 ** rng.uniform(np.log10(low), -2.0, count)
+    grazing = np.where(rng.random(count) < 0.5, grazing, np.pi - grazing)
+    theta = np.where(rng.random(count) < 0.5, np.arccos(1.0 - 2.0 * rng.random(count)), grazing)
+    return rng.uniform(0.01, 0.99, count), theta
+
+
+def aimed_rays(wall, count, seed):
+    """Rays whose straight way ends in a joint, or a few ulps of the angle beside it."""
+    rng = np.random.default_rng(seed)
+    joints = wall.vertices[wall.vertices[:, 1] < 0.0]
+    target = joints[rng.integers(len(joints), size=count)]
+    x = wall.period * rng.random(count)
+    theta = np.arctan2(-target[:, 1], x - target[:, 0])
+    return x, theta + rng.integers(-AIM_ULPS, AIM_ULPS + 1, size=count) * np.spacing(theta)
+
+
+class Closed:
+    """The judge of a wall with a closed form for its one hollow."""
+
+    reference = "closed form, 50 digits"
+
+    def __init__(self, wall, ray):
+        hollow = wall.hollows[0]
+        self.cell, self.left, self.width = mp.mpf(wall.period), mp.mpf(hollow.left), mp.mpf(hollow.right - hollow.left)
+        self.ray, self.stored = ray, Traced(wall, MOST_STORED_HITS)
+
+    def __call__(self, x, theta):
+        """State on the way out (here the angle alone), hits, itinerary."""
+        out, hits, itinerary = self.ray((x - self.left) / self.width, theta)
+        return (out,), hits, itinerary
+
+
+class Traced:
+    """The judge of any wall: the tracer in 50 digits."""
+
+    reference = "tracer in 50 digits"
+
+    def __init__(self, wall, most_hits=MOST_HITS):
+        self.scene, self.cell = wall.scene, mp.mpf(wall.period)
+        self.width, self.most_hits = self.cell, most_hits
+
+    def __call__(self, x, theta):
+        """State on the way out, hits, itinerary."""
+        ray = trace_precisely(self.scene, x, theta, self.most_hits)
+        if ray.theta is None:
+            raise ArithmeticError(f"x = {x}, theta = {theta}: still inside after {ray.bounces} hits")
+        return (ray.theta, ray.x / self.cell), ray.bounces, ray.itinerary
+
+
+def judge_of(name, wall):
+    """What knows where the rays of a case go."""
+    kind, _, rest = name.partition(", ")
+    figure = rest.rpartition(" ")[2]
+    if rest.startswith("theta") and kind in walls.GRAZED:
+        form = {"triangular teeth": tooth(0.7), "rectangular teeth": crevice(1.0), "arcs": arc(1.2)}[kind]
+        return Closed(wall, form)
+    if rest.startswith("angle"):
+        return Closed(wall, tooth(_nearest(figure, walls.TOOTH_ANGLES)))
+    if rest.startswith("r ="):
+        return Closed(wall, crevice(float(figure)))
+    if rest.startswith("half angle"):
+        return Closed(wall, arc(_nearest(figure, walls.ARC_ANGLES)))
+    if rest in [f"stem/cap {stem:g}" for stem in SMALL_STEMS]:
+        return Closed(wall, cap(float(figure)))
+    return Traced(wall)
+
+
+def rays_of(name, wall):
+    """Positions and angles of the rays of a case."""
+    if name.endswith("joints"):
+        return aimed_rays(wall, RAYS, 3)
+    low = ISLAND_ANGLE if name.startswith("floating") else LOWEST_ANGLE
+    number = FEW if "Koch 8" in name else FEWEST if name.startswith("floating") and "theta" in name else RAYS
+    place, theta = spread_rays(number, low, 1)
+    if "theta" in name:
+        theta = np.full(len(place), pi - LOWEST_ANGLE if "pi" in name else LOWEST_ANGLE)
+    if wall.closes and len(wall.hollows) == 1:
+        hollow = wall.hollows[0]
+        return hollow.left + (hollow.right - hollow.left) * place, theta
+    return wall.period * place, theta
+
+
+def judged(name, judge, x, theta):
+    """One ray, as a row of the file."""
+    with mp.workdps(DIGITS):
+        place, angle = mp.mpf(x), mp.mpf(theta)
+        if name == "floating islands, theta = 1e-12":
+            # the highest point of an island is a fifth of a period below the openings
+            assert 0.2 / mp.tan(angle) > MOST_FLIGHTS
+            return [x.hex(), theta.hex(), None, None, 1.0, TOO_FAR, []]
+        state, hits, itinerary = judge(place, angle)
+        near = [judge(place + dx, angle + dt)[0] for dx, dt in ((STEP * judge.cell, 0), (0, STEP))]
+        condition = 1 + sum(abs(b - a) / STEP for moved in near for a, b in zip(state, moved, strict=True))
+        half_ulp = mp.mpf(float(np.spacing(theta))) / 2
+        ends = {judge(place, angle + sign * half_ulp)[2] for sign in (-1, 1)}
+        clearance = CLEAR if ends == {itinerary} else IN_ANGLE
+        if clearance == CLEAR and "aspect 0" in name and isinstance(judge, Closed):
+            opening, stem = (place - judge.left) / judge.width, float(name.rpartition(" ")[2])
+            assert cap_clearance(stem, opening, angle) > 0
+            clearance = IN_WALL if cap_clearance(stem, opening, angle) < WALL_ERROR else CLEAR
+        others = {}
+        # a ray whose error may be seen at all may also have jumped
+        if isinstance(judge, Closed) or condition * (1 + hits) * EPS > SEEN:
+            for dx, dt in MOVES if isinstance(judge, Closed) else FEW_MOVES:
+                (out, *_), other, _ = judge(place + dx * EPS * judge.width, angle * (1 + dt * EPS))
+                # what differs by no more than the ray was moved is no other way
+                if other != hits and abs(out - state[0]) > 64 * EPS * condition:
+                    others[float(out)] = other
+        if clearance == IN_WALL:
+            # the wall that is traced is that of the rounded coordinates, and their rounding decides this ray
+            try:
+                (out, *_), other, _ = judge.stored(place, angle)
+                others[float(out)] = other
+            except ArithmeticError:
+                pass
+        rest = [[out.hex(), other] for out, other in sorted(others.items())]
+        return [x.hex(), theta.hex(), float(state[0]).hex(), hits, float(f"{float(condition):.4g}"), clearance, rest]
+
+
+def _nearest(figure, values):
+    """The value that was written with ten digits."""
+    return min(values, key=lambda value: abs(value - float(figure)))
+
+
+def main(chosen):
+    """Judge the chosen cases, or all; a case takes seconds, the mushrooms some minutes."""
+    data = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    builders = walls.extreme_walls()
+    for name in chosen or builders:
+        wall = builders[name]()
+        judge = judge_of(name, wall)
+        rows = [judged(name, judge, float(x), float(theta)) for x, theta in zip(*rays_of(name, wall), strict=True)]
+        data[name] = {"reference": judge.reference, "rays": rows}
+        write({name: data[name] for name in builders if name in data})
+        print(f"{name}: {len(rows)} rays", flush=True)
+
+
+def write(data):
+    """One ray a line."""
+    blocks = []
+    for name, case in data.items():
+        rows = ",\n".join(json.dumps(row) for row in case["rays"])
+        blocks.append(f'"{name}": {{"reference": "{case["reference"]}", "rays": [\n{rows}\n]}}')
+    FILE.write_text("{" + ",\n".join(blocks) + "}\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

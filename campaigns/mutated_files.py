@@ -1,0 +1,381 @@
+"""Files with random damage: each must be read as it stands or be refused, without a warning and in little memory.
+
+``python -m campaigns.mutated_files`` damages files of matrices, walls and profiles and prints what became of them. A
+field is left out, gets a value of another type, NaN, an infinity, a huge or a negative number; an array gets another
+type, shape or entry; an archive gets a member of no use or one that inflates to a thousand times its size; bytes are
+cut off, changed or added.
+
+- *refused*: an InputError.
+- *read*: the object says exactly what the damaged file says, and is the same after it was saved and read again.
+- *wrong*: another exception, a warning, another object, or more memory than ALLOWED; there must be none.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import tomllib
+import tracemalloc
+import warnings
+import zipfile
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.errors import AsperityError
+
+from .pages import print_table
+
+ROUNDS = 500
+# Bytes that reading a small file may take, of which the search for crossings takes up to 60 MB; the files are below
+# 100 kB. A bomb is an array of so many zeros a side, 128 MB.
+ALLOWED, BOMB = 100 * 2**20, 4000
+# What a plain value may become.
+OTHERS: tuple[Any, ...] = (
+    math.nan, math.inf, -math.inf, 1e308, -1e308, 10**30, 10**400, -1, 0, 1, True, False, "", "1", "nan", [], {},
+    [1.0, 2.0], {"a": 1}, 1e-320, 0.5,
+)  # fmt: skip
+WORDS = (
+    "",
+    "nan",
+    "inf",
+    "-inf",
+    "1e400",
+    "-1e400",
+    "1e308",
+    "1e200",
+    "1_0",
+    "0x10",
+    "abc",
+    "1;2",
+    "1,5",
+    "١",
+    "#",
+    "\0",
+)
+
+Damage = Callable[[np.random.Generator, bytes], bytes]
+Reading = Callable[[Path], str | None]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Files of one format: valid contents, the damages, and the reading, which returns what is wrong, if anything."""
+
+    name: str
+    contents: tuple[bytes, ...]
+    damages: tuple[Damage, ...]
+    read: Reading
+
+
+def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """The paths of all entries of nested lists and dicts."""
+    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, entry in entries:
+        yield (*path, key)
+        yield from leaves(entry, (*path, key))
+
+
+def damaged_value(rng: np.random.Generator, document: Any) -> None:
+    """Drop, replace or add one entry of nested lists and dicts."""
+    paths = list(leaves(document))
+    path = paths[rng.integers(len(paths))]
+    holder = document
+    for key in path[:-1]:
+        holder = holder[key]
+    draw = rng.integers(8)
+    if draw == 0:
+        del holder[path[-1]]
+    elif draw == 1 and isinstance(holder, dict):
+        holder["extra"] = OTHERS[rng.integers(len(OTHERS))]
+    else:
+        holder[path[-1]] = OTHERS[rng.integers(len(OTHERS))]
+
+
+def damaged_bytes(rng: np.random.Generator, content: bytes) -> bytes:
+    """Cut off, change or add bytes."""
+    data = bytearray(content)
+    at = int(rng.integers(len(data)))
+    draw = rng.integers(4)
+    if draw == 0:
+        return bytes(data[:at])
+    if draw == 1:
+        data[at] ^= 1 << int(rng.integers(8))
+    elif draw == 2:
+        data[at : at + int(rng.integers(1, 50))] = rng.bytes(int(rng.integers(50)))
+    else:
+        data += rng.bytes(int(rng.integers(1, 200)))
+    return bytes(data)
+
+
+# matrices
+
+
+def members_of(content: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def archive_of(members: dict[str, bytes]) -> bytes:
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+    return whole.getvalue()
+
+
+def array_bytes(array: Any) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
+def damaged_record(rng: np.random.Generator, content: bytes) -> bytes:
+    members = members_of(content)
+    record = json.loads(str(np.load(io.BytesIO(members["record.npy"]))))
+    damaged_value(rng, record)
+    return archive_of({**members, "record.npy": array_bytes(np.array(json.dumps(record)))})
+
+
+def damaged_array(rng: np.random.Generator, content: bytes) -> bytes:
+    """Another type, shape or entry of one array, or none."""
+    members = members_of(content)
+    name = sorted(members)[rng.integers(len(members))]
+    array = np.load(io.BytesIO(members[name]))
+    draw = int(rng.integers(7))
+    if draw == 0:
+        del members[name]
+        return archive_of(members)
+    if draw == 1 and array.ndim:
+        kind = ("f4", "f2", "c16", "U9", "S9", "O", "i8", "u8", "i2", "?", "M8[s]", "m8[s]", "V8", ">f8")[
+            rng.integers(14)
+        ]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                array = array.astype(kind)
+            except (TypeError, ValueError):
+                array = np.zeros(array.shape, kind)
+    elif draw == 2:
+        array = (
+            (array[:-1], array[..., None], array.ravel(), array.T[None], array[:0])[rng.integers(5)]
+            if array.ndim
+            else array[None]
+        )
+    elif draw == 3:
+        array = np.zeros((BOMB, BOMB) if rng.integers(2) else BOMB**2)
+    elif draw == 4:
+        return archive_of({**members, "extra.npy": array_bytes(np.zeros(BOMB**2))})
+    elif draw == 5:
+        # a header that promises more, or is in another version
+        stream = io.BytesIO()
+        np.lib.format.write_array_header_2_0(stream, {"shape": (10**6, 10**6), "fortran_order": False, "descr": "<f8"})
+        return archive_of({**members, name: stream.getvalue() + members[name]})
+    elif array.ndim and array.dtype.kind in "fi":
+        array = array.copy()
+        value = (np.nan, np.inf, 1e308, -1e308, -1.0, 2.0**62)[
+            rng.integers(6 if array.dtype.kind == "f" else 1, 6 + 1) - 1
+        ]
+        flat = array.reshape(-1)
+        flat[rng.integers(flat.size)] = value if array.dtype.kind == "f" else (2**62, -1)[rng.integers(2)]
+    return archive_of({**members, name: array_bytes(array)})
+
+
+def read_matrix(path: Path) -> str | None:
+    matrix = ker.load_matrix(path)
+    again = path.with_suffix(".again.npz")
+    matrix.save(again, overwrite=True)
+    there, here = zipfile.ZipFile(path), zipfile.ZipFile(again)
+    for name in here.namelist():
+        first, second = (np.load(io.BytesIO(file.read(name))) for file in (there, here))
+        if name == "record.npy":
+            mine, yours = json.loads(str(second), parse_int=float), json.loads(str(first), parse_int=float)
+            if any(repr(mine[key]) != repr(yours[key]) for key in mine if key != "basis"):
+                return "another record"
+        elif not np.array_equal(first, second):
+            return f"another array {name}"
+    return None
+
+
+def matrices() -> Kind:
+    law = ker.CircularArcLaw(0.1)
+    found = (
+        ker.discretise(ker.TriangularTeethLaw(0.7), ker.Bins(6)),
+        ker.discretise(ker.TriangularTeethLaw(0.7), ker.Bins([0.0, 1.0, 2.5, math.pi])),
+        ker.discretise(law, ker.Bins(4), method="qmc", samples=512),
+        ker.discretise(law, ker.Bins(40), method="qmc", samples=512),
+        ker.discretise(law, ker.Bins(4), method="monte-carlo", samples=512),
+        ker.discretise(ker.lambertian(), ker.Panels([0.0, 1.0, math.pi], 2)),
+        ker.discretise(ker.henyey_greenstein(0.5), ker.Legendre(4)).tensor(
+            ker.discretise(ker.lambertian(), ker.Bins(2))
+        ),
+    )
+    contents = []
+    with TemporaryDirectory() as folder:
+        for number, matrix in enumerate(found):
+            contents.append(matrix.save(Path(folder) / f"{number}.npz").read_bytes())
+    return Kind(
+        "matrix.npz", tuple(contents), (damaged_record, damaged_record, damaged_array, damaged_bytes), read_matrix
+    )
+
+
+# walls
+
+
+def damaged_document(rng: np.random.Generator, content: bytes) -> bytes:
+    document = tomllib.loads(content.decode())
+    damaged_value(rng, document)
+    return tomli_w.dumps(document).encode()
+
+
+def read_wall(path: Path) -> str | None:
+    wall = geo.load_wall(path)
+    again = path.with_suffix(".again.toml")
+    wall.save(again, overwrite=True)
+    if geo.load_wall(again) != wall:
+        return "another wall after it was saved"
+    if not (np.isfinite(wall.vertices).all() and math.isfinite(wall.arc_length) and math.isfinite(wall.depth)):
+        return "no finite wall"
+    document = tomllib.loads(path.read_text(encoding="utf-8"))
+    if type(document["period"]) is bool or wall.period != document["period"]:
+        return "another period"
+    if "vertices" in document and not np.allclose(wall.vertices, document["vertices"], rtol=1e-12, atol=1e-12):
+        return "other vertices"
+    return None
+
+
+def walls() -> Kind:
+    found = [entry.build() for name, entry in geo.WALLS.items() if name != "koch"]
+    island = [geo.Arc((0.3, -0.4), (0.1, 0.2), 0, 2 * math.pi)]
+    found.append(geo.Wall([geo.Segment((0, -1), (1, -1))], islands=[island]))
+    bezier = geo.Bezier([(0.1, -0.7), (0.3, -2 / 3), (0.4, -1), (1, 0)])
+    found.append(geo.Wall([geo.Segment((0, 0), (0.1, -0.7)), bezier], unit="µm"))
+    found.append(geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (0.5, -0.1), (1, 0)]))
+    contents = []
+    with TemporaryDirectory() as folder:
+        for number, wall in enumerate(found):
+            path = Path(folder) / f"{number}.toml"
+            wall.save(path)
+            contents.append(path.read_bytes())
+    return Kind("wall.toml", tuple(contents), (damaged_document, damaged_document, damaged_bytes), read_wall)
+
+
+# profiles
+
+
+def damaged_word(rng: np.random.Generator, content: bytes) -> bytes:
+    """Another word, a line more or less."""
+    lines = content.decode().splitlines()
+    at = int(rng.integers(len(lines)))
+    draw = rng.integers(6)
+    if draw == 0:
+        del lines[at]
+    elif draw == 1:
+        lines.insert(at, lines[int(rng.integers(len(lines)))])
+    else:
+        words = lines[at].split(" ")
+        words[int(rng.integers(len(words)))] = WORDS[rng.integers(len(WORDS))]
+        lines[at] = " ".join(words)
+    return "\n".join(lines).encode()
+
+
+def read_profile(path: Path) -> str | None:
+    """Positions are those that Python reads in the same lines; a height that no word of the file is, is undefined."""
+    profile = geo.read_profile(path)
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    numbers = {
+        value for word in text.replace(",", " ").replace(";", " ").split() if (value := number(word)) is not None
+    }
+    if not np.isfinite(profile.x).all() or not {*profile.x.tolist()} <= numbers:
+        return "other positions"
+    heights = profile.height[np.isfinite(profile.height)].tolist()
+    if not all(
+        any(
+            math.isclose(value, scale * height, rel_tol=1e-9, abs_tol=1e-300)
+            for value in numbers
+            for scale in (1, 1000)
+        )
+        for height in heights
+    ):
+        return "other heights"
+    if profile.undefined and any(word in text for word in ("1e400",)):
+        return "a number too large for a double is undefined"
+    return None
+
+
+def number(word: str) -> float | None:
+    try:
+        value = float(word)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def profiles() -> Kind:
+    rows = "\n".join(f"{0.5 * k} {math.sin(k):.4f}" for k in range(12))
+    contents = (rows, f"# a scan\nx height\n{rows}", f"x [um], height [nm]\n{rows}", rows.replace(" ", "; "))
+    return Kind(
+        "profile.txt", tuple(map(str.encode, contents)), (damaged_word, damaged_word, damaged_bytes), read_profile
+    )
+
+
+def outcome(kind: Kind, path: Path) -> str:
+    """refused, read, or what is wrong."""
+    tracemalloc.start()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            wrong = kind.read(path)
+    except AsperityError as reason:
+        wrong = "refused" if len(str(reason)) < 1000 else "a message without end"
+    except Exception as reason:
+        wrong = f"{type(reason).__name__}: {reason}"
+    finally:
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    return wrong or "read" if peak < ALLOWED else f"{peak / 2**20:.0f} MB of memory"
+
+
+def campaign(kind: Kind, rounds: int, seed: int) -> tuple[Counter[str], list[tuple[str, bytes]]]:
+    """How often files were refused and read, and the wrong outcomes with their files."""
+    rng = np.random.default_rng(seed)
+    counts: Counter[str] = Counter()
+    wrong = []
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / kind.name
+        for content in kind.contents:
+            path.write_bytes(content)
+            if outcome(kind, path) != "read":
+                wrong.append(("a valid file: " + outcome(kind, path), content))
+        for _ in range(rounds):
+            content = kind.contents[rng.integers(len(kind.contents))]
+            damage = kind.damages[rng.integers(len(kind.damages))]
+            path.write_bytes(damaged := damage(rng, content))
+            found = outcome(kind, path)
+            counts[found if found in ("refused", "read") else "wrong"] += 1
+            if found not in ("refused", "read"):
+                wrong.append((f"{damage.__name__}: {found}", damaged))
+    return counts, wrong
+
+
+def main() -> None:
+    lines = []
+    for kind in (matrices(), walls(), profiles()):
+        counts, wrong = campaign(kind, ROUNDS, 0)
+        lines.append([kind.name, str(ROUNDS), *(str(counts[name]) for name in ("refused", "read", "wrong"))])
+        for found, _ in wrong:
+            print(f"{kind.name}: {found}")
+    print_table("file | damaged | refused | read | wrong", lines)
+
+
+if __name__ == "__main__":
+    main()

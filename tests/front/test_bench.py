@@ -1,0 +1,369 @@
+"""The benchmark itself, in small: its scenes, its references, its processes, its report, and the extreme cases."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import time
+
+import numpy as np
+import pytest
+from campaigns import savings
+from campaigns.__main__ import begin_or_go_on
+from campaigns.__main__ import main as measure_everything
+from campaigns.exact_rows import ArcRow
+from campaigns.sections import SECTIONS, section_text
+from click.testing import CliRunner
+from scipy.stats import norm, t
+
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.bench.comparison import compare_runs
+from asperity.bench.extremes.report import run_extremes
+from asperity.bench.extremes.row import ExtremeRow
+from asperity.bench.quantities import collision as collision_quantities
+from asperity.bench.quantities import collision as uniform_disk
+from asperity.bench.quantities import methods as routes
+from asperity.bench.quantities import standard as quantities
+from asperity.bench.quantities.matrix import LAW_BASIS, resistance_of
+from asperity.bench.quantities.spectral import eta_at
+from asperity.bench.quantities.walls import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
+from asperity.bench.run import BenchRun
+from asperity.bench.running.processes import ChildCrashed, ChildProcess, OutOfTime, TimePlan
+from asperity.bench.running.references import known_reference
+from asperity.bench.running.timing import side_by_side
+from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
+from asperity.cli import main
+from asperity.errors import InputError
+from asperity.estimates import student_95
+from asperity.kernels.bases.directions import Directions
+from asperity.kernels.sampling.sobol import PARTS
+
+RAYS = 2**12
+
+
+def run_report(rows, problem="teeth/law"):
+    reference = spec.ReferenceValue(0.0, 1e-9, "by hand")
+    methods = [spec.WorkMethod(name, float) for name in dict.fromkeys(row[0] for row in rows)]
+    report = spec.WorkReport.of(spec.WorkProblem(problem, reference), methods, spec.Machine.here())
+    for name, error, seconds in rows:
+        report = report.with_row(spec.WorkRow(name, 1, "done", {"absolute": error}, tuple(seconds)))
+    return BenchRun((report,))
+
+
+# scenes and quantities
+
+
+def test_the_standard_set_has_a_wall_of_every_kind():
+    walls = [wall_of(name) for name in standard_names()]
+    assert len(walls) == 8
+    assert {wall.is_polygonal for wall in walls} == {True, False}
+    assert sum(ker.WallLaw(wall).closed_form is not None for wall in walls[:3]) == 3
+    assert len(wall_of("koch").pieces) == 256 and len(wall_of("profile").pieces) > 800
+    assert set(wall_of("mixed").plan().primitives) == {"lines", "circles", "beziers"}
+
+
+def test_random_walls_are_walls_and_the_same_for_ever():
+    walls = [random_wall(number) for number in range(RANDOM_WALLS)]
+    assert [wall.is_polygonal for wall in walls[::2]] == [True] * (RANDOM_WALLS // 2)
+    # a curved piece may be drawn as a segment, but hardly all of a wall's
+    assert sum(wall.is_polygonal for wall in walls[1::2]) <= 2
+    assert len({wall.arc_length for wall in walls}) == RANDOM_WALLS
+    assert np.array_equal(random_wall(7).vertices, walls[7].vertices)
+    assert len(scenes()) == 8 + RANDOM_WALLS
+
+
+def test_problems_are_found_by_scene_by_quantity_and_by_both():
+    assert len(problem_names()) == sum(len(one.scenes) for one in quantities.QUANTITIES.values())
+    assert problem_names(["koch/law"]) == ["koch/law"]
+    assert problem_names(["cusps"]) == [f"cusps/{name}" for name in ("law", "moment", "lambda2", "collision", "disk")]
+    assert len(problem_names(["moment"])) == 8
+    assert problem_names(["distance"]) == [f"{name}/distance" for name in standard_names()[:3]]
+    assert problem_names(["random-3"]) == ["random-3/moment"]
+    with pytest.raises(InputError, match="expected SCENE"):
+        problem_names(["hilbert-curve"])
+
+
+def test_every_problem_has_a_reference():
+    assert [name for name in problem_names() if known_reference(name) is None] == []
+    assert all(known_reference(f"random-{number}/moment") is not None for number in range(RANDOM_WALLS))
+
+
+@pytest.mark.parametrize("name", ["triangular-teeth", "focusing-arc", "cusps", "mushroom", "profile", "mixed"])
+def test_a_law_that_is_kept_is_markov_symmetric_and_that_of_the_wall(name):
+    law = known_reference(f"{name}/law")
+    size = LAW_BASIS.size
+    assert law.value.shape == (size, size) and np.array_equal(law.value, law.value.T)
+    # equal bins: the constant is kept
+    assert np.abs(law.value.sum(axis=1) - 1.0).max() <= 4.0 * law.error + 1e-12
+    # rays of another seed
+    seen = ker.discretise(ker.WallLaw(wall_of(name)), LAW_BASIS, "qmc", samples=2**16, rng=np.random.default_rng(5))
+    assert np.linalg.norm(seen.symmetric - law.value) <= 2.0 * seen.error.value + law.error
+
+
+@pytest.mark.parametrize("name", standard_names())
+def test_a_moment_that_is_kept_is_that_of_the_wall(name):
+    moment = known_reference(f"{name}/moment")
+    seen = ker.discretise(ker.WallLaw(wall_of(name)), ker.Legendre(2), "qmc", samples=2**16)
+    beyond = max(abs(seen.symmetric[1, 1] - float(moment.value)) - moment.error, 0.0)
+    # a half width of 95 % from the spread of eight nets: multiples of the standard error follow Student's distribution
+    assert norm.isf(t.sf(student_95(PARTS) * beyond / seen.error.value, PARTS - 1)) < 4.0
+    assert moment.error <= 5e-5
+
+
+def test_rows_of_arcs_by_formula_are_those_of_the_law():
+    law = ker.CircularArcLaw(1.2)
+    for theta in np.random.default_rng(4).uniform(0.0, np.pi, 20):
+        row = ArcRow.of(theta, 1.2)
+        assert row.mean() == pytest.approx(law.apply(np.cos, theta) + 1j * law.apply(np.sin, theta), abs=1e-10)
+        assert row.distribution(np.array([0.0, np.pi])) == pytest.approx([0.0, 1.0], abs=1e-12)
+
+
+def test_known_numbers_are_the_references():
+    assert float(known_reference("triangular-teeth/moment").value) == pytest.approx(0.134541971359171, abs=1e-14)
+    assert float(known_reference("focusing-arc/moment").value) == pytest.approx(0.327558333378, abs=1e-12)
+    # Chumley, Feres, Zhang 2013: zeta = -(ln 3)/4 for semicircles
+    assert float(known_reference("mixed/eta").value) == pytest.approx(1.0358390705, abs=1e-10)
+    edge = known_reference("koch/lambda2")
+    assert edge.is_exact and "theorem" in edge.source
+
+
+@pytest.mark.parametrize("name", ["triangular-teeth", "focusing-arc", "mixed"])
+def test_every_sampled_route_is_within_its_reported_error(name):
+    wall = wall_of(name)
+    reference = known_reference(f"{name}/law")
+    for route in routes.methods_for(wall):
+        if route.is_random:
+            found = route.matrix(wall, LAW_BASIS, 2**14, np.random.default_rng(1))
+            distance = float(np.linalg.norm(found.symmetric - reference.value))
+            # the Frobenius norm of noise on a thousand entries is close to its mean
+            assert distance <= 2.0 * found.error.value + reference.error, route.name
+
+
+@pytest.mark.parametrize(("law", "expected"), [(ker.specular(), 1.0), (ker.retroreflection(), 1.5)])
+def test_the_resistance_is_read_off_a_matrix(law, expected):
+    matrix = ker.discretise(law, Directions())
+    assert resistance_of(matrix.symmetric) == pytest.approx(expected, abs=1e-13)
+
+
+@pytest.mark.parametrize(("name", "angle"), [("koch", 1e-5), ("mixed", 1e-5), ("focusing-arc", 1e-4)])
+def test_rays_at_a_small_angle_come_to_the_diffusivity(name, angle):
+    wall = wall_of(name)
+    assert eta_at(wall, angle) == pytest.approx(float(known_reference(f"{name}/eta").value), abs=2e-3)
+
+
+def test_the_correlation_of_v1_is_that_of_the_ideal_disks():
+    smooth, rough = ker.smooth_matrix(uniform_disk.DISK), ker.no_slip_matrix(uniform_disk.DISK)
+    velocity = uniform_disk.sampled_velocities(200_000, np.random.default_rng(2))
+    square = np.mean(velocity[:, 0] ** 2)
+    along, roll = uniform_disk.velocity_fraction()
+    assert square == pytest.approx(along**2 / 4 + roll**2 / 4, rel=0.02)
+    for matrix, moment in ((smooth, -1.0), (rough, 1.0)):
+        incoming = -velocity
+        sampled = np.mean(-incoming[:, 0] * (incoming @ matrix.T)[:, 0]) / square
+        assert sampled == pytest.approx(uniform_disk.correlation_of(moment), abs=0.02)
+
+
+@pytest.mark.parametrize("way", ["operator", "velocities", "action"])
+def test_three_ways_to_the_collision_agree(way):
+    wall = wall_of("triangular-teeth")
+    exact = known_reference("triangular-teeth/collision").value
+    if way == "operator":
+        assert float(collision_quantities.by_operator(wall)) == pytest.approx(exact, abs=1e-13)
+    elif way == "action":
+        assert collision_quantities.by_action(wall, 64) == pytest.approx(exact, abs=1e-3)
+    else:
+        # standard deviation of one sample below 2
+        rng = np.random.default_rng(3)
+        assert abs(collision_quantities.by_velocities(wall, RAYS, rng) - exact) <= 4 * 2 / RAYS**0.5
+
+
+# processes and runs
+
+
+def test_a_call_that_takes_too_long_is_ended_and_the_next_one_works():
+    with ChildProcess() as child:
+        first = child.call(os.getpid, seconds=60.0)
+        with pytest.raises(OutOfTime):
+            child.call(time.sleep, 60.0, seconds=0.2)
+        assert child.call(os.getpid, seconds=60.0) not in (first, os.getpid())
+        with pytest.raises(ZeroDivisionError):
+            child.call(divmod, 1, 0, seconds=60.0)
+        with pytest.raises(ChildCrashed, match="code 3"):
+            child.call(os._exit, 3, seconds=60.0)
+
+
+def test_a_problem_runs_in_its_process_and_goes_on_from_its_file(tmp_path):
+    effort = Effort(True, 1, 0.01, 60.0, 120.0)
+    (report,) = run_problems(["triangular-teeth/collision"], effort, tmp_path, lambda line: None)
+    assert {row.status for row in report.rows} <= {"done", "left out"}
+    assert report.error(report.rows[0]) <= 1e-12
+    path = tmp_path / "triangular-teeth-collision.json"
+    assert spec.WorkReport.of_json(path.read_text()) == report
+    (again,) = run_problems(["triangular-teeth/collision"], effort, tmp_path, lambda line: None)
+    assert again == report
+
+
+def test_what_has_no_independent_reference_says_so(monkeypatch):
+    said = []
+    monkeypatch.setattr("asperity.bench.standard_set.known_reference", lambda name: None)
+    assert list(run_problems(["cusps/lambda2"], QUICK, None, said.append)) == []
+    assert said == ["cusps/lambda2: left out, no independent reference is known"]
+
+
+def test_a_plan_is_kept_whatever_the_parts_take(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("asperity.bench.running.processes.time.monotonic", lambda: now[0])
+    for greedy in (lambda number: True, lambda number: number % 2, lambda number: number > 6):
+        start, plan = now[0], TimePlan(100.0, 10)
+        for number in range(10):
+            fraction = plan.next_fraction()
+            assert 0.0 < fraction <= 100.0 - (now[0] - start)
+            now[0] += fraction if greedy(number) else 0.0
+        assert now[0] - start <= 100.0 + 1e-9
+
+
+def test_the_time_of_a_run_is_kept_and_what_it_left_out_is_said(tmp_path):
+    effort = dataclasses.replace(QUICK, total_seconds=0.01)
+    (report,) = run_problems(["triangular-teeth/collision"], effort, tmp_path, lambda line: None)
+    assert {(row.status, row.note) for row in report.rows} <= {
+        ("left out", "the time planned for this method was spent"),
+        ("left out", "a smaller budget met the time limit"),
+    }
+
+
+def test_both_sets_are_done_in_the_time_that_is_promised():
+    # three minutes, and forty-five with everything else
+    assert QUICK.total_seconds <= 170.0
+    assert sum(section.seconds for section in SECTIONS) <= 45.0 * 60.0
+    assert FULL.total_seconds < sum(section.seconds for section in SECTIONS)
+
+
+def test_a_run_of_sections_goes_on_where_it_was_and_a_finished_one_begins_anew(tmp_path):
+    (tmp_path / "peers.md").write_text("of before")
+    begin_or_go_on(tmp_path, quick=True)
+    assert not (tmp_path / "peers.md").exists()
+    (tmp_path / "peers.md").write_text("of now\n")
+    begin_or_go_on(tmp_path, quick=True)
+    peers = next(section for section in SECTIONS if section.name == "peers")
+    assert section_text(peers, True, tmp_path) == "of now"
+    begin_or_go_on(tmp_path, quick=False)
+    assert not (tmp_path / "peers.md").exists()
+
+
+def test_all_sections_are_joined_in_the_folder_of_the_run(tmp_path, monkeypatch):
+    begin_or_go_on(tmp_path, quick=True)
+    for section in SECTIONS:
+        (tmp_path / f"{section.name}.md").write_text(f"table of {section.name}\n")
+    (tmp_path / "standard").mkdir()
+    (tmp_path / "standard" / "koch.png").touch()
+    monkeypatch.setattr("sys.argv", ["campaigns", "--quick", "--out", str(tmp_path)])
+    measure_everything()
+    page = (tmp_path / "benchmarks.md").read_text()
+    assert page.startswith("Measured by `python -m campaigns --quick`.\n\ntable of speed\n")
+    assert "(standard/koch.png)" in page and "table of peers" not in page and "table of stability" not in page
+    assert "table of stability" in (tmp_path / "extremes.md").read_text()
+    # the next run begins anew
+    begin_or_go_on(tmp_path, quick=True)
+    assert not (tmp_path / "standard" / "koch.png").exists()
+
+
+def test_jobs_side_by_side_are_told_apart_beyond_their_noise():
+    slower = side_by_side(lambda: time.sleep(0.002), lambda: time.sleep(0.02) or 1, 3)
+    assert slower.differs and slower.second == 1
+    assert slower.low <= slower.high and slower.ratio > 2.0
+
+
+def test_a_run_is_written_and_read_again(tmp_path):
+    run = run_report([("auto", 1e-3, [0.2, 0.3]), ("rows", 1e-3, [0.15, 0.2])])
+    names = {path.name for path in run.save(tmp_path)}
+    assert names == {"summary.md", "tables.md", "bench.json", "teeth.png"}
+    assert BenchRun.of_json((tmp_path / "bench.json").read_text()) == run
+    assert "on 1 of the 1 where" in run.summary() and "| 1.3 |" in run.summary()
+    assert "| teeth/law | by hand | 1.0e-09 |" in run.references()
+    json.loads(run.to_json(), parse_constant=lambda word: pytest.fail(word))
+
+
+# comparison
+
+
+def test_a_slower_row_is_found_and_noise_is_not():
+    before = run_report([("auto", 1e-3, [1.0, 1.1, 1.2, 1.3, 1.4]), ("rows", 1e-3, [1.0, 1.1, 1.2, 1.3, 1.4])])
+    now = run_report([("auto", 1e-3, [2.0, 2.1, 2.2, 2.3, 2.4]), ("rows", 1e-3, [1.05, 1.15, 1.25, 1.35, 1.45])])
+    found = compare_runs(before, now)
+    assert [change.is_slower for change in found.changes] == [True, False]
+    assert found.is_worse and not compare_runs(before, before).is_worse
+    assert not compare_runs(now, before).is_worse and "faster" in compare_runs(now, before).table()
+    assert found.drift == pytest.approx(math.sqrt(2.0 * 1.05))
+
+
+def test_a_row_that_is_less_exact_or_gone_is_worse():
+    before = run_report([("auto", 1e-6, [1.0])])
+    assert compare_runs(before, run_report([("auto", 1e-5, [1.0])])).is_worse
+    # both below what the reference can tell
+    assert not compare_runs(run_report([("auto", 1e-13, [1.0])]), run_report([("auto", 1e-10, [1.0])])).is_worse
+    report = before.reports[0]
+    gone = dataclasses.replace(report, rows=(spec.WorkRow("auto", 1, "failed", note="no"),))
+    assert compare_runs(before, BenchRun((gone,))).is_worse
+    with pytest.raises(InputError, match="same problems"):
+        compare_runs(before, run_report([("auto", 1e-6, [1.0])], "another"))
+
+
+# extreme cases
+
+
+def test_verdicts_tell_apart_what_is_said_and_what_is_not():
+    assert ExtremeRow("a", "b", 1.0, 2.0).verdict == "met"
+    assert ExtremeRow("a", "b", 3.0, 2.0, reported=4.0).verdict == "degraded as reported"
+    assert ExtremeRow("a", "b", 1.0, 2.0, counts={"escaped": 9, "corner": 1}).verdict == "degraded as reported"
+    # a flag that is the exact answer is as good as an escape
+    aimed = ExtremeRow("a", "b", 1.0, 2.0, counts={"escaped": 9, "corner": 1}, flagged_rightly=1)
+    assert aimed.verdict == "met"
+    assert ExtremeRow("a", "b", 3.0, 2.0).verdict == "not met"
+    assert ExtremeRow("a", "b", float("nan"), 2.0).verdict == "not met"
+    assert ExtremeRow("a", "b", ended="refused").verdict == "refused"
+
+
+def test_a_case_that_would_hang_is_a_row():
+    report = run_extremes(True, ["matrix of 2000 bins"], seconds=0.05)
+    assert report.rows[0].verdict == "timed out"
+    assert "1 cases: 1 timed out." in report.table()
+
+
+# what scenes leave out
+
+
+@pytest.mark.parametrize("name", ["rectangular-teeth", "focusing-arc", "mushroom", "profile", "mixed"])
+def test_the_result_is_the_same_with_what_is_left_out(name):
+    wall = wall_of(name)
+    found = list(savings.ablations(wall))
+    assert found
+    for what, *pair in found:
+        traces = [savings.job(wall, scene, RAYS)() for scene in pair]
+        assert savings.largest_difference(*traces) <= savings.ROUNDED, what
+
+
+# the command
+
+
+def test_the_command_lists_problems_and_refuses_others(tmp_path):
+    result = CliRunner().invoke(main, ["bench", "hilbert-curve", "--out", str(tmp_path)])
+    assert result.exit_code == 1 and "expected SCENE" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_writes_and_compares(tmp_path, monkeypatch):
+    run = run_report([("auto", 1e-3, [1.0, 1.1, 1.2, 1.3, 1.4])])
+    monkeypatch.setattr("asperity.bench.commands.run_problems", lambda *_: iter(run.reports))
+    old = tmp_path / "old.json"
+    old.write_text(run_report([("auto", 1e-3, [0.1, 0.2, 0.3, 0.4, 0.5])]).to_json())
+    out = tmp_path / "new"
+    result = CliRunner().invoke(main, ["bench", "--quick", "--out", str(out), "--compare", str(old)])
+    assert result.exit_code == 1, result.output
+    assert "worse" in result.stdout and (out / "bench.json").exists()
+    same = CliRunner().invoke(
+        main, ["bench", "--quick", "--force", "--out", str(out), "--compare", str(out / "bench.json")]
+    )
+    assert same.exit_code == 0

@@ -1,0 +1,291 @@
+"""The command line: what it prints and writes, and how it refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from asperity import geometry as geo
+from asperity.cli import main
+from asperity.study import DATA, PICTURES
+
+FILES = sorted((*PICTURES, *DATA))
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def refused(*arguments):
+    """The single line on standard error of a run that must end with exit code 1 and print no result."""
+    result = run(*arguments)
+    assert result.exit_code == 1, result.output
+    assert result.stdout == ""
+    lines = result.stderr.splitlines()
+    assert len(lines) == 1 and lines[0].startswith("asperity: ")
+    return lines[0]
+
+
+@pytest.fixture(scope="module")
+def studied(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study") / "new"
+    result = run("study", "rectangular-teeth:height_to_width=2", "--bins", 16, "--out", folder)
+    assert result.exit_code == 0, result.output
+    return folder, result
+
+
+def test_a_study_prints_its_summary_and_writes_its_files(studied):
+    folder, result = studied
+    assert sorted(path.name for path in folder.iterdir()) == FILES
+    assert result.stdout.startswith("wall       rectangular-teeth:height_to_width=2: period 1, depth 1,")
+    assert result.stdout.count("wrote") == len(FILES)
+    assert result.stderr == ""  # no progress bar where there is no terminal
+
+
+def test_a_second_study_does_not_overwrite_the_first_and_says_so_before_the_work(studied, monkeypatch):
+    folder, _ = studied
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    monkeypatch.setattr("asperity.study.study_wall", lambda *_, **__: pytest.fail("the work began"))
+    message = refused("study", "flat", "--bins", 8, "--out", folder)
+    assert "--force" in message and "wall.png" in message
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_one_existing_file_is_enough_to_refuse_and_nothing_else_is_written(tmp_path):
+    (tmp_path / "study.json").write_text("mine")
+    assert "study.json" in refused("study", "flat", "--out", tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["study.json"]
+    assert (tmp_path / "study.json").read_text() == "mine"
+
+
+def test_force_replaces_an_earlier_study(tmp_path):
+    (tmp_path / "study.json").write_text("old")
+    result = run("study", "flat", "--bins", 8, "--out", tmp_path, "--force")
+    assert result.exit_code == 0
+    assert json.loads((tmp_path / "study.json").read_text())["wall"]["name"] == "flat"
+
+
+def test_a_study_that_fails_writes_no_file(tmp_path):
+    refused("study", "flat", "--bins", 0, "--out", tmp_path / "new")
+    assert not list(tmp_path.glob("new/*"))
+
+
+def test_json_goes_alone_to_standard_output(tmp_path):
+    result = run("study", "flat", "--bins", 8, "--json", "--out", tmp_path)
+    printed = json.loads(result.stdout)
+    assert printed == json.loads((tmp_path / "study.json").read_text())
+    assert "wrote" in result.stderr
+
+
+def test_mass_and_inertia_reach_the_disk():
+    printed = json.loads(run("study", "flat", "--bins", 8, "--mass", 2, "--inertia", 0.25, "--json").stdout)
+    collision = printed["collision"]
+    assert (collision["mass"], collision["inertia"]) == (2.0, 0.25)
+    assert collision["foreshortening"] == pytest.approx(1 / 3, rel=1e-15)
+
+
+def test_a_study_repeats_with_its_seed_and_changes_with_another():
+    arguments = ("study", "koch:generations=1", "--bins", 8, "--json", "--seed")
+    first, second, third = (json.loads(run(*arguments, seed).stdout)["tracer"] for seed in (3, 3, 4))
+    assert first == second != third
+
+
+def test_walls_of_every_kind_of_file_are_studied(tmp_path):
+    geo.rectangular_teeth(2.0).save(tmp_path / "wall.toml")
+    np.savetxt(tmp_path / "profile.txt", [[0.0, 0.0], [1.0, -0.5], [2.0, 0.1]])
+    for text, period, mirror in (
+        ("wall.toml", 1.0, True),
+        ("profile.txt", 4.0, True),
+        ("profile.txt:seam=step", 2.0, False),
+    ):
+        result = run("study", tmp_path / text, "--bins", 8, "--json")
+        assert result.exit_code == 0, result.output
+        wall = json.loads(result.stdout)["wall"]
+        assert (wall["name"], wall["period"], wall["mirror_symmetric"]) == (text, period, mirror)
+
+
+def test_an_open_wall_with_islands_has_no_check_by_kac(tmp_path):
+    post = [(0.4, -0.4), (0.4, -0.2), (0.6, -0.2), (0.6, -0.4), (0.4, -0.4)]
+    island = [geo.Segment(p, q) for p, q in pairwise(post)]
+    geo.Wall([geo.Segment((0, -0.5), (1, -0.5))], 1.0, [island]).save(tmp_path / "open.toml")
+    result = run("study", tmp_path / "open.toml", "--bins", 8, "--verbose", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "open: rays may pass from cell to cell, 1 island" in result.stdout and "Kac" not in result.stdout
+
+
+@pytest.mark.parametrize("convention", ["paper", "specular"])
+def test_a_gap_is_printed_with_its_evidence_and_as_json(convention):
+    flags = ["--specular"] if convention == "specular" else []
+    text = run("gap", "triangular-teeth", *flags).stdout
+    assert "no gap" in text and f"{convention} convention" in text and "essential spectrum" in text
+    assert text.startswith("spectral gap 0 (bound), no gap, ")
+    gap = json.loads(run("gap", "triangular-teeth", "--json", *flags).stdout)
+    assert gap["value"] == 0.0 and gap["error"] == 0.0 and gap["kind"] == "bound" and gap["convention"] == convention
+    assert gap["verdict"] == "no gap" and len(gap["evidence"]) == 1
+
+
+def test_the_named_walls_are_listed_and_drawn(tmp_path):
+    result = run("walls", "--out", tmp_path / "walls.png")
+    assert result.exit_code == 0
+    listed = [line.split()[0] for line in result.stdout.splitlines()]
+    assert listed == [*geo.WALLS, "wrote"]
+    assert (tmp_path / "walls.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_picture_of_the_walls_is_not_overwritten(tmp_path):
+    picture = tmp_path / "walls.png"
+    picture.write_text("mine")
+    assert "--force" in refused("walls", "--out", picture)
+    assert picture.read_text() == "mine"
+    assert run("walls", "--out", picture, "--force").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("wall", "words"),
+    [
+        ("focusing-arc", "Did you mean focusing-arcs"),
+        ("nowhere.toml", "neither a named wall nor a file"),
+        ("triangular-teeth:angle=4", "angle"),
+        ("focusing-arcs:half_angle=nan", "half_angle"),
+        ("triangular-teeth:angle=wide", "expected a number, got 'wide'"),
+        ("koch:generations=1.5", "expected a whole number"),
+        ("koch:generation=2", "did you mean generations"),
+        ("flat:angle", "expected name:parameter=value"),
+    ],
+)
+@pytest.mark.parametrize("command", ["study", "gap"])
+def test_a_wall_that_is_none_is_refused_in_one_line(command, wall, words):
+    assert words in refused(command, wall)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("wall.toml", "period = [", "not a TOML file"),
+        ("wall.toml", "period = 1.0", "vertices"),
+        ("wall.toml", "period = 1.0\nvertices = [[0, 0], [0.5, 0.5], [1, 0]]", "0.5"),
+        ("profile.txt", "0 1\n1 2 3\n", "line 2"),
+        ("profile.txt", "0 1\n0 2\n", "strictly increasing"),
+        ("profile.txt", "", "0 bytes"),
+    ],
+)
+def test_a_malformed_file_is_refused_with_its_name(tmp_path, name, text, words):
+    (tmp_path / name).write_text(text)
+    message = refused("study", tmp_path / name)
+    assert name in message and words in message
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--mass", -1), ("--mass", 0), ("--mass", "nan"), ("--inertia", "inf"), ("--tolerance", 0), ("--bins", 0)],
+)
+def test_a_number_out_of_range_is_refused_by_its_name(option, value):
+    assert option.lstrip("-") in refused("study", "flat", option, value)
+
+
+@pytest.mark.parametrize("place", ["file/folder", "file"])
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path, place):
+    (tmp_path / "file").write_text("in the way")
+    assert "cannot write there" in refused("study", "flat", "--out", tmp_path / place)
+    assert (tmp_path / "file").read_text() == "in the way"
+
+
+@pytest.mark.parametrize(
+    ("place", "remedy"), [("file/walls.png", "folder"), ("nowhere/walls.png", "folder"), ("walls.unknown", ".png")]
+)
+def test_a_picture_that_cannot_be_written_is_refused(tmp_path, place, remedy):
+    (tmp_path / "file").write_text("in the way")
+    words = refused("walls", "--out", tmp_path / place).split("cannot write the picture")[1]
+    assert remedy in words.split(";")[-1]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["study"],
+        ["nosuch"],
+        ["study", "flat", "--mass", "heavy"],
+        ["study", "flat", "--nosuch"],
+        ["study", "flat", "--seed", -1],
+        ["bench", "law", "--extremes"],
+    ],
+)
+def test_wrong_usage_ends_with_exit_code_two(arguments):
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert "Usage:" in result.stderr and result.stdout == ""
+
+
+@pytest.mark.parametrize("command", [[], ["study"], ["gap"], ["walls"]])
+def test_every_command_has_help(command):
+    result = run(*command, "--help")
+    assert result.exit_code == 0 and "Usage:" in result.stdout
+
+
+def test_the_module_runs_as_a_program(tmp_path):
+    command = [sys.executable, "-m", "asperity"]
+    shown = subprocess.run(
+        [*command, "study", "flat", "--bins", "8", "--json"], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert shown.returncode == 0 and shown.stderr == ""
+    assert json.loads(shown.stdout)["wall"]["name"] == "flat"
+    failed = subprocess.run([*command, "study", "nosuch"], capture_output=True, text=True, cwd=tmp_path)
+    assert failed.returncode == 1 and failed.stdout == ""
+    assert failed.stderr.startswith("asperity: 'nosuch' is neither") and failed.stderr.count("\n") == 1
+
+
+def test_a_wall_is_realised_for_a_law_and_written(tmp_path):
+    path = tmp_path / "wall.toml"
+    result = run("realise", "maxwell:0.5", "--moments", "3", "--mass", "1", "--inertia", "0.5", "--out", str(path))
+    assert result.exit_code == 0 and "defect" in result.output and path.exists()
+    assert run("realise", "lambertian", "--out", str(path)).exit_code == 1
+    assert "expected lambertian" in run("realise", "lambert").output
+    assert "a number after" in run("realise", "maxwell:half").output
+    assert run("realise", "lambertian", "--mass", "1").exit_code == 2
+
+
+def test_quiet_prints_nothing_and_writes_the_files(tmp_path):
+    result = run("study", "flat", "--bins", 8, "--quiet", "--out", tmp_path, "--format", "svg")
+    assert (result.exit_code, result.output) == (0, "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        [*(name.replace(".png", ".svg") for name in PICTURES), *DATA]
+    )
+    assert run("study", "flat", "--quiet", "--json").exit_code == 2
+
+
+def test_an_interrupted_study_leaves_no_folder_and_ends_with_130(tmp_path, monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("asperity.study.study_wall", interrupt)
+    result = run("study", "flat", "--out", tmp_path / "deep" / "new")
+    assert result.exit_code == 130 and result.stderr == "asperity: interrupted\n"
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "old").mkdir()
+    run("study", "flat", "--out", tmp_path / "old")
+    assert [path.name for path in tmp_path.iterdir()] == ["old"]
+
+
+def test_a_study_that_is_refused_leaves_no_folder(tmp_path):
+    refused("study", "flat", "--bins", 0, "--out", tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_whose_name_is_no_text_is_studied_and_named(tmp_path):
+    name = os.fsdecode(b"wall-\xff.toml")
+    geo.rectangular_teeth(2.0).save(tmp_path / name)
+    for command in (["study", name, "--bins", "4", "--out", "found"], ["gap", name]):
+        done = subprocess.run(
+            [sys.executable, "-m", "asperity", *command], cwd=tmp_path, capture_output=True, check=False,
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2] / "src")},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "found" / "wall.png").exists()

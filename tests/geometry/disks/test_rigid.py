@@ -1,0 +1,292 @@
+"""The true disk against a wall: first contact, involution, conservation, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from campaigns.judges.plain_collision import collide_plainly
+
+from asperity import geometry as geo
+from asperity.errors import InputError
+from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, Path, Span, flight, next_root
+from asperity.geometry.disk.satellites import Satellites
+
+DISK = geo.Disk(1.0, 0.6)
+WALLS = {
+    "triangular": geo.triangular_teeth(1.2),
+    "rectangular": geo.rectangular_teeth(0.5),
+    "focusing": geo.focusing_arcs(1.2),
+    "dispersing": geo.dispersing_arcs(1.0),
+    "elliptical": geo.elliptical_arcs(1.0, DISK),
+    "koch": geo.koch(2),
+    "open": geo.Wall.from_vertices([(0, -0.1), (0.3, -0.4), (0.6, -0.15), (1, -0.1)]),
+    "islands": geo.Wall([geo.Segment((0, -0.5), (1, -0.5))], islands=[[geo.Arc((0.4, -0.2), 0.1, 0.0, -2 * math.pi)]]),
+}
+SCALES = (1e-1, 1e-2, 1e-4, 1e-6, 1e-8)
+
+
+def states(wall, scale, n, seed=0, disk=DISK, spacing=None):
+    """States of the invariant measure over one cell and one spacing."""
+    rng = np.random.default_rng(seed)
+    ring = Satellites.around(scale, scale * wall.depth, spacing)
+    position = np.stack([rng.random(n) * scale * wall.period, (rng.random(n) - 0.5) * ring.spacing], axis=1)
+    theta = np.arccos(1 - 2 * rng.random(n))
+    # psi with density sin^2 by rejection
+    psi = np.pi * rng.random(4 * n)
+    psi = psi[rng.random(4 * n) < np.sin(psi) ** 2][:n]
+    return position, -disk.from_angles(theta, psi)
+
+
+@pytest.mark.parametrize("name", WALLS)
+@pytest.mark.parametrize("scale", SCALES)
+def test_a_collision_is_an_involution_within_its_conditioning_and_keeps_the_energy(name, scale):
+    wall = WALLS[name]
+    position, velocity = states(wall, scale, 500)
+    out = geo.collide(DISK, wall, scale, position, velocity)
+    assert out.counts()["escaped"] == len(position)
+    assert np.all(out.velocity[:, 1] > 0)
+    np.testing.assert_allclose(DISK.inner(out.velocity, out.velocity), 1.0, rtol=1e-13)
+    back = geo.collide(DISK, wall, scale, out.position, -out.velocity)
+    assert back.escaped.all()
+    # the outgoing state is rounded, which the way back magnifies as it magnifies a rounding of that size put in
+    eps = np.finfo(float).eps
+    rng = np.random.default_rng(1)
+    shaken = np.zeros(len(position))
+    for _ in range(3):
+        nudged = out.position + 64 * eps * np.maximum(np.abs(out.position), 1e-3 * scale) * rng.choice(
+            [-1, 1], (500, 2)
+        )
+        turned = -out.velocity * (1 + 64 * eps * rng.choice([-1, 1], (500, 3)))
+        other = geo.collide(DISK, wall, scale, nudged, turned)
+        shaken = np.maximum(shaken, np.abs(other.velocity - back.velocity).max(axis=1))
+    error = np.abs(back.velocity + velocity).max(axis=1)
+    assert np.all(error <= 1e-12 + 8 * shaken)
+    assert np.median(error) < 1e-11
+    assert np.array_equal(back.contacts, out.contacts)
+
+
+@pytest.mark.parametrize(
+    ("name", "scale", "n"),
+    [
+        ("triangular", 1e-1, 2500),
+        ("triangular", 1e-2, 2500),
+        ("rectangular", 1e-1, 750),
+        ("rectangular", 1e-3, 750),
+        ("focusing", 1e-2, 2000),
+        ("dispersing", 1e-1, 1500),
+    ],
+)
+def test_no_contact_is_missed_by_comparison_with_steps_of_the_distance(name, scale, n):
+    wall = WALLS[name]
+    position, velocity = states(wall, scale, n, seed=77)
+    spacing = Satellites.around(scale, scale * wall.depth).spacing
+    out = geo.collide(DISK, wall, scale, position, velocity)
+    place, outgoing, contacts = collide_plainly(DISK, wall, scale, spacing, position, velocity)
+    # the twin gives up where a satellite creeps along a piece, farther from it than its limit, for 20,000 steps
+    done = ~np.isnan(outgoing[:, 0])
+    assert done.mean() > 0.998
+    assert np.array_equal(contacts[done], out.contacts[done])
+    # the twin stops at 1e-11 from the wall, and a few contacts on curved pieces magnify that
+    np.testing.assert_allclose(outgoing[done], out.velocity[done], atol=1e-7)
+    np.testing.assert_allclose(place[done], out.position[done], atol=1e-7)
+    if name == "triangular":
+        assert np.count_nonzero(out.two_satellites) > 100
+
+
+def test_an_overhang_keeps_the_satellites_that_are_below_it():
+    wall = geo.mushrooms(0.3, 0.5)
+    position, velocity = states(wall, 0.1, 100, seed=3)
+    out = geo.collide(DISK, wall, 0.1, position, velocity)
+    spacing = Satellites.around(0.1, 0.1 * wall.depth).spacing
+    _, outgoing, contacts = collide_plainly(DISK, wall, 0.1, spacing, position, velocity)
+    done = ~np.isnan(outgoing[:, 0])
+    assert done.mean() > 0.9 and np.count_nonzero(out.two_satellites) > 10
+    assert np.array_equal(contacts[done], out.contacts[done])
+    np.testing.assert_allclose(outgoing[done], out.velocity[done], atol=1e-5)
+
+
+def test_a_lip_without_thickness_is_met_from_below_by_a_satellite_that_came_in_beside_it():
+    # its height is y = .005 - .096 t + .08 t^2 but for smaller terms: below the tops from x = .38, in the opening
+    # (.35, .65), to x = .89, under the lip; it comes in at the very height of the lip's lower side
+    rng = np.random.default_rng(0)
+    position = np.array([0.06781824, -0.03185973]) + 1e-9 * rng.random((200, 2))
+    out = geo.collide(DISK, geo.mushrooms(0.3), 0.1, position, [[-0.63075937, -0.04428023, 1.00015155]])
+    assert (out.contacts > 1).all() and out.two_satellites.all()
+
+
+def plate_in_a_hollow(thickness, lean):
+    foot, tip = 0.5 - 0.5 * thickness, 0.5 - 0.5 * thickness + lean
+    points = [(foot, -0.9), (tip, -0.2), (tip + thickness, -0.2), (foot + thickness, -0.9)]
+    points = [p for k, p in enumerate(points) if k == 0 or p != points[k - 1]]
+    return geo.Wall.from_vertices([(0, 0), (0, -0.9), *points, (1, -0.9), (1, 0)])
+
+
+ARC = geo.Arc((0.5, -0.6), 0.3, 2.5, 0.6)
+PLATES = {
+    "standing, no thickness": plate_in_a_hollow(0.0, 0.0),
+    "leaning, 3e-16 thick": plate_in_a_hollow(3e-16, 0.04),
+    "floating": geo.Wall(
+        [geo.Segment((0, -0.9), (1, -0.9))],
+        islands=[[geo.Segment((0.2, -0.6), (0.8, -0.4)), geo.Segment((0.8, -0.4), (0.2, -0.6))]],
+    ),
+    "an arc": geo.Wall([geo.Segment((0, -0.9), (1, -0.9))], islands=[[ARC, ARC.reversed()]]),
+}
+
+
+@pytest.mark.parametrize("name", PLATES)
+def test_disks_leave_a_plate_that_is_thinner_than_rounding(name):
+    wall, scale = PLATES[name], 1e-3
+    position, velocity = states(wall, scale, 60, seed=7)
+    spacing = Satellites.around(scale, scale * wall.depth).spacing
+    out = geo.collide(DISK, wall, scale, position, velocity)
+    _, outgoing, contacts = collide_plainly(DISK, wall, scale, spacing, position, velocity)
+    done = ~np.isnan(outgoing[:, 0])
+    assert out.escaped.all() and done.mean() > 0.95
+    assert np.array_equal(contacts[done], out.contacts[done])
+    few = done & (contacts < 8)
+    np.testing.assert_allclose(outgoing[few], out.velocity[few], atol=1e-5)
+
+
+def test_the_two_sides_of_a_sharp_peak_are_told_apart_next_to_its_tip():
+    # a disk that does not turn hits the left side so far below the tip, where the peak is 1e-15 to 1e-12 thick
+    wall = geo.Wall.from_vertices([(0, 0), (0, -0.9), (0.4996, -0.9), (0.5, -0.2), (0.5004, -0.9), (1, -0.9), (1, 0)])
+    below, scale = np.array([1e-9, 1e-10, 1e-11, 3e-12, 1e-12]), 1e-3
+    theta = np.arctan2(0.2 + below, 0.3 - 0.5)
+    velocity = -np.stack([np.cos(theta), np.sin(theta), 0.0 * theta], axis=1)
+    out = geo.collide(DISK, wall, scale, [[0.3 * scale, 0.0]], velocity)
+    assert out.escaped.all() and np.all(out.contacts == out.contacts[0])
+    np.testing.assert_allclose(out.velocity, out.velocity[[0] * len(below)], atol=1e-6)
+
+
+def test_a_root_that_is_too_many_steps_away_is_not_called_none():
+    motion = flight.py_func(0.0, -1.0, 0.0, 0.1)
+    span, path = Span(0.0, 1e9, (0.0, 0.0)), Path(0.0, 0.0, (0.0, 1.0), motion, 1e-15)
+    arguments = (1.0, False, None, (3.0 * ROOT_STEPS, 0.0, 1.0, 0.0, 1.0), None, span, path)
+    near, _, found = next_root(*arguments, 1.0)
+    assert near == ROOT_STEPS and found == geo.Status.BOUNCE_LIMIT
+    at, _, found = next_root(*arguments, 10.0)
+    assert at == pytest.approx(3.0 * ROOT_STEPS) and found == geo.Status.ESCAPED
+
+
+def test_a_disk_that_sinks_far_slower_than_it_turns_does_not_pass_through_the_wall():
+    # its lowest satellite rolls on the spot
+    sinking = np.array([1e-2, 1e-3, 1e-4])
+    velocity = np.stack([np.full(3, -0.5), -sinking, np.full(3, 0.5)], axis=1)
+    wall, scale = geo.focusing_arcs(1.2), 1e-8
+    out = geo.collide(DISK, wall, scale, [[0.4 * scale, 0.0]], velocity)
+    assert out.escaped.all() and np.all(out.contacts > 0)
+    back = geo.collide(DISK, wall, scale, out.position, -out.velocity)
+    assert np.array_equal(back.contacts, out.contacts)
+    np.testing.assert_allclose(back.velocity, -velocity, atol=1e-6)
+
+
+def test_a_flat_wall_reflects_in_closed_form():
+    # the lowest satellite, at the angle a, touches when x2 = cos a - 1; then Proposition 3.2 with k = (0, 1)
+    a, v2, omega = 0.01, -1.0, 1e-9
+    out = geo.collide(DISK, geo.flat(), 1e-3, [[0.0, a]], [[0.3, v2, omega]])
+    sine = math.sin(a)
+    impulse = -2 * (v2 + omega * sine) / (1 / DISK.mass + sine**2 / DISK.inertia)
+    expected = [0.3, v2 + impulse / DISK.mass, omega + impulse * sine / DISK.inertia]
+    np.testing.assert_allclose(out.velocity[0], expected, rtol=1e-9)
+    assert out.contacts.tolist() == [1]
+
+
+def test_the_wall_is_periodic_and_the_ring_of_satellites_too():
+    wall, scale = WALLS["triangular"], 2.0**-7
+    spacing = 2 * math.pi / 16
+    position, velocity = states(wall, scale, 200, spacing=spacing)
+    position = np.round(position, 8)
+    out = geo.collide(DISK, wall, scale, position, velocity, spacing)
+    moved = geo.collide(DISK, wall, scale, position + np.array([3 * scale, 2 * spacing]), velocity, spacing)
+    np.testing.assert_allclose(moved.velocity, out.velocity, atol=1e-9)
+    np.testing.assert_allclose(moved.position - out.position, np.tile([3 * scale, 2 * spacing], (200, 1)), atol=1e-11)
+
+
+def test_the_invariant_measure_is_kept():
+    # K preserves <w, e2> dx1 dalpha dw: the mean of a function over incoming states is that over outgoing ones
+    wall, scale, n = WALLS["focusing"], 0.05, 40_000
+    position, velocity = states(wall, scale, n, seed=5)
+    out = geo.collide(DISK, wall, scale, position, velocity)
+    for function in (lambda t, p: np.cos(t) ** 2, lambda t, p: np.cos(p), lambda t, p: np.cos(t + 2 * p)):
+        before, after = function(*DISK.to_angles(-velocity)), function(*DISK.to_angles(out.velocity))
+        difference = after - before
+        assert abs(difference.mean()) < 4.5 * difference.std() / math.sqrt(n)
+
+
+def test_threads_do_not_change_the_result():
+    wall = WALLS["triangular"]
+    position, velocity = states(wall, 0.01, 20_000)
+    one, two = (geo.collide(DISK, wall, 0.01, position, velocity, threads=k) for k in (1, 2))
+    assert one.velocity.tobytes() == two.velocity.tobytes()
+
+
+def test_contacts_that_double_precision_does_not_settle_are_named():
+    # a satellite that falls straight into the corner of a tooth, and a limit of contacts
+    wall = geo.triangular_teeth(1.2)
+    out = geo.collide(DISK, wall, 0.01, [[0.005, 0.0]], [[0.0, -1.0, 0.0]])
+    assert out.counts()["corner"] == 1
+    position, velocity = states(wall, 0.01, 100)
+    limited = geo.collide(DISK, wall, 0.01, position, velocity, max_contacts=1)
+    assert limited.counts()["bounce_limit"] == np.sum(geo.collide(DISK, wall, 0.01, position, velocity).contacts > 1)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("name", ["triangular", "focusing", "dispersing", "elliptical"])
+def test_two_satellites_at_one_time_are_named_where_the_order_decides(name, scale):
+    # a disk that falls between two satellites straight above a wall's line of symmetry: whichever is reflected first
+    # turns the disk its own way
+    wall = WALLS[name]
+    half = 0.5 * Satellites.around(scale, scale * wall.depth).spacing
+    position = [[0.0, half], [0.0, half * (1 - 1e-6)], [0.0, half * (1 + 1e-6)]]
+    out = geo.collide(DISK, wall, scale, position, [[0.0, -1.0, 0.0]])
+    assert out.status.tolist() == [geo.Status.CORNER, geo.Status.ESCAPED, geo.Status.ESCAPED]
+    assert abs(out.velocity[1, 2] - out.velocity[2, 2]) > 1e-2
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_the_default_spacing_is_the_least_divisor_that_is_allowed(scale):
+    ring = Satellites.around(scale, 1.3 * scale)
+    finer = Satellites.deepest_for(ring.count + 1)
+    assert ring.spacing >= scale**0.4 and ring.depth < 1 - math.cos(ring.spacing)
+    assert 2 * math.pi / (ring.count + 1) < scale**0.4 or ring.depth >= finer
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"spacing": 0.3}, "whole number"),
+        ({"spacing": 2 * math.pi / 500}, "at most two satellites"),
+        ({"scale": 3.0}, "make the scale smaller"),
+        ({"scale": 0.0}, "greater than 0"),
+        ({"velocity": [[0.0, 1.0, 0.0]]}, "v2 < 0"),
+        ({"velocity": [[0.0, -1.0]]}, r"shape \(n, 3\)"),
+        ({"position": [0.0, 0.0]}, r"shape \(n, 2\)"),
+        ({"position": np.zeros((3, 2)), "velocity": [[0, -1, 0]] * 2}, "equally many rows"),
+        ({"wall": "teeth"}, "expected a Wall"),
+        ({"disk": 1.0}, "expected a Disk"),
+    ],
+)
+def test_bad_input_is_refused_with_what_to_do(change, words):
+    arguments = {
+        "disk": DISK, "wall": WALLS["triangular"], "scale": 0.01, "position": [[0.0, 0.0]],
+        "velocity": [[0.0, -1.0, 0.0]],
+    }  # fmt: skip
+    with pytest.raises(InputError, match=words):
+        geo.collide(**(arguments | change))
+
+
+def test_a_disk_without_mass_is_refused():
+    with pytest.raises(InputError, match="mass"):
+        geo.Disk(mass=0.0)
+
+
+def test_a_disk_that_hardly_rises_still_meets_the_teeth_that_its_satellites_pass():
+    """After two contacts it rises at 2e-8 of its speed, for two million times its own flight; beside it 1e-5 away."""
+    x1, alpha = float.fromhex("0x1.57db386cde54dp-8"), float.fromhex("0x1.1faa321480667p+2")
+    velocity = [float.fromhex(v) for v in ("0x1.7110241ce5b49p-2", "-0x1.d98e328f28dcep-2", "-0x1.254823bc9dd96p+0")]
+    states = [[x1 + shift, alpha] for shift in (0.0, 1e-9, -1e-9, 1e-6, 1e-5, -1e-5)]
+    hit = geo.collide(geo.Disk(), geo.triangular_teeth(0.7), 0.1, states, [velocity] * len(states))
+    assert hit.contacts.tolist() == [3] * len(states) and hit.escaped.all()
+    assert np.abs(hit.velocity - hit.velocity[0]).max() < 1e-4

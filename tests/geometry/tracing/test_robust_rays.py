@@ -1,0 +1,79 @@
+"""Rays aimed at corners and tangencies: none lost, none wrong but for conditioning."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+from campaigns.judges.precise_tracer import trace_precisely
+from campaigns.robustness import WALLS, aimed_rays, grazing_rays, judge
+
+from asperity import geometry as geo
+from asperity.geometry.tracing.compiled.rays import SLOTS, trace_rays
+from asperity.geometry.tracing.compiled.records import NO_DETAILS, results_for
+from asperity.geometry.tracing.refinement import refined_trace
+from asperity.geometry.tracing.threads import new_flag
+
+RAYS = 3_000
+PRECISE_RAYS = 4
+
+
+@pytest.mark.parametrize("make", [aimed_rays, grazing_rays])
+@pytest.mark.parametrize("name", WALLS)
+def test_no_ray_is_lost_and_none_is_wrong_but_for_conditioning(name, make):
+    verdict = judge(WALLS[name], *make(WALLS[name], RAYS, np.random.default_rng(5)))
+    assert verdict.rays == RAYS and verdict.lost == 0 and verdict.wrong == 0
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_the_double_double_twin_agrees_with_fifty_digits(name):
+    scene = WALLS[name].scene
+    rng = np.random.default_rng(6)
+    x, theta = rng.random(PRECISE_RAYS), np.arccos(1.0 - 2.0 * rng.random(PRECISE_RAYS))
+    twin = refined_trace(scene, x, theta)
+    for i in range(PRECISE_RAYS):
+        ray = trace_precisely(scene, x[i], theta[i])
+        assert twin.status[i] == geo.Status.ESCAPED and ray.bounces == twin.collisions[i]
+        assert abs(ray.theta - mp.mpf(twin.theta[i, 0]) - mp.mpf(twin.theta[i, 1])) <= twin.rounding[i]
+
+
+def test_rays_over_many_bezier_pieces_hit_what_the_double_double_twin_hits():
+    # the twin tests every piece, the loop those whose circles the ray meets; a ray without hit would be traced again
+    wall = geo.random_wall(geo.HeightCorrelation(0.1), 32, rms_slope=1.0, smooth=True, rng=3)
+    rng = np.random.default_rng(12)
+    x, theta = rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
+    found = results_for(RAYS)
+    arrays = found.x, found.theta, found.collisions, found.status
+    trace_rays(x, theta, wall.scene.tables.address, 1000, new_flag(), arrays, NO_DETAILS.address, SLOTS.address)
+    twin = refined_trace(wall.scene, x, theta)
+    assert (found.status == geo.Status.ESCAPED).all() and found.collisions.max() > 3
+    assert np.array_equal(found.collisions, twin.collisions)
+    assert np.abs(found.theta - twin.theta[:, 0]).max() < 1e-11
+
+
+@pytest.mark.parametrize(
+    ("name", "x", "theta"),
+    [
+        ("cubic bumps", 0.8301588680018963, 1.2919607451958173),
+        ("four arcs", 0.15442430372297744, 1.4884981590669946),
+    ],
+)
+def test_double_doubles_settle_a_ray_that_sensitive_and_insensitive_bounces_take_in_turn(name, x, theta):
+    # beside a corner, and inside for 200 bounces more: the product of two norms bounds the rounding by 1e-15, not 1e-20
+    twin = refined_trace(WALLS[name].scene, np.array([x]), np.array([theta]), 200)
+    assert twin.status[0] == geo.Status.BOUNCE_LIMIT and twin.collisions[0] == 200 and twin.rounding[0] < 1e-19
+    assert geo.trace(WALLS[name], x, theta, max_collisions=200).status == geo.Status.BOUNCE_LIMIT
+
+
+@pytest.mark.parametrize(
+    ("x", "theta"), [(0.5, 0.5 * math.pi), (0.0, 0.5 * math.pi), (0.25, 0.75 * math.pi), (0.75, 0.25 * math.pi)]
+)
+def test_a_corner_hit_exactly_is_reported_and_one_two_ulps_away_is_not(x, theta):
+    # aimed straight down, and at 45 degrees, at the corner (1/2, -1/4) of a notch
+    notch = geo.Wall.from_vertices([(0.0, 0.0), (0.5, -0.25), (1.0, 0.0)])
+    assert geo.trace(notch, x, theta).status == geo.Status.CORNER
+    if x > 0.0:
+        beside = geo.trace(notch, x, theta + np.spacing(theta) * np.array([-2.0, 2.0]))
+        assert beside.escaped.all()

@@ -1,0 +1,329 @@
+"""Runs of hits computed in one step, and lines found through boxes: to be the same as hit by hit, line by line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import mpmath as mp
+import numpy as np
+import pytest
+from campaigns.judges.precise_tracer import trace_precisely
+from campaigns.judges.precise_wedge import unfold
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.geometry.scene.columns import PARTNER, RUN_SINE, TREE_LEVELS
+from asperity.geometry.scene.scene import NO_TABLES
+from asperity.geometry.tracing.compiled.lines import is_ahead
+from asperity.geometry.tracing.refinement import REFINED_SEGMENTS, refined_trace
+
+EPS = np.finfo(float).eps
+# Counts fit into int64 up to here.
+NO_LIMIT = 2**62
+
+
+def rays(seed, n):
+    rng = np.random.default_rng(seed)
+    return rng.random(n), np.arccos(1.0 - 2.0 * rng.random(n))
+
+
+def step_by_step(wall):
+    """The same wall, with the marks that allow runs taken off its tables."""
+    plain = geo.Wall(wall.pieces, wall.period, wall.islands)
+    circles = plain.scene.circles
+    if circles is not None:
+        circles = circles.copy()
+        circles[:, RUN_SINE] = 0.0
+    plain.__dict__["scene"] = replace(plain.scene, pairs=None, circles=circles, closed=None)
+    return plain
+
+
+def turned(points, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(points) @ np.array([[c, s], [-s, c]])
+
+
+def tilted_channel(width, length, angle):
+    """A channel with a flat end, tilted about its upper left joint, below an opening as wide as its mouth."""
+    inner = turned([(0, 0), (0, -length), (width, -length), (width, 0)], angle) + np.array([0.4, -0.1])
+    right = inner[3, 0]
+    return geo.Wall.from_vertices([(0, 0), (0.35, 0), *inner.tolist(), (max(right, 0.4) + 0.05, 0.0), (1, 0)])
+
+
+def funnel(top, bottom, depth):
+    """An isosceles trapezoid that narrows downwards, or upwards where bottom > top."""
+    m = 0.5
+    return geo.Wall.from_vertices(
+        [(0, 0), (m - top / 2, 0), (m - bottom / 2, -depth), (m + bottom / 2, -depth), (m + top / 2, 0), (1, 0)]
+    )
+
+
+def bent_channel():
+    """A mushroom's stem with a curved bottom that bulges into it, and a long tail beside it."""
+    return geo.Wall(
+        [
+            geo.Segment((0, 0), (0.45, 0)),
+            geo.Segment((0.45, 0), (0.45, -3)),
+            geo.Bezier([(0.45, -3), (0.5, -2.6), (0.55, -3)]),
+            geo.Segment((0.55, -3), (0.55, 0)),
+            geo.Segment((0.55, 0), (1, 0)),
+        ]
+    )
+
+
+WALLS = {
+    "tilted channel": tilted_channel(0.05, 2.0, 0.3),
+    "channel tilted the other way": tilted_channel(0.05, 2.0, -0.2),
+    "narrowing funnel": funnel(0.2, 0.05, 2.0),
+    "widening funnel": funnel(0.05, 0.2, 2.0),
+    "nearly a channel": funnel(0.1, 0.1 - 1e-9, 3.0),
+    "sharp tooth": geo.triangular_teeth(0.02),
+    "curved bottom": bent_channel(),
+    "stem of a mushroom": geo.mushrooms(0.1, 4.0),
+    "two generations": geo.mushrooms(0.3, 0.5, 2),
+    "semicircle": geo.focusing_arcs(np.pi / 2),
+}
+
+
+@pytest.mark.parametrize(
+    ("ratio", "theta"), [(1.0, 1e-12), (1e8, 1.0), (1e8, 1e-3), (7.3, 0.01), (1e6, 1e-6), (1e-6, 1e-12), (1e8, 2.9)]
+)
+def test_channels_of_rectangular_teeth_count_every_hit(ratio, theta):
+    x, _ = rays(1, 20_000)
+    law = ker.RectangularTeethLaw(ratio)
+    traced = geo.trace(geo.rectangular_teeth(ratio), x, theta, max_collisions=NO_LIMIT)
+    # A hit within 16 ulp of the depth of a joint is a corner, at the bottom after half of the d crossings or at the top
+    # after all; one crossing sinks by the depth over d/2.
+    d = law.crossings(theta)
+    ahead = 2 * x - 1 if theta < np.pi / 2 else 2 - 2 * x
+    slack = 64 * EPS * d * (1 + 1 / ratio)
+    miss = [np.abs(place - np.round(place)) for place in (d - ahead, d / 2 - ahead)]
+    clear = (x < 0.5) | (np.minimum(*miss) > slack)
+    assert clear.mean() > 0.85
+    assert traced.escaped[clear].all()
+    assert np.array_equal(traced.collisions[clear], law.hits(x, theta)[clear])
+    assert np.max(np.abs(traced.theta - law.reflect(x, theta))[clear]) <= 8 * EPS
+
+
+@pytest.mark.parametrize("angle", [1e-8, 1e-6, 1e-4, 1e-2, 0.25])
+def test_wedges_of_triangular_teeth_count_every_hit(angle):
+    x, theta = rays(2, 100_000)
+    law = ker.TriangularTeethLaw(angle)
+    traced = geo.trace(geo.triangular_teeth(angle), x, theta, max_collisions=NO_LIMIT)
+    hits, outgoing = law.hits(x, theta), law.reflect(x, theta)
+    # the number of hits changes where the angle at the last hit is 0, the outgoing angle is near 0 or pi there
+    clear = np.minimum(outgoing, np.pi - outgoing) > 1e-12
+    assert clear.mean() > 0.999
+    same = traced.collisions == hits
+    # rays within rounding of one hit more or less: the fraction of starts that lie within 64 ulp of such a position
+    assert np.mean(~same) <= 1e-4
+    assert traced.counts()["escaped"] >= len(x) - np.sum(~clear)
+    assert np.max(np.abs(traced.theta - outgoing)[same & traced.escaped]) <= 64 * EPS
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_runs_change_nothing_but_the_time(name):
+    wall = WALLS[name]
+    x, theta = rays(3, 20_000)
+    fast, slow = geo.trace(wall, x, theta), geo.trace(step_by_step(wall), x, theta)
+    # conditioning by a finite difference: rays that another start nearby sends elsewhere are left out
+    h = 1e-9
+    near = [geo.trace(wall, x + h, theta), geo.trace(wall, x, theta + h * np.sign(np.pi / 2 - theta))]
+    stable = np.all([n.collisions == fast.collisions for n in near], axis=0) & fast.escaped
+    assert stable.mean() > 0.95
+    stretch = sum(np.abs(n.theta - fast.theta) + np.abs(n.x - fast.x) for n in near) / h
+    # hit by hit each hit adds a rounding error; a channel multiplies it by the hits to come
+    allowed = 64 * EPS * (1 + slow.collisions) * (1 + stretch)
+    assert np.array_equal(fast.collisions[stable], slow.collisions[stable])
+    assert np.array_equal(fast.status[stable], slow.status[stable])
+    miss = np.abs(fast.theta - slow.theta) + np.abs(fast.x - slow.x)
+    assert np.all(miss[stable] <= allowed[stable])
+
+
+@pytest.mark.parametrize("angle", [3e-9, 1e-7, 1e-5, 1e-3, 0.02, 0.29])
+@pytest.mark.parametrize("middle", [0.5, 0.83])
+def test_rays_that_pass_an_apex_at_any_distance_are_those_of_the_unfolded_wedge(angle, middle):
+    rng = np.random.default_rng(9)
+    depth = float(0.5 / np.tan(angle / 2))
+    vertices = [(0.0, 0.0), (middle, -depth), (1.0, 0.0)]
+    wall = geo.Wall.from_vertices(vertices)
+    slack = 16 * EPS * depth
+    # lines at 4 slacks to 1e-3 of the depth from the apex, on either side, and rays near the axis
+    x, far = rng.random(120), 10 ** rng.uniform(np.log10(4 * slack), np.log10(max(1e-3, 16 * slack)), 120)
+    theta = np.arctan2(depth, x - middle) + rng.choice([-1, 1], 120) * far / np.hypot(depth, x - middle)
+    theta[80:] = np.pi / 2 + rng.choice([-1, 1], 40) * 10 ** rng.uniform(-14, -1, 40)
+    traced = geo.trace(wall, x, theta, max_collisions=NO_LIMIT)
+    exact = [unfold(vertices, *ray) for ray in zip(x.tolist(), theta.tolist(), strict=True)]
+    # nearer to a joint, at the apex or at an end of the opening, a ray is a corner hit within rounding
+    clear = np.array([ray.from_joint for ray in exact]) > 8 * slack
+    assert clear.mean() > 0.7 and traced.escaped[clear].all()
+    for i in np.flatnonzero(clear):
+        assert traced.collisions[i] == exact[i].hits
+        assert abs(traced.theta[i] - exact[i].theta) <= 8 * EPS
+        # the line is moved by some rounding errors of the depth
+        assert abs(traced.x[i] - exact[i].x) * np.sin(traced.theta[i]) <= 16 * EPS * max(1.0, depth)
+
+
+def test_flagged_rays_with_long_runs_along_an_arc_are_traced_in_one_step_too():
+    rng = np.random.default_rng(10)
+    scene = geo.focusing_arcs(np.pi / 2).scene
+    x, theta = rng.uniform(1e-12, 2e-12, 40), np.pi / 2 - rng.uniform(0.5e-6, 1e-6, 40)
+    refined = refined_trace(scene, x, theta)
+    assert np.count_nonzero(refined.status == 0) >= 38 and refined.collisions.min() > 10 * REFINED_SEGMENTS
+    for i in np.flatnonzero(refined.status == 0):
+        ray = trace_precisely(scene, x[i], theta[i], 10**9)
+        assert ray.bounces == refined.collisions[i]
+        with mp.workdps(50):
+            miss = [abs(mp.fsum(found[i]) - true) for found, true in ((refined.x, ray.x), (refined.theta, ray.theta))]
+        assert max(miss) <= 2 * refined.rounding[i] < 1e-14
+
+
+def test_a_line_a_slack_away_is_met_without_a_second_test():
+    tables = NO_TABLES._replace(joints=np.zeros((2, 4)), lines=np.array([[1.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0]]))
+
+    def ahead(t):
+        # the height t (c_before - c_after) / length, with close = 1 and slack = 1e-3
+        return is_ahead.py_func(tables, 0, (0.5, -0.5), t, 1.0, 1e-3)
+
+    assert [ahead(t) for t in (1.5, 0.5, 2.1e-3, 1.9e-3, -0.5)] == [True, True, True, False, False]
+
+
+def test_only_lines_that_face_each_other_freely_make_runs():
+    assert geo.triangular_teeth(0.7).scene.pairs is None
+    assert len(geo.rectangular_teeth(1.0).scene.pairs) == 2
+    # a tooth stands between the outer sides of this hollow: only the channels on either side of it make runs
+    comb = [(0, 0), (0.1, 0), (0.1, -1), (0.2, -1), (0.2, -0.2), (0.25, -0.2), (0.25, -1), (0.4, -1), (0.4, 0), (1, 0)]
+    pairs = geo.Wall.from_vertices(comb).scene.pairs
+    assert sorted(pairs[:, PARTNER].tolist()) == [0.0, 2.0, 4.0, 6.0]
+
+
+def test_a_run_stops_at_the_largest_number_of_collisions():
+    wall = geo.rectangular_teeth(1e8)
+    traced = geo.trace(wall, [0.7, 0.71], 0.3, max_collisions=100_001)
+    assert traced.collisions.tolist() == [100_001] * 2
+    assert traced.counts()["bounce_limit"] == 2
+    arc = geo.trace(geo.focusing_arcs(np.pi / 2), 1e-11, np.pi / 2 + 1e-5, max_collisions=5_000)
+    assert int(arc.collisions) == 5_000 and arc.counts()["bounce_limit"] == 1
+
+
+def test_the_cost_of_a_run_does_not_grow_with_its_hits():
+    """The wedge turns a ray pi/psi times, the channel a ray 2 r cot(theta) times: all of it within the bounce loop."""
+    import time
+
+    x, _ = rays(4, 100_000)
+    walls = {depth: geo.rectangular_teeth(depth) for depth in (1e4, 1e8, 1e9)}
+    least = dict.fromkeys(walls, np.inf)
+    for _ in range(3):
+        for depth, wall in walls.items():
+            start = time.process_time()
+            traced = geo.trace(wall, x, 1.0, max_collisions=NO_LIMIT, threads=1)
+            least[depth] = min(least[depth], time.process_time() - start)
+            assert traced.escaped.mean() > 0.9999
+    # 1e5 times and 10 times the hits
+    assert least[1e9] < 20 * least[1e4]
+    assert least[1e9] < 1.5 * least[1e8]
+
+
+def random_teeth(count, seed):
+    """One hollow with a ragged floor of many long and short lines, overhanging in places."""
+    rng = np.random.default_rng(seed)
+    x = np.linspace(0.0, 1.0, count + 1)[1:-1] + 0.3 / count * (rng.random(count - 1) - 0.5)
+    y = -0.2 - 0.6 * rng.random(count - 1) ** 3
+    return geo.Wall.from_vertices([(0, 0), *zip(x, y, strict=True), (1, 0)])
+
+
+def comb(count):
+    """Parallel slots below a common opening: every line is long and runs through many cells."""
+    points = [(0.0, 0.0), (0.0, -1.0)]
+    for k in range(count):
+        left, right = (k + 0.4) / count, (k + 0.6) / count
+        points += [(left, -1.0), (left, -0.1), (right, -0.1), (right, -1.0)]
+    return geo.Wall.from_vertices([*points, (1.0, -1.0), (1.0, 0.0)])
+
+
+def curved_floor(count):
+    """Many lines and a few Bezier pieces and arcs in one hollow."""
+    flanks = [(0.3 * k / count, -0.5 * k / count - 0.01 * (k % 2)) for k in range(count)]
+    left = [geo.Segment(p, q) for p, q in pairwise(flanks)]
+    x, y = flanks[-1]
+    middle = [
+        geo.Bezier([(x, y), (0.4, -0.9), (0.5, -0.4)]),
+        geo.Bezier([(0.5, -0.4), (0.6, -0.9), (1 - x, y)]),
+    ]
+    mirrored = [(1 - px, py) for px, py in reversed(flanks)]
+    right = [geo.Segment(p, q) for p, q in pairwise(mirrored)]
+    return geo.Wall([*left, *middle, *right])
+
+
+MANY = {
+    "koch 4": geo.koch(4),
+    "koch 6": geo.koch(6),
+    "random teeth": random_teeth(400, 5),
+    "comb": comb(60),
+    "lines and curves": curved_floor(80),
+}
+
+
+def without_boxes(wall):
+    plain = geo.Wall(wall.pieces, wall.period, wall.islands)
+    hollows = plain.scene.hollows.copy()
+    hollows[:, TREE_LEVELS] = 0.0
+    plain.__dict__["scene"] = replace(plain.scene, hollows=hollows, boxes=None)
+    return plain
+
+
+@pytest.mark.parametrize("name", MANY)
+def test_a_tree_of_boxes_changes_no_bit(name):
+    wall = MANY[name]
+    assert wall.plan().hollows_with_grid >= 1
+    count = 3_000 if len(wall.pieces) < 1_000 else 500  # without boxes a ray asks every piece
+    x, theta = rays(6, count)
+    # and rays along the axes, and aimed at joints: they pass along edges and through corners of boxes
+    below = wall.vertices[wall.vertices[:, 1] < -1e-3]
+    targets = below[np.random.default_rng(7).integers(0, len(below), count)]
+    aimed = np.mod(np.arctan2(targets[:, 1], targets[:, 0] - x), np.pi)
+    x = np.concatenate([x, x, targets[:, 0] % 1.0, wall.vertices[::7, 0] % 1.0])
+    theta = np.concatenate([theta, aimed, np.full(count, np.pi / 2), np.full(len(wall.vertices[::7]), np.pi / 4)])
+    found, plain = geo.trace(wall, x, theta), geo.trace(without_boxes(wall), x, theta)
+    for field in ("x", "theta", "collisions", "status"):
+        assert np.array_equal(getattr(found, field), getattr(plain, field))
+
+
+def test_a_wall_of_sixty_thousand_lines_is_traced_in_microseconds_a_bounce():
+    import time
+
+    wall = geo.koch(8)
+    x, theta = rays(8, 2_000)
+    geo.trace(wall, x[:1], theta[:1])
+    start = time.process_time()
+    traced = geo.trace(wall, x, theta, threads=1)
+    spent = time.process_time() - start
+    assert sum(traced.counts().values()) == len(x)
+    # brute force takes 50 us a bounce
+    assert spent / traced.collisions.sum() < 10e-6
+
+
+def test_the_plan_tells_channels_wedges_and_trees():
+    assert geo.rectangular_teeth(2.0).plan().channels == 1
+    assert geo.triangular_teeth(0.1).plan().wedges == 1
+    assert geo.triangular_teeth(0.7).plan().wedges == 0
+    assert geo.koch(3).plan().hollows_with_grid == 0 and geo.koch(4).plan().hollows_with_grid == 1
+    tilted = tilted_channel(0.05, 2.0, 0.3).plan()
+    assert tilted.channels + tilted.wedges == 1 and not tilted.mirror_symmetric
+    two = geo.Wall.from_vertices([(0, 0), (0.25, -0.5), (0.5, 0), (0.75, -0.5), (1, 0)]).plan()
+    assert two.hollows == 2 and two.distinct_hollows == 1
+
+
+def test_of_two_lines_at_a_joint_a_tree_of_boxes_finds_the_same_as_the_plain_list():
+    along = np.arange(1, 100) / 100
+    left = np.column_stack([0.5 * along, -0.37 * along])
+    right = np.column_stack([1.0 - 0.5 * along, -0.37 * along])[::-1]
+    wall = geo.Wall.from_vertices([(0, 0), *left.tolist(), (0.5, -0.37), *right.tolist(), (1, 0)])
+    assert wall.plan().hollows_with_grid == 1
+    rng = np.random.default_rng(1)
+    joint, x = wall.vertices[1:-1][rng.integers(199, size=3_000)], rng.random(3_000)
+    theta = np.arctan2(-joint[:, 1], x - joint[:, 0])
+    found, plain = geo.trace(wall, x, theta), geo.trace(without_boxes(wall), x, theta)
+    for field in ("x", "theta", "collisions", "status"):
+        assert np.array_equal(getattr(found, field), getattr(plain, field))

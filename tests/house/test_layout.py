@@ -1,0 +1,160 @@
+"""The layout: folders lie on floors, imports go down and never round, and a listing tells where things are."""
+
+import ast
+import re
+from collections.abc import Iterator
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+import asperity
+from asperity import geometry, kernels, spectral
+
+ROOT = Path(asperity.__file__).parent
+TREE = Path(__file__).parents[2]
+CONTRIBUTING = (TREE / "CONTRIBUTING.md").read_text(encoding="utf-8")
+ROOMS = ("geometry", "kernels", "spectral")
+MOST_MODULES = 14
+# Every folder once, from the ground up; a room's own names come after its folders.
+FLOORS = [
+    *("core", "verification"),
+    *("geometry.curves", "geometry.disk", "geometry.tables", "geometry.cells", "geometry.scene"),
+    *("geometry.scene.compiled", "geometry.walls"),
+    *("geometry.tracing.double_double", "geometry.tracing.compiled", "geometry.tracing"),
+    *("geometry.polygons.compiled", "geometry.polygons", "geometry.itineraries.compiled", "geometry.itineraries"),
+    *("geometry.collisions.compiled", "geometry.collisions", "geometry.plotting", "geometry"),
+    *(
+        "kernels.bases",
+        "kernels.matrices",
+        "kernels.expectations",
+        "kernels.laws",
+        "kernels.walls",
+        "kernels.channels",
+        "kernels.sampling",
+    ),
+    *("kernels.discretisation", "kernels.distances", "kernels.positions", "kernels.thermal", "kernels.collisions"),
+    *("kernels.billiards", "kernels.inverse", "kernels.aerodynamics", "kernels"),
+    *("spectral.eigenvalues", "spectral.essential", "spectral.bounds", "spectral.gap", "spectral.consequences"),
+    *("spectral.sweeps", "spectral.work_diagrams", "spectral"),
+    # the ledger's index finds the files of its folders without naming them
+    *("ledger", "ledger.plane", "ledger.disk", "ledger.proof"),
+    *("study", "bench.running", "bench.quantities", "bench.extremes", "bench", "explore"),
+]
+# Pictures are drawn by the classes that they show, and asperity itself holds its front door.
+DRAWN_ANYWHERE = "spectral.plotting"
+COMPILED = ("compiled", "double_double")
+
+
+def modules() -> dict[str, Path]:
+    """Every module by its dotted name below asperity; a package by its own."""
+    found = {}
+    for top, prefix in [(ROOT, ()), *((ROOT / room, (room,)) for room in ROOMS)]:
+        for path in top.rglob("*.py"):
+            parts = (*prefix, *path.relative_to(top).with_suffix("").parts)
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+MODULES = modules()
+
+
+def is_package(name: str) -> bool:
+    return MODULES[name].name == "__init__.py"
+
+
+def folder_of(name: str) -> str:
+    return name if is_package(name) else name.rpartition(".")[0]
+
+
+def imports(name: str) -> Iterator[str]:
+    """The modules of asperity that a module imports, also inside functions and for types alone."""
+    package = folder_of(name).split(".") if folder_of(name) else []
+    for node in ast.walk(ast.parse(MODULES[name].read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        start = package[: len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
+        for alias in node.names:
+            full = ".".join([*start, alias.name])
+            yield full if full in MODULES else ".".join(start)
+
+
+IMPORTS = {name: set(imports(name)) for name in MODULES}
+
+
+def test_no_file_imports_itself_by_way_of_others():
+    # raises a CycleError that names the files
+    list(TopologicalSorter({name: found - {name, ""} for name, found in IMPORTS.items()}).static_order())
+
+
+@pytest.mark.parametrize("name", sorted(name for name in MODULES if name and name.split(".")[0] not in ("__main__",)))
+def test_imports_go_down(name):
+    if folder_of(name) == "":
+        return
+    own = folder_of(name)
+    for target in IMPORTS[name]:
+        if target not in MODULES or "" in (target, folder_of(target)) or DRAWN_ANYWHERE in (name, target):
+            continue
+        assert FLOORS.index(folder_of(target)) <= FLOORS.index(own), f"{name} imports {target}, which lies above it"
+
+
+def test_every_folder_has_a_floor_and_at_most_fourteen_modules():
+    folders = {folder_of(name) for name in MODULES} - {""}
+    assert folders == set(FLOORS)
+    for folder in folders:
+        inside = [name for name in MODULES if folder_of(name) == folder and not is_package(name)]
+        assert len(inside) <= MOST_MODULES, folder
+
+
+def test_no_file_has_the_name_of_a_function_or_class_in_it():
+    # a name imported from the file would take the file's place in its package
+    for name, path in MODULES.items():
+        defined = (ast.FunctionDef, ast.ClassDef)
+        own = {node.name for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, defined)}
+        assert name.rpartition(".")[2] not in own, name
+
+
+def test_inner_folders_begin_with_their_docstring_and_nothing_else():
+    for name, path in MODULES.items():
+        if is_package(name) and name.count("."):
+            (docstring,) = ast.parse(path.read_text(encoding="utf-8")).body
+            assert isinstance(docstring, ast.Expr), name
+
+
+def test_numba_stands_in_the_compiled_folders_only():
+    for name, path in MODULES.items():
+        at_top = [node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.ImportFrom)]
+        if any(node.module == "numba" for node in at_top):
+            assert set(name.split(".")) & set(COMPILED) or name == "core.compilation", name
+
+
+def test_contributing_lists_the_folders_from_the_ground_up():
+    block = re.search(r"^## Where things are$.*?^```text$(.*?)^```$", CONTRIBUTING, re.DOTALL | re.MULTILINE)
+    assert block is not None
+    listed: list[str] = []
+    prefix = ""
+    for line in block[1].strip().splitlines():
+        names = line.split()
+        if not line.startswith(" "):
+            # a long list goes on below
+            prefix = names.pop(0).removeprefix("src/asperity")
+        listed += [f"{prefix}.{name}".removeprefix(".") for name in names]
+    of_a_room = [name for name in FLOORS if name.split(".")[0] in ROOMS and name.count(".") == 1]
+    of_the_house = [name for name in FLOORS if name not in ROOMS and "." not in name]
+    assert listed == [f for f in FLOORS if f in (*of_a_room, *of_the_house)]
+
+
+def test_every_file_that_contributing_names_exists():
+    named = re.findall(r"`((?:src|tests|docs|campaigns|constraints|geometry|kernels|spectral)/[\w./]*)`", CONTRIBUTING)
+    assert [name for name in named if not (TREE / name).exists()] == []
+
+
+@pytest.mark.parametrize("room", [geometry, kernels, spectral], ids=ROOMS)
+def test_no_folder_hides_a_public_name(room):
+    folders = {path.stem for path in (ROOT / room.__name__.rpartition(".")[2]).iterdir()}
+    assert folders & set(room.__all__) == set()
+
+
+@pytest.mark.parametrize("room", [geometry, kernels, spectral], ids=ROOMS)
+def test_a_room_lists_its_public_names_and_no_others(room):
+    assert set(dir(room)) == set(room.__all__)

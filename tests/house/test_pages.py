@@ -1,0 +1,171 @@
+"""The gallery's short examples are right, and the reference lists all public names."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import re
+import runpy
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import asperity
+from asperity import kernels as ker
+
+DOCS = Path(__file__).parents[2] / "docs"
+HOW_TO = sorted(path.stem for path in (DOCS / "how-to").glob("*.py"))
+
+
+@pytest.fixture
+def run(monkeypatch):
+    """Runs a short example as a script, in which no window opens, and returns its names."""
+    from matplotlib import pyplot
+
+    monkeypatch.setattr(pyplot, "show", lambda: None)
+    yield lambda name: runpy.run_path(str(DOCS / "how-to" / f"{name}.py"))
+    pyplot.close("all")
+
+
+@pytest.fixture(scope="module")
+def reference():
+    spec = importlib.util.spec_from_file_location("docs_reference", DOCS / "reference.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_wall_and_its_law(run):
+    P = run("a_wall_and_its_law")["P"]
+    assert np.allclose(P.array, P.array.T, atol=1e-9) and np.allclose(P.array.sum(axis=1), 1.0)
+
+
+def test_the_published_gap(run):
+    names = run("a_gap_with_its_error")
+    assert abs(float(names["gap"]) - 0.0373) < 5e-5 + names["gap"].error
+    assert names["found"].high < 1 - float(names["gap"])
+
+
+def test_the_profile_keeps_its_units(run):
+    names = run("a_measured_profile")
+    heights = names["height"] / 1000.0
+    assert names["profile"].unit == "um"
+    assert names["wall"].depth == pytest.approx(float(np.ptp(heights)), abs=1e-5)
+    assert float(names["found"].tangential) == pytest.approx(1 + entry(names["law"], np.cos), abs=0.02)
+
+
+def entry(law, function):
+    """3 <cos, P cos>, by sampling."""
+    theta = ker.SINE.sample(200_000, np.random.default_rng(3))
+    return 3 * float(np.mean(function(theta) * function(law.sample(theta, np.random.default_rng(4)))))
+
+
+def test_the_disk_conserves_energy_and_rolling_momentum(run):
+    names = run("a_disk")
+    disk, after, before = names["disk"], names["after"], names["before"]
+    assert np.allclose(disk.inner(after, after), disk.inner(before, before), rtol=1e-12)
+    assert np.allclose(disk.rolling_momentum(after), disk.rolling_momentum(before), atol=1e-12)
+
+
+def test_no_slip_plates_confine_and_rough_plates_do_not(run):
+    ratio = run("no_slip_billiards")["ratio"]
+    assert ratio["no-slip plates"].max() <= 1 + 1e-12 and np.median(ratio["rough plates"]) > 1
+
+
+def test_least_resistance_is_below_the_smooth_body_and_the_best_triangle_below_retroreflection(run):
+    names = run("the_least_resistance")
+    assert names["least"].lower < 0.987823750 < names["least"].upper + 1e-9
+    assert math.sqrt(2) < float(names["best"].resistance) < names["most"].upper == 1.5
+
+
+def test_the_wall_has_the_wanted_moments(run):
+    names = run("a_wall_for_a_law")
+    assert abs(names["difference"]).max() < 1e-10
+
+
+def test_sobol_sequences_beat_independent_rays(run):
+    report = run("error_against_time")["report"]
+    error = {row.method: row.errors["absolute"] for row in report.rows}  # of the largest budget
+    assert error["Sobol sequence"] < error["independent rays"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["knudsen_diffusion", "two_laws_compared", "a_sweep"])
+def test_the_slower_examples_agree_with_what_is_known(run, name):
+    names = run(name)
+    if name == "knudsen_diffusion":
+        eta = [found.eta for found in names["found"].values()]
+        zeta = -math.log(9) / 8
+        assert eta == pytest.approx([1, 1, 1, (1 + zeta) / (1 - zeta), 3], abs=1e-6)
+    elif name == "two_laws_compared":
+        distances = [float(found) for found in names["distances"]]
+        # the distance is convex in the fraction
+        slopes = np.diff(distances) / np.diff(names["fractions"])
+        assert np.all(np.diff(slopes) > -2e-2) and min(distances) < distances[0]
+    else:
+        assert names["table"].rows[-1].verdict == "essential edge"
+        assert names["table"].rows[-1].value == pytest.approx(1 - 3 / 8 * math.log(9), abs=1e-6)
+
+
+def test_no_line_of_a_page_is_lost_as_a_comment():
+    """A line that begins with a percent sign is a comment in Markdown of MyST: "95 %" may not be broken before it."""
+    pages = [page for page in DOCS.rglob("*.md") if not {"_build", "generated"} & set(page.parts)]
+    lines = [(page.name, line) for page in pages for line in page.read_text(encoding="utf-8").splitlines()]
+    assert len(pages) > 40
+    assert not [(name, line) for name, line in lines if line.lstrip().startswith("%")]
+
+
+def test_the_commands_on_the_pages_exist():
+    root = DOCS.parent
+    pages = [root / "README.md", root / "CONTRIBUTING.md", root / "campaigns" / "README.md", *DOCS.rglob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages if "generated" not in page.parts)
+    campaigns = set(re.findall(r"python -m\s+campaigns\.([a-z][\w.]*\w)", text))
+    assert len(campaigns) > 18
+    assert [
+        name for name in sorted(campaigns) if not (root / "campaigns" / f"{name.replace('.', '/')}.py").exists()
+    ] == []
+
+
+def test_every_campaign_of_the_table_has_a_section():
+    page = (DOCS / "checked.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| \[([^]]+)\]\(#([\w-]+)\) \| [^|]+\| ([^|]+) \| ([^|]+) \| (\d+) \| `", page, re.MULTILINE)
+    assert len(rows) > 20
+    headings = {line[3:].lower().replace(" ", "-") for line in page.splitlines() if line.startswith("## ")}
+    assert {anchor for _, anchor, *_ in rows} == headings
+
+
+def test_every_short_example_is_in_the_story(reference):
+    assert sorted(reference.STORY) == HOW_TO
+
+
+def test_the_reference_lists_every_public_name_once(reference, tmp_path):
+    reference.write_pages(tmp_path)
+    listed = [
+        line.strip().removeprefix("~")
+        for page in tmp_path.glob("task-*.rst")
+        for line in page.read_text(encoding="utf-8").splitlines()
+        if line.startswith("   ~asperity.")
+    ]
+    rooms = (asperity.geometry, asperity.kernels, asperity.spectral)
+    public = {f"{room.__name__}.{name}" for room in rooms for name in room.__all__}
+    assert len(listed) == len(set(listed)) and set(listed) | reference.ELSEWHERE == public
+    by_hand = (DOCS / "api" / "index.md").read_text(encoding="utf-8")
+    assert "automodule:: asperity.geometry.disk.symbolic" in by_hand and "   verify\n" in by_hand
+
+
+def test_a_folder_without_a_task_has_its_own_page(reference, monkeypatch, tmp_path):
+    monkeypatch.setattr(reference, "TASKS", reference.TASKS[1:])
+    reference.write_pages(tmp_path)
+    assert "asperity.geometry.Wall" in (tmp_path / "task-geometry-walls.rst").read_text(encoding="utf-8")
+
+
+def test_inventories_have_the_links_of_the_table(reference, tmp_path):
+    found = reference.write_inventories(DOCS / "links.txt", tmp_path)
+    assert set(found) == {"python", "numpy", "scipy", "matplotlib"}
+    head, packed = Path(found["matplotlib"]).read_bytes().split(b"by zlib.\n")
+    assert head.startswith(b"# Sphinx inventory version 2\n# Project: matplotlib\n")
+    page = "api/_as_gen/matplotlib.axes.Axes.html#matplotlib.axes.Axes"
+    for name in ("Axes", "matplotlib.axes.Axes"):
+        assert f"{name} py:class 1 {page} -" in zlib.decompress(packed).decode().splitlines()

@@ -1,0 +1,61 @@
+"""The peers' environment: made from scratch, and where a peer cannot be had, a row that says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from campaigns import peers
+
+
+@pytest.fixture
+def data(tmp_path):
+    file = tmp_path / "chain.npz"
+    np.savez(file, matrix=np.eye(2), gap=0.5)
+    return file
+
+
+def commands(monkeypatch, **codes):
+    """Replace processes by what they would say; returns the commands that were asked for."""
+    asked = []
+
+    def run(command, **options):
+        asked.append(command)
+        word = next(word for word in ("venv", "--version", "install", "peer_worker") if word in " ".join(command))
+        code, out, err = codes.get(word.strip("-"), (0, '{"gap": 0.5}\n', ""))
+        return peers.subprocess.CompletedProcess(command, code, out, err)
+
+    monkeypatch.setattr(peers.subprocess, "run", run)
+    return asked
+
+
+def test_the_environment_is_made_once_and_each_package_installed_once(tmp_path, data, monkeypatch):
+    asked = commands(monkeypatch)
+    environment = peers.PeerEnvironment(tmp_path / "environment")
+    assert environment.run("deeptime", "deeptime", data) == {"gap": 0.5}
+    assert environment.run("deeptime", "deeptime", data) == {"gap": 0.5}
+    assert ["venv" in command for command in asked] == [True, False, False, False]
+    assert ["install" in command for command in asked] == [False, True, False, False]
+
+
+def test_without_an_index_the_row_says_so_and_the_others_go_on(tmp_path, data, monkeypatch):
+    asked = commands(monkeypatch, install=(1, "", "WARNING: retrying\nERROR: No matching | distribution\n"))
+    environment = peers.PeerEnvironment(tmp_path / "environment")
+    refusal = environment.run("deeptime", "deeptime", data)
+    assert refusal == "cannot be installed: ERROR: No matching / distribution"
+    assert environment.run("deeptime", "deeptime", data) == refusal
+    assert len(asked) == 2
+
+
+def test_a_peer_that_fails_or_an_environment_that_cannot_be_made_is_a_row(tmp_path, data, monkeypatch):
+    commands(monkeypatch, peer_worker=(1, "", "IndexError: index -1\n"))
+    assert peers.PeerEnvironment(tmp_path / "a").run("pydtmc", "PyDTMC", data) == "fails: IndexError: index -1"
+    commands(monkeypatch, venv=(1, "ensurepip is not available\n", ""))
+    found = peers.PeerEnvironment(tmp_path / "b").run("pydtmc", "PyDTMC", data)
+    assert found == "no environment: ensurepip is not available"
+
+
+def test_the_limits_hold(tmp_path, data, monkeypatch):
+    monkeypatch.setattr(peers, "MAKE_SECONDS", 0.01)
+    assert "ended after 0 s" in peers.PeerEnvironment(tmp_path / "a").run("deeptime", "deeptime", data)
+    monkeypatch.setattr(peers, "ALL_SECONDS", 0.0)
+    assert "time was up" in peers.PeerEnvironment(tmp_path / "b").run("deeptime", "deeptime", data)

@@ -1,0 +1,112 @@
+"""Wrong kinds of arguments end in an InputError, whatever public callable meets them."""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import signal
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from campaigns.judges.public_calls import CALLS, DISK, EDGES, LAW, LEFT_OUT, MATRIX, TEETH, methods_of
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import AsperityError, InputError
+
+WRONG: dict[str, Any] = {
+    "None": None, "text": "text", "number as text": "0.5", "bytes": b"bytes", "object": object(), "list": [],
+    "dict": {"a": 1}, "tuple": (1, 2, 3), "array": np.array([1.0, 2.0, 3.0]), "matrix": np.zeros((2, 2)),
+    "ragged": [[1, 2], [3]], "texts": np.array(["a", "b"]), "objects": np.array([None, {}], dtype=object),
+    "nan": np.nan, "inf": np.inf, "negative": -1, "zero": 0, "fraction": 2.5, "beyond double": 10**400,
+    "minus beyond": -(10**400), "complex": 1j, "true": True, "function": lambda: 0, "class": int, "wall": TEETH,
+    "law": LAW, "disk": DISK, "kernel": MATRIX, "path": "no/such/file", "nul": "a\0b",
+    "surrogate": "\ud800", "span of time": np.timedelta64(3, "s"), "date": np.datetime64("2020-01-01"),
+}  # fmt: skip
+# A function of the user that fails, or returns nonsense, fails in its own way; a bound may be met after hours.
+FUNCTIONS = ("density", "map", "function", "spacing", "family", "objective", "cost", "solve", "spectrum")
+ENDLESS_KINDS = ("zero", "beyond double", "minus beyond")
+ENDLESS = {"tolerance", "smallest_opening", "permutations", "max_contacts", "max_collisions", "iterations"}
+# Seconds of the processor that a call may take: one that takes its argument may work.
+LONGEST = 10.0
+
+
+class TooLong(BaseException):
+    """A call goes on and on."""
+
+
+def call(function: Callable[..., Any], arguments: dict[str, Any]) -> None:
+    def stop(*_: object) -> None:
+        raise TooLong
+
+    before = signal.signal(signal.SIGVTALRM, stop)
+    signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
+    try:
+        function(**arguments)
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
+def test_every_public_callable_is_called_or_left_out_for_a_reason():
+    public = {name for room in (geo, ker, spec) for name in room.__all__ if callable(getattr(room, name))}
+    assert public - LEFT_OUT == {name for name in CALLS if "." not in name and name not in ("Estimate", "study_wall")}
+    assert public >= LEFT_OUT
+    for function, arguments in CALLS.values():
+        inspect.signature(function).bind(**arguments)
+
+
+def test_every_public_method_explains_wrong_kinds():
+    kinds = [getattr(room, name) for room in (geo, ker, spec) for name in room.__all__]
+    methods = set().union(*(methods_of(kind) for kind in kinds if inspect.isclass(kind)))
+    bare = []
+    for base, name in methods:
+        member = vars(base)[name]
+        function = member.__func__ if isinstance(member, (classmethod, staticmethod)) else member
+        if not hasattr(function, "__wrapped__"):
+            bare.append(f"{base.__name__}.{name}")
+    assert len(methods) > 200 and not bare, sorted(bare)
+
+
+@pytest.mark.parametrize("theta", [np.array([1, 2]), np.array([1], dtype=np.int8)], ids=["int64", "int8"])
+def test_whole_angles_reach_the_compiled_march_as_doubles(theta):
+    # the march takes doubles by their address: other numbers were read beyond their end
+    law = ker.WallLaw(geo.elliptical_arcs(1.0))
+    whole, doubles = (law.distribution(given, EDGES) for given in (theta, theta.astype(np.float64)))
+    np.testing.assert_array_equal(whole.below, doubles.below)
+
+
+def test_edges_of_a_wrong_shape_do_not_reach_the_compiled_march():
+    with pytest.raises(InputError, match="edges"):
+        ker.WallLaw(geo.elliptical_arcs(1.0)).distribution(np.array([1.0]), np.ones((4, 3, 2)))
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", CALLS)
+def test_a_wrong_kind_of_argument_is_an_input_error(name, tmp_path, monkeypatch):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    monkeypatch.chdir(tmp_path)
+    function, arguments = CALLS[name]
+    raised = []
+    # compiles what is needed, which takes longer than a call may
+    with contextlib.suppress(AsperityError):
+        function(**arguments)
+    for changed in arguments:
+        for kind, wrong in WRONG.items():
+            if (callable(wrong) and changed in FUNCTIONS) or (changed in ENDLESS and kind in ENDLESS_KINDS):
+                continue
+            try:
+                call(function, {**arguments, changed: wrong})
+            except AsperityError:
+                pass
+            except (Exception, TooLong) as other:
+                raised.append(f"{changed} = {kind}: {type(other).__name__}: {str(other)[:90]}")
+            pyplot.close("all")
+    assert not raised, "\n".join(raised)

@@ -1,0 +1,252 @@
+"""Exact laws of polygonal walls: against closed forms, traced rays, and what must hold for every wall."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from campaigns.judges.traced_pairs import chi_square_p
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import InputError
+from asperity.kernels.discretisation.isometries import branch_matrix
+from asperity.kernels.laws.isometry_table import IsometryTable
+from asperity.kernels.walls.isometry_branches import isometries
+
+EPS = float(np.finfo(np.float64).eps)
+SKEW = [(0, 0), (0.3, -0.5), (1, 0)]
+STEP = [(0, 0), (0.2, 0), (0.2, -0.5), (1, -0.5), (1, 0)]
+SPIKED = [(0, 0), (0.2, -0.7), (0.5, -0.2), (0.6, -0.9), (0.8, 0), (1, 0)]
+OVERHANG = [(0, 0), (0.4, 0), (0.3, -0.4), (0.9, -0.5), (1, 0)]
+DOVETAIL = [(0, 0), (0.4, 0), (0.3, -0.4), (0.9, -0.5), (0.8, 0), (1, 0)]
+WALLS = {"skew": SKEW, "step": STEP, "spiked": SPIKED, "overhang": OVERHANG}
+BASES = [
+    ker.Bins(48),
+    ker.Bins([0.0, 0.02, 0.4, 1.1, 2.0, 3.1, math.pi]),
+    ker.Legendre(24),
+    ker.Panels([0.0, 0.05, 0.3, 0.9, 1.5, 2.2, 2.9, math.pi], 4),
+]
+
+
+def law_of(name: str) -> ker.PolygonLaw:
+    return ker.PolygonLaw(geo.Wall.from_vertices(WALLS[name]))
+
+
+# ---- tables of laws in closed form ----------------------------------------------------------------------------------
+@pytest.mark.parametrize("psi", [1e-3, 0.05, 0.7, math.pi / 3, math.pi / 2, 2.0, 2.9, math.pi - 1e-4])
+def test_the_table_of_triangular_teeth_is_their_law(psi: float) -> None:
+    law = ker.TriangularTeethLaw(psi)
+    table = law.isometry_table()
+    assert table is not None and table.mass() == pytest.approx(1.0, abs=1e-14)
+    theta = np.concatenate([[1e-9, 1e-4, math.pi - 1e-4], np.random.default_rng(1).uniform(0.001, 3.14, 500)])
+    (fraction, angle), (expected, outgoing) = table.branches(theta), law.branches(theta)
+    assert np.abs(fraction.sum(axis=-1) - 1.0).max() < 1e-14
+    # next to a kink, known to a few ulps, a probability is known to an ulp over the width of its interval
+    for k in (1, 2, 5):
+        found, wanted = (fraction * np.cos(k * angle)).sum(-1), (expected * np.cos(k * outgoing)).sum(-1)
+        assert np.abs(found - wanted).max() < 1e-13 + 64.0 * EPS / psi
+
+
+@pytest.mark.parametrize("psi", [0.05, 0.7, math.pi / 2, 2.9])
+@pytest.mark.parametrize("basis", BASES, ids=repr)
+def test_matrices_from_the_table_are_those_of_quadrature_between_kinks(psi: float, basis: ker.Basis) -> None:
+    law = ker.TriangularTeethLaw(psi)
+    found = ker.discretise(law, basis)
+    reference, error = branch_matrix(law, basis, 0.0)
+    assert found.method == "exact" and error < 1e-11
+    assert np.linalg.norm(found.symmetric - reference) < 2e-13
+    assert np.linalg.norm(found.symmetric - found.symmetric.T) < 2e-13
+
+
+def test_the_published_number_of_triangular_teeth() -> None:
+    found = ker.discretise(ker.TriangularTeethLaw(0.7), ker.Legendre(2))
+    assert found.symmetric[1, 1] == pytest.approx(0.134541971359171, abs=1e-15)
+
+
+@pytest.mark.parametrize("r", [1e-6, 0.5, 40.0, 1e8])
+def test_polygons_that_are_teeth_have_the_laws_of_teeth(r: float) -> None:
+    basis = ker.Bins(32)
+    wall = geo.rectangular_teeth(r)
+    for law in (ker.PolygonLaw(wall), ker.PolygonLaw(wall.mirrored()), ker.PolygonLaw(wall.scaled(7.0))):
+        found = ker.discretise(law, basis).symmetric
+        assert np.linalg.norm(found - ker.discretise(ker.RectangularTeethLaw(r), basis).symmetric) < 1e-13
+        theta = np.array([0.3, 1.0, 2.7])
+        wanted = ker.RectangularTeethLaw(r).apply(np.cos, theta)
+        assert np.allclose(law.apply(np.cos, theta), wanted, atol=1e-14 * max(1.0, r))
+    assert float(ker.PolygonLaw(wall).unresolved) == 0.0
+
+
+def test_beams_of_a_triangle_and_a_rectangle_give_the_closed_forms() -> None:
+    from asperity.geometry.polygons.beams import beams_of
+    from asperity.kernels.discretisation.isometry_tables import table_matrix
+    from asperity.kernels.walls.polygon import table_of_beams
+
+    for basis in BASES:
+        table = table_of_beams(beams_of([(0, 0), (0.5, -0.5 / math.tan(0.35)), (1, 0)]))
+        exact = ker.discretise(ker.TriangularTeethLaw(0.7), basis).symmetric
+        assert np.linalg.norm(table_matrix(table, basis)[0] - exact) < 1e-13 * math.sqrt(basis.size)
+        table = table_of_beams(beams_of([(0, 0), (0, -1.3), (1, -1.3), (1, 0)], max_beams=20_000))
+        half = IsometryTable.joined([IsometryTable.flat(0.5), table.scaled(0.5)])
+        found, bound = table_matrix(half, basis)
+        exact = ker.discretise(ker.RectangularTeethLaw(1.3), basis).symmetric
+        assert 0.0 < np.linalg.norm(found - exact) <= bound + 2e-13
+
+
+# ---- laws of polygons -----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", WALLS)
+def test_probabilities_sum_to_one_and_are_linear_in_the_cotangent_between_kinks(name: str) -> None:
+    law = law_of(name)
+    theta = np.random.default_rng(2).uniform(0.01, 3.13, 2000)
+    probability, outgoing = law.branches(theta)
+    assert np.abs(probability.sum(axis=-1) - 1.0).max() < 1e-14
+    assert law.isometry_table().mass() == pytest.approx(1.0, abs=1e-13)
+    assert probability.min() >= 0.0 and outgoing.min() > 0.0 and outgoing.max() < math.pi
+    breakpoints, left_out = law.breakpoints(10**6)
+    assert left_out < 0.1
+    edges = np.concatenate([[0.05], breakpoints[(breakpoints > 0.05) & (breakpoints < 3.09)], [3.09]])
+    width = np.diff(edges)
+    inside = edges[:-1] + np.array([[0.2], [0.5], [0.8]]) * width
+    inside = inside[:, width > 1e-6]
+    fraction = law.branches(inside)[0]
+    low, middle, high = np.cos(inside) / np.sin(inside)
+    weight = ((middle - low) / (high - low))[:, None]
+    assert np.abs((1.0 - weight) * fraction[0] + weight * fraction[2] - fraction[1]).max() < 1e-11
+
+
+@pytest.mark.parametrize("name", WALLS)
+@pytest.mark.parametrize("basis", BASES, ids=repr)
+def test_matrices_of_polygons_are_markov_and_reversible(name: str, basis: ker.Basis) -> None:
+    found = ker.discretise(law_of(name), basis)
+    assert found.method == "exact" and found.error.kind == "bound"
+    allowed = min(float(found.error), 1e-11) + 32.0 * EPS * basis.size
+    assert np.linalg.norm(found.symmetric @ basis.constant - basis.constant) < allowed
+    assert np.linalg.norm(found.symmetric - found.symmetric.T) < allowed
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_traced_rays_follow_the_exact_law(name: str) -> None:
+    wall = geo.Wall.from_vertices(WALLS[name])
+    p_value = chi_square_p(wall, ker.PolygonLaw(wall), 200_000, 12, np.random.default_rng(3))
+    assert 1e-4 < p_value < 1.0 - 1e-4
+
+
+def test_different_hollows_add_up_by_their_widths_and_equal_ones_are_computed_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from asperity.geometry.polygons import beams
+
+    calls: list[int] = []
+    whole = beams.beams_of
+
+    def counted(chain: np.ndarray, **limits: float) -> object:
+        calls.append(len(chain))
+        return whole(chain, **limits)
+
+    monkeypatch.setattr(beams, "beams_of", counted)
+    skew, mirrored = [(0.3, -0.5), (1.0, 0.0)], [(1.7, -0.5), (2.0, 0.0)]
+    large, other = [(2.6, -1.0), (4.0, 0.0)], [(4.2, -0.9), (4.5, -0.1), (5.0, 0.0)]
+    wall = geo.Wall.from_vertices([(0.0, 0.0), *skew, *mirrored, *large, *other, (6.0, 0.0)])
+    basis = ker.Legendre(12)
+    found = ker.discretise(ker.PolygonLaw(wall), basis).symmetric
+    assert calls == [3, 4]
+    alone = ker.PolygonLaw(geo.Wall.from_vertices(SKEW))
+    mirrored_angle = ker.PolygonLaw(geo.Wall.from_vertices(SKEW).mirrored())
+    last = ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.2, -0.9), (0.5, -0.1), (1, 0)]))
+    total = (3.0 * alone + mirrored_angle + last + ker.specular()) * (1.0 / 6.0)
+    assert np.linalg.norm(found - ker.discretise(total, basis).symmetric) < 1e-12
+
+
+def test_what_is_not_resolved_is_sent_back_and_reported() -> None:
+    wall = geo.Wall.from_vertices(DOVETAIL)
+    rough, fine = ker.PolygonLaw(wall, max_beams=100), ker.PolygonLaw(wall, max_beams=10_000)
+    assert float(rough.unresolved) > 1e-5 > 10.0 * float(fine.unresolved) and rough.unresolved.kind == "bound"
+    for basis in BASES:
+        found, exact = ker.discretise(rough, basis), ker.discretise(fine, basis)
+        assert np.linalg.norm(found.symmetric @ basis.constant - basis.constant) < 1e-12
+        assert np.linalg.norm(found.symmetric - exact.symmetric) <= float(found.error) + float(exact.error)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
+def test_the_tolerance_bounds_the_unresolved_flux_of_the_whole_wall(tolerance: float) -> None:
+    law = ker.PolygonLaw(geo.koch(3), tolerance=tolerance, max_beams=10**7)
+    assert 0.1 * tolerance < float(law.unresolved) <= tolerance
+
+
+def test_few_angles_are_answered_as_many() -> None:
+    theta = np.random.default_rng(6).uniform(0.01, 3.13, 3)
+    law, same = (ker.PolygonLaw(geo.koch(2), max_beams=3000) for _ in range(2))
+    at_once, _ = same.branches(np.concatenate([theta, np.linspace(0.1, 3.0, 500)]))
+    for k, angle in enumerate(theta):
+        probability, _ = law.branches(angle)
+        assert np.array_equal(probability, at_once[k][: probability.size]) and not at_once[k][probability.size :].any()
+
+
+def test_walls_that_are_curved_or_open_are_refused_with_advice() -> None:
+    with pytest.raises(InputError, match="WallLaw"):
+        ker.PolygonLaw(geo.focusing_arcs(1.0))
+    with pytest.raises(InputError, match="WallLaw"):
+        plate = [geo.Segment((0.2, -0.1), (0.4, -0.1)), geo.Segment((0.4, -0.1), (0.2, -0.1))]
+        ker.PolygonLaw(geo.Wall([geo.Segment((0, -1), (1, -1))], islands=[plate]))
+    with pytest.raises(InputError, match="wall"):
+        ker.PolygonLaw(1.0)
+
+
+def test_polygons_have_no_gap_and_their_walls_are_exact() -> None:
+    law = law_of("skew")
+    assert spec.spectral_gap(law).verdict == "no gap"
+    wall_law = ker.WallLaw(geo.Wall.from_vertices(SKEW))
+    assert wall_law.closed_form is None and wall_law.exact_law == ker.PolygonLaw(wall_law.wall, max_beams=100_000)
+    basis = ker.Legendre(8)
+    exact = ker.discretise(wall_law, basis)
+    assert exact.method == "exact"
+    assert np.linalg.norm(exact.symmetric - ker.discretise(law, basis).symmetric) < 1e-13
+    drawn = law.sample(np.full(20_000, 1.1), np.random.default_rng(4))
+    mean, square = (float(law.apply(lambda a, k=k: np.cos(a) ** k, 1.1)) for k in (1, 2))
+    assert abs(np.cos(drawn).mean() - mean) < 4.0 * math.sqrt((square - mean * mean) / drawn.size)
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_collision_matrices_are_isometries_of_the_kinetic_metric(name: str) -> None:
+    disk = geo.Disk(mass=1.3, inertia=0.5)
+    law = law_of(name)
+    theta = np.array([0.4, 1.0, 1.9, 2.8])
+    branches = ker.CollisionLaw(law, disk).branches(theta)
+    assert np.allclose(sum(probability for probability, _ in branches), 1.0, atol=1e-13)
+    metric = np.diag([disk.mass, disk.mass, disk.inertia])
+    for _, matrix in branches:
+        assert np.allclose(np.swapaxes(matrix, -1, -2) @ metric @ matrix, metric, atol=1e-13)
+    # the velocity with angle theta goes to the one with the branch's angle
+    for k, angle in enumerate(theta):
+        incoming = -disk.from_angles(angle, 0.5 * math.pi)
+        images = [disk.to_angles(m[k] @ incoming)[0] for p, m in branches if p[k] > 1e-9]
+        listed = law.branches(angle)
+        assert np.allclose(np.sort(images), np.sort(listed[1][listed[0] > 1e-9]), atol=1e-12)
+
+
+def test_signs_from_the_table_are_those_found_by_probing() -> None:
+    theta = np.linspace(0.2, 3.0, 40)
+    for law in (ker.TriangularTeethLaw(0.7), ker.RectangularTeethLaw(3.0)):
+        probability, sign, offset = isometries(law, theta)
+        image = sign * theta[:, None] + offset
+        fraction, outgoing = law.branches(theta)
+        for k in (1, 3):
+            assert np.allclose((probability * np.cos(k * image)).sum(-1), (fraction * np.cos(k * outgoing)).sum(-1))
+    frame = ker.TriangularTeethLaw(0.7).in_specular_frame().isometry_table()
+    assert frame is not None
+    fraction, outgoing = frame.branches(theta)
+    wanted = ker.TriangularTeethLaw(0.7).in_specular_frame().apply(np.cos, theta)
+    assert np.allclose((fraction * np.cos(outgoing)).sum(-1), wanted, atol=1e-13)
+    assert ker.lambertian().isometry_table() is None
+
+
+def test_the_largest_hollow_tells_first_that_beams_do_not_resolve():
+    law = ker.PolygonLaw(geo.koch(4), max_beams=2_000)
+    assert not law.resolves(1e-4) and len(law._known) == 1
+    assert law.resolves(1.0) and len(law._known) == len(law._shapes) > 1
+    assert float(law.unresolved) > 1e-4
+    # the tables that are known are used
+    known = dict(law._known)
+    assert law.isometry_table() is law.isometry_table() and all(law._known[key] is known[key] for key in known)

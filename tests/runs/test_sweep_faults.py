@@ -1,0 +1,352 @@
+"""Sweeps on workers, and what is left when a worker, the scheduler, the process or the disk is lost."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity import AsperityError, Estimate
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.core.workers import connected, results
+from asperity.spectral.sweeps.named_families import wall_by_name
+
+distributed = pytest.importorskip("distributed")
+
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="processes are ended differently here"),
+    # dask's own threads and sockets, when what they talk to is killed
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore:.*:DeprecationWarning"),
+]
+
+SOURCE = Path(__file__).resolve().parents[2] / "src"
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join([str(SOURCE), os.environ.get("PYTHONPATH", "")])}
+FRACTIONS = [round(0.02 * k, 2) for k in range(1, 26)]
+GRID = {"diffuse_fraction": FRACTIONS}
+# Seconds after which Ctrl-C must have ended a sweep: an idle machine takes a tenth of one.
+SOON = 3.0
+
+
+def slowly(law):
+    """A number with all its digits, after a while."""
+    time.sleep(0.08)
+    return Estimate(law.terms[0][0] ** 0.5, 1e-16, "estimate", "slowly")
+
+
+def half_diffuse(rng):
+    return ker.maxwell(np.random.default_rng(rng).uniform(0.2, 0.8))
+
+
+def without_seconds(table):
+    return [replace(row, seconds=0.0) for row in table.rows]
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    return without_seconds(spec.sweep(ker.maxwell, GRID, [slowly, "gap"]))
+
+
+@pytest.fixture(scope="module")
+def workers():
+    with connected(2) as client:
+        yield client
+
+
+def test_the_table_does_not_depend_on_the_workers(undisturbed, workers):
+    table = spec.sweep(ker.maxwell, GRID, [slowly, "gap"], client=workers)
+    assert without_seconds(table) == undisturbed
+
+
+def test_traced_walls_have_the_same_bits_on_workers(workers):
+    grid = {"wall": ["dispersing-arcs:curvature=0.5", "mushrooms:generations=1"]}
+    alone, together = (spec.sweep(wall_by_name, grid, "resistance", 1e-3, client=client) for client in (None, workers))
+    assert [row.message for row in alone.rows] == [row.message for row in together.rows]
+    assert without_seconds(alone) == without_seconds(together)
+
+
+def test_the_points_that_are_chosen_do_not_depend_on_the_workers(workers):
+    grid = {"diffuse_fraction": spec.Between(0.01, 0.9, points=10)}
+    alone, together = (spec.sweep(ker.maxwell, grid, slowly, client=client) for client in (None, workers))
+    assert without_seconds(alone) == without_seconds(together)
+
+
+def test_a_mean_law_has_the_same_bits_on_workers(workers):
+    alone, together = (spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1, client=client) for client in (None, workers))
+    assert alone.symmetric.tobytes() == together.symmetric.tobytes() and alone.error == together.error
+
+
+def test_a_killed_worker_is_replaced_and_its_points_computed_again(undisturbed, workers, tmp_path):
+
+    def murderous(law):
+        # the first point to come here ends its worker
+        try:
+            os.close(os.open(tmp_path / "done", os.O_CREAT | os.O_EXCL))
+        except FileExistsError:
+            return Estimate(law.terms[0][0] ** 0.5, 1e-16, "estimate", "slowly")
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    table = spec.sweep(ker.maxwell, GRID, murderous, client=workers)
+    assert (tmp_path / "done").exists()
+    values = [row.value for row in undisturbed if row.quantity == "slowly"]
+    assert [row.value for row in table.rows] == values
+
+
+def test_a_point_that_ends_every_worker_ends_the_sweep_with_a_message(tmp_path):
+    def deadly(law):
+        if law.terms[0][0] > 0.45:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return slowly(law)
+
+    with pytest.raises(AsperityError, match="ended every worker"):
+        spec.sweep(ker.maxwell, GRID, deadly, client=1, checkpoint=tmp_path / "a")
+
+
+def started(*command, cwd):
+    return subprocess.Popen(
+        [sys.executable, *command], env=ENVIRONMENT, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def test_a_lost_scheduler_ends_the_sweep_which_then_goes_on(undisturbed, tmp_path):
+    program = (
+        "import time\nfrom distributed import LocalCluster\n"
+        "if __name__ == '__main__':\n"
+        "    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address='127.0.0.1:0')\n"
+        "    print(cluster.scheduler_address, flush=True)\n    time.sleep(600)\n"
+    )
+    (tmp_path / "cluster.py").write_text(program)
+
+    computed = tmp_path / "computed"
+
+    def slowly(law):
+        # by value: the scheduler has no module of these tests
+        time.sleep(0.08)
+        with computed.open("a") as file:
+            file.write("point\n")
+        return Estimate(law.terms[0][0] ** 0.5, 1e-16, "estimate", "slowly")
+
+    with started("cluster.py", cwd=tmp_path) as cluster:
+        assert cluster.stdout is not None
+        address = cluster.stdout.readline().strip()
+        # the scheduler is killed while the sweep waits for results
+        killer = threading.Thread(target=killed_after, args=(cluster, computed, 10))
+        killer.start()
+        try:
+            with pytest.raises(AsperityError, match="the scheduler is gone"):
+                spec.sweep(ker.maxwell, GRID, [slowly, "gap"], client=address, checkpoint=tmp_path / "a")
+        finally:
+            cluster.kill()
+            killer.join()
+    with Stored(tmp_path / "a") as stored:
+        assert 0 < len(stored) < len(FRACTIONS)
+    table = spec.sweep(ker.maxwell, GRID, [slowly, "gap"], checkpoint=tmp_path / "a")
+    assert without_seconds(table) == undisturbed
+
+
+def killed_after(process, told, lines):
+    """Kill a process once a file has so many lines: later than the first points are stored."""
+    while process.poll() is None:
+        if told.exists() and told.read_text().count("\n") >= lines:
+            process.kill()
+            return
+        time.sleep(0.02)
+
+
+class Stored:
+    """The points in a checkpoint, read as any other program would."""
+
+    def __init__(self, path):
+        import sqlite3
+
+        self.file = sqlite3.connect(path)
+
+    def __enter__(self):
+        return [key for (key,) in self.file.execute("SELECT key FROM parts")]
+
+    def __exit__(self, *_):
+        self.file.close()
+
+
+SWEEP = """
+import sys, time
+from asperity import kernels as ker, spectral as spec
+from asperity.estimates import Estimate
+
+def slowly(law):
+    print("point", flush=True)
+    time.sleep(0.08)
+    return Estimate(law.terms[0][0] ** 0.5, 1e-16, "estimate", "slowly")
+
+if __name__ == "__main__":
+    grid = {"diffuse_fraction": [round(0.02 * k, 2) for k in range(1, 26)]}
+    table = spec.sweep(ker.maxwell, grid, [slowly, "gap"], checkpoint="a")
+    print(repr([(row.value, row.error, row.quantity) for row in table.rows]))
+"""
+
+
+def test_a_killed_process_goes_on_with_the_same_bits(undisturbed, tmp_path):
+    (tmp_path / "run.py").write_text(SWEEP)
+    for _ in range(3):
+        with started("run.py", cwd=tmp_path) as process:
+            assert process.stdout is not None
+            for _ in range(9):
+                process.stdout.readline()
+            process.kill()
+    with started("run.py", cwd=tmp_path) as process:
+        out, _ = process.communicate(timeout=60)
+    assert out.count("point") < len(FRACTIONS)
+    assert out.splitlines()[-1] == repr([(row.value, row.error, row.quantity) for row in undisturbed])
+
+
+SWEPT = ["sweep", "focusing-arcs", "--over", "half_angle=0.1:1.5:400"]
+RANDOM = ["ensemble", "gaussian:length=0.3", "--points", "40", "--rms-slope", "0.5", "--walls", "400"]
+
+
+@pytest.mark.parametrize("command", [SWEPT, [*SWEPT, "--workers", "2"], RANDOM], ids=lambda words: words[-1])
+def test_ctrl_c_ends_the_command_within_a_second_and_says_how_to_go_on(tmp_path, command):
+    if command == RANDOM:
+        pytest.importorskip("SurfaceTopography")
+    (tmp_path / "long.py").write_text(
+        "import signal, runpy, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "if __name__ == '__main__':\n"
+        "    sys.argv[0] = 'asperity'\n"
+        "    runpy.run_module('asperity', run_name='__main__')\n"
+    )
+    asked = ["long.py", *command, "--quantity", "resistance,gap", "--tolerance", "1e-3", "--out", "a"]
+    with started(*asked, cwd=tmp_path) as process:
+        try:
+            deadline = time.time() + 120.0
+            while time.time() < deadline and not has_points(tmp_path / "a" / "sweep.checkpoint"):
+                time.sleep(0.2)
+            sent = time.time()
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=60)
+            took = time.time() - sent
+        finally:
+            process.kill()
+    assert process.returncode == 130, err
+    assert took < SOON
+    assert "of 400 points, which are in a/sweep.checkpoint; the same call goes on from there" in err.splitlines()[-1]
+
+
+def has_points(path):
+    """Whether a file that another process holds has grown beyond its empty tables."""
+    return path.exists() and path.stat().st_size > 16384
+
+
+def test_a_disk_that_is_full_stops_the_sweep_and_loses_nothing(undisturbed, tmp_path):
+    limited = SWEEP.replace(
+        'if __name__ == "__main__":',
+        'if __name__ == "__main__":\n'
+        "    import resource, signal\n"
+        "    from asperity.core import checkpoints\n"
+        "    checkpoints.MOMENT = 0.0\n"
+        "    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "    resource.setrlimit(resource.RLIMIT_FSIZE, (20480, resource.RLIM_INFINITY))",
+    )
+    (tmp_path / "limited.py").write_text(limited)
+    with started("limited.py", cwd=tmp_path) as process:
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "what was written before is safe. Free space" in err
+    with Stored(tmp_path / "a") as stored:
+        assert 0 < len(stored) < len(FRACTIONS)
+    (tmp_path / "run.py").write_text(SWEEP)
+    with started("run.py", cwd=tmp_path) as process:
+        out, _ = process.communicate(timeout=60)
+    assert out.count("point") == len(FRACTIONS) - len(stored)
+    assert out.splitlines()[-1] == repr([(row.value, row.error, row.quantity) for row in undisturbed])
+
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+BLOCKS = [
+    pytest.param(block, id=f"{page.name}-{number}")
+    for page in sorted(DOCS.glob("*.md"))
+    for number, block in enumerate(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+    if re.search(r"client=\d", block)
+]
+GUARD = 'if __name__ == "__main__":\n'
+
+
+def test_there_are_examples_that_start_workers():
+    assert len(BLOCKS) >= 2
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_an_example_that_starts_workers_runs_as_a_script_and_says_what_it_lacks_without_its_guard(block, tmp_path):
+    if "random_wall" in block:
+        pytest.importorskip("SurfaceTopography")
+    shorter = {
+        "1.5, 50": "1.5, 3",
+        "1e-6": "1e-2",
+        "family, 100": "family, 4",
+        ", 64,": ", 12,",
+        ".extremum(": ".plot(",
+    }
+    for long, short in shorter.items():
+        block = block.replace(long, short)
+    (tmp_path / "whole.py").write_text(block)
+    with started("whole.py", cwd=tmp_path) as process:
+        _, err = process.communicate(timeout=600)
+    assert process.returncode == 0, err
+    assert list(tmp_path.glob("*.sweep"))
+    head, tail = block.split(GUARD)
+    (tmp_path / "without.py").write_text(head + textwrap.dedent(tail).replace('.sweep"', '.other"'))
+    with started("without.py", cwd=tmp_path) as process:
+        _, err = process.communicate(timeout=600)
+    assert process.returncode == 1
+    last = err.splitlines()[-1]
+    assert last.startswith("asperity.errors.InputError: client: each worker reads the script")
+    assert GUARD.strip() in last
+    # the trace of this one call
+    assert err.count("Traceback") == 1 and len(err.splitlines()) < 40
+
+
+def listening(_=None):
+    """Sockets of this process to which others can connect."""
+    held = {os.readlink(link) for link in Path("/proc/self/fd").iterdir() if link.is_symlink()}
+    found = []
+    for table in map(Path, ("/proc/net/tcp", "/proc/net/tcp6")):
+        lines = [line.split() for line in table.read_text().splitlines()[1:]] if table.exists() else []
+        found += [line for line in lines if line[3] == "0A" and f"socket:[{line[9]}]" in held]
+    named = [line.split() for line in Path("/proc/net/unix").read_text().splitlines()[1:]]
+    # flags with 10000: it accepts connections
+    return found + [line for line in named if line[3] == "00010000" and f"socket:[{line[6]}]" in held]
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="no list of sockets here")
+def test_workers_that_are_started_here_listen_nowhere():
+    import socket
+
+    before = listening()
+    with connected(2) as workers:
+        tasks = dict(results(listening, range(4), workers))
+        assert list(tasks.values()) == [[]] * 4
+        assert listening() == before
+    # the list does show a socket that listens
+    with socket.create_server(("127.0.0.1", 0)):
+        assert len(listening()) == len(before) + 1
+
+
+def test_a_random_ensemble_gives_a_sign_of_life_before_its_first_wall(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    with started("-m", "asperity", *RANDOM, "--quantity", "gap_specular", "--out", "a", cwd=tmp_path) as process:
+        try:
+            assert process.stderr is not None
+            assert process.stderr.readline().startswith("asperity: computing; Ctrl-C stops it")
+        finally:
+            process.kill()

@@ -1,0 +1,340 @@
+"""Parities, mixing times, conductance, the billiard Laplacian, diffusion, large matrices, sampling errors."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import LinearOperator
+from scipy.stats import binomtest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import AccuracyError, InputError
+from asperity.estimates import Estimate
+from asperity.spectral.eigenvalues.standard_errors import sampling_errors
+
+
+# ---- parities ---------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("basis", [ker.Legendre(8), ker.Bins(9), ker.Panels(np.linspace(0, np.pi, 5), 2)], ids=repr)
+def test_eigenvalues_of_mirror_symmetric_laws_are_labelled_even_and_odd(basis):
+    matrix = ker.discretise(ker.henyey_greenstein(0.5), basis)
+    found = spec.spectrum(matrix, k=6)
+    assert found.parity[:4] == ("even", "odd", "even", "odd")
+    assert np.allclose(np.sort(np.linalg.eigvalsh(matrix.symmetric))[::-1][:6], found.values, atol=1e-12)
+    theta = np.array([0.3, 1.1])
+    for place, parity in enumerate(found.parity):
+        mirrored = found.eigenfunction(place, np.pi - theta)
+        assert np.allclose(mirrored, (1 if parity == "even" else -1) * found.eigenfunction(place, theta), atol=1e-12)
+
+
+def test_laws_without_mirror_symmetry_have_no_parities():
+    law = ker.MatrixLaw([[0.6, 0.3, 0.1], [0.3, 0.5, 0.2], [0.1, 0.2, 0.7]])
+    assert set(spec.spectrum(law, k=3, basis=ker.Bins(3)).parity) == {"none"}
+
+
+# ---- mixing -----------------------------------------------------------------------------------------------------
+def test_mixing_times_bound_the_distance_that_powers_of_the_matrix_have():
+    matrix = ker.discretise(ker.henyey_greenstein(0.8), ker.Bins(32))
+    weights = matrix.weights
+    density = np.where(np.arange(32) < 4, 8.0, 0.0)
+    size = np.sqrt(weights @ (density - 1.0) ** 2)
+    for distance, measure in [
+        ("L2", lambda f: np.sqrt(weights @ (f - 1.0) ** 2)),
+        ("total variation", lambda f: 0.5 * weights @ np.abs(f - 1.0)),
+        ("chi-square", lambda f: weights @ (f - 1.0) ** 2),
+    ]:
+        found = spec.mixing_time(matrix, 0.05, distance, initial=size)
+        after = np.linalg.matrix_power(matrix.array, found.steps) @ density
+        assert measure(after) <= 0.05
+        assert found.earliest <= found.steps
+
+
+def test_the_worst_density_takes_as_long_as_the_bound_says():
+    found = spec.mixing_time(ker.maxwell(0.5), 0.01, "L2")
+    assert found.steps == found.earliest == 7  # 2^-7 < 0.01 < 2^-6
+    assert float(found.relaxation_time) == pytest.approx(1 / np.log(2))
+
+
+def test_a_point_needs_a_law_with_a_density():
+    found = spec.mixing_time(ker.henyey_greenstein(0.5), 0.01, start=1.0)
+    assert found.steps > 1
+    with pytest.raises(InputError, match="start: expected a law with a density"):
+        spec.mixing_time(ker.maxwell(0.5), start=1.0)
+    with pytest.raises(AccuracyError, match="not known to have a gap"):
+        spec.mixing_time(ker.specular())
+
+
+def test_implied_time_scales_are_those_of_the_eigenvalues():
+    scales, intervals = spec.spectrum(ker.henyey_greenstein(0.5), k=4).implied_time_scales()
+    assert np.allclose(scales, 1 / (np.log(2) * np.arange(1, 4)))
+    assert np.all(intervals[:, 0] <= scales) and np.all(scales <= intervals[:, 1])
+
+
+def test_the_eigenfunctions_that_are_drawn_are_the_legendre_polynomials():
+    ax = Figure().subplots()
+    spec.spectrum(ker.henyey_greenstein(0.5), k=3).plot_eigenfunctions(ax)
+    first, second, _ = ax.lines
+    u = np.cos(first.get_xdata())
+    assert [first.get_label(), second.get_label()] == ["0.5 (odd)", "0.25 (even)"]
+    assert np.allclose(first.get_ydata(), np.sqrt(3.0) * u, atol=1e-9)
+    assert np.allclose(second.get_ydata(), np.sqrt(5.0) * (1.5 * u**2 - 0.5), atol=1e-9)
+
+
+# ---- cuts and the Laplacian -------------------------------------------------------------------------------------
+@pytest.mark.parametrize("g", [0.3, 0.9])
+def test_cheegers_bounds_hold(g):
+    found = spec.conductance(ker.discretise(ker.henyey_greenstein(g), ker.Bins(64)))
+    assert found.gap_below <= 1 - g <= found.gap_above + found.error
+
+
+@pytest.mark.parametrize("half_angle", [0.1, 0.2])
+def test_shallow_arcs_tend_to_the_billiard_laplacian(half_angle):
+    found = spec.laplacian_comparison(ker.CircularArcLaw(half_angle), 3)
+    exact = (np.log(1 / np.cos(half_angle) + np.tan(half_angle)) - np.sin(half_angle)) / np.sin(half_angle)
+    assert spec.mean_squared_slope(geo.focusing_arcs(half_angle)) == pytest.approx(exact, rel=1e-6)
+    assert found.flatness == pytest.approx(exact, rel=0.5 * half_angle)
+    assert np.all(np.abs(found.ratios - 1.0) < half_angle)
+
+
+def test_walls_with_vertical_sides_have_no_flatness():
+    assert spec.mean_squared_slope(geo.rectangular_teeth(1.0)) == np.inf
+    assert spec.mean_squared_slope(geo.focusing_arcs(np.pi / 2)) == np.inf
+
+
+# ---- diffusion --------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("a", [0.25, 0.5, 1.0])
+@pytest.mark.parametrize("arrangement", ["mirror", "half-turn"])
+def test_maxwells_walls_have_the_diffusivity_of_smoluchowski(a, arrangement):
+    for law in (ker.maxwell(a), ker.maxwell(a).in_specular_frame()):
+        found = spec.diffusivity(law, radius=0.5, speed=3.0, arrangement=arrangement)
+        assert found.eta == pytest.approx((2 - a) / a, rel=1e-12) and found.zeta == pytest.approx(1 - a, abs=1e-12)
+        assert float(found) == pytest.approx((2 - a) / a * 4 * 0.5 * 3.0 / np.pi, rel=1e-12)
+
+
+def test_the_semicircle_turns_grazing_flights_round():
+    """Of M, its ends' difference: zeta = -(1/8) ln 9."""
+    found = spec.diffusivity(ker.CircularArcLaw(np.pi / 2))
+    zeta = -np.log(9) / 8
+    assert abs(found.zeta - zeta) <= found.zeta_error < 1e-7
+    assert abs(found.eta - (1 + zeta) / (1 - zeta)) <= found.eta_error
+
+
+def test_the_page_on_diffusion_has_the_means_of_cotangents_that_rays_give():
+    """Every number of its table, to a unit of the last digit."""
+    page = (Path(__file__).parents[2] / "docs" / "theory" / "knudsen-diffusion.md").read_text(encoding="utf-8")
+    walls = {
+        "arcs, half angle 0.3": geo.focusing_arcs(0.3),
+        "bumps, curvature 1": geo.dispersing_arcs(1.0),
+        "triangular teeth, angle 1": geo.triangular_teeth(1.0),
+        "semicircles": geo.focusing_arcs(np.pi / 2),
+        "`koch(2)`": geo.koch(2),
+    }
+    x = (np.arange(100_000) + 0.5) / 100_000
+    for name, wall in walls.items():
+        row = re.search(rf"^\| {re.escape(name)} ((\| -?[\d.]+ ){{4}})\|$", page, flags=re.MULTILINE)
+        assert row is not None, name
+        for theta, text in zip((0.1, 0.01, 0.001, 0.0001), row[1].replace("|", "").split(), strict=True):
+            traced = geo.trace(wall, x * wall.period, np.full(x.size, theta))
+            mean = -float(np.mean(np.tan(theta) / np.tan(traced.theta[traced.escaped])))
+            assert abs(mean - float(text)) < 10.0 ** -len(text.partition(".")[2]), (name, theta, mean)
+
+
+@pytest.mark.parametrize(
+    ("law", "arrangement"),
+    [
+        (ker.lambertian(), "mirror"),
+        (ker.maxwell(0.5), "mirror"),
+        (ker.maxwell(0.5), "half-turn"),
+        (ker.CircularArcLaw(np.pi / 2), "mirror"),
+    ],
+    ids=str,
+)
+def test_exit_times_agree_with_the_spectral_formula(law, arrangement):
+    lengths = 10.0 * 2.0 ** np.arange(0, 4.5, 0.5)
+    simulated = spec.exit_times(law, lengths, 1000, np.random.default_rng(5), arrangement=arrangement).eta()
+    found = spec.diffusivity(law, arrangement=arrangement)
+    assert abs(float(simulated) - found.eta) <= simulated.error + found.eta_error
+    assert simulated.error < 0.75 * found.eta
+
+
+def test_times_scale_with_width_and_speed():
+    first = spec.exit_times(ker.lambertian(), [5.0, 10.0, 20.0], 50, np.random.default_rng(1))
+    second = spec.exit_times(ker.lambertian(), [10.0, 20.0, 40.0], 50, np.random.default_rng(1), radius=2.0, speed=4.0)
+    assert np.allclose(first.times, 2.0 * second.times)
+
+
+def test_specular_channels_are_refused():
+    with pytest.raises(InputError, match="infinite"):
+        spec.diffusivity(ker.specular())
+    with pytest.raises(InputError, match="arrangement"):
+        spec.diffusivity(ker.lambertian(), arrangement="glide")
+
+
+@pytest.mark.parametrize(
+    ("law", "eta"),
+    [
+        (ker.lambertian(), 1.0),
+        (ker.CircularArcLaw(0.05), 1.0),
+        (ker.WallLaw(geo.dispersing_arcs(1.0)), 1.0),
+        (ker.WallLaw(geo.koch(2)), 2.6),
+        (ker.MatrixLaw([[0.75, 0.25], [0.25, 0.75]]), 1.0),
+        (0.5 * ker.MatrixLaw([[0.75, 0.25], [0.25, 0.75]]) + 0.5 * ker.specular(), 3.0),
+    ],
+    ids=repr,
+)
+def test_a_limit_by_theorem_has_a_bound_that_is_not_zero_and_its_reason(law, eta):
+    found = spec.diffusivity(law)
+    assert found.kind == "bound" and "by the law's structure or the shape of the wall" in found.method
+    assert abs(found.eta - eta) <= found.eta_error and 0.0 < found.eta_error < 1e-12
+    assert 0.0 < found.zeta_error < 1e-12 and 0.0 < found.error < 1e-12
+
+
+def test_a_limit_at_decreasing_angles_is_an_estimate_with_an_error():
+    found = spec.diffusivity(ker.TriangularTeethLaw(1.0))
+    assert found.kind == "estimate" and "at decreasing angles" in found.method
+    assert abs(found.eta - 1.0) <= found.eta_error < 1e-4
+
+
+def test_the_text_of_a_diffusivity_says_that_it_is_a_slope_and_from_where_on():
+    """At L = 160 r the constant beside the slope of shallow arcs, whose L^2/(D_0 tau) is 45, is the larger part."""
+    shallow, deep = spec.diffusivity(ker.CircularArcLaw(0.05), radius=2.0), spec.diffusivity(ker.CircularArcLaw(1.2))
+    for text in (str(shallow), repr(shallow), f"{shallow}", shallow._repr_html_()):
+        assert "2.546, the slope of L^2/tau against ln(L/r) for L well above" in text
+    assert shallow.onset > 2.0 * 160.0 > 10.0 * deep.onset
+    # of all flights beyond the onset the persistence is near its limit, by rays of another seed
+    angle = 0.5 * np.arctan(2.0 * 2.0 / shallow.onset)
+    outgoing = ker.CircularArcLaw(0.05).sample(np.full(20_000, angle), np.random.default_rng(8))
+    assert abs(np.mean(np.tan(angle) / np.tan(outgoing))) < 0.1
+
+
+# without a closed form
+TWO_DEPTHS = geo.Wall.from_vertices([(0, 0), (0, -0.3), (0.4, -0.3), (0.4, -0.7), (0.9, -0.7), (0.9, 0), (1, 0)])
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        ker.RectangularTeethLaw(1.0),
+        ker.WallLaw(geo.rectangular_teeth(2.0)),
+        ker.RectangularTeethLaw(1.0) @ ker.RectangularTeethLaw(0.5),
+        0.5 * ker.specular() + 0.5 * ker.retroreflection(),
+        ker.retroreflection().in_specular_frame(),
+        ker.WallLaw(TWO_DEPTHS),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_walls_that_keep_the_sine_of_every_angle_have_no_diffusivity(law):
+    assert np.ptp(np.sin(law.sample(np.full(50, 0.7), np.random.default_rng(0)))) < 1e-14
+    with pytest.raises(InputError, match="equally long"):
+        spec.diffusivity(law)
+
+
+def test_half_rectangular_teeth_in_a_diffuse_wall_have_the_mean_of_their_diffusivities():
+    """Between two diffuse reflections d is kept, so eta is the mean of (2 + c)/(2 - c) for c = 1 - q, uniform."""
+    found = spec.diffusivity(0.5 * ker.RectangularTeethLaw(1.0) + 0.5 * ker.lambertian())
+    assert abs(found.eta - (4.0 * np.log(2.0) - 1.0)) <= found.eta_error < 10.0
+
+
+def test_a_diffusivity_that_the_limit_at_grazing_does_not_bound_is_refused():
+    with pytest.raises(AccuracyError, match="does not bound") as caught:
+        spec.diffusivity(0.9 * ker.RectangularTeethLaw(1.0) + 0.1 * ker.lambertian())
+    assert 0.1 < caught.value.defect < 2.0
+
+
+# ---- large matrices ---------------------------------------------------------------------------------------------
+def wells(barriers: np.ndarray, inside: int):
+    """A chain of wells of ``inside`` states, hopping at rate 1/4 in them and at the rates ``barriers`` between them."""
+    hop = np.full((len(barriers) + 1) * inside - 1, 0.25)
+    hop[inside - 1 :: inside] = barriers
+    return diags_array([hop, 1 - np.append(hop, 0) - np.append(0, hop), hop], offsets=[-1, 0, 1])
+
+
+@pytest.mark.parametrize("inside", [8, 40])
+def test_the_thirty_slow_eigenvalues_of_thirty_wells_are_complete(inside):
+    """To first order in the rates: 1 - lambda are the eigenvalues of the wells' own chain over ``inside``."""
+    rates = 50.0 * np.repeat([1e-6, 1e-9, 1e-12], [10, 10, 9])
+    found = spec.leading_eigenvalues(wells(rates, inside), 30)
+    assert found.complete and found.counted == len(found.values) == 30
+    coarse = np.diag(np.append(rates, 0) + np.append(0, rates)) - np.diag(rates, 1) - np.diag(rates, -1)
+    expected = np.sort(np.linalg.eigvalsh(coarse)) / inside
+    gaps = 1 - found.values
+    assert np.all(np.abs(gaps - expected) <= found.error + 4 * inside * expected * rates.max() + 1e-16)
+    assert found.error < 1e-13
+
+
+def test_copies_of_a_multiple_eigenvalue_are_all_found():
+    values = np.concatenate([np.ones(10), np.full(10, 1 - 1e-9), np.linspace(0, 0.9, 480)])
+    for asked, given in ((10, 10), (12, 20)):
+        found = spec.leading_eigenvalues(diags_array(values), asked)
+        assert found.complete and len(found.values) == given
+        assert np.allclose(found.values, values[:given], rtol=0.0, atol=1e-14)
+
+
+def test_operators_without_entries_are_not_called_complete():
+    values = np.linspace(-0.5, 1.0, 400)
+    operator = LinearOperator((400, 400), matvec=lambda v: values * v.ravel(), dtype=float)
+    found = spec.leading_eigenvalues(operator, 3)
+    assert np.allclose(found.values, values[::-1][:3]) and not found.complete and found.error == np.inf
+
+
+def test_matrices_that_are_not_symmetric_are_refused():
+    with pytest.raises(InputError, match="symmetric"):
+        spec.leading_eigenvalues(np.array([[0.0, 1.0], [0.0, 0.0]]), 1)
+    with pytest.raises(InputError, match="symmetric"):
+        spec.leading_eigenvalues(diags_array([np.ones(99), np.zeros(100)], offsets=[1, 0]), 1)
+
+
+# ---- sampling ---------------------------------------------------------------------------------------------------
+RUNS = 2000
+LAW = ker.MatrixLaw([[0.5, 0.3, 0.2], [0.3, 0.4, 0.3], [0.2, 0.3, 0.5]])
+
+
+@pytest.fixture(scope="module")
+def sampled():
+    """Matrices of 4000 independent pairs each, seeds 0, 1, 2, ..."""
+    basis = ker.Bins(3)
+    flux = ker.discretise(LAW, basis).flux
+    made = []
+    for seed in range(RUNS):
+        counts = np.random.default_rng(seed).multinomial(4000, flux.ravel() / flux.sum()).reshape(3, 3)
+        rows = counts / counts.sum(axis=1, keepdims=True)
+        error = Estimate(0.0, 0.0, "estimate", "not used")
+        made.append(ker.KernelMatrix(rows, basis, error, counts=counts, samples=4000, reversible=True))
+    return made
+
+
+def test_delta_intervals_cover_as_often_as_they_claim(sampled):
+    covered = 0
+    for matrix in sampled:
+        found = spec.spectrum(matrix, k=2)
+        value, error = found.values[1], found.errors.quantile * sampling_errors(matrix, found.vectors, found.values)[1]
+        covered += abs(value - 0.3) <= error
+    assert binomtest(covered, RUNS, 0.95).pvalue > 1e-3, covered
+
+
+def test_bootstrap_intervals_cover_as_often_as_they_claim(sampled):
+    covered = 0
+    for seed, matrix in enumerate(sampled):
+        low, high = spec.bootstrap_intervals(matrix, 1, np.random.default_rng(seed), resamples=200)[0]
+        covered += low <= 0.3 <= high
+    # 200 resamples know their own quantiles to a percent or two only; a miss of two percent is still a good interval
+    assert binomtest(covered, RUNS, 0.93, alternative="less").pvalue > 1e-3, covered
+
+
+def test_errors_of_the_gap_of_one_matrix_hold_in_95_percent():
+    # the changes from the coarser basis alone would hold in 80 %
+    held = []
+    for half_angle in (0.3, 0.5, 0.7, 1.1, 1.4):
+        law = ker.CircularArcLaw(half_angle)
+        for turned in (law, law.in_specular_frame()):
+            gap = spec.spectral_gap(turned, 1e-4)
+            for basis in (*map(ker.Legendre, (8, 16, 32)), *map(ker.Bins, (16, 32, 64))):
+                found = spec.spectral_gap(ker.discretise(turned, basis, tolerance=1e-5))
+                held.append(abs(found.value - gap.value) <= found.error + gap.error)
+    assert np.mean(held) >= 0.95

@@ -1,0 +1,106 @@
+"""The ledger's checks refuse wrong formulas: a sample of the mutants of `python -m campaigns.ledger_mutants`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from campaigns.judges.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
+from campaigns.ledger_mutants import Mutant, changes, judged, library, mutants_of, noticed
+
+from asperity.geometry.disk import disk, rolling
+from asperity.ledger import index as ledger
+from asperity.verification import Formula, agreement, verified
+
+ROWS = {entry.id: entry for entry in ledger.entries() if entry.check is not None}
+# How many mutants of a row are tried here; proofs take longer than numbers.
+SAMPLE = {"symbolic": 1, "numeric": 3}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("entry", ROWS.values(), ids=ROWS)
+def test_a_check_refuses_wrong_formulas(entry):
+    mutants = [mutant for mutant in mutants_of(entry) if (entry.id, mutant.label) not in EQUIVALENT]
+    for mutant in mutants[:: max(1, len(mutants) // SAMPLE[entry.kind])]:
+        outcome = judged(entry, mutant)
+        assert outcome.answer in ("refuted", "undecided", "raised"), outcome
+
+
+# Each was accepted by the check of its row as it stood before the mutants were tried.
+ONCE_ACCEPTED = {
+    "S1.09": lambda right: lambda theta: right(theta) + 1e-3,
+    "S1.13": lambda right: lambda spacing: 1 - 3 * spacing**2,
+    "S1.23": lambda right: lambda psi, xp: xp.pi + psi,
+    "S2.01": lambda right: lambda ratio, theta: right(ratio, theta) + 1e-3,
+    "S2.08": lambda right: lambda psi, theta: right(psi + 1e-3, theta),
+    "S2.22": lambda right: lambda centre, root, factor: factor * (centre + root),
+    "S2.26": lambda right: lambda preserves, twice: False,
+    "S4.03": lambda right: lambda rho: rho**2 / 5,
+    "S4.09": lambda right: lambda rho, xp: -2 * xp.sin(rho / 2),
+    "S4.10": lambda right: lambda *arguments: [-part for part in right(*arguments)],
+    "S4.11": lambda right: lambda *arguments: [-part for part in right(*arguments)],
+    "S4.15": lambda right: lambda rho, m: 2 * right(rho, m),
+    "S5.02": lambda right: lambda J, xp: (0, 1, 1 / xp.sqrt(J)),
+    "S5.34": lambda right: lambda rho, eps, L: 10 * right(rho, eps, L),
+    "S5.39": lambda right: lambda a, b, eps, rho: (2 * a + 2) * (2 * b + 1) / (eps * rho),
+}
+
+
+@pytest.mark.parametrize("row", ONCE_ACCEPTED)
+def test_a_wrong_formula_that_was_once_accepted_is_refuted(row):
+    wrong = ONCE_ACCEPTED[row](ROWS[row].right)
+    assert judged(ROWS[row], Mutant("", wrong)).answer == "refuted"
+
+
+def test_outgoing_angles_are_neither_moved_nor_mirrored():
+    law = ROWS["S2.08"].right
+    for turn in (lambda angle: angle + 1e-3, lambda angle: np.pi - angle):
+        wrong = Mutant("", lambda psi, theta, turn=turn: (law(psi, theta)[0], turn(law(psi, theta)[1])))
+        assert judged(ROWS["S2.08"], wrong).answer == "refuted"
+
+
+@pytest.mark.parametrize("row", sorted({row for row, _ in EQUIVALENT}))
+def test_what_is_listed_as_equivalent_is_accepted(row):
+    mutants = {mutant.label: mutant for mutant in mutants_of(ROWS[row])}
+    for label in (label for other, label in EQUIVALENT if other == row):
+        assert judged(ROWS[row], mutants[label]).answer == "accepted", label
+
+
+def test_a_function_is_changed_in_one_place_at_a_time():
+    labels = {change.label for change in changes(disk.foreshortening)}
+    assert labels == {
+        "disk.foreshortening: return 2 / xp.sqrt(1 + mass / inertia)",
+        "disk.foreshortening: return -1 / xp.sqrt(1 + mass / inertia)",
+        "disk.foreshortening: return 1 * xp.sqrt(1 + mass / inertia)",
+        "disk.foreshortening: return 1 / xp.sqrt(2 + mass / inertia)",
+        "disk.foreshortening: return 1 / xp.sqrt(-1 + mass / inertia)",
+        "disk.foreshortening: return 1 / xp.sqrt(1 - mass / inertia)",
+        "disk.foreshortening: return 1 / xp.sqrt(1 + mass * inertia)",
+    }
+
+
+def test_a_change_is_undone():
+    change = changes(disk.foreshortening)[0]
+    with change.in_place():
+        assert disk.foreshortening(3.0, 1.0) == 1.0
+    assert disk.foreshortening(3.0, 1.0) == 0.5
+
+
+def test_a_check_that_looks_at_nothing_accepts_what_is_wrong():
+    @verified(
+        id="S9.01", section="0", statement="Twice x.", reason="One. Two.", kind="numeric",
+        printed=Formula("2x", lambda x: 2 * x), perturbed=lambda x: x,
+    )  # fmt: skip
+    def entry(formula):
+        return agreement(formula(0.0), 0.0, 1e-12)
+
+    answers = {mutant.label: judged(entry, mutant).answer for mutant in mutants_of(entry)}
+    assert answers["formula: 3 * x"] == "accepted" and answers["result moved"] == "refuted"
+    assert judged(entry, Mutant("", lambda x: float("nan"))).answer == "undecided"
+
+
+@pytest.mark.parametrize(("function", "rows"), [(disk.branch_block, ["S1.23"]), (rolling.slip, ["S4.15"])])
+def test_the_rows_see_the_librarys_formulas(function, rows):
+    seen = {found.function: found for found in library([ROWS[row] for row in rows])}[function]
+    assert [entry.id for entry in seen.rows] == rows
+    for change in changes(function)[::5]:
+        assert change.label in EQUIVALENT_IN_THE_LIBRARY or noticed(seen, change) == rows[0], change.label
