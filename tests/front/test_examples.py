@@ -83,6 +83,7 @@ def test_the_gap_study_finds_what_is_published_and_goes_on(tmp_path):
     assert study.tables(found).count("\n| ") == 6
 
 
+@pytest.mark.slow
 def test_the_page_has_the_table_that_the_gap_study_prints():
     study = load("gap_study")
     found = study.main()

@@ -52,6 +52,7 @@ def test_a_new_vertex_joins_the_side_that_it_lies_on(k):
     assert geo.Wall.from_vertices(joined).arc_length == pytest.approx(TEETH.arc_length, rel=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CURVED)
 def test_the_first_interval_of_the_gap_holds_the_gap_of_the_law(name):
     known = spec.spectral_gap(ker.WallLaw(CURVED[name]), 1e-3, rng=0)

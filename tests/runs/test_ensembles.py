@@ -163,6 +163,7 @@ def test_a_stopped_mean_law_goes_on_to_the_same_bits(tmp_path):
         spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=2, checkpoint=tmp_path / "a", key="half diffuse")
 
 
+@pytest.mark.slow
 def test_the_deficit_of_gentle_gaussian_walls_is_four_times_their_mean_squared_slope():
     pytest.importorskip("SurfaceTopography")
     ratios = []

@@ -43,6 +43,7 @@ def test_an_arc_has_its_known_moment_in_both_conventions():
     assert specular.tangential == paper.tangential and specular.misfit == paper.misfit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law",
     [ker.TriangularTeethLaw(0.7), ker.CircularArcLaw(0.8), ker.WallLaw(geo.dispersing_arcs(0.8)),
@@ -101,6 +102,7 @@ def test_the_error_of_the_misfit_holds_against_a_fine_rule(law):
     assert abs(fine - found.misfit.value) <= found.misfit.error + 1e-6
 
 
+@pytest.mark.slow
 def test_laws_without_known_means_are_sampled_with_honest_errors():
     # a product of two driven laws: its conditional means have no error of their own
     law = ker.WallLaw(geo.dispersing_arcs(0.5)) @ ker.WallLaw(geo.dispersing_arcs(0.5))
@@ -223,6 +225,7 @@ def test_the_misfit_of_very_shallow_teeth_is_that_of_their_exact_changes():
     assert found.misfit.error < 0.05 * found.misfit.value
 
 
+@pytest.mark.slow
 def test_angles_at_which_the_tolerance_is_missed_are_named():
     law = ker.WallLaw(geo.dispersing_arcs(1e-4))
     found = spec.accommodation(law, theta=[1e-4, 1.0])

@@ -95,6 +95,7 @@ def test_enclosures_of_arcs_hold_the_eigenvalues_of_a_second_method(half_angle):
 
 
 # at 1.05 the third eigenvalue by modulus is near the fourth
+@pytest.mark.slow
 @pytest.mark.parametrize("half_angle", [0.05, 0.2, 0.35, 0.5, 0.7, 0.85, 1.0, 1.05, 1.15, 1.3, 1.4, 1.5])
 def test_enclosures_hold_those_of_a_far_finer_run(half_angle):
     law = ker.CircularArcLaw(half_angle)

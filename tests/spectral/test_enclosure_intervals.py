@@ -357,6 +357,7 @@ def test_four_eigenvalues_are_enclosed_unless_another_number_is_given():
     assert len(spec.enclosures(ker.MatrixLaw(0.5 * np.eye(6) + 1.0 / 12.0))) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("k", "basis"), [(1, "Legendre(32)"), (12, "Legendre(36)")])
 def test_phase_functions_are_tried_in_polynomials_beyond_those_asked_for(k, basis):
     found = spec.enclosures(ker.henyey_greenstein(0.5), k)
@@ -389,6 +390,7 @@ def test_powers_are_recognised_where_they_tell_something():
         assert enclosure.as_power(nothing) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("g", [0.5, -0.9])
 def test_a_phase_function_and_its_square_have_powers_of_g(g):
     law = ker.henyey_greenstein(g)

@@ -44,6 +44,7 @@ def test_maxwell_has_one_indexed_eigenvalue_and_the_rest_is_refused_with_the_rea
     assert "not indexed" in found[1].reason and "Lambertian fraction" in found[1].reason
 
 
+@pytest.mark.slow
 def test_the_focusing_arc_has_the_published_eigenvalues():
     """Facts 10: 0.3670253152(3) and -0.311346443 at a half angle of 1.2."""
     found = spec.enclosures(ker.CircularArcLaw(1.2), 3, basis=ker.Legendre(20))
@@ -60,6 +61,7 @@ SHALLOW_CURVES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "wall",
     [geo.focusing_arcs(0.3), geo.dispersing_arcs(0.5), *(geo.Wall([curve]) for curve in SHALLOW_CURVES)],

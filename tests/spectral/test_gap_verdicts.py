@@ -133,6 +133,7 @@ def test_a_curved_wall_without_mirror_symmetry_is_isolated():
     assert any("essential" in line for line in gap.evidence)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [2, 3])
 def test_powers_have_the_powers_of_the_spectrum(exponent):
     """g = -0.7: an even power turns the lower end up."""
@@ -144,6 +145,7 @@ def test_powers_have_the_powers_of_the_spectrum(exponent):
     assert semicircle.verdict == "essential edge"
 
 
+@pytest.mark.slow
 def test_henyey_greenstein_has_a_gap_with_a_bound():
     gap = spec.spectral_gap(ker.henyey_greenstein(0.999999), tolerance=1e-12)
     assert gap.kind == "bound" and gap.verdict == "isolated" and abs(float(gap) - 1e-6) <= gap.error + 1e-16

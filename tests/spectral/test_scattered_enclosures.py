@@ -16,6 +16,7 @@ from asperity.spectral.bounds.operator_residuals import image_rule
 from asperity.spectral.bounds.separation import rest_of_spectrum
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make, numbers", [(diagonal_case, range(40)), (teeth_case, range(2))], ids=["words", "teeth"])
 def test_random_compositions_are_enclosed_and_indexed_as_known_otherwise(make, numbers):
     for number in numbers:

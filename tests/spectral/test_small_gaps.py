@@ -26,6 +26,7 @@ def parabola(depth):
     return geo.Wall([geo.Bezier([(0, 0), (0.5, -depth), (1, 0)])])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", list(cases(small=True)), ids=lambda case: case.name)
 def test_small_gaps_hold_against_rays_in_fifty_digits(case):
     rows = list(held(case))
@@ -34,6 +35,7 @@ def test_small_gaps_hold_against_rays_in_fifty_digits(case):
         assert row.is_confirmed, row
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 6, 10])
 def test_small_gaps_of_random_walls_and_mixtures_hold_against_rays_in_fifty_digits(number):
     rows = list(random_rows(number))

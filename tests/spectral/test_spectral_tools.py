@@ -145,6 +145,7 @@ def test_the_page_on_diffusion_has_the_means_of_cotangents_that_rays_give():
             assert abs(mean - float(text)) < 10.0 ** -len(text.partition(".")[2]), (name, theta, mean)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "arrangement"),
     [
@@ -309,6 +310,7 @@ def sampled():
     return made
 
 
+@pytest.mark.slow
 def test_delta_intervals_cover_as_often_as_they_claim(sampled):
     covered = 0
     for matrix in sampled:
@@ -327,6 +329,7 @@ def test_bootstrap_intervals_cover_as_often_as_they_claim(sampled):
     assert binomtest(covered, RUNS, 0.93, alternative="less").pvalue > 1e-3, covered
 
 
+@pytest.mark.slow
 def test_errors_of_the_gap_of_one_matrix_hold_in_95_percent():
     # the changes from the coarser basis alone would hold in 80 %
     held = []

@@ -12,6 +12,7 @@ from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("g", [-0.7, 0.5, 0.9])
 def test_henyey_greenstein_has_the_eigenvalues_g_to_the_l(g):
     found = spec.spectrum(ker.henyey_greenstein(g), k=8)

@@ -70,6 +70,7 @@ def plain_first_contact(first, second, position, velocity):
     return brentq(gap, times[crossing[0]], times[crossing[0] + 1], xtol=1e-14) if len(crossing) else None
 
 
+@pytest.mark.slow
 def test_the_first_contact_is_that_of_a_dense_search():
     first, second = geo.SatelliteDisk(DISKS[0], 5, 0.15), geo.SatelliteDisk(DISKS[1], 7, 0.1, 1.5)
     rng = np.random.default_rng(1)

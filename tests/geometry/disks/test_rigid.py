@@ -67,6 +67,7 @@ def test_a_collision_is_an_involution_within_its_conditioning_and_keeps_the_ener
     assert np.array_equal(back.contacts, out.contacts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "scale", "n"),
     [
@@ -135,6 +136,7 @@ PLATES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLATES)
 def test_disks_leave_a_plate_that_is_thinner_than_rounding(name):
     wall, scale = PLATES[name], 1e-3

@@ -136,6 +136,7 @@ UNEQUAL = geo.SatelliteDisk(DISK, 5, [0.1, 0.25, 0.05, 0.3, 0.15], [1.0, 0.9, 1.
 TOOTHED = geo.SatelliteDisk(geo.Disk(2.0, 0.7), 12, 0.02, [1.5, 1.1] * 6, joined=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "second"), [(UNEQUAL, UNEQUAL), (UNEQUAL, TOOTHED), (TOOTHED, UNEQUAL)],
                          ids=["satellites", "on teeth", "teeth on"])  # fmt: skip
 def test_the_first_contact_is_that_of_a_dense_search_over_unequal_satellites_and_teeth(first, second):

@@ -273,6 +273,7 @@ def without_boxes(wall):
     return plain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MANY)
 def test_a_tree_of_boxes_changes_no_bit(name):
     wall = MANY[name]

@@ -84,6 +84,7 @@ def tangent_rays(wall, rng):
     return np.concatenate(rays, axis=1) if rays else np.empty((2, 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_waves", [False, True])
 @pytest.mark.parametrize(
     ("kinds", "flattest", "seeds"),

@@ -65,6 +65,7 @@ def test_squared_slopes_have_the_given_mean(points):
     assert abs(z_score(slopes, 0.04)) < FAR
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("points", [8, 9])
 def test_squared_slopes_of_smooth_walls_have_the_given_mean(points):
     # so coarse that the cubics differ from the polynomial through the heights

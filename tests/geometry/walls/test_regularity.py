@@ -46,6 +46,7 @@ def test_the_largest_curvature_of_an_ellipse_is_at_an_axis_inside_the_arc_or_at_
     assert float(wall.largest_curvature) == pytest.approx(expected, rel=1e-13)
 
 
+@pytest.mark.slow
 def test_the_largest_curvature_of_cubic_pieces_agrees_with_a_search_in_thirty_digits():
     rng = np.random.default_rng(0)
     pieces = [*WAVES.pieces, *(geo.Bezier(rng.random((4, 2))) for _ in range(12))]

@@ -51,6 +51,7 @@ def test_the_first_moment_of_a_focusing_arc_lies_within_its_error(tolerance: flo
     assert abs(matrix[1, 1] - FIRST_MOMENT) <= error + LAST_DIGIT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("basis", [ker.Legendre(8), ker.Bins(6), ker.Panels(np.linspace(0.0, np.pi, 4), 2)], ids=repr)
 def test_matrices_of_a_focusing_arc_lie_within_their_errors_in_every_basis(basis: ker.Basis) -> None:
     exact = ker.discretise(ker.CircularArcLaw(1.2), basis)
@@ -59,6 +60,7 @@ def test_matrices_of_a_focusing_arc_lie_within_their_errors_in_every_basis(basis
     assert np.linalg.norm(matrix - exact.symmetric) <= error + float(exact.error)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [0, 2, 5])
 def test_rows_of_random_walls_agree_with_a_plain_tracer(kind: int) -> None:
     wall, entries = random_curved_wall(kind), 400

@@ -70,6 +70,7 @@ def test_expectations_on_patches_are_those_of_rays():
     assert np.abs(0.3 * found - expected).max() < 1e-8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("floor", [[(0.5, 0.2)], [(0.25, 0.1), (0.75, 0.1)], [(0.25, 0.15), (0.5, 0.05), (0.75, 0.15)]])
 def test_matrices_of_crevices_with_straight_floors_are_the_exact_ones(floor):
     wall = _polygon(floor)

@@ -29,7 +29,7 @@ TEETH, CREVICES = ker.TriangularTeethLaw(0.7), ker.RectangularTeethLaw(0.8)
 HG = ker.henyey_greenstein
 CYCLE = ker.MatrixLaw([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 MIRROR, BACK = ker.specular(), ker.retroreflection()
-THETA = np.linspace(0.07, 3.05, 9)
+THETA = np.linspace(0.07, 3.05, 4)
 
 
 def smooth(angle: np.ndarray) -> np.ndarray:
@@ -167,6 +167,7 @@ NARROW = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("basis", NARROW.values(), ids=NARROW)
 @pytest.mark.parametrize(
     "expression",

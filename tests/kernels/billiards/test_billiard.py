@@ -154,6 +154,7 @@ def test_bad_input_is_refused():
         geo.Container([[0, 0]], [[0, 2]])
 
 
+@pytest.mark.slow
 def test_the_example_finds_the_strip_bounded_and_the_wedge_periodic_until_the_walls_are_rough():
     path = Path(__file__).parents[3] / "docs" / "examples" / "disk_in_a_strip.py"
     spec = importlib.util.spec_from_file_location("disk_in_a_strip", path)

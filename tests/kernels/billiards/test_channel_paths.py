@@ -47,6 +47,7 @@ def test_positions_in_a_bent_channel_over_their_scale_are_normal():
     assert kstest(1.15 * scaled, "norm").pvalue < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [ker.lambertian(), ker.maxwell(0.5)])
 def test_the_variance_of_the_limit_in_a_straight_channel_is_half_of_the_diffusivity(law):
     exact = 0.5 * float(spec.diffusivity(law))

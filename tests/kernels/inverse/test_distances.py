@@ -330,6 +330,7 @@ def test_the_joint_distance_of_a_law_from_itself_is_nothing(law):
     assert found.value == 0.0 and found.error < 1e-9
 
 
+@pytest.mark.slow
 def test_the_joint_distance_of_an_arc_and_teeth_is_known_to_a_thousandth():
     pair = ker.CircularArcLaw(1.2), ker.TriangularTeethLaw(0.7)
     found, rough = (ker.distance(*pair, kind="joint", tolerance=tolerance) for tolerance in (1e-3, 1e-2))

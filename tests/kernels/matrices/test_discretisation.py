@@ -171,6 +171,7 @@ def test_unsymmetric_bases_see_the_same_arcs() -> None:
     assert np.abs(ker.discretise(law, coarse).flux - merge @ symmetric.flux @ merge.T).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_graded_panels_have_the_second_eigenvalue_of_the_arc() -> None:
     basis = ker.Panels.for_wall(geo.focusing_arcs(1.2), degree=3)
     matrix = ker.discretise(ker.WallLaw(geo.focusing_arcs(1.2)), basis)

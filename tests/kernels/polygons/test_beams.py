@@ -208,6 +208,7 @@ def test_the_tolerance_is_met_whatever_the_limit_on_beams():
         assert beams.complete and 0.2 * tolerance < beams.unresolved <= tolerance
 
 
+@pytest.mark.slow
 def test_a_hollow_symmetric_within_rounding_is_off_by_no_more_than_its_leaves_say():
     # sides of Koch curves, and of their mirror images, differ by 3e-15 radians
     given = min((shape.vertices for shape, _ in distinct_hollows(geo.koch(3)) if len(shape.vertices) > 3), key=len)
