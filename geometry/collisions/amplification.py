@@ -1,4 +1,4 @@
-"""Whether a collision amplifies rounding errors: its outgoing state is disturbed, reversed, and collides again."""
+"""Whether a collision amplifies rounding errors: the disk collides again from disturbed incoming states."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..tracing.tracing import Status, StatusCounts, numbers_of
 
-# Largest change of the reversed path's end: of positions in radii and radians, of velocities relative to the speed.
+# Accuracy of a disk that is not amplified: positions in radii and radians, velocities relative to the speed.
 ACCURACY = 1e-6
-# Disturbance of the outgoing state: rounding errors of all contacts, and a margin for the directions in SIGNS. Errors
-# found by the campaign docs/checks/amplified-collisions are at most 1/16 of what the disturbance makes of them.
+# Disturbance of the incoming state, of the size of the rounding errors at a contact.
 DISTURBANCE = 16.0 * EPS
-# Disturbed states of a collision, in orthogonal directions. One is enough where it changes the end by less than a
-# thousandth of the accuracy.
-DISTURBED, CLEAR = 3, 1e-3 * ACCURACY
+# Disturbed states of a collision, in orthogonal directions, and the largest change of its end. The changes scatter as
+# the error does, which exceeds all three of them 10 times once in 10^3. One is enough if it changes the end by CLEAR.
+DISTURBED, LIMIT, CLEAR = 3, 0.1 * ACCURACY, 1e-4 * ACCURACY
 # Twice the inverse cosine of the angle to the normal that few contacts of a collision exceed on average: 1/5.
 STEEP = 10.0
-# Growth at a contact of a flat wall, for rounding errors that add up: collisions of a thousand contacts are reversed.
+# Growth at a contact of a flat wall, for rounding errors that add up: collisions of a thousand contacts are repeated.
 LEAST_GROWTH = 0.02
 
 
@@ -57,7 +56,7 @@ class DiskCounts(StatusCounts):
 
 
 def fewest_contacts(bend: float, ratio: float) -> int:
-    """Return the number of contacts from which on a collision is reversed, so that ordinary ones cost nothing.
+    """Return the number of contacts from which on a collision is repeated, so that ordinary ones cost nothing.
 
     ``bend`` is the largest curvature times the length of a flight, ``ratio`` the mass over the inertia: in the
     foreshortened wall curvatures are up to 1 + m/J times as large. A flight without contact is exact.
@@ -67,7 +66,7 @@ def fewest_contacts(bend: float, ratio: float) -> int:
 
 
 def mark_amplified(
-    reverse: Callable[[NDArray[np.intp], Floats, Floats], tuple[Floats, Floats, NDArray[np.bool_]]],
+    again: Callable[[NDArray[np.intp], Floats, Floats], tuple[Floats, Floats, NDArray[np.bool_]]],
     states: tuple[Floats, Floats],
     ends: tuple[Floats, Floats],
     status: NDArray[np.uint8],
@@ -77,23 +76,21 @@ def mark_amplified(
     """Set the status of amplified disks, among the ``doubtful`` ones that escaped, to ``AMPLIFIED``.
 
     ``states`` are the incoming positions and velocities, one row for each disk, and ``ends`` the outgoing ones.
-    ``reverse`` collides the disks of some rows from given states, and tells which of them escaped. ``units`` are the
+    ``again`` collides the disks of some rows from disturbed states, and tells which of them escaped. ``units`` are the
     sizes of positions, for their rounding errors, and the masses of the velocities.
     """
     (at, moving), (position, velocity), (sizes, masses) = states, ends, units
     rows = np.flatnonzero((status == DiskStatus.ESCAPED) & doubtful)
-    columns = np.arange(at.shape[1] + moving.shape[1])
+    signs = np.arange(at.shape[1] + moving.shape[1])
     for k in range(DISTURBED):
         if not len(rows):
             break
-        shift = DISTURBANCE * (1.0 - 2.0 * (columns >> k & 1))
+        shift = DISTURBANCE * (1.0 - 2.0 * (signs >> k & 1))
         speeds = np.sqrt(np.sum(masses * moving[rows] ** 2, axis=1, keepdims=True) / masses)
-        found, back, escaped = reverse(
-            rows,
-            position[rows] + shift[: at.shape[1]] * sizes,
-            shift[at.shape[1] :] * speeds - velocity[rows],
-        )
-        error = np.maximum(np.abs(found - at[rows]).max(axis=1), np.abs((back + moving[rows]) / speeds).max(axis=1))
-        amplified = ~(escaped & (error <= ACCURACY))
+        start = at[rows] + shift[: at.shape[1]] * sizes, moving[rows] + shift[at.shape[1] :] * speeds
+        there, w, escaped = again(rows, *start)
+        changes = np.abs(there - position[rows]).max(axis=1), np.abs((w - velocity[rows]) / speeds).max(axis=1)
+        change = np.maximum(*changes)
+        amplified = ~(escaped & (change <= LIMIT))
         status[rows[amplified]] = DiskStatus.AMPLIFIED
-        rows = rows[~amplified & (error > CLEAR)]
+        rows = rows[~amplified & (change > CLEAR)]

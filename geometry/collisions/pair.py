@@ -14,9 +14,6 @@ from ..disk.rim import Features, SatelliteDisk
 from .amplification import DiskCounts, DiskStatus, fewest_contacts, mark_amplified
 from .encounter import MAX_CONTACTS, TOUCHING, Encounter, largest_bend_of
 
-# Speed below which no time is computed from it.
-TINIEST = 1e-300
-
 
 @dataclass(frozen=True)
 class PairCollision(DiskCounts):
@@ -110,23 +107,21 @@ def collide_pair(
     results = [_encounter(first, second, x, w).run(max_contacts) for x, w in zip(at, moving, strict=True)]
     time, contacts, status = (np.array([result[k] for result in results]) for k in range(3))
     arrays = (at, moving, time.astype(np.float64), contacts.astype(np.int64), status.astype(np.uint8))
-    spacing = max(first.spacing, second.spacing)
-    # reversed from where the disks are apart again
-    after = np.where(contacts > 0, spacing / np.maximum(np.abs(moving).max(axis=(1, 2)), TINIEST), 0.0)
 
-    def reverse(rows: NDArray[np.intp], x: Floats, w: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def again(rows: NDArray[np.intp], x: Floats, w: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         x, w, escaped = x.reshape(-1, 2, 3), w.reshape(-1, 2, 3), np.zeros(len(rows), dtype=bool)
         for k, row in enumerate(rows):
             elapsed, _, outcome = _between(first, second, x[k], w[k]).run(max_contacts)
-            x[k] += (time[row] + after[row] - elapsed) * w[k]
+            # at the same time
+            x[k] += (time[row] - elapsed) * w[k]
             escaped[k] = outcome == DiskStatus.ESCAPED
         return x.reshape(-1, 6), w.reshape(-1, 6), escaped
 
-    ends = (at + after[:, np.newaxis, np.newaxis] * moving).reshape(-1, 6), moving.reshape(-1, 6)
+    spacing, ends = max(first.spacing, second.spacing), (at.reshape(-1, 6), moving.reshape(-1, 6))
     masses = np.array([m for body in (first, second) for m in (body.disk.mass, body.disk.mass, body.disk.inertia)])
     ratio = max(body.disk.mass / body.disk.inertia for body in (first, second))
     doubtful = contacts >= fewest_contacts(spacing * (1.0 + largest_bend_of(first, second)), ratio)
-    mark_amplified(reverse, states, ends, arrays[-1], doubtful, (spacing, masses))
+    mark_amplified(again, states, ends, arrays[-1], doubtful, (spacing, masses))
     for array in arrays:
         array.setflags(write=False)
     return PairCollision(*arrays)

@@ -157,20 +157,20 @@ def marked(
     bend: float,
     sizes: tuple[float, float],
 ) -> DiskResults:
-    """Return the results of disks from ``states``, those marked whose reversed path leads elsewhere.
+    """Return the results of disks from ``states``, amplified ones marked.
 
     ``bend`` is that of `fewest_contacts`; ``sizes`` are those of x1 and alpha for rounding errors.
     """
     results, masses = collided(*states), np.array([disk.mass, disk.mass, disk.inertia])
     doubtful = results.contacts >= fewest_contacts(bend, disk.mass / disk.inertia)
 
-    def reverse(rows: NDArray[np.intp], at: Floats, moving: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        moving[:, 1] = np.minimum(moving[:, 1], -0.5 * results.velocity[rows, 1])
-        back = collided(at, moving)
-        return back.position, back.velocity, back.status == Status.ESCAPED
+    def again(rows: NDArray[np.intp], at: Floats, moving: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        moving[:, 1] = np.minimum(moving[:, 1], 0.5 * states[1][rows, 1])
+        there = collided(at, moving)
+        return there.position, there.velocity, there.status == Status.ESCAPED
 
     ends = results.position, results.velocity
-    mark_amplified(reverse, states, ends, results.status, doubtful, (np.array(sizes), masses))
+    mark_amplified(again, states, ends, results.status, doubtful, (np.array(sizes), masses))
     return results
 
 
