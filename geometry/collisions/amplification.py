@@ -19,7 +19,7 @@ ACCURACY = 1e-6
 # Disturbance of the incoming state, of the size of the rounding errors at a contact.
 DISTURBANCE = 16.0 * EPS
 # Disturbed states of a collision, in orthogonal directions, and the largest change of its end. The changes scatter as
-# the error does, which exceeds all three of them 10 times once in 10^3. One is enough if it changes the end by CLEAR.
+# the error does, which exceeds all three of them 10 times once in 10^3. One is enough if its change is at most CLEAR.
 DISTURBED, LIMIT, CLEAR = 3, 0.1 * ACCURACY, 1e-4 * ACCURACY
 # Twice the inverse cosine of the angle to the normal that few contacts of a collision exceed on average: 1/5.
 STEEP = 10.0

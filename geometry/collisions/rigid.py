@@ -112,6 +112,11 @@ def collide(
     cell is one convex hollow, as of triangular teeth or focusing arcs, 16 disks at once take 0.1 microseconds per
     contact.
 
+    Disks with many contacts, the fewer the larger m/J and the curvature of the wall, collide again from incoming states
+    that differ by rounding; where the outgoing states differ by more than 1e-7 the status is ``AMPLIFIED``. The state
+    is that of a path that obeys the laws within rounding. So laws and means over many disks count it as any other, and
+    ``escaped`` includes it. It must not be compared with another computation of the same disk.
+
     Source: Rudzis 2022, sections 1.3.1 to 1.3.5, and Proposition 3.2 with the angle alpha + j rho (eq. 3.26 prints
     alpha - j rho).
 
