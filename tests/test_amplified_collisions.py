@@ -61,13 +61,26 @@ def test_laws_of_the_true_disk_sample_amplified_disks():
     assert np.isfinite(out).all() and np.all(out[:, 1] > 0.0)
 
 
-def test_cylinder_rims_and_pairs_have_the_status():
+def test_the_cylinder_and_the_modified_collision_have_the_status():
     disk = geo.Disk(1.0, 1e-4)
     wall = WALLS["islands"]
     cylinder = geo.collide_cylinder(disk, wall, 1e-2, *states(wall, disk, 1e-2, 100))
     assert cylinder.counts()["amplified"] > 0 and cylinder.escaped.all()
     modified = geo.collide_modified(disk, wall, 1e-2, *states(wall, disk, 1e-2, 60))
     assert modified.counts()["amplified"] > 0
+
+
+def test_pairs_with_many_contacts_of_round_satellites_have_the_status():
+    rng, n = np.random.default_rng(0), 12
+    body = geo.SatelliteDisk(geo.Disk(), 24, 0.02)
+    position, velocity = np.zeros((2, n, 2, 3))
+    position[:, 1, 0], position[:, :, 2] = 2.3, rng.random((n, 2))
+    velocity[:, 0, 0], velocity[:, 0, 1] = 1.0, rng.uniform(-0.3, 0.3, n)
+    velocity[:, :, 2] = rng.standard_normal((n, 2))
+    hit = geo.collide_pair(body, body, position, velocity)
+    amplified = hit.status == AMPLIFIED
+    assert hit.escaped.all() and amplified.any() and not amplified[hit.contacts <= 3].any()
+    assert hit.contacts[amplified].min() > 3 and np.isfinite(hit.position).all()
 
 
 def test_repeats_begin_with_fewer_contacts_where_walls_bend_and_inertias_are_small():

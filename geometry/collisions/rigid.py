@@ -149,7 +149,7 @@ def collide(
         return results
 
     bend = (largest_bend(ground) + eps) * (wall.period + wall.depth)
-    results = marked(collided, (at, moving), disk, bend, (eps, ring.spacing))
+    results = marked(collided, (at, moving), disk, bend, (eps, ring.reach))
     for array in results:
         array.setflags(write=False)
     return RigidCollision(*results)
