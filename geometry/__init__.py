@@ -9,6 +9,7 @@ from ..verification.identity import verify
 from .cells.hollow import Hollow
 from .cells.measured import Profile
 from .cells.profile import read_profile
+from .collisions.amplification import DiskStatus
 from .collisions.configuration_space import ConfigurationSpace
 from .collisions.cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
 from .collisions.pair import PairCollision, collide_pair
@@ -61,6 +62,7 @@ __all__ = [
     "Curve",
     "CylinderCollision",
     "Disk",
+    "DiskStatus",
     "HeightCorrelation",
     "Hollow",
     "InnerDisk",

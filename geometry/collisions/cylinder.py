@@ -13,18 +13,19 @@ from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk
 from ..tracing.threads import in_blocks
-from ..tracing.tracing import MAX_COLLISIONS, StatusCounts
+from ..tracing.tracing import MAX_COLLISIONS
 from ..walls.wall import Wall
+from .amplification import DiskCounts
 from .configuration_space import ConfigurationSpace
-from .records import Rolling, ground_of, mass_fractions, position_rounding, results_for
-from .rigid import at_the_tops, check_kinds, checked_states, collide, from_the_tops
+from .records import DiskResults, Rolling, ground_of, largest_bend, mass_fractions, position_rounding, results_for
+from .rigid import at_the_tops, check_kinds, checked_states, collide, from_the_tops, marked
 
 # Newton steps on a convex function: at worst a step halves the error, near the root it squares the error.
 LANDING_STEPS = 80
 
 
 @dataclass(frozen=True)
-class CylinderCollision(StatusCounts):
+class CylinderCollision(DiskCounts):
     """The results of `collide_cylinder` for n disks.
 
     Attributes
@@ -37,7 +38,7 @@ class CylinderCollision(StatusCounts):
         The time from height 0 to height 0.
     contacts : array of int, shape (n,)
     status : array of int, shape (n,)
-        Values of `Status`.
+        Values of `DiskStatus`.
     """
 
     position: Floats
@@ -104,23 +105,28 @@ def collide_cylinder(
     eps = positive_number("scale", scale)
     at, moving = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
-    start = at_the_tops(wall, eps, at, moving)
-    n = len(at)
-    results, ground, masses = results_for(n), ground_of(wall.scene), mass_fractions(disk)
+    ground, masses = ground_of(wall.scene), mass_fractions(disk)
     rolling = Rolling(eps, wall.cell.depth, position_rounding(wall.scene, 0.0))
 
-    def run(part: slice) -> None:
-        roll_disks(start[part], moving[part], masses, rolling, max_contacts, ground, results.part(part))
+    def collided(at: Floats, moving: Floats) -> DiskResults:
+        start, results = at_the_tops(wall, eps, at, moving), results_for(len(at))
 
-    in_blocks(run, n, threads, stop=ground.stop)
-    from_the_tops(wall, eps, at, start, moving, results)
+        def run(part: slice) -> None:
+            roll_disks(start[part], moving[part], masses, rolling, max_contacts, ground, results.part(part))
+
+        in_blocks(run, len(at), threads, stop=ground.stop)
+        from_the_tops(wall, eps, at, start, moving, results)
+        return results
+
+    bend = largest_bend(ground) * (wall.period + wall.depth)
+    results = marked(collided, (at, moving), disk, bend, (eps, eps))
     for array in results:
         array.setflags(write=False)
     return CylinderCollision(results.position, results.velocity, results.time, results.contacts, results.status)
 
 
 @dataclass(frozen=True)
-class ModifiedCollision(StatusCounts):
+class ModifiedCollision(DiskCounts):
     """The results of `collide_modified` for n disks.
 
     Attributes
@@ -138,7 +144,7 @@ class ModifiedCollision(StatusCounts):
         within the depth of the wall; and v2 > J^(-1/2) sin(rho/2) for unit velocities, so eta is one to one. There K~
         is an involution. Elsewhere the values follow from the same formulas without a guarantee.
     status : array of int, shape (n,)
-        Values of `Status`, from the true collision.
+        Values of `DiskStatus`, from the true collision.
     """
 
     position: Floats

@@ -12,7 +12,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..disk.disk import Disk
-from ..disk.rim import Features
+from ..disk.rim import Features, SatelliteDisk
 from ..tracing.tracing import Status
 
 MAX_CONTACTS, MAX_STEPS = 1000, 100_000
@@ -185,6 +185,12 @@ class Encounter:
             if disk is not None:
                 moving[:2] += sign * impulse / disk.mass * normal
                 moving[2] += sign * impulse * lever / disk.inertia
+
+
+def largest_bend_of(*bodies: SatelliteDisk) -> float:
+    """Return the largest curvature of round satellites of bodies, 0 for points."""
+    sizes = np.concatenate([body.sizes for body in bodies])
+    return float((1.0 / sizes[sizes > 0.0]).max(initial=0.0))
 
 
 def _is_same(one: Contact, other: Contact, tolerance: float) -> bool:

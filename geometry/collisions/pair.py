@@ -11,12 +11,12 @@ from ...core.checks import Floats, finite_array, instance, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
 from ..disk.rim import Features, SatelliteDisk
-from ..tracing.tracing import StatusCounts
-from .encounter import MAX_CONTACTS, TOUCHING, Encounter
+from .amplification import DiskCounts, DiskStatus, fewest_contacts, mark_amplified
+from .encounter import MAX_CONTACTS, TOUCHING, Encounter, largest_bend_of
 
 
 @dataclass(frozen=True)
-class PairCollision(StatusCounts):
+class PairCollision(DiskCounts):
     """The results of `collide_pair` for n pairs.
 
     Attributes
@@ -28,8 +28,9 @@ class PairCollision(StatusCounts):
         The time of the last contact.
     contacts : array of int, shape (n,)
     status : array of int, shape (n,)
-        Values of `Status`. ``ESCAPED``: the disks separate, or never meet. ``CORNER``: two contacts at once, whose
+        Values of `DiskStatus`. ``ESCAPED``: the disks separate, or never meet. ``CORNER``: two contacts at once, whose
         order double precision does not resolve. ``BOUNCE_LIMIT``: more contacts, or more steps, than allowed.
+        ``AMPLIFIED``: the disks separate, but rounding may have changed the final state by more than 1e-6.
     """
 
     position: Floats
@@ -63,7 +64,7 @@ def collide_pair(
     velocity : array_like, shape (n, 2, 3)
         (v1, v2, omega) of both disks.
     max_contacts : int
-        Pairs with more contacts end with ``Status.BOUNCE_LIMIT``.
+        Pairs with more contacts end with ``DiskStatus.BOUNCE_LIMIT``.
 
     Returns
     -------
@@ -102,9 +103,25 @@ def collide_pair(
     at, moving = finite_array("position", position).copy(), finite_array("velocity", velocity).copy()
     if at.ndim != 3 or at.shape[1:] != (2, 3) or moving.shape != at.shape:
         raise InputError(f"position, velocity: expected two arrays of shape (n, 2, 3), got {at.shape}, {moving.shape}")
+    states = at.reshape(-1, 6).copy(), moving.reshape(-1, 6).copy()
     results = [_encounter(first, second, x, w).run(max_contacts) for x, w in zip(at, moving, strict=True)]
     time, contacts, status = (np.array([result[k] for result in results]) for k in range(3))
     arrays = (at, moving, time.astype(np.float64), contacts.astype(np.int64), status.astype(np.uint8))
+
+    def again(rows: NDArray[np.intp], x: Floats, w: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        x, w, escaped = x.reshape(-1, 2, 3), w.reshape(-1, 2, 3), np.zeros(len(rows), dtype=bool)
+        for k, row in enumerate(rows):
+            elapsed, _, outcome = _between(first, second, x[k], w[k]).run(max_contacts)
+            # at the same time
+            x[k] += (time[row] - elapsed) * w[k]
+            escaped[k] = outcome == DiskStatus.ESCAPED
+        return x.reshape(-1, 6), w.reshape(-1, 6), escaped
+
+    spacing, ends = max(first.spacing, second.spacing), (at.reshape(-1, 6), moving.reshape(-1, 6))
+    masses = np.array([m for body in (first, second) for m in (body.disk.mass, body.disk.mass, body.disk.inertia)])
+    ratio = max(body.disk.mass / body.disk.inertia for body in (first, second))
+    doubtful = contacts >= fewest_contacts(spacing * (1.0 + largest_bend_of(first, second)), ratio)
+    mark_amplified(again, states, ends, arrays[-1], doubtful, (spacing, masses))
     for array in arrays:
         array.setflags(write=False)
     return PairCollision(*arrays)
@@ -142,14 +159,19 @@ class _TwoRims:
         return bool(closing >= 0.0 or across > self.span * speed)
 
 
+def _between(first: SatelliteDisk, second: SatelliteDisk, position: Floats, velocity: Floats) -> Encounter:
+    radii = first.largest, second.largest
+    return Encounter((first.disk, second.disk), radii, _TwoRims(first, second), position, velocity)
+
+
 def _encounter(first: SatelliteDisk, second: SatelliteDisk, position: Floats, velocity: Floats) -> Encounter:
-    around = _TwoRims(first, second)
     apart = float(np.hypot(*(position[0, :2] - position[1, :2])))
     # rims with edges must not even be within the reach of their tips, where points may be between edges
     least = sum(body.largest if body.joined else float(body.radii.max()) for body in (first, second))
     if apart < least:
         raise InputError(f"position: expected disks whose rims do not cross, got centres at distance {apart:.6g}")
-    encounter = Encounter((first.disk, second.disk), (first.largest, second.largest), around, position, velocity)
+    encounter = _between(first, second, position, velocity)
+    around = encounter.around
     one, two = around.near(position)
     between = (position[0, :2] - position[1, :2]) + one.arms[:, np.newaxis] - two.arms[np.newaxis, :]
     gaps = np.hypot(between[..., 0], between[..., 1]) - one.sizes[:, np.newaxis] - two.sizes[np.newaxis, :]

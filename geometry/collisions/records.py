@@ -30,9 +30,10 @@ from ..scene.columns import (
     RIGHT,
     SIZE,
     STARTS_LINE,
+    STRETCH,
 )
 from ..tracing.threads import new_flag
-from .compiled.graph_table import graphs_of
+from .compiled.graph_table import LEAST_BEND, MOST_BEND, graphs_of
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -130,6 +131,13 @@ def ground_of(scene: Scene) -> Ground:
     return Ground(
         scene.cell, scene.is_open, hollows, scene.joints, lines, table, exact_arcs, beziers, graphs, new_flag()
     )
+
+
+def largest_bend(ground: Ground) -> float:
+    """Return an upper bound on the curvature of the wall's pieces."""
+    arcs = np.abs(ground.arcs[:, CURVATURE]) * np.maximum(ground.arcs[:, STRETCH], 1.0) ** 2
+    bends = np.abs(ground.graphs[:, [LEAST_BEND, MOST_BEND]])
+    return float(max(arcs.max(initial=0.0), bends.max(initial=0.0)))
 
 
 def is_convex(ground: Ground) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,16 +15,17 @@ from ...core.kinds import explained
 from ..disk.disk import Disk
 from ..disk.satellites import Satellites
 from ..tracing.threads import in_blocks
-from ..tracing.tracing import MAX_COLLISIONS, Status, StatusCounts
+from ..tracing.tracing import MAX_COLLISIONS, Status
 from ..walls.wall import Wall
-from .records import DiskResults, Ground, Ring, ground_of, is_convex, mass_fractions, results_for, ring_of
+from .amplification import DiskCounts, fewest_contacts, mark_amplified
+from .records import DiskResults, Ground, Ring, ground_of, is_convex, largest_bend, mass_fractions, results_for, ring_of
 
 # Mass fractions, satellites, limit on contacts, wall.
 Constants = tuple[tuple[float, float], Ring, int, Ground]
 
 
 @dataclass(frozen=True)
-class RigidCollision(StatusCounts):
+class RigidCollision(DiskCounts):
     """The results of `collide` for n disks.
 
     Attributes
@@ -39,8 +41,9 @@ class RigidCollision(StatusCounts):
     two_satellites : array of bool, shape (n,)
         Whether more than one satellite touched the wall.
     status : array of int, shape (n,)
-        Values of `Status`. ``ESCAPED``: the disk came back to x2 = 0. ``CORNER`` and ``GRAZING``: double precision does
-        not resolve a contact, for example two simultaneous contacts. ``BOUNCE_LIMIT``: the disk did not come back.
+        Values of `DiskStatus`. ``ESCAPED``: the disk came back to x2 = 0. ``CORNER`` and ``GRAZING``: double precision
+        does not resolve a contact, for example two simultaneous contacts. ``BOUNCE_LIMIT``: the disk did not come back.
+        ``AMPLIFIED``: the disk came back, but rounding may have changed its outgoing state by more than 1e-6.
     """
 
     position: Floats
@@ -86,7 +89,7 @@ def collide(
         rho, 2 pi over a whole number; by default the least spacing of at least eps^0.4 at which no three satellites
         reach the wall.
     max_contacts : int
-        Disks still near the wall after ``max_contacts`` contacts end with ``Status.BOUNCE_LIMIT``.
+        Disks still near the wall after ``max_contacts`` contacts end with ``DiskStatus.BOUNCE_LIMIT``.
     threads : int, optional
         Number of threads, by default one for each processor that the process may use. The result does not depend on
         it.
@@ -109,6 +112,11 @@ def collide(
     cell is one convex hollow, as of triangular teeth or focusing arcs, 16 disks at once take 0.1 microseconds per
     contact.
 
+    Disks with many contacts, the fewer the larger m/J and the curvature of the wall, collide again from incoming states
+    that differ by rounding; where the outgoing states differ by more than 1e-7 the status is ``AMPLIFIED``. The state
+    is that of a path that obeys the laws within rounding. So laws and means over many disks count it as any other, and
+    ``escaped`` includes it. It must not be compared with another computation of the same disk.
+
     Source: Rudzis 2022, sections 1.3.1 to 1.3.5, and Proposition 3.2 with the angle alpha + j rho (eq. 3.26 prints
     alpha - j rho).
 
@@ -126,21 +134,49 @@ def collide(
     ring = ring_of(Satellites.around(eps, eps * wall.depth, spacing), eps, wall.scene)
     at, moving = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
-    start = at_the_tops(wall, eps, at, moving)
-    n = len(at)
-    results = results_for(n)
     ground = ground_of(wall.scene)
     constants = mass_fractions(disk), ring, max_contacts, ground
     collide_block = _in_waves if is_convex(ground) else _one_by_one
 
-    def run(part: slice) -> None:
-        collide_block(start[part], moving[part], constants, results.part(part))
+    def collided(at: Floats, moving: Floats) -> DiskResults:
+        start, results = at_the_tops(wall, eps, at, moving), results_for(len(at))
 
-    in_blocks(run, n, threads, stop=ground.stop)
-    from_the_tops(wall, eps, at, start, moving, results)
+        def run(part: slice) -> None:
+            collide_block(start[part], moving[part], constants, results.part(part))
+
+        in_blocks(run, len(at), threads, stop=ground.stop)
+        from_the_tops(wall, eps, at, start, moving, results)
+        return results
+
+    bend = (largest_bend(ground) + eps) * (wall.period + wall.depth)
+    results = marked(collided, (at, moving), disk, bend, (eps, ring.reach))
     for array in results:
         array.setflags(write=False)
     return RigidCollision(*results)
+
+
+def marked(
+    collided: Callable[[Floats, Floats], DiskResults],
+    states: tuple[Floats, Floats],
+    disk: Disk,
+    bend: float,
+    sizes: tuple[float, float],
+) -> DiskResults:
+    """Return the results of disks from ``states``, amplified ones marked.
+
+    ``bend`` is that of `fewest_contacts`; ``sizes`` are those of x1 and alpha for rounding errors.
+    """
+    results, masses = collided(*states), np.array([disk.mass, disk.mass, disk.inertia])
+    doubtful = results.contacts >= fewest_contacts(bend, disk.mass / disk.inertia)
+
+    def again(rows: NDArray[np.intp], at: Floats, moving: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        moving[:, 1] = np.minimum(moving[:, 1], 0.5 * states[1][rows, 1])
+        there = collided(at, moving)
+        return there.position, there.velocity, there.status == Status.ESCAPED
+
+    ends = results.position, results.velocity
+    mark_amplified(again, states, ends, results.status, doubtful, (np.array(sizes), masses))
+    return results
 
 
 def _one_by_one(start: Floats, moving: Floats, constants: Constants, results: DiskResults) -> None:

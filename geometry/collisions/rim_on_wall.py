@@ -13,9 +13,9 @@ from ...core.kinds import explained
 from ..disk.rim import Features, SatelliteDisk
 from ..tracing.tracing import Status
 from ..walls.wall import Wall
-from .encounter import MAX_CONTACTS, Encounter
-from .records import results_for
-from .rigid import RigidCollision, checked_states
+from .encounter import MAX_CONTACTS, Encounter, largest_bend_of
+from .records import DiskResults, results_for
+from .rigid import RigidCollision, checked_states, marked
 
 # No step moves a point by more than this part of a period, so that it stays in the cells that are looked at.
 STRIDE = 0.5
@@ -53,7 +53,7 @@ def collide_rim(
     velocity : array_like, shape (n, 3)
         Incoming (v1, v2, omega) with v2 < 0.
     max_contacts : int
-        Disks with more contacts end with ``Status.BOUNCE_LIMIT``.
+        Disks with more contacts end with ``DiskStatus.BOUNCE_LIMIT``.
 
     Returns
     -------
@@ -91,22 +91,28 @@ def collide_rim(
     whole_number("max_contacts", max_contacts, 1)
     at, moving = checked_states(position, velocity)
     around = _AboveWall(body, wall, eps)
-    results = results_for(len(at))
-    for k, (x, w) in enumerate(zip(at, moving, strict=True)):
-        # the wall is the second body and stands still; alpha counts from the lowest point
-        moved = math.floor(x[0] / around.period) * around.period
-        state = np.array([[x[0] - moved, 0.0, x[1] - 0.5 * math.pi], [0.0, 0.0, 0.0]])
-        speeds = np.array([w, [0.0, 0.0, 0.0]])
-        encounter = Encounter((body.disk, None), (body.largest, 0.0), around, state, speeds)
-        time, contacts, status = encounter.run(max_contacts)
-        rest = -state[0, 1] / speeds[0, 1] if status == Status.ESCAPED else 0.0
-        end = state[0] + rest * speeds[0]
-        results.position[k] = end[0] + moved, end[2] + 0.5 * math.pi
-        results.velocity[k], results.time[k] = speeds[0], time + rest
-        results.contacts[k], results.status[k] = contacts, status
-        apart = np.array(encounter.angles)[:, np.newaxis] - body.turns
-        nearest = np.argmax(np.cos(apart), axis=1)
-        results.two_satellites[k] = len(set(nearest.tolist())) > 1
+
+    def collided(at: Floats, moving: Floats) -> DiskResults:
+        results = results_for(len(at))
+        for k, (x, w) in enumerate(zip(at, moving, strict=True)):
+            # the wall is the second body and stands still; alpha counts from the lowest point
+            moved = math.floor(x[0] / around.period) * around.period
+            state = np.array([[x[0] - moved, 0.0, x[1] - 0.5 * math.pi], [0.0, 0.0, 0.0]])
+            speeds = np.array([w, [0.0, 0.0, 0.0]])
+            encounter = Encounter((body.disk, None), (body.largest, 0.0), around, state, speeds)
+            time, contacts, status = encounter.run(max_contacts)
+            rest = -state[0, 1] / speeds[0, 1] if status == Status.ESCAPED else 0.0
+            end = state[0] + rest * speeds[0]
+            results.position[k] = end[0] + moved, end[2] + 0.5 * math.pi
+            results.velocity[k], results.time[k] = speeds[0], time + rest
+            results.contacts[k], results.status[k] = contacts, status
+            apart = np.array(encounter.angles)[:, np.newaxis] - body.turns
+            nearest = np.argmax(np.cos(apart), axis=1)
+            results.two_satellites[k] = len(set(nearest.tolist())) > 1
+        return results
+
+    bend = eps * (wall.period + wall.depth) * (1.0 + largest_bend_of(body))
+    results = marked(collided, (at, moving), body.disk, bend, (eps, body.spacing))
     for array in results:
         array.setflags(write=False)
     return RigidCollision(*results)

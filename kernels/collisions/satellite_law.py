@@ -25,6 +25,8 @@ MOST_DRAWS = 20
 class SatelliteLaw:
     """The collision law K^{Sigma, eps} of the true disk, with x1 uniform in a cell and alpha in one spacing.
 
+    Disks of status ``DiskStatus.AMPLIFIED`` count as all others that escape.
+
     Parameters
     ----------
     wall : Wall
