@@ -7,8 +7,9 @@ import pytest
 from benchmarks.ledger_mutants import Mutant, changes, judged, library, mutants_of, noticed
 
 from asperity.geometry.disk import disk, rolling
+from asperity.ledger import Formula, verified
 from asperity.ledger import index as ledger
-from asperity.verification import Formula, agreement, verified
+from asperity.verification import agreement
 from equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 
 ROWS = {entry.id: entry for entry in ledger.entries() if entry.check is not None}
