@@ -8,12 +8,9 @@ from typing import Any
 
 from ..core.checks import positive_number
 from ..core.errors import InputError
-from .verdict import Verdict, every
+from .verdict import Verdict
 
 TIME_LIMIT = 10.0
-# Points at which both sides are compared before a proof is sought: for an equality, and for an inequality.
-POINTS = 24
-MORE_POINTS = 60
 
 
 def verify(
@@ -84,25 +81,12 @@ def verify(
     else:
         claims, given = _equations(sp, lhs, rhs), assumptions
     if time_limit is None:
+        from .derivation import decide
+
         return decide(claims, _relations(sp, given))
     from .worker import decide_in_time
 
     return decide_in_time(claims, _relations(sp, given), positive_number("time_limit", time_limit))
-
-
-def decide(claims: list[tuple[Any, Any, str]], relations: list[Any]) -> Verdict:
-    """The verdict on claims (left, right, "==", "<=" or "<") under the same assumptions."""
-    from .balls import Unclear
-
-    verdicts = []
-    for claim in claims:
-        try:
-            verdicts.append(_decided(*claim, relations))
-        except Unclear:
-            verdicts.append(Verdict("undecided", "two numbers could not be told apart"))
-        if verdicts[-1].answer == "refuted":
-            break
-    return every(*verdicts)
 
 
 def _are_relations(sp: Any, side: Any) -> bool:
@@ -169,51 +153,3 @@ def _relations(sp: Any, assumptions: Any) -> list[Any]:
         return [_exact(sp, "assumptions", one) for one in given]
     except TypeError as reason:
         raise InputError(f"assumptions: expected relations, got {reprlib.repr(assumptions)}") from reason
-
-
-def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Verdict:
-    import sympy as sp
-
-    from .constants import written
-    from .derivation import EXPANSION, Derivation, expands_to_zero
-    from .domain import Domain
-    from .integrals import UNFINISHED, prepared
-    from .refutation import Search
-
-    symbols = set().union(*(part.free_symbols for part in (left, right, *assumptions)))
-    real = {symbol: _as_real(sp, symbol) for symbol in symbols}
-    relations = [written(given, real) for given in assumptions]
-    domain = Domain.of(real.values(), relations)
-    as_written = [written(side, real) for side in (left, right)]
-    left, right = (prepared(side) for side in as_written)
-    # what is not real or not finished as it is written is searched as it is prepared
-    first, second = (
-        side if as_it_is.has(sp.I, *UNFINISHED) else as_it_is
-        for side, as_it_is in zip((left, right), as_written, strict=True)
-    )
-    search = Search(first, second, relation, domain)
-    derivation = Derivation(left, right, relation, search.refutation, search.deciding)
-    expands = relation == "==" and expands_to_zero(left - right)
-    found = search.refutation(domain, POINTS if relation == "==" else MORE_POINTS, until_defined=expands)
-    if expands and found is None and search.defined:
-        return Verdict("proved", EXPANSION)
-    if not search.tried:
-        raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, assumptions))}")
-    if found is None:
-        found = derivation.verdict(domain)
-    if search.undefined == search.tried or (found is not None and found.answer == "proved" and not derivation.methods):
-        raise InputError(
-            f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {as_written[0]} and "
-            f"{as_written[1]}, and at each of {search.tried} points one of them is not"
-        )
-    if found is None:
-        found = Verdict("undecided", f"no counterexample among {search.tried} points, and {derivation.reason}")
-    names = {str(stand_in): str(symbol) for symbol, stand_in in real.items()}
-    point = {names.get(name, name): value for name, value in found.counterexample.items()}
-    return Verdict(found.answer, found.evidence, point, found.values)
-
-
-def _as_real(sp: Any, symbol: Any) -> Any:
-    if symbol.is_real is False:
-        raise InputError(f"{symbol}: expected a real symbol, because identities are verified over the real numbers")
-    return symbol if symbol.is_real else sp.Dummy(symbol.name, **{**symbol._assumptions_orig, "real": True})

@@ -26,7 +26,7 @@ START_SECONDS = 120.0
 # Seconds after the time limit at which the process ends itself.
 GRACE = 5.0
 _COMMAND = (
-    "import sys; sys.path[:] = {path!r}; from asperity.verification.identity import decide; "
+    "import sys; sys.path[:] = {path!r}; from asperity.verification.derivation import decide; "
     "from asperity.verification.worker import serve; serve({handle}, decide)"
 )
 
@@ -73,7 +73,7 @@ _worker: _Worker | None = None
 
 
 def decide_in_time(claims: list[Any], relations: list[Any], seconds: float) -> Verdict:
-    """The verdict of `identity.decide`, or *undecided* after ``seconds``."""
+    """The verdict of `derivation.decide`, or *undecided* after ``seconds``."""
     global _worker
     try:
         question = _pickled((claims, relations, seconds))
