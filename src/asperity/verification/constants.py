@@ -7,6 +7,7 @@ irrational constant is a symbol, about which sympy knows what balls show and not
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
@@ -29,9 +30,12 @@ def unevaluated(function: Any, args: Any) -> Any:
     return function(*args, evaluate=False) if issubclass(function, kinds) else function(*args)
 
 
-def without_evaluation(e: Any) -> Any:
-    """How pickle is to store an object: an expression by its arguments, another as usual."""
-    return (unevaluated, (e.func, e.args)) if isinstance(e, sp.Basic) and e.args else NotImplemented
+class Pickler(pickle.Pickler):
+    """Stores expressions as they are written: sympy's own pickles are evaluated when they are read."""
+
+    def reducer_override(self, e: Any) -> Any:
+        """An expression by its arguments, another object as usual."""
+        return (unevaluated, (e.func, e.args)) if isinstance(e, sp.Basic) and e.args else NotImplemented
 
 
 def written(e: Any, names: Mapping[Any, Any]) -> Any:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import io
+import pickle
 import reprlib
 from collections.abc import Iterable, Mapping
+from importlib import import_module
 from typing import Any
 
 from ..core.checks import positive_number
+from ..core.child import ChildCrashed, ChildProcess, OutOfTime
 from ..core.errors import InputError
 from .verdict import Verdict
 
@@ -41,14 +45,14 @@ def verify(
     Verdict
             ``"proved"`` rests on an exact derivation. ``"refuted"`` has a counterexample: an exact point that meets the
             assumptions and at which both sides are defined. Balls that contain the two values show that the relation
-            fails. ``"undecided"`` names the reason.
+            fails. ``"undecided"`` names the reason; integrals, derivatives, sums and limits are not evaluated.
 
     Raises
     ------
     InputError
             If a side or an assumption is text or another object than these, the shapes differ, an assumption is not an
-            inequality, no point meets the assumptions, or at each examined point of the domain one side is undefined or
-            not real.
+            inequality, a side has the imaginary unit, no point meets the assumptions, or at each examined point of the
+            domain one side is undefined or not real.
 
     Notes
     -----
@@ -80,13 +84,56 @@ def verify(
         claims, given = _relations_as_claims(sp, lhs), assumptions if rhs is None else rhs
     else:
         claims, given = _equations(sp, lhs, rhs), assumptions
-    if time_limit is None:
-        from .derivation import decide
+    if time_limit is not None:
+        return _decided_in_time(claims, _relations(sp, given), positive_number("time_limit", time_limit))
+    from .derivation import decide
 
-        return decide(claims, _relations(sp, given))
-    from .worker import decide_in_time
+    return decide(claims, _relations(sp, given))
 
-    return decide_in_time(claims, _relations(sp, given), positive_number("time_limit", time_limit))
+
+def _decided_in_time(claims: list[Any], relations: list[Any], seconds: float) -> Verdict:
+    """The verdict of `derivation.decide` in a process, or *undecided* after ``seconds``."""
+    from .constants import Pickler
+
+    question = io.BytesIO()
+    try:
+        Pickler(question).dump((claims, relations))
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise InputError(
+            f"lhs, rhs: expected expressions that can be pickled ({error}); pass time_limit=None"
+        ) from error
+    try:
+        return Verdict(*_child.call(_answer, question.getvalue(), seconds=seconds))
+    except OutOfTime:
+        return Verdict("undecided", f"the time limit of {seconds:g} s was reached")
+    except ChildCrashed as error:
+        raise RuntimeError("the process that verifies identities has ended; pass time_limit=None") from error
+
+
+def _load() -> None:
+    import_module(".derivation", __package__)
+
+
+# It starts with the first question, in about a second.
+_child = ChildProcess(_load)
+
+
+def _answer(question: bytes) -> tuple[Any, ...]:
+    """The parts of a verdict; in the other process."""
+    from .derivation import decide
+
+    try:
+        claims, relations = pickle.loads(question)
+    except Exception as error:
+        raise InputError(f"lhs, rhs: expected expressions of sympy ({error}); pass time_limit=None") from error
+    try:
+        found = decide(claims, relations)
+    except InputError:
+        raise
+    except Exception as error:
+        # some errors of sympy cannot be pickled
+        raise RuntimeError(f"{type(error).__name__}: {error}") from error
+    return found.answer, found.evidence, dict(found.counterexample), found.values
 
 
 def _are_relations(sp: Any, side: Any) -> bool:
