@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -172,13 +173,14 @@ class Domain:
             bound = _positive(relation) + Interval.of(-form[1])
             box[symbol] &= bound * (1 / coefficient)
         box = {s: interval.between_integers() if s.is_integer else interval for s, interval in box.items()}
-        if any(one.is_empty or _values(s, one) == [] for s, one in box.items()):
+        domain = cls(box, tuple(conditions), box)
+        if any(one.is_empty or _values(s, one) == [] for s, one in box.items()) or domain._by_distances is None:
             integers = ", ".join(str(s) for s in every if s.is_integer)
             raise InputError(
                 f"assumptions: no point meets {', '.join(map(str, relations)) or 'them'}"
                 + (f" ({integers} integer)" if integers else "")
             )
-        return cls(box, tuple(conditions), box)
+        return domain
 
     def enclosure(self, expression: Any) -> Interval | None:
         """All values of a linear expression in the symbols that vary; None for another expression."""
@@ -225,16 +227,22 @@ class Domain:
         box[distance] = found & positive
         return part.fixed(symbol, sp.expand(symbol + (distance - difference) / form[0][symbol]))
 
-    def faces(self) -> list[Domain] | None:
-        """Open parts whose union contains the domain: the interior first, then the faces; None if there are too many.
-
-        An integer with few values gives one part for each value.
-        """
+    @cached_property
+    def _by_distances(self) -> Domain | None:
+        """The domain with symbols written by their distances from others; None if it is known to be empty."""
         whole: Domain | None = self
         for relation in self.conditions:
             if whole is not None and _form(relation) is not None:
                 difference = (relation.gts - relation.lts).xreplace(dict(whole.values))
                 whole = whole.where(sp.expand(difference), _positive(relation))
+        return whole
+
+    def faces(self) -> list[Domain] | None:
+        """Open parts whose union contains the domain: the interior first, then the faces; None if there are too many.
+
+        An integer with few values gives one part for each value.
+        """
+        whole = self._by_distances
         if whole is None:
             return []
         choices: list[list[tuple[Any, Any]]] = []
