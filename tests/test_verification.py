@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 import time
 
 import mpmath
@@ -377,6 +380,31 @@ def test_the_time_limit_holds_and_the_next_question_is_answered():
     assert verdict.answer == "undecided" and "time limit" in verdict.evidence
     assert time.perf_counter() - start < 30.0
     assert verify(sp.sin(x) ** 2, 1 - sp.cos(x) ** 2).answer == "proved"
+
+
+def test_a_script_without_a_guard_runs_once_and_leaves_no_process(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import sympy\n"
+        "from asperity.verification import identity\n"
+        "x = sympy.Symbol('x', real=True)\n"
+        "print(identity.verify(sympy.sin(x) ** 2, 1 - sympy.cos(x) ** 2).answer, identity._child._process.pid)\n"
+    )
+    command, environment = [sys.executable, str(script)], {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment, timeout=120)
+    answer, process = done.stdout.split()
+    assert answer == "proved"
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(process), 0)
+
+
+def test_a_copy_of_this_process_starts_a_process_of_its_own():
+    assert verify(sp.sin(x) ** 2, 1 - sp.cos(x) ** 2).answer == "proved"
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if verify(sp.Abs(x), x, x > 0).answer == "proved" else 1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert verify(sp.Abs(x), x).answer == "refuted"
 
 
 def test_questions_that_cannot_be_asked_are_refused_in_words():
