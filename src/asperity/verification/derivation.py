@@ -147,4 +147,4 @@ def _equal(left: Any, right: Any, part: Part) -> str | None:
     difference = left - right
     if expands_to_zero(difference):
         return EXPANSION
-    return NORMAL_FORM if vanishes(difference, part.plain) or vanishes(difference, part.parameters) else None
+    return NORMAL_FORM if vanishes(difference, part.parameters) else None

@@ -118,14 +118,10 @@ def sign_in(e: Any) -> Signs:
 
 
 class Parameters:
-    """The parameters that replace the symbols of a domain; all expressions of a part share them.
+    """The parameters that replace the symbols of a domain; all expressions of a part share them."""
 
-    Without ``half_angles`` every angle is a pair (c, s): fewer signs are known, but polynomials stay short.
-    """
-
-    def __init__(self, domain: Domain, half_angles: bool) -> None:
+    def __init__(self, domain: Domain) -> None:
         self._domain = domain
-        self._half_angles = half_angles
         self._numbers: dict[Any, Any] = {}
         self._opaque: dict[Any, Any] = {}
         self._angles: dict[Any, tuple[Any, Any]] = {}
@@ -231,7 +227,7 @@ class Parameters:
             # half turns that move the interval between -pi and pi
             turns = sp.floor(low / sp.pi) + (1 if high - low > sp.pi else 0) if -sp.oo not in (low, -high) else 0
             low, high = low - turns * sp.pi, high - turns * sp.pi
-            if self._half_angles and is_below(-sp.pi, low, True) and is_below(high, sp.pi, True):
+            if is_below(-sp.pi, low, True) and is_below(high, sp.pi, True):
                 ends = (sp.tan(low / 2) if low != -sp.pi else -sp.oo, sp.tan(high / 2) if high != sp.pi else sp.oo)
                 t = _running(ends, unit)
                 sign = -1 if turns % 2 else 1

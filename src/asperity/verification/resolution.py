@@ -39,8 +39,7 @@ class Part:
             # every statement would hold on an empty part, and a proof says nothing of a closed end
             raise ValueError("expected an open part with points in it")
         self.domain = domain
-        self.plain = Parameters(domain, half_angles=False)
-        self.parameters = Parameters(domain, half_angles=True)
+        self.parameters = Parameters(domain)
         self._box = {s: interval(one.low, one.high, FEW_BITS) for s, one in domain.intervals.items()}
         self._known: dict[Any, Signs] = {}
         self._resolved: dict[Any, Any] = {}
