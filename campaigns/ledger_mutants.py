@@ -32,8 +32,8 @@ import asperity
 from asperity.core.tables import table
 from asperity.geometry.disk import disk, rolling
 from asperity.kernels.walls import circular_arc, triangular
+from asperity.ledger import Entry
 from asperity.ledger import index as ledger
-from asperity.verification import Entry
 from campaigns.judges.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 
 from .pages import print_table

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles, broadcast, finite_array
-from ...core.html import verbatim
 from ...core.kinds import explained
+from ...core.tables import verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

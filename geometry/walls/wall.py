@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, instance, numbers, positive_number
 from ...core.errors import InputError, WallError
-from ...core.html import html_table
 from ...core.kinds import explained, explained_class
+from ...core.tables import html_table
 from ..cells.cell import Cell
 from ..cells.measured import Profile
 from ..cells.miniature import wall_miniature

@@ -25,8 +25,8 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.html import html_table
 from ...core.kinds import explained, explained_class
+from ...core.tables import html_table
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.given import Vectorised, seed_by_name

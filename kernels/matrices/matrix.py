@@ -22,9 +22,9 @@ from ...core.checks import Floats, finite_array, finite_number, foreign, frozen,
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.frames import data_array, data_frame
-from ...core.html import html_table
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
+from ...core.tables import html_table
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, positive_number, whole_number
 from ...core.estimates import ErrorKind
 from ...core.frames import data_frame
-from ...core.html import html_table
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
+from ...core.tables import html_table
 from ...kernels import Basis, CollisionLaw, Composition, DensityLaw, Law, Legendre, Power, discretise
 from ...kernels.bases.measure import SINE
 from ...kernels.bases.panels import ONE_PANEL

@@ -12,9 +12,9 @@ from ...core.checks import Floats, frozen
 from ...core.errors import AccuracyError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.frames import data_frame
-from ...core.html import html_table
 from ...core.kinds import explained_class
 from ...core.rounding import EPS
+from ...core.tables import html_table
 from ...kernels import Basis, Bins, KernelMatrix
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
 from .dense import ExtremalEigenvalues, compressed, end_values

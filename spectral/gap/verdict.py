@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.estimates import Estimate, rounded
-from ...core.html import html_table
+from ...core.tables import html_table
 from ..eigenvalues.spectra import EIGENVALUE, Spectrum, Verdict
 from ..essential.edge import EssentialEdge
 from ..plotting import draw_eigenvalues

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.html import verbatim
+from ...core.tables import verbatim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,9 +13,8 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.frames import data_frame
-from ...core.html import verbatim
 from ...core.kinds import explained_class
-from ...core.tables import table
+from ...core.tables import table, verbatim
 from .machine import Machine
 from .order import FittedOrder, fit_order
 from .problem import ROUNDED, WorkMethod, WorkProblem

@@ -12,9 +12,10 @@ from click.testing import CliRunner
 
 from asperity import InputError
 from asperity.cli import main
+from asperity.ledger import Formula, by_reading, erratum, verified
 from asperity.ledger import index as ledger
 from asperity.ledger.text import latex_of, page_of, table_of
-from asperity.verification import Formula, Verdict, agreement, by_reading, erratum, verified
+from asperity.verification import Verdict, agreement
 
 ROWS = ledger.entries()
 MACHINE = [entry for entry in ROWS if entry.kind != "by reading"]

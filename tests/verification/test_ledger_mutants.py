@@ -8,8 +8,9 @@ from campaigns.judges.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LI
 from campaigns.ledger_mutants import Mutant, changes, judged, library, mutants_of, noticed
 
 from asperity.geometry.disk import disk, rolling
+from asperity.ledger import Formula, verified
 from asperity.ledger import index as ledger
-from asperity.verification import Formula, agreement, verified
+from asperity.verification import agreement
 
 ROWS = {entry.id: entry for entry in ledger.entries() if entry.check is not None}
 # How many mutants of a row are tried here; proofs take longer than numbers.

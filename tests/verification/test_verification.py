@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 import time
 
 import mpmath
@@ -19,7 +22,10 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.disk import symbolic as sym
 from asperity.verification import agreement, every, holds, no_excess
-from asperity.verification.balls import evaluate
+from asperity.verification.balls import Unclear, evaluate
+from asperity.verification.domain import Domain, Interval
+from asperity.verification.refutation import Search
+from asperity.verification.resolution import Part
 
 theta, psi, x, y = sp.symbols("theta psi x y", real=True)
 m, J, eps, rho = sp.symbols("m J epsilon rho", positive=True)
@@ -179,16 +185,13 @@ PROVED = {
     "a root where one symbol is larger": (sp.sqrt((x**2 - y**2) ** 2), x**2 - y**2, [x > y, y > 0]),
     "complementary arcs, where both are defined": (sp.asin(x) + sp.acos(x), pi / 2, []),
     "nested roots": (sp.sqrt(2 + sp.sqrt(3)), (sp.sqrt(6) + sp.sqrt(2)) / 2, []),
-    "an integral": (sp.Integral(t * sp.sin(t), (t, 0, x)), sp.sin(x) - x * sp.cos(x), []),
-    "an integral to infinity": (sp.Integral(sp.exp(-t), (t, 0, sp.oo)), 1, []),
-    "an integral up to a singular end": (sp.Integral(1 / sp.sqrt(t), (t, 0, 1)), 2, []),
     "steps": (sp.floor(x), 0, [x >= 0, x < 1]),
     "few integers": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 1, n <= 3]),
     "logarithms where both are defined": (sp.log(x**2), 2 * sp.log(x), []),
     "powers": (p ** (x + y), p**x * p**y, []),
     "geometric and arithmetic mean": (2 * sp.sqrt(p * q) <= p + q, None, ()),
 }  # fmt: skip
-# Undecided since the smaller prover; true: by a derivative, cuts at zeros of sines, parity, integrals between symbols.
+# Undecided, though true: by a derivative, cuts at zeros of sines, parity, integrals.
 UNDECIDED = {
     "complementary arctangents": (sp.atan(x) + sp.atan(1 / x), sp.pi / 2, [x > 0]),
     "atan2": (sp.atan2(p * sp.sin(x), p * sp.cos(x)), x, [x > -pi, x <= pi]),
@@ -197,6 +200,9 @@ UNDECIDED = {
         sp.atan(x) + sp.atan(y), sp.atan((x + y) / (1 - x * y)), [x > 0, y > 0, x * y < 1],
     ),
     "Machin's formula": (4 * sp.atan(sp.Rational(1, 5)) - sp.atan(sp.Rational(1, 239)), pi / 4, []),
+    "an integral": (sp.Integral(t * sp.sin(t), (t, 0, x)), sp.sin(x) - x * sp.cos(x), []),
+    "an integral to infinity": (sp.Integral(sp.exp(-t), (t, 0, sp.oo)), 1, []),
+    "an integral up to a singular end": (sp.Integral(1 / sp.sqrt(t), (t, 0, 1)), 2, []),
     "an integral between symbols": (sp.Integral(1 / t, (t, x, 2 * x)), sp.log(2), [x > 0]),
     "an odd number": (sp.floor(odd / 2), (odd - 1) / 2, []),
     "the parity of an integer": (sp.Abs(sp.sin(pi * n / 2)), (1 - (-1) ** n) / 2, []),
@@ -218,7 +224,6 @@ REFUTED = {
     "twice acos, on the other side": (2 * sp.acos(x), sp.acos(2 * x**2 - 1), [x >= -1, x <= 1]),
     "complementary arctangents, but for 0": (sp.atan(x) + sp.atan(1 / x), pi / 2, [sp.Ne(x, 0)]),
     "one integer of four": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 0, n <= 3]),
-    "an integral": (sp.Integral(sp.sqrt(1 - t**2), (t, 0, 1)), pi / 5, []),
     "the sine below its argument, everywhere": (sp.sin(x) <= x, None, ()),
     "a shifted square above a small number": (sp.Rational(1, 10**25) <= (3 * x + 1) ** 2, [x > -3, x <= 0], ()),
     "a square above a small number": (x**2 >= sp.Rational(1, 10**25), None, ()),
@@ -246,10 +251,99 @@ def test_what_fails_anywhere_is_refuted(name):
     assert verdict.values[0] != verdict.values[1] or "strict" in name
 
 
-def test_the_singular_ends_of_an_integral_are_not_passed_over():
-    # divergent, and 0 where it has no length
-    assert verify(sp.Integral(1 / t, (t, -1, 1)), 0).answer == "undecided"
-    assert verify(sp.Integral(1 / t, (t, x, 2 * x)), sp.log(2), [x >= 0]).answer != "proved"
+@pytest.fixture
+def blind(monkeypatch):
+    """The search for counterexamples sees nothing, so that only the proofs can be right or wrong."""
+    seen = Search._at
+    monkeypatch.setattr(Search, "_at", lambda self, point: [seen(self, point)].clear())
+
+
+@pytest.mark.parametrize("name", [*FALSE, *REFUTED])
+def test_no_proof_relies_on_the_search(name, blind):
+    # each fails on a closed end, on a diagonal, at a jump or beyond 1e-25
+    assert verify(*(FALSE | REFUTED)[name], time_limit=None).answer == "undecided"
+
+
+def test_a_proof_on_the_open_domain_says_nothing_of_a_closed_end(blind):
+    for lhs, rhs, opened, closed in [
+        (sp.sign(x), 1, [x > 0], [x >= 0]),
+        (sp.floor(x), 0, [x > 0, x < 1], [x > 0, x <= 1]),
+        (0 ** (x - y), 0, [x > y], [x >= y]),
+        (sp.sign(x - y), 1, [x > y, y > 0], [x >= y, y > 0]),
+    ]:
+        assert verify(lhs, rhs, opened, time_limit=None).answer == "proved"
+        assert verify(lhs, rhs, closed, time_limit=None).answer == "undecided"
+
+
+@pytest.mark.parametrize("bounds", [Interval(pi, sp.Integer(3)), Interval(pi, pi), Interval(pi, 4 * pi, True)])
+def test_a_part_is_open_and_has_points(bounds):
+    with pytest.raises(ValueError, match="open part with points"):
+        Part(Domain({x: bounds}, (), {x: bounds}))
+
+
+@pytest.mark.parametrize(
+    "relations",
+    [
+        [x > y, y >= 0],
+        [x >= y, x <= 1, y > -1],
+        [eps < rho / 4, rho < 3],
+        [2 * x + y > 1, x - y < 2, x < 3],
+        [x > y, y > t, t > x - 2],
+        [n >= 0, n <= 2, x > n],
+    ],
+)
+def test_the_parts_of_a_domain_contain_its_points(relations):
+    domain = Domain.of([], relations)
+    parts = domain.faces()
+    for point in domain.points(np.random.default_rng(0), 30):
+        assert any(_contains(part, point) for part in parts), point
+
+
+def _contains(part, point):
+    """Whether there are values in the intervals of a part at which its symbols have the values of a point."""
+    free = [s for s in part.intervals if s not in point]
+    known = {s: point[s] for s in part.intervals if s in point}
+    rest = [part.values[s].xreplace(known) - value for s, value in point.items() if s in part.values]
+    found = sp.solve(rest, free, dict=True) if rest and free else [{}] if not any(rest) else []
+    return bool(found) and all(part.intervals[s].contains(v) for s, v in {**known, **found[0]}.items())
+
+
+def test_a_function_that_jumps_and_is_not_resolved_is_opaque(blind):
+    u = sp.sin(x) + y
+    assert verify(sp.floor(u) + sp.sin(y) ** 2, sp.floor(u) + 1 - sp.cos(y) ** 2, time_limit=None).answer == "proved"
+    for jump in (sp.floor, sp.ceiling, sp.sign):
+        assert verify(jump(u + 1) * y, jump(1 + y + sp.sin(x)) * y, time_limit=None).answer == "proved"
+        assert verify(jump(u) + jump(-u), 0, time_limit=None).answer == "undecided" or jump is sp.sign
+        assert verify(jump(u), u, time_limit=None).answer == "undecided"
+
+
+@pytest.mark.parametrize("method", ["signs", "resolved"])
+def test_what_cannot_be_told_apart_is_undecided(method, monkeypatch):
+    def unclear(*_):
+        raise Unclear
+
+    monkeypatch.setattr(Part, method, unclear)
+    assert verify(sp.acos(sp.cos(x)), x, [x >= 0, x <= pi], time_limit=None).answer == "undecided"
+
+
+def test_a_counterexample_is_certainly_in_the_domain():
+    # the condition holds everywhere or nowhere, and no ball tells which; so no point is certain
+    root = sp.sqrt(2, evaluate=False)
+    unclear = sp.Gt(x**2 + root**2 - 2 - sp.exp(-sp.exp(20)), x**2, evaluate=False)
+    with pytest.raises(InputError, match="no point"):
+        verify(x, x + 1, [unclear], time_limit=None)
+
+
+def test_what_is_not_evaluated_is_undecided_and_the_evidence_says_so():
+    # the first diverges, the second fails where its interval has no length, the third is false
+    for lhs, rhs, assumptions in [
+        (sp.Integral(1 / t, (t, -1, 1)), 0, []),
+        (sp.Integral(1 / t, (t, x, 2 * x)), sp.log(2), [x >= 0]),
+        (sp.Integral(sp.sqrt(1 - t**2), (t, 0, 1)), pi / 5, []),
+        (sp.Derivative(sp.sin(x), x), sp.cos(x), []),
+    ]:
+        verdict = verify(lhs, rhs, assumptions)
+        assert verdict.answer == "undecided" and ".doit()" in verdict.evidence
 
 
 @pytest.mark.parametrize(
@@ -286,6 +380,31 @@ def test_the_time_limit_holds_and_the_next_question_is_answered():
     assert verdict.answer == "undecided" and "time limit" in verdict.evidence
     assert time.perf_counter() - start < 30.0
     assert verify(sp.sin(x) ** 2, 1 - sp.cos(x) ** 2).answer == "proved"
+
+
+def test_a_script_without_a_guard_runs_once_and_leaves_no_process(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import sympy\n"
+        "from asperity.verification import identity\n"
+        "x = sympy.Symbol('x', real=True)\n"
+        "print(identity.verify(sympy.sin(x) ** 2, 1 - sympy.cos(x) ** 2).answer, identity._child._process.pid)\n"
+    )
+    command, environment = [sys.executable, str(script)], {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment, timeout=120)
+    answer, process = done.stdout.split()
+    assert answer == "proved"
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(process), 0)
+
+
+def test_a_copy_of_this_process_starts_a_process_of_its_own():
+    assert verify(sp.sin(x) ** 2, 1 - sp.cos(x) ** 2).answer == "proved"
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if verify(sp.Abs(x), x, x > 0).answer == "proved" else 1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert verify(sp.Abs(x), x).answer == "refuted"
 
 
 def test_questions_that_cannot_be_asked_are_refused_in_words():

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.child import ChildCrashed, ChildProcess, OutOfTime
 from ..core.errors import InputError
 from ..spectral import WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
 from ..spectral.work_diagrams.machine import on_few_cores
@@ -19,8 +20,8 @@ from .quantities.collision import DISK, by_true_disks
 from .quantities.standard import QUANTITIES
 from .quantities.walls import scenes, standard_names, wall_of
 from .run import file_stem
-from .running.processes import ChildCrashed, ChildProcess, OutOfTime, TimePlan
 from .running.references import known_reference
+from .running.time_plan import TimePlan
 
 Say = Callable[[str], None]
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from .checks import numbers
 from .errors import InputError
-from .html import html_table
+from .tables import html_table
 
 ErrorKind = Literal["bound", "estimate"]
 

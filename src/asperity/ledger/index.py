@@ -8,7 +8,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from ..core.errors import InputError
-from ..verification.entry import Entry, Finding
+from .entry import Entry, Finding
 
 FOLDERS = ("plane", "disk", "proof")
 

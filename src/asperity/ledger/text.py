@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ..verification.entry import Entry, Finding
 from ..verification.verdict import Verdict
+from .entry import Entry, Finding
 
 WIDTH = 66
 FOUND = {None: "not checked", True: "as stated", False: "NOT AS STATED"}

@@ -14,7 +14,7 @@ import numpy as np
 from ..core.checks import Floats
 from ..core.errors import FileExistsRefusal, InputError
 from ..core.files import draw_whole, write_whole
-from ..core.html import verbatim
+from ..core.tables import verbatim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

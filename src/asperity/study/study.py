@@ -17,9 +17,9 @@ from ..core.checks import Rng, generator, positive_number
 from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
 from ..core.estimates import NORMAL_95, Estimate
 from ..core.files import moved_when_complete
-from ..core.html import html_table
 from ..core.kinds import explained
 from ..core.long_runs import progress_bar
+from ..core.tables import html_table
 from ..geometry import Disk, Wall, trace
 from ..geometry.cells.miniature import wall_miniature
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise

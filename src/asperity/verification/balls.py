@@ -6,12 +6,16 @@ of a negative number is not real. A power of a negative number is real only if i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
 from flint import arb, ctx, fmpq
+
+# Bits that suffice for most constants, and bits at which a sign stays unknown.
+FEW_BITS, MANY_BITS = 100, 2000
 
 
 class Undefined(Exception):
@@ -79,6 +83,26 @@ def interval(low: Any, high: Any, bits: int = 64) -> Any:
     with ctx.workprec(bits):
         ends = [_value(end, {}).ball for end in (low, high)]
         return ends[0].union(ends[1])
+
+
+def sign_of(number: Any) -> int:
+    """The sign of an exact number; raises `Unclear` if the number is not real or cannot be distinguished from 0."""
+    if number.is_Rational or number in (sp.oo, -sp.oo):
+        return int(sp.sign(number))
+    try:
+        with suppress(Unclear):
+            return evaluate(number, {}, FEW_BITS).sign
+        return evaluate(sp.expand(number, power_exp=False, power_base=False, log=False), {}, MANY_BITS).sign
+    except Undefined as error:
+        raise Unclear from error
+
+
+def is_below(low: Any, high: Any, also_equal: bool = False) -> bool:
+    """Whether one exact number, or infinity, is below another, or also if both are equal."""
+    if -sp.oo in (low, -high):
+        return True
+    sign = sign_of(high - low)
+    return sign > 0 or (also_equal and sign == 0)
 
 
 def is_true(relation: Any, point: Mapping[Any, Any], bits: int) -> bool:
@@ -208,16 +232,13 @@ def _unclear(*_: Value) -> Any:
     raise Unclear
 
 
-def _within(low: float | None, high: float | None, function: Callable[[Any], Any], open_ends: bool = False) -> Any:
-    """A function that is real on [low, high], or on (low, high) with ``open_ends``."""
+def _of_sine(name: str) -> Any:
+    """The arcsine or the arccosine, real on [-1, 1]."""
 
     def image(x: Value) -> Any:
-        if (low is not None and x.ball < low) or (high is not None and x.ball > high):
+        if x.ball < -1 or x.ball > 1:
             raise Undefined
-        inside = (low is None or x.ball >= low) and (high is None or x.ball <= high)
-        if not inside or (open_ends and ((low is not None and x.ball <= low) or (high is not None and x.ball >= high))):
-            raise Unclear
-        return function(x.ball)
+        return getattr(x.ball, name)() if -1 <= x.ball <= 1 else _unclear()
 
     return image
 
@@ -232,36 +253,12 @@ def _sign(x: Value) -> Any:
     return _exactly(sp.Integer(x.sign))
 
 
-def _step(x: Value, at_zero: Value | None = None) -> Any:
-    sign = x.sign
-    return (at_zero or _exactly(sp.S.Half)) if sign == 0 else _exactly(sp.Integer((1 + sign) // 2))
-
-
 def _whole(name: str) -> Any:
     def image(x: Value) -> Any:
         number = getattr(x.ball, name)().unique_fmpz()
         return _unclear() if number is None else _exactly(sp.Integer(int(number)))
 
     return image
-
-
-def _remainder(x: Value, y: Value) -> Any:
-    if y.ball.contains(0):
-        raise Unclear
-    number = (x.ball / y.ball).floor().unique_fmpz()
-    return _unclear() if number is None else x.ball - y.ball * arb(number)
-
-
-def _direction(y: Value, x: Value) -> Any:
-    if x.ball > 0:
-        return (y.ball / x.ball).atan()
-    if y.ball > 0:
-        return arb.pi() / 2 - (x.ball / y.ball).atan()
-    if y.ball < 0:
-        return -arb.pi() / 2 - (x.ball / y.ball).atan()
-    if x.ball < 0 and y.exact == 0:
-        return _exactly(sp.pi)
-    return _unclear()
 
 
 def _extreme(name: str) -> Any:
@@ -278,13 +275,6 @@ def _by(name: str) -> Any:
     return lambda x: getattr(x.ball, name)()
 
 
-def _of_inverse(function: Any) -> Any:
-    def image(x: Value) -> Any:
-        return _unclear() if x.ball.contains(0) else function(Value(1 / x.ball))
-
-    return image
-
-
 # Functions of rational multiples of powers of pi whose exact values are taken from sympy.
 _EXACT = (sp.Add, sp.Mul, sp.Pow, sp.sin, sp.cos, sp.tan, sp.cot, sp.sec, sp.csc, sp.Abs, sp.sign)
 LARGEST = 10**4
@@ -292,28 +282,18 @@ _CONSTANTS: dict[Any, Any] = {
     sp.pi: arb.pi, sp.E: arb.const_e, sp.EulerGamma: arb.const_euler, sp.Catalan: arb.const_catalan,
     sp.GoldenRatio: lambda: (1 + arb(5).sqrt()) / 2,
 }  # fmt: skip
-_ARCSINE, _ARCCOSINE = _within(-1, 1, lambda x: x.asin()), _within(-1, 1, lambda x: x.acos())
 _FUNCTIONS: dict[Any, Any] = {
     **{getattr(sp, name): _by(name) for name in (
-        "sin", "cos", "tan", "cot", "sec", "csc", "exp", "sinh", "cosh", "tanh", "coth", "sech", "csch", "atan",
-        "asinh", "erf", "erfc", "erfi", "gamma",
+        "sin", "cos", "tan", "cot", "sec", "csc", "exp", "sinh", "cosh", "tanh", "coth", "sech", "csch", "atan", "erf",
+        "erfc", "erfi", "gamma",
     )},
     sp.log: _logarithm,
-    sp.asin: _ARCSINE,
-    sp.acos: _ARCCOSINE,
-    # sympy's arc cotangent jumps at 0, where its value is pi/2
-    sp.acot: _of_inverse(_by("atan")),
-    sp.asec: _of_inverse(_ARCCOSINE),
-    sp.acsc: _of_inverse(_ARCSINE),
-    sp.acosh: _within(1, None, lambda x: x.acosh()),
-    sp.atanh: _within(-1, 1, lambda x: x.atanh(), open_ends=True),
-    sp.atan2: _direction,
+    sp.asin: _of_sine("asin"),
+    sp.acos: _of_sine("acos"),
     sp.Abs: lambda x: abs(x.ball),
     sp.Max: _extreme("max"),
     sp.Min: _extreme("min"),
     sp.sign: _sign,
-    sp.Heaviside: _step,
     sp.floor: _whole("floor"),
     sp.ceiling: _whole("ceil"),
-    sp.Mod: _remainder,
 }  # fmt: skip

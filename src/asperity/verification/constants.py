@@ -7,6 +7,7 @@ irrational constant is a symbol, about which sympy knows what balls show and not
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
@@ -19,7 +20,6 @@ from .balls import Constant, Unclear, Undefined, evaluate
 BITS = (64, 2000)
 # Larger numbers are not factored.
 LARGEST = 10**15
-
 # The number 1 where a function of a rational number is meant: exp(3) is written exp(3 ONE).
 ONE = Constant.of(sp.S.One, positive=True)
 
@@ -30,13 +30,16 @@ def unevaluated(function: Any, args: Any) -> Any:
     return function(*args, evaluate=False) if issubclass(function, kinds) else function(*args)
 
 
-def without_evaluation(e: Any) -> Any:
-    """How pickle is to store an object: an expression by its arguments, another as usual."""
-    return (unevaluated, (e.func, e.args)) if isinstance(e, sp.Basic) and e.args else NotImplemented
+class Pickler(pickle.Pickler):
+    """Stores expressions as they are written: sympy's own pickles are evaluated when they are read."""
+
+    def reducer_override(self, e: Any) -> Any:
+        """An expression by its arguments, another object as usual."""
+        return (unevaluated, (e.func, e.args)) if isinstance(e, sp.Basic) and e.args else NotImplemented
 
 
 def written(e: Any, names: Mapping[Any, Any]) -> Any:
-    """The expression with other symbols and with exact numbers, otherwise as it is written."""
+    """The expression with other symbols, exact numbers and functions by their definitions, else as it is written."""
     if e in names:
         return names[e]
     if e.is_Float:
@@ -47,8 +50,9 @@ def written(e: Any, names: Mapping[Any, Any]) -> Any:
     if e.is_Pow and args[0] in (sp.S.Zero, sp.zoo):
         # sympy writes 0**(-x) as a power of infinity, whatever the sign of x
         return _power_of_zero(args[1] if args[0] == 0 else -args[1])
-    if e.func is sp.frac:
-        return sp.Add(args[0], -sp.floor(args[0], evaluate=False), evaluate=False)
+    if e.func in _DEFINITIONS:
+        with sp.evaluate(False):
+            return _DEFINITIONS[e.func](*args)
     return e if args == e.args else unevaluated(e.func, args)
 
 
@@ -147,3 +151,24 @@ def _decided(relation: Any) -> Any:
         return bool(relation.func(sp.Integer(evaluate(relation.lhs - relation.rhs, {}, BITS[-1]).sign), 0))
     except (Undefined, Unclear):
         return relation
+
+
+def _direction(y: Any, x: Any) -> Any:
+    quarter, ratio = sp.pi / 2, sp.atan(x / y)
+    return sp.Piecewise((sp.atan(y / x), x > 0), (quarter - ratio, y > 0), (-quarter - ratio, y < 0), (sp.pi, x < 0))
+
+
+# Functions that are replaced wherever they are written; what is on the right is defined at the same points.
+_DEFINITIONS: dict[Any, Any] = {
+    sp.frac: lambda x: x - sp.floor(x),
+    sp.Mod: lambda x, y: x - y * sp.floor(x / y),
+    sp.Heaviside: lambda x, at_zero: sp.Piecewise((0, x < 0), (at_zero, sp.Eq(x, 0)), (1, True)),
+    sp.atan2: _direction,
+    # sympy's arc cotangent jumps at 0, where its value is pi/2
+    sp.acot: lambda x: sp.Piecewise((sp.pi / 2, sp.Eq(x, 0)), (sp.atan(1 / x), True)),
+    sp.asec: lambda x: sp.acos(1 / x),
+    sp.acsc: lambda x: sp.asin(1 / x),
+    sp.asinh: lambda x: sp.log(x + sp.sqrt(x**2 + 1)),
+    sp.acosh: lambda x: sp.log(x + sp.sqrt(x**2 - 1)),
+    sp.atanh: lambda x: sp.log((1 + x) / (1 - x)) / 2,
+}

@@ -1,168 +1,140 @@
-"""Exact derivations of equalities and inequalities on a domain, part by part.
+"""Verdicts on equalities and inequalities: a counterexample, or a proof on every part of the domain.
 
-The domain is divided into its interior and its faces, and further where a linear expression changes its sign that
-decides a branch. On each part both sides are resolved into smooth functions and
-compared by a normal form or by squares. A part on which one side is defined nowhere needs no proof.
+The domain is divided into its interior and its faces, and further where a linear expression is 0 at which a function
+jumps, bends or ends. On each part both sides are resolved into smooth functions. An equality is proved by a normal
+form, an inequality by the sign of the difference. A part on which one side is defined nowhere needs no proof.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import sympy as sp
 
+from ..core.errors import InputError
 from .balls import Unclear
-from .constants import visible
+from .constants import visible, written
 from .domain import Domain
 from .normal_form import NOT_NEGATIVE, POSITIVE, vanishes
-from .polyhedron import Inequality
-from .resolution import Nowhere, Resolution, is_infinite
-from .signs import Part
-from .verdict import Verdict
+from .refutation import Search
+from .resolution import Part, is_infinite
+from .verdict import Verdict, every
 
+# Points at which both sides are compared before a proof is sought: for an equality, and for an inequality.
+POINTS = 24
+MORE_POINTS = 60
 # Parts that are tried, and points of every part at which a counterexample is sought.
 PARTS = 60
-POINTS = 3
+FEW_POINTS = 3
+# Neither transformed nor evaluated here.
+UNFINISHED = (sp.Integral, sp.Derivative, sp.Sum, sp.Product, sp.Limit, sp.Subs)
 
 EXPANSION = "expansion"
 NORMAL_FORM = "polynomial normal form"
 SQUARES = "neither side is negative, and the polynomial normal forms of the squares agree"
-INSIDE = "one function of equal things"
 SIGN = "the sign of the difference"
+NOWHERE = "defined nowhere on the domain"
 
-Refute = Callable[[Domain, int], Verdict | None]
-
-
-@dataclass
-class Derivation:
-    """The search for a proof of one relation between two sides.
-
-    Parameters
-    ----------
-    left, right : sympy expressions
-    relation : {"==", "<=", "<"}
-    refute : callable
-        Searches a part for a counterexample, with a given number of points.
-    deciding : sequence of expressions
-        A part on which no proof is found is divided where one of these that is linear is 0.
-
-    Attributes
-    ----------
-    methods : list of str
-        The methods that proved the parts on which both sides are defined.
-    reason : str
-        Why no proof was found.
-    """
-
-    left: Any
-    right: Any
-    relation: str
-    refute: Refute
-    deciding: Sequence[Any] = ()
-    methods: list[str] = field(default_factory=list, init=False)
-    reason: str = field(default="no known method proves it", init=False)
-
-    def verdict(self, domain: Domain) -> Verdict | None:
-        """Return *proved* or *refuted*, or None with a `reason`."""
-        cells = domain.cells()
-        if cells is None:
-            self.reason = "the domain has too many faces"
-            return None
-        waiting, tried = cells[::-1], 0
-        while waiting:
-            cell, tried = waiting.pop(), tried + 1
-            try:
-                found = self.refute(cell, POINTS) if tried > 1 or waiting else None
-                if found is not None:
-                    return found
-                if not self._is_proved(cell):
-                    pieces = self._pieces(cell)
-                    if not pieces or tried + len(waiting) > PARTS:
-                        return None
-                    waiting += pieces
-            except sp.polys.polyerrors.BasePolynomialError as error:
-                self.reason = f"sympy's polynomials do not serve: {error}"
-                return None
-            except Unclear:
-                self.reason = "two numbers could not be told apart"
-                return None
-        return Verdict("proved", "; ".join(dict.fromkeys(self.methods)) or "defined nowhere on the domain")
-
-    def _pieces(self, cell: Domain) -> list[Domain]:
-        """The part divided where the first suitable deciding expression is 0."""
-        for g in self.deciding:
-            one = Inequality.of(g.xreplace(dict(cell.values)), True)
-            if one is None or not one.coefficients:
-                continue
-            sides = [cell.where(one), cell.where(replace(one.negated(), strict=True))]
-            middle = cell.on(one)
-            if middle is not None and not any(side.is_empty for side in sides):
-                return [*sides, *([] if middle.is_empty or not middle.has_allowed_values else [middle])]
-        return []
-
-    def _is_proved(self, cell: Domain) -> bool:
-        box = boxed(cell)
-        if box.polyhedron.is_empty:
-            return True
-        left, right = (visible(side, box.values) for side in (self.left, self.right))
-        if is_infinite(left) or is_infinite(right):
-            return True
-        part = Part(box)
-        method = equal_as_written(left, right, part) if self.relation == "==" else None
-        if method is None:
-            resolution = Resolution(part)
-            try:
-                left, right = resolution.resolved(left), resolution.resolved(right)
-            except Nowhere:
-                return True
-            method = self._method(left, right, part)
-        if method is not None:
-            self.methods.append(method)
-        return method is not None
-
-    def _method(self, left: Any, right: Any, part: Part) -> str | None:
-        if self.relation == "==":
-            return derive_equality(left, right, part)
-        allowed = POSITIVE if self.relation == "<" else NOT_NEGATIVE
-        if part.thorough_signs(right - left) <= allowed or _signs_of_steps(right - left, part) <= allowed:
-            return SIGN
-        return NORMAL_FORM if self.relation == "<=" and derive_equality(left, right, part) is not None else None
+Claim = tuple[Any, Any, str]
 
 
-def _signs_of_steps(difference: Any, part: Part) -> frozenset[int]:
-    """The signs of an expression after floor(x) is replaced by x - f with a new symbol 0 <= f < 1."""
-    steps = sorted(difference.atoms(sp.floor), key=str)
-    if len(steps) != 1 or steps[0].args[0].has(sp.floor):
-        return frozenset({-1, 0, 1})
-    (step,) = steps
-    fraction = sp.Dummy("f", real=True)
-    bounds = (
-        Inequality({fraction: sp.Integer(1)}, sp.Integer(0), strict=True),
-        Inequality({fraction: sp.Integer(-1)}, sp.Integer(1), strict=True),
-    )
-    domain = part.domain
-    wider = replace(domain, symbols=(*domain.symbols, fraction), inequalities=(*domain.inequalities, *bounds))
-    inside = Part(wider).thorough_signs(difference.xreplace({step: step.args[0] - fraction}))
-    return inside | part.thorough_signs(difference.xreplace({step: step.args[0]}))
+def decide(claims: list[Claim], relations: list[Any]) -> Verdict:
+    """The verdict on claims (left, right, "==", "<=" or "<") under the same assumptions."""
+    verdicts = []
+    for claim in claims:
+        try:
+            verdicts.append(_decided(*claim, relations))
+        except Unclear:
+            verdicts.append(Verdict("undecided", "two numbers could not be told apart"))
+        if verdicts[-1].answer == "refuted":
+            break
+    return every(*verdicts)
 
 
-def boxed(domain: Domain) -> Domain:
-    """Introduce a new symbol for the slack of each inequality between symbols, while symbols suffice."""
-    slacks: set[Any] = set()
-    while True:
-        ties = [one for one in domain.inequalities if len(one.coefficients) > 1 and not slacks & set(one.coefficients)]
-        choice = next(
-            ((one, s) for one in ties for s in sorted(one.coefficients, key=str) if abs(one.coefficients[s]) == 1), None
+def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Verdict:
+    symbols = set().union(*(part.free_symbols for part in (left, right, *assumptions)))
+    real = {symbol: _as_real(symbol) for symbol in symbols}
+    domain = Domain.of(real.values(), [written(given, real) for given in assumptions])
+    claim = written(left, real), written(right, real), relation
+    for side in claim[:2]:
+        if side.has(sp.I):
+            raise InputError(f"{side}: expected a real expression, got one with the imaginary unit")
+        if side.has(*UNFINISHED):
+            return Verdict(
+                "undecided", "an integral, a derivative, a sum or a limit is not evaluated; try .doit() first"
+            )
+    search = Search(*claim, domain)
+    found = _found(search, domain, tuple(map(visible, claim[:2])))
+    if search.undefined == search.tried or found.evidence == NOWHERE:
+        raise InputError(
+            f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {claim[0]} and {claim[1]}, "
+            f"and at each of {search.tried} points one of them is not"
         )
-        if choice is None:
-            return domain
-        one, symbol = choice
-        slack = sp.Dummy(f"d_{symbol}", real=True)
-        slacks.add(slack)
-        value = sp.expand(symbol + (slack - one.expression) / one.coefficients[symbol])
-        domain = domain.replaced(symbol, value, slack)
+    names = {str(stand_in): str(symbol) for symbol, stand_in in real.items()}
+    point = {names.get(name, name): value for name, value in found.counterexample.items()}
+    return Verdict(found.answer, found.evidence, point, found.values)
+
+
+def _as_real(symbol: Any) -> Any:
+    if symbol.is_real is False:
+        raise InputError(f"{symbol}: expected a real symbol, because identities are verified over the real numbers")
+    return symbol if symbol.is_real else sp.Dummy(symbol.name, **{**symbol._assumptions_orig, "real": True})
+
+
+def _found(search: Search, domain: Domain, sides: tuple[Any, Any]) -> Verdict:
+    """A counterexample, a proof on every part of the domain, or *undecided* with a reason."""
+    expands = search.relation == "==" and expands_to_zero(sides[0] - sides[1])
+    points = POINTS if search.relation == "==" else MORE_POINTS
+    found = search.refutation(domain, points, until_defined=expands)
+    if not search.tried:
+        raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, domain.conditions))}")
+    if found is not None:
+        return found
+    if expands and search.defined:
+        return Verdict("proved", EXPANSION)
+    reason = f"no counterexample among {search.tried} points, and "
+    waiting = domain.faces()
+    if waiting is None:
+        return Verdict("undecided", reason + "the domain has too many faces")
+    methods: dict[str, None] = {}
+    tried = 0
+    while waiting:
+        part, tried = waiting.pop(0), tried + 1
+        found = search.refutation(part, FEW_POINTS) if tried > 1 or waiting else None
+        if found is not None:
+            return found
+        try:
+            method = _method(*sides, search.relation, part)
+        except sp.polys.polyerrors.BasePolynomialError as error:
+            return Verdict("undecided", f"{reason}sympy's polynomials do not serve: {error}")
+        if method is not None:
+            methods[method] = None
+            continue
+        pieces = next((pieces for g in search.deciding if (pieces := part.divided(g))), [])
+        if not pieces or tried + len(waiting) > PARTS:
+            return Verdict("undecided", reason + "no known method proves it")
+        waiting = pieces + waiting
+    return Verdict("proved", "; ".join(method for method in methods if method != NOWHERE) or NOWHERE)
+
+
+def _method(left: Any, right: Any, relation: str, domain: Domain) -> str | None:
+    """The method that proves a relation on an open part, or None."""
+    left, right = (visible(side, domain.values) for side in (left, right))
+    part = Part(domain)
+    method = _equal(left, right, part) if relation == "==" and not is_infinite(left - right) else None
+    if method is not None:
+        return method
+    left, right = part.resolved(left), part.resolved(right)
+    if is_infinite(left) or is_infinite(right):
+        return NOWHERE
+    if relation != "==" and part.signs(right - left) <= (POSITIVE if relation == "<" else NOT_NEGATIVE):
+        return SIGN
+    if relation == "<":
+        return None
+    method = _equal(left, right, part)
+    if method is None and all(part.signs(side) <= NOT_NEGATIVE for side in (left, right)):
+        return SQUARES if vanishes(left**2 - right**2, part.parameters) else None
+    return method
 
 
 def expands_to_zero(difference: Any) -> bool:
@@ -170,28 +142,9 @@ def expands_to_zero(difference: Any) -> bool:
     return bool(sp.expand(difference, power_exp=False, log=False) == 0)
 
 
-def equal_as_written(left: Any, right: Any, part: Part) -> str | None:
-    """The method that shows two sides equal without resolving branches, or None."""
-    if expands_to_zero(left - right):
+def _equal(left: Any, right: Any, part: Part) -> str | None:
+    """The method that shows two sides equal, or None."""
+    difference = left - right
+    if expands_to_zero(difference):
         return EXPANSION
-    if vanishes(left - right, part.plain) or vanishes(left - right, part.parameters):
-        return NORMAL_FORM
-    return None
-
-
-def derive_equality(left: Any, right: Any, part: Part) -> str | None:
-    """The method that shows two resolved sides equal on an open part, or None."""
-    method = equal_as_written(left, right, part)
-    if method is not None:
-        return method
-    if all(part.is_nonnegative(side) for side in (left, right)) and vanishes(left**2 - right**2, part.parameters):
-        return SQUARES
-    return INSIDE if _equal_inside(left, right, part) else None
-
-
-def _equal_inside(left: Any, right: Any, part: Part) -> bool:
-    """Whether both sides are the same function of arguments that are found equal."""
-    if left.func != right.func or len(left.args) != len(right.args) or not (left.is_Function or left.is_Pow):
-        return False
-    pairs = [(a, b) for a, b in zip(left.args, right.args, strict=True) if a != b]
-    return len(pairs) == 1 and derive_equality(*pairs[0], part) is not None
+    return NORMAL_FORM if vanishes(difference, part.parameters) else None

@@ -1,4 +1,8 @@
-"""The domain of an identity: real or integer symbols, inequalities between them, and further conditions."""
+"""The domain of an identity: an interval for each symbol, and conditions that its points meet.
+
+Bounds of single symbols are intervals. An inequality between symbols, such as x > y, makes one of them an expression in
+the others and in their distance: x = y + t with t > 0. All other relations are conditions, which only select points.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +14,9 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from flint import ctx
 
 from ..core.errors import InputError
-from .balls import Unclear, Undefined, evaluate, is_true
-from .polyhedron import BITS, Inequality, Polyhedron, is_below, sign_of
+from .balls import MANY_BITS, Unclear, Undefined, evaluate, is_below, is_true
 
 # Simple numbers are tried first, because a counterexample with small numbers is easier to read.
 SIMPLE = tuple(sp.Rational(p, q) for q in (1, 2, 3, 5) for p in range(1, 16))
@@ -37,28 +39,117 @@ VALUES = 24
 
 
 @dataclass(frozen=True)
+class Interval:
+    """An interval of real numbers between two exact numbers or infinities."""
+
+    low: Any = -sp.oo
+    high: Any = sp.oo
+    low_closed: bool = False
+    high_closed: bool = False
+
+    @classmethod
+    def of(cls, number: Any) -> Interval:
+        return cls(number, number, True, True)
+
+    @property
+    def is_empty(self) -> bool:
+        return not is_below(self.low, self.high, self.low_closed and self.high_closed)
+
+    @property
+    def closed_ends(self) -> list[Any]:
+        return list(dict.fromkeys([self.low] * self.low_closed + [self.high] * self.high_closed))
+
+    @property
+    def signs(self) -> frozenset[int]:
+        """The signs of its numbers."""
+        zero = sp.Integer(0)
+        present = {1: is_below(zero, self.high), 0: self.contains(zero), -1: is_below(self.low, zero)}
+        return frozenset(sign for sign in present if present[sign])
+
+    @property
+    def inner_point(self) -> Any:
+        """A number that is not an end, near neither end if both are finite."""
+        third = sp.Rational(1, 3)
+        if self.low == -sp.oo:
+            return third if self.high == sp.oo else self.high - third
+        return self.low + third if self.high == sp.oo else self.low + third * (self.high - self.low)
+
+    @property
+    def opened(self) -> Interval:
+        """The interval without its ends."""
+        return Interval(self.low, self.high)
+
+    def contains(self, value: Any) -> bool:
+        return is_below(self.low, value, self.low_closed) and is_below(value, self.high, self.high_closed)
+
+    def __and__(self, other: Interval) -> Interval:
+        lows = (self.low, self.low_closed), (other.low, other.low_closed)
+        highs = (self.high, self.high_closed), (other.high, other.high_closed)
+        low, low_closed = lows[is_below(self.low, other.low, not other.low_closed)]
+        high, high_closed = highs[is_below(other.high, self.high, not other.high_closed)]
+        return Interval(low, high, low_closed, high_closed)
+
+    def __add__(self, other: Interval) -> Interval:
+        return Interval(
+            self.low + other.low,
+            self.high + other.high,
+            self.low_closed and other.low_closed,
+            self.high_closed and other.high_closed,
+        )
+
+    def __mul__(self, factor: Any) -> Interval:
+        """The multiple by a rational number other than 0."""
+        if factor > 0:
+            return Interval(factor * self.low, factor * self.high, self.low_closed, self.high_closed)
+        return Interval(factor * self.high, factor * self.low, self.high_closed, self.low_closed)
+
+    def between_integers(self) -> Interval:
+        """The interval with rational ends moved inwards to integers."""
+        low, high = self.low, self.high
+        if low.is_Rational:
+            low = sp.ceiling(low) if self.low_closed else sp.floor(low) + 1
+        if high.is_Rational:
+            high = sp.floor(high) if self.high_closed else sp.ceiling(high) - 1
+        return Interval(low, high, self.low_closed or bool(low.is_Rational), self.high_closed or bool(high.is_Rational))
+
+
+def linear(expression: Any) -> tuple[dict[Any, Any], Any] | None:
+    """The rational coefficients of symbols and the constant of a linear expression; None for another expression."""
+    constant = sp.Integer(0)
+    coefficients: dict[Any, Any] = {}
+    for term in sp.Add.make_args(sp.expand(expression)):
+        fraction, unit = term.as_coeff_Mul(rational=True)
+        if not term.free_symbols:
+            constant += term
+        elif unit.is_Symbol:
+            coefficients[unit] = coefficients.get(unit, 0) + fraction
+        else:
+            return None
+    if constant.has(sp.oo, sp.zoo, sp.nan, sp.I):
+        return None
+    return {s: c for s, c in coefficients.items() if c != 0}, constant
+
+
+@dataclass(frozen=True)
 class Domain:
     """The domain of an identity, or a part of that domain.
 
     Parameters
     ----------
-    symbols : tuple of symbols
-        The real symbols that vary.
-    inequalities : tuple of Inequality
-        The linear inequalities in these symbols.
+    original : mapping
+        The symbols of the identity with their intervals.
     conditions : tuple of relations
-        All other conditions, in the original symbols.
+        All other relations between these symbols.
+    intervals : mapping
+        The symbols that vary independently on this part, with their intervals. Some are distances between symbols.
     values : mapping
-        The symbols that do not vary on this part, as expressions in those that do.
-    original : tuple of symbols
-        The symbols of the whole domain, whose values `points` returns.
+        The other symbols, as expressions in those that vary.
     """
 
-    symbols: tuple[Any, ...]
-    inequalities: tuple[Inequality, ...] = ()
-    conditions: tuple[Any, ...] = ()
+    original: Mapping[Any, Interval]
+    conditions: tuple[Any, ...]
+    intervals: Mapping[Any, Interval]
     values: Mapping[Any, Any] = field(default_factory=dict)
-    original: tuple[Any, ...] = ()
 
     @classmethod
     def of(cls, symbols: Iterable[Any], relations: Iterable[Any]) -> Domain:
@@ -71,128 +162,130 @@ class Domain:
         """
         relations = [part for given in relations for part in _parts(given)]
         every = sorted(set(symbols).union(*(relation.free_symbols for relation in relations)), key=str)
-        inequalities = [bound for symbol in every for bound in _own_bounds(symbol)]
-        conditions = [
-            sp.Ne(symbol, 0, evaluate=False)
-            for symbol in every
-            if symbol.is_zero is False and not (symbol.is_extended_positive or symbol.is_extended_negative)
-        ]
+        box = {s: _own_interval(s) for s in every}
+        conditions = [sp.Ne(s, 0, evaluate=False) for s in every if s.is_zero is False]
         for relation in relations:
-            linear = None
-            if not isinstance(relation, sp.Ne):
-                linear = Inequality.of(relation.gts - relation.lts, isinstance(relation, sp.Gt | sp.Lt))
-            if linear is None:
+            form = _form(relation)
+            if form is None or len(form[0]) != 1:
                 conditions.append(relation)
-            else:
-                inequalities.append(tightened(linear))
-        domain = cls(tuple(every), tuple(inequalities), tuple(conditions), {}, tuple(every))
-        if domain.is_empty:
-            raise InputError(f"assumptions: no point meets {', '.join(map(str, relations)) or 'them'}{_ranges(domain)}")
+                continue
+            ((symbol, coefficient),) = form[0].items()
+            bound = _positive(relation) + Interval.of(-form[1])
+            box[symbol] &= bound * (1 / coefficient)
+        box = {s: interval.between_integers() if s.is_integer else interval for s, interval in box.items()}
+        domain = cls(box, tuple(conditions), box)
+        if any(one.is_empty or _values(s, one) == [] for s, one in box.items()) or domain._by_distances is None:
+            integers = ", ".join(str(s) for s in every if s.is_integer)
+            raise InputError(
+                f"assumptions: no point meets {', '.join(map(str, relations)) or 'them'}"
+                + (f" ({integers} integer)" if integers else "")
+            )
         return domain
 
-    @cached_property
-    def polyhedron(self) -> Polyhedron:
-        return Polyhedron(self.symbols, self.inequalities)
-
-    @cached_property
-    def is_empty(self) -> bool:
-        """Whether the domain is known to contain no point."""
-        if self.polyhedron.is_empty:
-            return True
-        for symbol in self.symbols:
-            low, high, low_closed, high_closed = self.interval(symbol)
-            numbers = _few_integers(low, high) if symbol.is_integer else None
-            bounds = low, high, low_closed, high_closed
-            if numbers is not None and not any(_is_inside(n, bounds) and has_properties(symbol, n) for n in numbers):
-                return True
-        return False
-
-    def interval(self, symbol: Any) -> tuple[Any, Any, bool, bool]:
-        """The ends of a symbol's interval, and whether each end belongs to the interval."""
-        if symbol not in self._intervals:
-            others = [s for s in self.symbols if s != symbol]
-            self._intervals[symbol] = Polyhedron([symbol, *others], self.inequalities).bounds(0, {})
-        return self._intervals[symbol]
-
-    @cached_property
-    def _intervals(self) -> dict[Any, tuple[Any, Any, bool, bool]]:
-        return {}
+    def enclosure(self, expression: Any) -> Interval | None:
+        """All values of a linear expression in the symbols that vary; None for another expression."""
+        form = linear(expression)
+        if form is None:
+            return None
+        found = Interval.of(form[1])
+        for symbol, coefficient in form[0].items():
+            found += self.intervals.get(symbol, Interval()) * coefficient
+        return found
 
     # ---- parts
 
-    def fixed(self, symbol: Any, value: Any) -> Domain | None:
-        """The part in which a symbol has a value, an expression in the others; None if this is not linear."""
-        inequalities = [one.substituted(symbol, value) for one in self.inequalities]
-        if None in inequalities:
-            return None
+    def fixed(self, symbol: Any, value: Any) -> Domain:
+        """The part in which a symbol that varies has a value, a number or an expression in the others."""
         values = {s: v.xreplace({symbol: value}) for s, v in self.values.items()} | {symbol: value}
-        symbols = tuple(s for s in self.symbols if s != symbol)
-        return replace(self, symbols=symbols, inequalities=tuple(filter(None, inequalities)), values=values)
+        return replace(self, intervals={s: i for s, i in self.intervals.items() if s != symbol}, values=values)
 
-    def where(self, one: Inequality) -> Domain:
-        """The part in which one more inequality holds."""
-        return replace(self, inequalities=(*self.inequalities, one))
+    def where(self, difference: Any, positive: Interval) -> Domain | None:
+        """The part on which a linear expression is positive, or not negative; None if it is known to be empty.
 
-    def replaced(self, symbol: Any, value: Any, new: Any, inequalities: Iterable[Inequality] = ()) -> Domain:
-        """The domain with ``symbol`` written as an expression in a new symbol."""
-        part = self.fixed(symbol, value)
-        assert part is not None
-        return replace(part, symbols=(*part.symbols, new), inequalities=(*part.inequalities, *inequalities))
+        One of several symbols is written by the value of the expression. Its own bounds should follow from the bounds
+        of the others; else the part that is described is larger.
+        """
+        form = linear(difference)
+        if form is None or not form[0]:
+            return self
+        box, choices = dict(self.intervals), []
+        for symbol, coefficient in form[0].items():
+            rest = replace(self, intervals=box).enclosure(sp.expand(symbol - difference / coefficient))
+            assert rest is not None
+            bound = rest + positive * (1 / coefficient)
+            box[symbol], own = box[symbol] & bound, box[symbol]
+            choices.append(((bound & own) != bound, symbol.is_integer is True, symbol))
+        part = replace(self, intervals=box)
+        if any(one.is_empty for one in box.values()):
+            return None
+        _, is_integer, symbol = min(choices, key=lambda choice: choice[:2])
+        if len(choices) == 1 or is_integer:
+            return part
+        distance = sp.Dummy("d", real=True)
+        found = part.enclosure(difference)
+        assert found is not None
+        box[distance] = found & positive
+        return part.fixed(symbol, sp.expand(symbol + (distance - difference) / form[0][symbol]))
 
-    def cells(self) -> list[Domain] | None:
-        """Open parts whose union is the domain: the interior and the faces; None if there are too many.
+    @cached_property
+    def _by_distances(self) -> Domain | None:
+        """The domain with symbols written by their distances from others; None if it is known to be empty."""
+        whole: Domain | None = self
+        for relation in self.conditions:
+            if whole is not None and _form(relation) is not None:
+                difference = (relation.gts - relation.lts).xreplace(dict(whole.values))
+                whole = whole.where(sp.expand(difference), _positive(relation))
+        return whole
+
+    def faces(self) -> list[Domain] | None:
+        """Open parts whose union contains the domain: the interior first, then the faces; None if there are too many.
 
         An integer with few values gives one part for each value.
         """
-        parts = [self]
-        for symbol in self.symbols:
-            parts = [piece for part in parts for piece in part._by_integers(symbol)]
-        found: list[Domain] = []
-        for part in parts:
-            closed = [one for one in part.inequalities if not one.strict and one.coefficients]
-            if len(parts) * 2 ** len(closed) > FACES:
-                return None
-            for on_face in product((False, True), repeat=len(closed)):
-                cell: Domain | None = replace(
-                    part,
-                    inequalities=(
-                        *(one for one in part.inequalities if one.strict),
-                        *(replace(one, strict=True) for one, face in zip(closed, on_face, strict=True) if not face),
-                    ),
-                )
-                for one in (one for one, face in zip(closed, on_face, strict=True) if face):
-                    cell = cell.on(one) if cell is not None else None
-                if cell is not None and not cell.is_empty and cell.has_allowed_values:
-                    found.append(cell)
-        # the interior comes first
-        return sorted(found, key=lambda cell: -len(cell.symbols))
+        whole = self._by_distances
+        if whole is None:
+            return []
+        choices: list[list[tuple[Any, Any]]] = []
+        for symbol, interval in whole.intervals.items():
+            values = _values(symbol, interval)
+            ends = interval.closed_ends if values is None else values
+            inside = [(symbol, None)] if values is None and not interval.opened.is_empty else []
+            choices.append(inside + [(symbol, end) for end in ends if has_properties(symbol, end)])
+        if np.prod([float(len(choice)) for choice in choices]) > FACES:
+            return None
+        found = []
+        for choice in product(*choices):
+            part = replace(whole, intervals={s: interval.opened for s, interval in whole.intervals.items()})
+            for symbol, value in choice:
+                part = part if value is None else part.fixed(symbol, value)
+            if not part._is_excluded:
+                found.append(part)
+        return sorted(found, key=lambda part: -len(part.intervals))
 
-    def _by_integers(self, symbol: Any) -> list[Domain]:
-        if not symbol.is_integer:
-            return [self]
-        bounds = self.interval(symbol)
-        numbers = _few_integers(*bounds[:2])
-        if numbers is None:
-            return [self]
-        allowed = [n for n in numbers if _is_inside(n, bounds) and has_properties(symbol, n)]
-        return [part for n in allowed if (part := self.fixed(symbol, n)) is not None]
-
-    def on(self, one: Inequality) -> Domain | None:
-        """The part where the left side of an inequality is 0, None if there is none."""
-        here = Inequality.of(one.expression.xreplace(dict(self.values)), False)
-        assert here is not None
-        for symbol, coefficient in here.coefficients.items():
-            return self.fixed(symbol, sp.expand(symbol - here.expression / coefficient))
-        return self if sign_of(here.constant) == 0 else None
+    def divided(self, difference: Any) -> list[Domain]:
+        """Open parts where a linear expression is positive, negative and 0; none if only one of them has points."""
+        difference = sp.expand(difference.xreplace(dict(self.values)))
+        found = self.enclosure(difference)
+        form = linear(difference)
+        if found is None or form is None or not found.signs >= {-1, 1}:
+            return []
+        symbol, coefficient = next(iter(form[0].items()))
+        at = self.fixed(symbol, sp.expand(symbol - difference / coefficient))
+        positive = Interval(low=sp.Integer(0))
+        parts = [self.where(difference, positive), self.where(-difference, positive), at]
+        return [part for part in parts if part is not None and not part._is_excluded]
 
     @property
-    def has_allowed_values(self) -> bool:
-        """Whether the fixed symbols have values that agree with their properties and with the conditions."""
-        fixed = {s: v for s, v in self.values.items() if not v.free_symbols}
-        if any(lacks_properties(symbol, value) for symbol, value in fixed.items()):
-            return False
-        decided = [c for c in self.conditions if c.free_symbols and c.free_symbols <= set(fixed)]
-        return not any(_is_false(condition, fixed) for condition in decided)
+    def _is_excluded(self) -> bool:
+        """Whether the fixed symbols have values that certainly violate a condition."""
+        known = {s: v for s, v in self.values.items() if not v.free_symbols}
+        for condition in self.conditions:
+            try:
+                if condition.free_symbols <= set(known) and not is_true(condition, known, MANY_BITS):
+                    return True
+            except (Undefined, Unclear):
+                continue
+        return False
 
     # ---- points
 
@@ -213,37 +306,32 @@ class Domain:
 
     def _point(self, rng: np.random.Generator, simple: bool) -> dict[Any, Any] | None:
         point: dict[Any, Any] = {}
-        for position, symbol in enumerate(self.symbols):
-            bounds = self.polyhedron.bounds(position, point)
+        for symbol, interval in self.intervals.items():
             value = None
             if point and rng.random() < TOGETHER:
                 # the value of another symbol, up to the sign
                 value = list(point.values())[rng.integers(len(point))] * int(rng.choice([-1, 1]))
-                value = value if _is_inside(value, bounds) and has_properties(symbol, value) else None
+                value = value if interval.contains(value) and has_properties(symbol, value) else None
             if value is None:
-                value = _number(symbol, bounds, simple, rng)
+                value = _number(symbol, interval, simple, rng)
             if value is None:
                 return None
             point[symbol] = value
-        return self._whole(point)
-
-    def _whole(self, point: Mapping[Any, Any]) -> dict[Any, Any] | None:
-        """The values of the original symbols, None if they violate a condition."""
-        point = {**point, **{s: value.xreplace(dict(point)) for s, value in self.values.items()}}
+        point |= {s: sp.expand(value.xreplace(point)) for s, value in self.values.items()}
         whole = {s: point[s] for s in self.original}
-        return whole if self.allows(whole) else None
+        return whole if self._allows(whole) else None
 
-    def allows(self, point: Mapping[Any, Any]) -> bool:
-        """Whether a point of the original symbols has their properties and certainly meets the conditions."""
+    def _allows(self, point: Mapping[Any, Any]) -> bool:
+        """Whether a point certainly lies in the intervals, meets the conditions and has the symbols' properties."""
         try:
-            return all(has_properties(s, value) for s, value in point.items()) and all(
-                is_true(condition, point, BITS) for condition in self.conditions
-            )
+            return all(
+                interval.contains(point[s]) and has_properties(s, point[s]) for s, interval in self.original.items()
+            ) and all(is_true(condition, point, MANY_BITS) for condition in self.conditions)
         except (Undefined, Unclear):
             return False
 
 
-# Properties that are known of rational numbers only; signs are inequalities of the domain.
+# Properties that are known of rational numbers only; signs are bounds of the domain.
 _ARITHMETIC = {
     "integer", "noninteger", "even", "odd", "rational", "irrational", "prime", "composite", "algebraic",
     "transcendental",
@@ -258,69 +346,46 @@ def has_properties(symbol: Any, value: Any) -> bool:
     return all(getattr(value, f"is_{name}") in (known, None) for name, known in given.items())
 
 
-def lacks_properties(symbol: Any, value: Any) -> bool:
-    """Whether a number is known to lack a property of a symbol."""
-    return bool(value.is_Rational and not has_properties(symbol, value))
-
-
-def _few_integers(low: Any, high: Any) -> list[Any] | None:
-    """All integers from one number to another, with one more at each end; None if they are many."""
-    if low == -sp.oo or high == sp.oo or not is_below(high - low, sp.Integer(VALUES)):
+def _values(symbol: Any, interval: Interval) -> list[Any] | None:
+    """The values of an integer symbol that has few; None if there are many or the symbol is not an integer."""
+    low, high = interval.low, interval.high
+    if not (symbol.is_integer and low.is_Integer and high.is_Integer and high - low < VALUES):
         return None
-    with ctx.workprec(BITS):
-        first, last = (evaluate(end, {}, BITS).ball.floor().unique_fmpz() for end in (low, high))
-    return None if None in (first, last) else [sp.Integer(n) for n in range(int(first), int(last) + 2)]
+    return [n for n in map(sp.Integer, range(int(low), int(high) + 1)) if has_properties(symbol, n)]
 
 
-def _is_false(condition: Any, point: Mapping[Any, Any]) -> bool:
-    try:
-        return not is_true(condition, point, BITS)
-    except Undefined:
-        return True
-    except Unclear:
-        return False
-
-
-def _is_inside(value: Any, bounds: tuple[Any, Any, bool, bool]) -> bool:
-    low, high, low_closed, high_closed = bounds
-    return is_below(low, value, low_closed) and is_below(value, high, high_closed)
-
-
-def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng: np.random.Generator) -> Any:
-    low, high, low_closed, high_closed = bounds
-    ends = [end for end, closed in ((low, low_closed), (high, high_closed)) if closed]
-    if low == high:
-        return low if ends else None
-    if ends and rng.random() < 0.2:
+def _number(symbol: Any, interval: Interval, simple: bool, rng: np.random.Generator) -> Any:
+    """A random number of the interval; None if none was found."""
+    inside, ends = interval.opened, interval.closed_ends
+    if ends and (interval.low == interval.high or rng.random() < 0.2):
         return ends[rng.integers(len(ends))]
     if simple:
         for _ in range(20):
             value = int(rng.choice([-1, 1])) * SIMPLE[rng.integers(len(SIMPLE))]
-            if _is_inside(value, (low, high, False, False)) and has_properties(symbol, value):
+            if inside.contains(value) and has_properties(symbol, value):
                 return value
     special = SPECIAL[rng.integers(len(SPECIAL))]
-    if rng.random() < OFTEN and _is_inside(special, bounds) and has_properties(symbol, special):
+    if rng.random() < OFTEN and interval.contains(special) and has_properties(symbol, special):
         return special
-    value = _between(as_float(low), as_float(high), rng)
+    value = _between(as_float(interval.low), as_float(interval.high), rng)
     if symbol.is_integer:
         # small, or in the range of other numbers
         number = sp.Integer(round(value) if rng.random() < 0.5 else int(rng.integers(-3, 4)))
-        if symbol.is_even is not None and symbol.is_even != number.is_even:
-            number += 1
-        return number if _is_inside(number, bounds) else None
+        number += 0 if has_properties(symbol, number) else 1
+        return number if interval.contains(number) else None
     for digits in DIGITS:
         exact = sp.Rational(np.format_float_positional(value, digits, unique=False, fractional=False))
-        if _is_inside(exact, (low, high, False, False)):
+        if inside.contains(exact):
             return exact
     # the interval is shorter than floats resolve
-    middle = (low + high) / 2
-    exact = middle if middle.is_Rational else sp.Rational(str(sp.N(middle, DIGITS[-1])))
-    return exact if _is_inside(exact, (low, high, False, False)) else None
+    point = interval.inner_point
+    exact = point if point.is_Rational else sp.Rational(str(sp.N(point, DIGITS[-1])))
+    return exact if inside.contains(exact) else None
 
 
 def as_float(end: Any) -> float:
     """The float next to an exact number or infinity."""
-    return float(end) if end in (sp.oo, -sp.oo) else float(evaluate(end, {}, BITS).ball.mid())
+    return float(end) if end in (sp.oo, -sp.oo) else float(evaluate(end, {}, MANY_BITS).ball.mid())
 
 
 def _between(low: float, high: float, rng: np.random.Generator) -> float:
@@ -353,31 +418,22 @@ def _parts(given: Any) -> list[Any]:
     )
 
 
-def _own_bounds(symbol: Any) -> list[Inequality]:
+def _own_interval(symbol: Any) -> Interval:
+    """The interval by the properties of a symbol."""
     if symbol.is_zero:
         raise InputError(f"{symbol}: expected a symbol that may differ from 0; substitute 0 for it in both sides")
     if symbol.is_nonnegative:
-        return [tightened(Inequality({symbol: sp.Integer(1)}, sp.Integer(0), bool(symbol.is_positive)))]
+        return Interval(low=sp.Integer(0), low_closed=not symbol.is_positive)
     if symbol.is_nonpositive:
-        return [tightened(Inequality({symbol: sp.Integer(-1)}, sp.Integer(0), bool(symbol.is_negative)))]
-    return []
+        return Interval(high=sp.Integer(0), high_closed=not symbol.is_negative)
+    return Interval()
 
 
-def tightened(one: Inequality) -> Inequality:
-    """Move the bound of a single integer symbol to the next integer and make it non-strict."""
-    if len(one.coefficients) != 1:
-        return one
-    ((symbol, coefficient),) = one.coefficients.items()
-    end = one.end(symbol, {})
-    if not symbol.is_integer or not end.is_Rational:
-        return one
-    if coefficient > 0:
-        end = sp.floor(end) + 1 if one.strict else sp.ceiling(end)
-        return Inequality({symbol: sp.Integer(1)}, -end, False)
-    end = sp.ceiling(end) - 1 if one.strict else sp.floor(end)
-    return Inequality({symbol: sp.Integer(-1)}, end, False)
+def _form(relation: Any) -> tuple[dict[Any, Any], Any] | None:
+    """The linear form that a relation makes positive, or not negative; None if there is none."""
+    return None if isinstance(relation, sp.Ne) else linear(relation.gts - relation.lts)
 
 
-def _ranges(domain: Domain) -> str:
-    empty = [s for s in domain.symbols if s.is_integer]
-    return f" ({', '.join(map(str, empty))} integer)" if empty else ""
+def _positive(relation: Any) -> Interval:
+    """The values that a relation allows for the difference of its sides."""
+    return Interval(low=sp.Integer(0), low_closed=not isinstance(relation, sp.Gt | sp.Lt))

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import io
+import pickle
 import reprlib
 from collections.abc import Iterable, Mapping
+from importlib import import_module
 from typing import Any
 
 from ..core.checks import positive_number
+from ..core.child import ChildCrashed, ChildProcess, OutOfTime
 from ..core.errors import InputError
-from .verdict import Verdict, every
+from .verdict import Verdict
 
 TIME_LIMIT = 10.0
-# Points at which both sides are compared before a proof is sought: for an equality, and for an inequality.
-POINTS = 24
-MORE_POINTS = 60
 
 
 def verify(
@@ -44,14 +45,14 @@ def verify(
     Verdict
             ``"proved"`` rests on an exact derivation. ``"refuted"`` has a counterexample: an exact point that meets the
             assumptions and at which both sides are defined. Balls that contain the two values show that the relation
-            fails. ``"undecided"`` names the reason.
+            fails. ``"undecided"`` names the reason; integrals, derivatives, sums and limits are not evaluated.
 
     Raises
     ------
     InputError
             If a side or an assumption is text or another object than these, the shapes differ, an assumption is not an
-            inequality, no point meets the assumptions, or at each examined point of the domain one side is undefined or
-            not real.
+            inequality, a side has the imaginary unit, no point meets the assumptions, or at each examined point of the
+            domain one side is undefined or not real.
 
     Notes
     -----
@@ -83,26 +84,56 @@ def verify(
         claims, given = _relations_as_claims(sp, lhs), assumptions if rhs is None else rhs
     else:
         claims, given = _equations(sp, lhs, rhs), assumptions
-    if time_limit is None:
-        return decide(claims, _relations(sp, given))
-    from .worker import decide_in_time
+    if time_limit is not None:
+        return _decided_in_time(claims, _relations(sp, given), positive_number("time_limit", time_limit))
+    from .derivation import decide
 
-    return decide_in_time(claims, _relations(sp, given), positive_number("time_limit", time_limit))
+    return decide(claims, _relations(sp, given))
 
 
-def decide(claims: list[tuple[Any, Any, str]], relations: list[Any]) -> Verdict:
-    """The verdict on claims (left, right, "==", "<=" or "<") under the same assumptions."""
-    from .balls import Unclear
+def _decided_in_time(claims: list[Any], relations: list[Any], seconds: float) -> Verdict:
+    """The verdict of `derivation.decide` in a process, or *undecided* after ``seconds``."""
+    from .constants import Pickler
 
-    verdicts = []
-    for claim in claims:
-        try:
-            verdicts.append(_decided(*claim, relations))
-        except Unclear:
-            verdicts.append(Verdict("undecided", "two numbers could not be told apart"))
-        if verdicts[-1].answer == "refuted":
-            break
-    return every(*verdicts)
+    question = io.BytesIO()
+    try:
+        Pickler(question).dump((claims, relations))
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise InputError(
+            f"lhs, rhs: expected expressions that can be pickled ({error}); pass time_limit=None"
+        ) from error
+    try:
+        return Verdict(*_child.call(_answer, question.getvalue(), seconds=seconds))
+    except OutOfTime:
+        return Verdict("undecided", f"the time limit of {seconds:g} s was reached")
+    except ChildCrashed as error:
+        raise RuntimeError("the process that verifies identities has ended; pass time_limit=None") from error
+
+
+def _load() -> None:
+    import_module(".derivation", __package__)
+
+
+# It starts with the first question, in about a second.
+_child = ChildProcess(_load)
+
+
+def _answer(question: bytes) -> tuple[Any, ...]:
+    """The parts of a verdict; in the other process."""
+    from .derivation import decide
+
+    try:
+        claims, relations = pickle.loads(question)
+    except Exception as error:
+        raise InputError(f"lhs, rhs: expected expressions of sympy ({error}); pass time_limit=None") from error
+    try:
+        found = decide(claims, relations)
+    except InputError:
+        raise
+    except Exception as error:
+        # some errors of sympy cannot be pickled
+        raise RuntimeError(f"{type(error).__name__}: {error}") from error
+    return found.answer, found.evidence, dict(found.counterexample), found.values
 
 
 def _are_relations(sp: Any, side: Any) -> bool:
@@ -169,51 +200,3 @@ def _relations(sp: Any, assumptions: Any) -> list[Any]:
         return [_exact(sp, "assumptions", one) for one in given]
     except TypeError as reason:
         raise InputError(f"assumptions: expected relations, got {reprlib.repr(assumptions)}") from reason
-
-
-def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Verdict:
-    import sympy as sp
-
-    from .constants import written
-    from .derivation import EXPANSION, Derivation, expands_to_zero
-    from .domain import Domain
-    from .integrals import UNFINISHED, prepared
-    from .refutation import Search
-
-    symbols = set().union(*(part.free_symbols for part in (left, right, *assumptions)))
-    real = {symbol: _as_real(sp, symbol) for symbol in symbols}
-    relations = [written(given, real) for given in assumptions]
-    domain = Domain.of(real.values(), relations)
-    as_written = [written(side, real) for side in (left, right)]
-    left, right = (prepared(side) for side in as_written)
-    # what is not real or not finished as it is written is searched as it is prepared
-    first, second = (
-        side if as_it_is.has(sp.I, *UNFINISHED) else as_it_is
-        for side, as_it_is in zip((left, right), as_written, strict=True)
-    )
-    search = Search(first, second, relation, domain)
-    derivation = Derivation(left, right, relation, search.refutation, search.deciding)
-    expands = relation == "==" and expands_to_zero(left - right)
-    found = search.refutation(domain, POINTS if relation == "==" else MORE_POINTS, until_defined=expands)
-    if expands and found is None and search.defined:
-        return Verdict("proved", EXPANSION)
-    if not search.tried:
-        raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, assumptions))}")
-    if found is None:
-        found = derivation.verdict(domain)
-    if search.undefined == search.tried or (found is not None and found.answer == "proved" and not derivation.methods):
-        raise InputError(
-            f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {as_written[0]} and "
-            f"{as_written[1]}, and at each of {search.tried} points one of them is not"
-        )
-    if found is None:
-        found = Verdict("undecided", f"no counterexample among {search.tried} points, and {derivation.reason}")
-    names = {str(stand_in): str(symbol) for symbol, stand_in in real.items()}
-    point = {names.get(name, name): value for name, value in found.counterexample.items()}
-    return Verdict(found.answer, found.evidence, point, found.values)
-
-
-def _as_real(sp: Any, symbol: Any) -> Any:
-    if symbol.is_real is False:
-        raise InputError(f"{symbol}: expected a real symbol, because identities are verified over the real numbers")
-    return symbol if symbol.is_real else sp.Dummy(symbol.name, **{**symbol._assumptions_orig, "real": True})

@@ -10,21 +10,20 @@ dependent.
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Callable
 from math import comb, lcm
 from typing import Any
 
 import sympy as sp
 from flint import ctx
 
-from .balls import Constant, Unclear, evaluate
+from .balls import MANY_BITS, Constant, Unclear, evaluate, is_below, sign_of
 from .constants import ONE, built, visible
-from .domain import Domain
-from .polyhedron import BITS, is_below, sign_of
+from .domain import Domain, Interval
 
 Signs = frozenset[int]
 POSITIVE, NOT_NEGATIVE, ZERO = frozenset({1}), frozenset({0, 1}), frozenset({0})
-NEGATIVE, NOT_POSITIVE, NONZERO, ANY = frozenset({-1}), frozenset({-1, 0}), frozenset({-1, 1}), frozenset({-1, 0, 1})
+NEGATIVE, NOT_POSITIVE, ANY = frozenset({-1}), frozenset({-1, 0}), frozenset({-1, 0, 1})
 # Multiples of an angle beyond this are angles of their own, because they are polynomials of this degree.
 MOST = 24
 
@@ -79,73 +78,50 @@ def _unfolded(e: Any) -> Any:
     return e
 
 
-def product_of(factors: list[Signs]) -> Signs:
-    """The signs that a product may have."""
-    found = POSITIVE
-    for signs in factors:
-        found = frozenset(a * b for a in found for b in signs)
-    return found
-
-
-def powered(signs: Signs, exponent: int) -> Signs:
-    """The signs that an integer power may have where it is defined."""
-    if exponent < 0:
-        signs -= {0}
-    return signs if exponent % 2 else frozenset(sign * sign for sign in signs)
-
-
-def sign_in(e: Any) -> Signs:
-    """The signs of an expression in parameters: from its terms and factors, and of a constant from balls."""
+def signs_of(e: Any, signs: Callable[[Any], Signs]) -> Signs:
+    """The signs that an expression may have where it is defined, from the signs of its parts."""
     if not e.free_symbols:
         try:
             return frozenset({sign_of(e)})
         except Unclear:
             return ANY
-    if e.is_Symbol:
+    if e.is_Mul:
+        found = POSITIVE
+        for factor in map(signs, e.args):
+            found = frozenset(a * b for a in found for b in factor)
+        return found
+    if e.is_Pow and e.exp.is_Integer:
+        base = signs(e.base) - (ZERO if e.exp < 0 else frozenset())
+        return base if e.exp % 2 else frozenset(sign * sign for sign in base)
+    if e.is_Pow and e.exp.is_Rational:
+        return POSITIVE if e.exp < 0 else signs(e.base) & NOT_NEGATIVE
+    if e.func in (sp.exp, sp.Abs, sp.acos):
+        return POSITIVE if e.func is sp.exp else NOT_NEGATIVE
+    if e.func in (sp.atan, sp.asin, sp.sinh, sp.tanh):
+        return signs(e.args[0])
+    return ANY
+
+
+def sign_in(e: Any) -> Signs:
+    """The signs of an expression in parameters; of a sum, if its terms have one sign."""
+    if e.is_Symbol and e.free_symbols:
         known = [sign for sign, excluded in ((1, e.is_nonpositive), (0, e.is_nonzero), (-1, e.is_nonnegative))
                  if not excluded]  # fmt: skip
         return frozenset(known)
-    if e.is_Mul:
-        return product_of([sign_in(factor) for factor in e.args])
-    if e.is_Pow and e.exp.is_Integer:
-        return powered(sign_in(e.base), int(e.exp))
-    if e.is_Pow and e.exp.is_Rational:
-        return (sign_in(e.base) & NOT_NEGATIVE) - ({0} if e.exp < 0 else set())
-    if e.func in (sp.exp, sp.Abs):
-        return POSITIVE if e.func is sp.exp else NOT_NEGATIVE
-    found = ANY
-    if e.is_Add:
+    if e.is_Add and e.free_symbols:
         signs = [sign_in(term) for term in e.args]
         for strict, loose in ((POSITIVE, NOT_NEGATIVE), (NEGATIVE, NOT_POSITIVE)):
             if all(one <= loose for one in signs):
                 return strict if strict in signs else loose
-        found = _of_polynomial(e)
-    return found
-
-
-def _of_polynomial(e: Any) -> Signs:
-    """The sign of a polynomial in one positive parameter without a root beyond 0, by Sturm's theorem."""
-    if len(e.free_symbols) != 1 or e.atoms(Constant) or not e.is_polynomial():
         return ANY
-    (t,) = e.free_symbols
-    polynomial = sp.Poly(e, t)
-    if not t.is_positive or not (polynomial.domain.is_ZZ or polynomial.domain.is_QQ):
-        return ANY
-    zero_at_0 = int(polynomial.nth(0) == 0)
-    return frozenset({int(sp.sign(polynomial.LC()))}) if polynomial.count_roots(0, None) == zero_at_0 else ANY
+    return signs_of(e, sign_in)
 
 
 class Parameters:
-    """The parameters that replace the symbols of a domain; all expressions of a part share them.
+    """The parameters that replace the symbols of a domain; all expressions of a part share them."""
 
-    Without ``half_angles`` every angle is a pair (c, s): fewer signs are known, but polynomials stay short.
-    ``positive`` contains expressions that are known to be positive.
-    """
-
-    def __init__(self, domain: Domain, half_angles: bool, positive: Set[Any] = frozenset()) -> None:
-        self._positive = positive
+    def __init__(self, domain: Domain) -> None:
         self._domain = domain
-        self._half_angles = half_angles
         self._numbers: dict[Any, Any] = {}
         self._opaque: dict[Any, Any] = {}
         self._angles: dict[Any, tuple[Any, Any]] = {}
@@ -154,10 +130,8 @@ class Parameters:
         self.circles: dict[Any, tuple[Any, Any]] = {}
 
     def _interval(self, symbol: Any) -> tuple[Any, Any]:
-        if symbol not in self._domain.symbols:
-            return -sp.oo, sp.oo
-        low, high, *_ = self._domain.interval(symbol)
-        return visible(low), visible(high)
+        interval = self._domain.intervals.get(symbol, Interval())
+        return visible(interval.low), visible(interval.high)
 
     def normal(self, e: Any) -> Any:
         """The expression in the parameters, with roots and absolute values split into factors of known sign."""
@@ -180,7 +154,7 @@ class Parameters:
 
     def factored(self, e: Any) -> Any:
         """The normal form as a product, for `sign_in`."""
-        return sp.factor(sp.together(self.normal(e)))
+        return sp.factor(sp.together(self._on_circles(self.normal(e))))
 
     def _rebuilt(self, e: Any) -> Any:
         if isinstance(e, Constant):
@@ -253,7 +227,7 @@ class Parameters:
             # half turns that move the interval between -pi and pi
             turns = sp.floor(low / sp.pi) + (1 if high - low > sp.pi else 0) if -sp.oo not in (low, -high) else 0
             low, high = low - turns * sp.pi, high - turns * sp.pi
-            if self._half_angles and is_below(-sp.pi, low, True) and is_below(high, sp.pi, True):
+            if is_below(-sp.pi, low, True) and is_below(high, sp.pi, True):
                 ends = (sp.tan(low / 2) if low != -sp.pi else -sp.oo, sp.tan(high / 2) if high != sp.pi else sp.oo)
                 t = _running(ends, unit)
                 sign = -1 if turns % 2 else 1
@@ -273,10 +247,8 @@ class Parameters:
             return e.args[0]
         if not e.is_Pow or e.exp.is_Rational:
             return None
-        is_positive = (
-            e.base in self._positive
-            or sign_in(e.base) == POSITIVE
-            or (e.base.is_Symbol and is_below(sp.S.Zero, self._interval(e.base)[0], True))
+        is_positive = sign_in(e.base) == POSITIVE or (
+            e.base.is_Symbol and is_below(sp.S.Zero, self._interval(e.base)[0], True)
         )
         return e.exp * built(sp.log, [e.base]) if is_positive else None
 
@@ -309,10 +281,10 @@ def _plain_end(end: Any, outward: Any) -> Any:
     """
     if end in (sp.oo, -sp.oo):
         return end
-    quarters = evaluate(2 * end / sp.pi, {}, BITS)
+    quarters = evaluate(2 * end / sp.pi, {}, MANY_BITS)
     if quarters.exact is not None and quarters.exact.is_Integer:
         return quarters.exact * sp.pi / 2
-    with ctx.workprec(BITS):
+    with ctx.workprec(MANY_BITS):
         whole = (quarters.ball.floor() if outward is sp.floor else quarters.ball.ceil()).unique_fmpz()
     if whole is None:
         return -sp.oo if outward is sp.floor else sp.oo

@@ -11,10 +11,9 @@ import numpy as np
 import sympy as sp
 from flint import ctx
 
-from .balls import Unclear, Undefined, Value, evaluate
+from .balls import Unclear, Undefined, Value, evaluate, is_below
 from .constants import spelled
-from .domain import SPECIAL, Domain, as_float
-from .polyhedron import is_below
+from .domain import SPECIAL, Domain, as_float, has_properties, linear
 from .verdict import Verdict
 
 SEED = 0
@@ -28,6 +27,7 @@ MORE = 4
 # Expressions whose zeros are tried, operations beyond which they are not sought, and the first steps of a function.
 MOST_CRITICAL = 60
 LARGEST = 40
+_PERIODIC = (sp.cos, sp.sin, sp.tan, sp.cot)
 _OUTWARD = (0, 1, -1, 2, -2, 3, -3, 4, -4)
 
 
@@ -38,14 +38,9 @@ def _deciding(e: Any) -> Iterator[Any]:
             yield part.lhs - part.rhs
         elif part.func in (sp.Max, sp.Min):
             yield from (a - b for a, b in combinations(part.args, 2))
-        elif part.func in (sp.floor, sp.ceiling, sp.Mod):
+        elif part.func in (sp.floor, sp.ceiling):
             yield from (part.args[0] - k for k in _OUTWARD)
-        elif part.func in (sp.acos, sp.asin, sp.atan, sp.acot) and part.args[0].func in (
-            sp.cos,
-            sp.sin,
-            sp.tan,
-            sp.cot,
-        ):
+        elif part.func in (sp.acos, sp.asin, sp.atan) and part.args[0].func in _PERIODIC:
             yield from (part.args[0].args[0] - k * sp.pi / 2 for k in _OUTWARD)
         elif part.is_Pow:
             yield from () if part.exp.is_Integer and part.exp > 0 else part.args
@@ -54,15 +49,16 @@ def _deciding(e: Any) -> Iterator[Any]:
 
 
 def _zeros(g: Any) -> list[tuple[Any, Any]]:
-    """The zeros of a linear or quadratic polynomial in one symbol, each with the symbol."""
+    """Symbols, and the values at which a linear expression or a quadratic polynomial of one symbol is 0."""
+    form = linear(g)
+    if form is not None:
+        return [(symbol, sp.expand(symbol - g / coefficient)) for symbol, coefficient in [*form[0].items()][:1]]
     if len(g.free_symbols) != 1 or sp.count_ops(g) > LARGEST:
         return []
     (symbol,) = g.free_symbols
-    if not g.is_polynomial(symbol) or sp.degree(g, symbol) > 2:
+    if not g.is_polynomial(symbol) or sp.degree(g, symbol) != 2:
         return []
     c, b, a = (sp.Poly(g, symbol).nth(k) for k in range(3))
-    if a == 0:
-        return [] if b == 0 else [(symbol, sp.expand(-c / b))]
     root = sp.sqrt(sp.expand(b**2 - 4 * a * c))
     return [(symbol, (sign * root - b) / (2 * a)) for sign in (1, -1)] if root.is_real else []
 
@@ -115,19 +111,21 @@ class Search:
 
     def _special(self) -> Iterator[dict[Any, Any]]:
         """Points at which a function may jump or bend, and points between these and the ends of the domain."""
-        for symbol in self.domain.symbols:
-            low, high, *_ = self.domain.interval(symbol)
-            places = {place for one, place in self._critical if one == symbol}
-            places |= set(SPECIAL) if len(self.domain.symbols) == 1 else set()
+        for symbol, place in self._critical:
+            if place.free_symbols:
+                yield from self.domain.fixed(symbol, place).points(self._rng, 1)
+        for symbol, interval in self.domain.intervals.items():
+            low, high = interval.low, interval.high
+            places = {place for one, place in self._critical if one == symbol and not place.free_symbols}
+            places |= set(SPECIAL) if len(self.domain.intervals) == 1 else set()
             try:
                 inside = sorted((p for p in places if is_below(low, p) and is_below(p, high)), key=as_float)
             except Unclear:
                 continue
             ends = [end for end in (low, *inside, high) if end not in (sp.oo, -sp.oo)]
             for value in (*inside, *((a + b) / 2 for a, b in pairwise(ends) if inside)):
-                face = self.domain.fixed(symbol, value)
-                if face is not None and not face.is_empty and (symbol.is_integer is not True or value.is_Integer):
-                    yield from face.points(self._rng, 1)
+                if has_properties(symbol, value):
+                    yield from self.domain.fixed(symbol, value).points(self._rng, 1)
 
     def _at(self, point: dict[Any, Any]) -> Verdict | None:
         self.tried += 1

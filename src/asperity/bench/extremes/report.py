@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
+from ...core.child import ChildCrashed, ChildProcess, OutOfTime
 from ...core.errors import AsperityError, InputError
 from ...core.tables import table
-from ..running.processes import ChildCrashed, ChildProcess, OutOfTime
 from .row import ExtremeRow
 
 # Disks and collisions in each case, bins of the largest matrix, and seconds for each case.

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...geometry import Disk, Wall, rectangular_teeth, trace, triangular_teeth
 from ...geometry.disk.disk import contact_normal, foreshortening
-from ...verification import Formula, Verdict, agreement, erratum, every, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, verify
+from ..entry import Code, Formula, erratum, verified
 
 # Rounding error of a dozen reflections.
 TRACED = 1e-10

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ...geometry.disk.disk import direction, foreshortening, frame_rows
-from ...verification import Formula, Verdict, convention, erratum, every, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, every, verify
+from ..entry import Code, Formula, convention, erratum, verified
 
 
 @verified(

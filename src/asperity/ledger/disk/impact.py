@@ -7,20 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...geometry.disk.disk import contact_normal
-from ...verification import (
-    Formula,
-    Verdict,
-    agreement,
-    by_reading,
-    convention,
-    erratum,
-    every,
-    holds,
-    no_excess,
-    verified,
-    verify,
-)
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, holds, no_excess, verify
+from ..entry import Code, Formula, by_reading, convention, erratum, verified
 from ..samples import generator
 
 

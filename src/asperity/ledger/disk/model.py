@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...geometry.disk import rolling
-from ...verification import Formula, Verdict, by_reading, erratum, every, no_excess, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, every, no_excess, verify
+from ..entry import Code, Formula, by_reading, erratum, verified
 
 
 @verified(

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ...verification import Formula, Verdict, agreement, every, verified
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every
+from ..entry import Code, Formula, verified
 from ..samples import generator
 
 EPS = 1e-6

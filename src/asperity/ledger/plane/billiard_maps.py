@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.checks import Floats
-from ...verification import Formula, Verdict, agreement, by_reading, erratum, every, holds, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, holds, verify
+from ..entry import Code, Formula, by_reading, erratum, verified
 from ..samples import generator
 
 # Semi-axes of the elliptical table.

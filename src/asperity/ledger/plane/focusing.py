@@ -9,8 +9,8 @@ import numpy as np
 from ...geometry import focusing_arcs, trace
 from ...geometry.disk.disk import foreshortening
 from ...kernels.walls.circular_arc import CircularArcLaw
-from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, holds, verify
+from ..entry import Code, Formula, convention, erratum, verified
 
 HALF_ANGLES = (0.3, 0.8, 1.3)
 RAYS = 4000

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...geometry import dispersing_arcs, trace
-from ...verification import Formula, Verdict, agreement, by_reading, convention, erratum, every, holds, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, holds, verify
+from ..entry import Code, Formula, by_reading, convention, erratum, verified
 
 POINTS = 2000
 # Error of a sum over POINTS equal cells, for a piecewise linear integrand.

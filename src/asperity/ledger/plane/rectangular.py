@@ -10,8 +10,8 @@ from ...geometry import rectangular_teeth, trace
 from ...geometry.disk.disk import foreshortening
 from ...kernels.laws.crevice import crevice_retro
 from ...kernels.walls.rectangular import RectangularTeethLaw
-from ...verification import Formula, Verdict, agreement, erratum, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, verify
+from ..entry import Code, Formula, erratum
 from ..entry_probability import FRACTION_ERROR, fraction
 
 HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)

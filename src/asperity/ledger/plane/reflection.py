@@ -8,8 +8,8 @@ import numpy as np
 
 from ...geometry.tracing.tracing import trace
 from ...geometry.walls.named import dispersing_arcs, focusing_arcs, rectangular_teeth, triangular_teeth
-from ...verification import Formula, Verdict, agreement, by_reading, erratum, every, holds, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, holds, verify
+from ..entry import Code, Formula, by_reading, erratum, verified
 
 RAYS = 400
 # Rounding error of a ray. It grows with curvature and bounces, both small here.

@@ -9,8 +9,8 @@ import numpy as np
 from ...geometry import focusing_arcs, rectangular_teeth, trace, triangular_teeth
 from ...geometry.disk.disk import foreshortening
 from ...kernels.walls.triangular import TriangularTeethLaw
-from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, holds, verify
+from ..entry import Code, Formula, convention, erratum, verified
 from ..entry_probability import FRACTION_ERROR, fraction
 
 APEX_ANGLES = (0.35, 0.9, 1.6, 2.4)

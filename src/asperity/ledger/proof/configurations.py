@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...geometry.disk import rolling
-from ...verification import Formula, Verdict, agreement, erratum, every, holds, no_excess, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, holds, no_excess, verify
+from ..entry import Code, Formula, erratum, verified
 from ..samples import clearance, generator, is_free, residual, satellites
 
 SATELLITES = 40

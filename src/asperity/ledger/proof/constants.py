@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...geometry.disk import rolling
-from ...verification import Formula, Verdict, agreement, by_reading, erratum, every, no_excess, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, no_excess, verify
+from ..entry import Code, Formula, by_reading, erratum, verified
 from ..samples import generator, masses, unit_velocities
 
 

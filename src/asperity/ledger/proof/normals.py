@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ...geometry.disk import rolling
 from ...geometry.disk.disk import contact_normal
-from ...verification import Formula, Verdict, erratum, every, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, every, verify
+from ..entry import Code, Formula, erratum, verified
 
 
 @verified(

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...geometry.disk import rolling
 from ...geometry.disk.disk import frame_rows
-from ...verification import Formula, Verdict, by_reading, convention, erratum, every, holds, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, every, holds, verify
+from ..entry import Code, Formula, by_reading, convention, erratum, verified
 from ..samples import generator, masses
 
 

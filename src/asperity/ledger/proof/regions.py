@@ -5,20 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...geometry.disk import rolling
-from ...verification import (
-    Formula,
-    Verdict,
-    agreement,
-    by_reading,
-    convention,
-    erratum,
-    every,
-    holds,
-    no_excess,
-    verified,
-    verify,
-)
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, holds, no_excess, verify
+from ..entry import Code, Formula, by_reading, convention, erratum, verified
 from ..samples import generator, kinetic_norm, masses, residual, unit_velocities
 
 good_states = by_reading(

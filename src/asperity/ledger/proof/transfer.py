@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...geometry.disk import rolling
-from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, no_excess, verified, verify
-from ...verification.entry import Code
+from ...verification import Verdict, agreement, every, holds, no_excess, verify
+from ..entry import Code, Formula, convention, erratum, verified
 from ..samples import generator, kinetic_norm, masses, unit_velocities
 
 

@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import Any, Literal
 
 from ..core.errors import InputError
-from .verdict import Verdict
+from ..verification import Verdict
 
 Status = Literal["verified", "erratum", "convention"]
 Kind = Literal["symbolic", "numeric", "by reading"]
@@ -59,7 +59,8 @@ class Entry:
 
     Examples
     --------
-    >>> from asperity.verification import Formula, agreement, erratum
+    >>> from asperity.ledger import Formula, erratum
+    >>> from asperity.verification import agreement
     >>> @erratum(
     ...     id="S9.01", section="0", statement="The area of a disk of radius r.", kind="numeric",
     ...     printed=Formula(r"2\pi r", lambda r: 6.283 * r), corrected=Formula(r"\pi r^2", lambda r: 3.1416 * r**2),
