@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from asperity.bench.extremes.report import run_extremes
 from asperity.bench.quantities.walls import RANDOM_WALLS
 from asperity.bench.run import BenchRun
 from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
 from asperity.spectral import Machine
 
+from .extremes.report import run_extremes
 from .peers import peer_tables
 from .savings import savings_table
 from .speed import speed_and_goals

@@ -1,6 +1,6 @@
 """The collision of the disk with satellites in 50 digits, one disk at a time.
 
-``python -m campaigns.judges.precise_collision`` writes ``src/asperity/bench/running/extreme_disks.json``, which the
+``python -m campaigns.judges.precise_collision`` writes ``campaigns/extremes/extreme_disks.json``, which the
 stability report reads. As in `plain_collision`, nothing is known of a flight but that no satellite moves faster than
 some speed: it advances by the least time in which one could reach the wall, until one is near; then a secant finds the
 contact. The wall is polygonal, its corners are doubles.
@@ -9,15 +9,13 @@ contact. The wall is polygonal, its corners are doubles.
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import mpmath as mp
 import numpy as np
+from campaigns.extremes.disks import DATA, DISK, SCALES, WALL
 
-from asperity.bench.extremes.disks import DATA, DISK, SCALES, WALL
 from asperity.geometry.disk.satellites import Satellites
 
-FILE = Path(__file__).parents[2] / "src/asperity/bench/running" / DATA
 DIGITS, GUARD = 50, 15
 DISKS = 12
 # A satellite so near the wall, in units of the wall, is brought to it by secants; it is there at the second distance.
@@ -158,7 +156,7 @@ def main():
     for scale in SCALES:
         rows = [judged(scale, *state) for state in zip(*disks_of(scale), strict=True)]
         blocks.append(f'"{scale:g}": [\n' + ",\n".join(json.dumps(row) for row in rows) + "\n]")
-        FILE.write_text("{" + ",\n".join(blocks) + "}\n", encoding="utf-8")
+        DATA.write_text("{" + ",\n".join(blocks) + "}\n", encoding="utf-8")
         print(f"{scale:g}: {len(rows)} disks", flush=True)
 
 

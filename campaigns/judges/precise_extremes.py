@@ -1,7 +1,7 @@
 """Rays on the extreme walls, and where they go in 50 digits.
 
 ``python -m campaigns.judges.precise_extremes [CASE]`` writes the data. The stability report reads
-``src/asperity/bench/running/extreme_rays.json``. Walls with a closed form are judged by it (`precise_rays`), the
+``campaigns/extremes/extreme_rays.json``. Walls with a closed form are judged by it (`precise_rays`), the
 others by the tracer in 50 digits (`precise_tracer`); neither shares code with the library.
 
 Of each ray the file has the position, the angle, the outgoing angle rounded once, the number of hits, the condition (1
@@ -14,17 +14,14 @@ from __future__ import annotations
 import json
 import sys
 from math import pi
-from pathlib import Path
 
 import mpmath as mp
 import numpy as np
+from campaigns.extremes import walls as walls
+from campaigns.extremes.rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
 from campaigns.judges.precise_rays import arc, cap, cap_clearance, crevice, tooth
 from campaigns.judges.precise_tracer import DIGITS, trace_precisely
 
-from asperity.bench.extremes import walls as walls
-from asperity.bench.extremes.rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
-
-FILE = Path(__file__).parents[2] / "src/asperity/bench/running" / DATA
 RAYS, FEW, FEWEST = 64, 24, 4
 # Stems so narrow that none of the rays misses them after its first hit, the one that the closed form is about.
 SMALL_STEMS = walls.STEMS[:2]
@@ -178,7 +175,7 @@ def _nearest(figure, values):
 
 def main(chosen):
     """Judge the chosen cases, or all; a case takes seconds, the mushrooms some minutes."""
-    data = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    data = json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else {}
     builders = walls.extreme_walls()
     for name in chosen or builders:
         wall = builders[name]()
@@ -195,7 +192,7 @@ def write(data):
     for name, case in data.items():
         rows = ",\n".join(json.dumps(row) for row in case["rays"])
         blocks.append(f'"{name}": {{"reference": "{case["reference"]}", "rays": [\n{rows}\n]}}')
-    FILE.write_text("{" + ",\n".join(blocks) + "}\n", encoding="utf-8")
+    DATA.write_text("{" + ",\n".join(blocks) + "}\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

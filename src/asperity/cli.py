@@ -472,7 +472,6 @@ def warm_up() -> None:
 @main.command()
 @click.argument("problem", nargs=-1)
 @click.option("--quick", is_flag=True, help="Short ladders and cheap references: under three minutes.")
-@click.option("--extremes", is_flag=True, help="The stability report instead: stiff and extreme cases.")
 @click.option(
     "--out", default="bench-results", show_default=True, type=click.Path(path_type=Path), help="Folder for results."
 )
@@ -486,17 +485,14 @@ def warm_up() -> None:
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     help="Compare with the bench.json of an earlier run; exit code 1 if something became slower or less exact.",
 )
-def bench(problem: tuple[str, ...], quick: bool, extremes: bool, out: Path, force: bool, compare: Path | None) -> None:
+def bench(problem: tuple[str, ...], quick: bool, out: Path, force: bool, compare: Path | None) -> None:
     """Error against run time on the standard set, or on PROBLEMs of it: SCENE, QUANTITY or SCENE/QUANTITY.
 
     \b
     Examples:
       asperity bench --quick
       asperity bench focusing-arc/moment lambda2 --out my-bench
-      asperity bench --extremes
     """
     from .bench.commands import run_bench
 
-    if extremes and (problem or compare is not None):
-        raise click.UsageError("--extremes takes no PROBLEM and no --compare; leave these out")
-    sys.exit(run_bench(problem, quick=quick, extremes=extremes, out=out, force=force, compare=compare))
+    sys.exit(run_bench(problem, quick=quick, out=out, force=force, compare=compare))

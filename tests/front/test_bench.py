@@ -14,6 +14,8 @@ from campaigns import savings
 from campaigns.__main__ import begin_or_go_on
 from campaigns.__main__ import main as measure_everything
 from campaigns.exact_rows import ArcRow
+from campaigns.extremes.report import run_extremes
+from campaigns.extremes.row import ExtremeRow
 from campaigns.sections import SECTIONS, section_text
 from click.testing import CliRunner
 from scipy.stats import norm, t
@@ -21,8 +23,6 @@ from scipy.stats import norm, t
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench.comparison import compare_runs
-from asperity.bench.extremes.report import run_extremes
-from asperity.bench.extremes.row import ExtremeRow
 from asperity.bench.quantities import collision as collision_quantities
 from asperity.bench.quantities import collision as uniform_disk
 from asperity.bench.quantities import methods as routes

@@ -215,7 +215,6 @@ def test_a_picture_that_cannot_be_written_is_refused(tmp_path, place, remedy):
         ["study", "flat", "--mass", "heavy"],
         ["study", "flat", "--nosuch"],
         ["study", "flat", "--seed", -1],
-        ["bench", "law", "--extremes"],
     ],
 )
 def test_wrong_usage_ends_with_exit_code_two(arguments):

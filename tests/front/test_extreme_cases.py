@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 
 import pytest
+from campaigns.extremes import disks as extreme_disks
+from campaigns.extremes import rays as extreme_rays
+from campaigns.extremes.report import case_names, run_case
+from campaigns.extremes.walls import extreme_walls
 from campaigns.judges import precise_collision
-from campaigns.judges.precise_extremes import FILE, judge_of, judged
+from campaigns.judges.precise_extremes import judge_of, judged
 
 from asperity import geometry as geo
-from asperity.bench.extremes import disks as extreme_disks
-from asperity.bench.extremes import rays as extreme_rays
-from asperity.bench.extremes.report import case_names, run_case
-from asperity.bench.extremes.walls import extreme_walls
 
 SLOW_CASES = ("Koch 8", "matrix of")
 DEGRADED = (
@@ -36,7 +36,7 @@ def test_an_extreme_case_is_met_or_says_why_it_is_not(name):
 
 
 def test_every_extreme_wall_has_its_rays():
-    assert list(json.loads(FILE.read_text())) == list(extreme_walls())
+    assert list(json.loads(extreme_rays.DATA.read_text())) == list(extreme_walls())
     for name in extreme_walls():
         reference, rays = extreme_rays.known_rays(name)
         assert reference in ("closed form, 50 digits", "tracer in 50 digits")
@@ -47,7 +47,7 @@ def test_every_extreme_wall_has_its_rays():
 def test_the_data_are_what_their_script_computes(name):
     wall = extreme_walls()[name]()
     judge = judge_of(name, wall)
-    stored = json.loads(FILE.read_text())[name]
+    stored = json.loads(extreme_rays.DATA.read_text())[name]
     assert stored["reference"] == judge.reference
     rays = stored["rays"]
     # the rays that are stored, not new ones: numpy's arccos and powers round differently from processor to processor
@@ -71,7 +71,7 @@ def test_the_check_of_rays_can_fail(name, other):
 
 @pytest.mark.parametrize("scale", [1e-1, 1e-8])
 def test_the_disks_data_are_what_their_script_computes(scale):
-    stored = json.loads(precise_collision.FILE.read_text())[f"{scale:g}"]
+    stored = json.loads(extreme_disks.DATA.read_text())[f"{scale:g}"]
     position, velocity = precise_collision.disks_of(scale)
     assert precise_collision.judged(scale, position[3], velocity[3]) == stored[3]
 

@@ -332,13 +332,6 @@ def test_bench_with_force_removes_the_rows_of_its_problems_and_no_other_file(tmp
     assert names_in(tmp_path) == ["bench.json", "koch-moment.json", "mine.json", "summary.md", "tables.md"]
 
 
-def test_bench_refuses_to_replace_a_report_before_it_works(tmp_path):
-    (tmp_path / "extremes.md").write_text("precious")
-    refused = bench("--extremes", "--out", tmp_path)
-    assert refused.exit_code == 1 and "--force" in refused.output
-    assert (tmp_path / "extremes.md").read_text() == "precious"
-
-
 # values
 
 

@@ -18,6 +18,7 @@ from asperity.estimates import Estimate
 EXACT = ker.discretise(ker.TriangularTeethLaw(0.7), ker.Bins(6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "rounds"), [(mutated_files.matrices, 100), (mutated_files.walls, 200), (mutated_files.profiles, 30)]
 )
@@ -68,6 +69,7 @@ def test_no_matrix_is_made_with_a_field_that_no_file_holds(fields, name):
         ker.KernelMatrix(np.eye(2), ker.Bins(2), Estimate(np.nan, 0.0, "bound", "given"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["symmetric", "counts", "basis", "record", "none"])
 @pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA])
 def test_no_member_is_inflated_before_its_header_is_checked(tmp_path, name, method):

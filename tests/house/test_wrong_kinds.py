@@ -84,6 +84,7 @@ def test_edges_of_a_wrong_shape_do_not_reach_the_compiled_march():
         ker.WallLaw(geo.elliptical_arcs(1.0)).distribution(np.array([1.0]), np.ones((4, 3, 2)))
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", CALLS)
 def test_a_wrong_kind_of_argument_is_an_input_error(name, tmp_path, monkeypatch):

@@ -286,6 +286,7 @@ def test_there_are_examples_that_start_workers():
     assert len(BLOCKS) >= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", BLOCKS)
 def test_an_example_that_starts_workers_runs_as_a_script_and_says_what_it_lacks_without_its_guard(block, tmp_path):
     if "random_wall" in block:

@@ -24,6 +24,7 @@ SKEW = ker.WallLaw(geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0
 ARROW = ker.WallLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.4), (1, 0)]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wall", [verdicts.random_curved_wall(11), verdicts.island_wall(0)], ids=["mixed", "island"])
 def test_the_straight_part_reaches_as_far_as_straight_rays_of_the_textbook(wall):
     """A matrix of these rays reaches a little less far, the root of (Q^m 1) a little farther."""
@@ -76,6 +77,7 @@ def test_one_segment_among_curves_reaches_as_far_as_its_best_pair_of_angles():
     assert found.low - 2e-3 <= expected <= found.high + 1e-3
 
 
+@pytest.mark.slow
 def test_a_mixed_wall_that_was_undecided_has_a_verdict_that_the_judge_does_not_refute():
     wall = verdicts.random_curved_wall(9)
     row = next(verdicts.rows_of("mixed 9", wall, 1e-2, more=False))
@@ -110,6 +112,7 @@ def test_the_spectrum_of_a_law_carries_its_verdict():
     assert matrix.verdict == "undecided" and matrix.gap == 1.0 - matrix.values[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [ARC @ ARC, ARC**3, ker.henyey_greenstein(-0.7) ** 2], ids=str)
 def test_eigenvalues_of_powers_are_powers(law):
     base, exponent = (law.laws[0], 2) if isinstance(law, ker.Composition) else (law.law, law.exponent)

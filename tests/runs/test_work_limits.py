@@ -39,6 +39,7 @@ def comb(rng: np.random.Generator) -> geo.Wall:
     return geo.Wall.from_vertices([*vertices, (1.0, -depth), (1.0, 0.0)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_samples_bound_the_work_on_a_comb(seed: int) -> None:
     wall = comb(np.random.default_rng(seed))
@@ -63,6 +64,7 @@ def test_an_angle_stops_near_its_limit_of_segments() -> None:
         assert found.segments < limit + 64 * (int(collisions) + 100), "a block of rays beyond the limit"
 
 
+@pytest.mark.slow
 def test_a_gap_within_a_time_limit_agrees_with_one_without() -> None:
     law = ker.WallLaw(geo.dispersing_arcs(0.8))
     exact = spec.spectral_gap(law, tolerance=1e-7)
@@ -96,6 +98,7 @@ def test_a_time_limit_is_a_positive_number(tool, limit) -> None:
         tool(ker.lambertian(), time_limit=limit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "more"),
     [

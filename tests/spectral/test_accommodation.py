@@ -160,6 +160,7 @@ def exact_coefficients(vertices, theta):
         return float(1 + along / mp.cos(angle)), float((mp.sin(angle) - raised) / complete)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1e-6, 1e-3, 0.09])
 @pytest.mark.parametrize("diffuse", [0.0, 1e-9])
 def test_coefficients_of_random_shallow_walls_have_the_digits_of_sums_in_fifty_digits(size, diffuse):

@@ -54,6 +54,7 @@ def test_a_composition_whose_images_have_no_known_error_is_refused():
         spec.enclosures(near @ ker.TriangularTeethLaw(0.7) @ near, 2, tolerance=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 2, 3, 4, 5, 8, 9, 13, 14, 18, 19, 28])
 def test_laws_in_given_bases_are_enclosed_and_indexed_as_known_otherwise(number):
     found = judged(given_case(number))

@@ -257,6 +257,7 @@ def test_facets_that_hardly_bend_are_left_to_other_means():
     assert shallow_gap(arc.in_specular_frame(), essential_edge(arc)) is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth, of_slow_functions", [(0.025, 0.03), (1.0, 0.2)])
 def test_a_gap_of_slow_functions_is_held_against_fast_oscillations(depth, of_slow_functions):
     """The textbook tracer finds the quotient of the oscillation that the evidence names."""

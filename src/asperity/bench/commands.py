@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
-from ..core.errors import FileExistsRefusal
-from ..core.files import text_of, write_whole
+from ..core.files import text_of
 from .comparison import compare_runs
-from .run import BenchRun, made_here, prepare_folder
+from .run import BenchRun, prepare_folder
 from .standard_set import FULL, QUICK, problem_names, run_problems
 
 
-def run_bench(
-    problems: Sequence[str], *, quick: bool, extremes: bool, out: Path, force: bool, compare: Path | None
-) -> int:
+def run_bench(problems: Sequence[str], *, quick: bool, out: Path, force: bool, compare: Path | None) -> int:
     """Run the requested measurements, print and write the results; return the exit code."""
     names = problem_names(problems)
     earlier = None if compare is None else BenchRun.of_json(text_of(compare))
-    if extremes:
-        from .extremes.report import run_extremes
-
-        return _show(out / "extremes.md", lambda: run_extremes(quick).table(), force)
     prepare_folder(out, names, force=force)
     effort = QUICK if quick else FULL
     reports = list(run_problems(names, effort, out, lambda line: click.echo(line, err=True)))
@@ -37,15 +29,3 @@ def run_bench(
     found = compare_runs(earlier, run)
     click.echo(found.table())
     return 1 if found.is_worse else 0
-
-
-def _show(path: Path, make: Callable[[], str], force: bool) -> int:
-    """Print and write a report; an existing file is refused before the work."""
-    made_here(path.parent)
-    if os.path.exists(path) and not force:
-        raise FileExistsRefusal(f"--out: {path} exists; use another folder or --force to replace it")
-    text = make()
-    write_whole(path, text + "\n", overwrite=True)
-    click.echo(text)
-    click.echo(f"wrote {path}", err=True)
-    return 0

@@ -111,6 +111,7 @@ def test_a_no_slip_disk_in_a_circle_keeps_its_angle_of_incidence_every_second_ti
     np.testing.assert_allclose(flights[1::2], np.broadcast_to(flights[1], flights[1::2].shape), rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spinning", [False, True])
 @pytest.mark.parametrize("name", TABLES)
 def test_the_starts_are_in_equilibrium_and_fly_as_far_as_santalo_says(name, spinning):

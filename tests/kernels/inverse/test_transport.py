@@ -360,6 +360,7 @@ def test_deep_crevices_converge_weakly_but_not_row_by_row():
     assert rows.distances[-1] > 0.5 * rows.distances[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["zigzag", "bottle"])
 def test_the_resistance_of_a_wall_without_closed_form_meets_its_tolerance(kind):
     # straight Bezier pieces are traced; the same polygon is known exactly by its beams

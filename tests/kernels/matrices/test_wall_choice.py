@@ -96,6 +96,7 @@ def test_a_tighter_tolerance_that_is_out_of_reach_gives_no_worse_a_matrix():
     assert loose <= 1e-4 and tight <= loose
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wall", [geo.dispersing_arcs(1.0), geo.mushrooms(0.3)], ids=["dispersing", "mushrooms"])
 def test_curved_walls_in_bins_are_left_to_quadrature_where_it_is_far_more_exact(wall):
     law, basis = ker.WallLaw(wall), ker.Bins(32)
@@ -126,6 +127,7 @@ def test_cells_are_not_judged_before_their_first_panels_are_divided(name):
     assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= 2.5 * float(rays.error)
 
 
+@pytest.mark.slow
 def test_pieces_that_only_the_asymmetry_shows_are_looked_for_without_dividing_all_panels():
     wall = geo.Wall([geo.Bezier([(0, 0), (0.2, -1.6), (0.8, -1.6), (1, 0)])])
     _, error, rays = traced_matrix(wall, ker.Bins(64), Budget(1.37e-4))

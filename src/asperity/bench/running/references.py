@@ -1,4 +1,4 @@
-"""Stored references: JSON files written by committed scripts."""
+"""The stored references of the standard set, which `campaigns.standard_references` writes."""
 
 from __future__ import annotations
 
@@ -15,21 +15,14 @@ FILE = Path(__file__).with_name("standard_references.json")
 
 
 @cache
-def stored(file: str) -> dict[str, Any]:
-    """The table in a JSON file of this folder, read once in each process.
-
-    Examples
-    --------
-    >>> sorted(stored("extreme_disks.json"))[:2]
-    ['0.0001', '0.001']
-    """
-    table: dict[str, Any] = json.loads(Path(__file__).with_name(file).read_text(encoding="utf-8"))
+def _stored() -> dict[str, Any]:
+    table: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
     return table
 
 
 def known_reference(problem: str) -> ReferenceValue | None:
     """The reference of a problem SCENE/QUANTITY, or None if no independent reference is known."""
-    entry = stored(FILE.name).get(problem)
+    entry = _stored().get(problem)
     if entry is None:
         return None
     value = np.asarray(entry["value"], dtype=np.float64)

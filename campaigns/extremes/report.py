@@ -8,9 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
-from ...core.child import ChildCrashed, ChildProcess, OutOfTime
-from ...core.errors import AsperityError, InputError
-from ...core.tables import table
+from asperity.core.child import ChildCrashed, ChildProcess, OutOfTime
+from asperity.core.errors import AsperityError, InputError
+from asperity.core.tables import table
+
 from .row import ExtremeRow
 
 # Disks and collisions in each case, bins of the largest matrix, and seconds for each case.
@@ -97,9 +98,10 @@ def _load() -> None:
     """Load, and on a new machine compile, the loops that serve all walls, before the first case."""
     import numpy as np
 
-    from ... import geometry as geo
-    from ...geometry.tracing.refinement import refined_trace
-    from ..quantities.collision import DISK
+    from asperity import geometry as geo
+    from asperity.bench.quantities.collision import DISK
+    from asperity.geometry.tracing.refinement import refined_trace
+
     from .disks import WALL
 
     # a hollow with a closed form, and a hollow with a grid

@@ -7,12 +7,13 @@ from functools import partial
 
 import numpy as np
 
-from ... import geometry as geo
-from ...core.checks import Floats
-from ...core.rounding import EPS
-from ...kernels import Bins, CollisionLaw, KernelMatrix, Legendre, TriangularTeethLaw, discretise, maxwell
-from ...kernels.matrices.matrix import frobenius_error
-from ...spectral import spectrum
+from asperity import geometry as geo
+from asperity.core.checks import Floats
+from asperity.core.rounding import EPS
+from asperity.kernels import Bins, CollisionLaw, KernelMatrix, Legendre, TriangularTeethLaw, discretise, maxwell
+from asperity.kernels.matrices.matrix import frobenius_error
+from asperity.spectral import spectrum
+
 from .row import ExtremeRow
 
 # Rounding errors of tens of operations on quantities of size 1.

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
-from ... import geometry as geo
-from ...core.rounding import EPS
-from ..quantities.collision import DISK, sampled_velocities
-from ..running.references import stored
-from .row import ExtremeRow
+from asperity import geometry as geo
+from asperity.bench.quantities.collision import DISK, sampled_velocities
+from asperity.core.rounding import EPS
+
+from .row import ExtremeRow, stored
 
 # Written by campaigns/judges/precise_collision.py
-DATA = "extreme_disks.json"
+DATA = Path(__file__).with_name("extreme_disks.json")
 # Measured errors are below 0.4; the limit is the limit for single rays.
 UNITS = 32.0
 # Rounding errors of a few contacts, each magnified up to tens of times; measured below 600 EPS.

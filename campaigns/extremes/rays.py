@@ -8,16 +8,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
-from ... import geometry as geo
-from ...core.rounding import EPS
-from ..running.references import stored
-from .row import ExtremeRow
+from asperity import geometry as geo
+from asperity.core.rounding import EPS
+
+from .row import ExtremeRow, stored
 from .walls import extreme_walls
 
-DATA = "extreme_rays.json"
+DATA = Path(__file__).with_name("extreme_rays.json")
 UNIT = "eps x condition"
 # Measured errors of the tracer are below 5 in these units; the margin is a factor six.
 UNITS = 32.0

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from math import pi
 
-from ... import geometry as geo
+from asperity import geometry as geo
 
 TOOTH_ANGLES = (1e-4, 1e-2, 0.7, pi - 1e-2, pi - 1e-4)
 TOOTH_RATIOS = (1e-6, 1e-3, 1.0, 1e4, 1e8)

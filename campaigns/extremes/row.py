@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
 
 ExtremeVerdict = Literal["met", "degraded as reported", "refused", "not met", "timed out"]
 
@@ -62,3 +65,10 @@ class ExtremeRow:
             return "not met"
         flagged = sum(number for status, number in self.counts.items() if status != "escaped")
         return "degraded as reported" if self.error > self.allowed or flagged > self.flagged_rightly else "met"
+
+
+@cache
+def stored(file: Path) -> dict[str, Any]:
+    """The table in a JSON file, read once in each process."""
+    table: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return table
