@@ -18,9 +18,10 @@ from ..tracing.tracing import Status, StatusCounts, numbers_of
 ACCURACY = 1e-6
 # Disturbance of the incoming state, of the size of the rounding errors at a contact.
 DISTURBANCE = 16.0 * EPS
-# Disturbed states of a collision, in orthogonal directions, and the largest change of its end. The changes scatter as
-# the error does, which exceeds all three of them 10 times once in 10^3. One is enough if its change is at most CLEAR.
-DISTURBED, LIMIT, CLEAR = 3, 0.1 * ACCURACY, 1e-4 * ACCURACY
+# Disturbed states of a collision, and the largest change of its end. The changes scatter as the error does, but are of
+# two sizes, up to 175 to 1, where a contact is found to one rounding error or to sixteen. One disturbed state is enough
+# if its change is at most CLEAR.
+DISTURBED, LIMIT, CLEAR = 6, 1e-2 * ACCURACY, 1e-4 * ACCURACY
 # Twice the inverse cosine of the angle to the normal that few contacts of a collision exceed on average: 1/5.
 STEEP = 10.0
 # Growth at a contact of a flat wall, for rounding errors that add up: collisions of a thousand contacts are repeated.
@@ -81,11 +82,10 @@ def mark_amplified(
     """
     (at, moving), (position, velocity), (sizes, masses) = states, ends, units
     rows = np.flatnonzero((status == DiskStatus.ESCAPED) & doubtful)
-    signs = np.arange(at.shape[1] + moving.shape[1])
     for k in range(DISTURBED):
         if not len(rows):
             break
-        shift = DISTURBANCE * (1.0 - 2.0 * (signs >> k & 1))
+        shift = DISTURBANCE * np.random.default_rng(k).uniform(-1.0, 1.0, at.shape[1] + moving.shape[1])
         speeds = np.sqrt(np.sum(masses * moving[rows] ** 2, axis=1, keepdims=True) / masses)
         start = at[rows] + shift[: at.shape[1]] * sizes, moving[rows] + shift[at.shape[1] :] * speeds
         there, w, escaped = again(rows, *start)

@@ -113,7 +113,7 @@ def collide(
     contact.
 
     Disks with many contacts, the fewer the larger m/J and the curvature of the wall, collide again from incoming states
-    that differ by rounding; where the outgoing states differ by more than 1e-7 the status is ``AMPLIFIED``. The state
+    that differ by rounding; where the outgoing states differ by more than 1e-8 the status is ``AMPLIFIED``. The state
     is that of a path that obeys the laws within rounding. So laws and means over many disks count it as any other, and
     ``escaped`` includes it. It must not be compared with another computation of the same disk.
 
