@@ -480,12 +480,7 @@ def warm_up() -> None:
     is_flag=True,
     help="Measure these problems again and replace reports in the folder; by default a run goes on.",
 )
-@click.option(
-    "--compare",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    help="Compare with the bench.json of an earlier run; exit code 1 if something became slower or less exact.",
-)
-def bench(problem: tuple[str, ...], quick: bool, out: Path, force: bool, compare: Path | None) -> None:
+def bench(problem: tuple[str, ...], quick: bool, out: Path, force: bool) -> None:
     """Error against run time on the standard set, or on PROBLEMs of it: SCENE, QUANTITY or SCENE/QUANTITY.
 
     \b
@@ -495,4 +490,4 @@ def bench(problem: tuple[str, ...], quick: bool, out: Path, force: bool, compare
     """
     from .bench.commands import run_bench
 
-    sys.exit(run_bench(problem, quick=quick, out=out, force=force, compare=compare))
+    run_bench(problem, quick=quick, out=out, force=force)

@@ -13,6 +13,7 @@ import pytest
 from campaigns import savings
 from campaigns.__main__ import begin_or_go_on
 from campaigns.__main__ import main as measure_everything
+from campaigns.comparison import compare_runs
 from campaigns.exact_rows import ArcRow
 from campaigns.extremes.report import run_extremes
 from campaigns.extremes.row import ExtremeRow
@@ -22,7 +23,6 @@ from scipy.stats import norm, t
 
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench.comparison import compare_runs
 from asperity.bench.quantities import collision as collision_quantities
 from asperity.bench.quantities import collision as uniform_disk
 from asperity.bench.quantities import methods as routes
@@ -355,16 +355,9 @@ def test_the_command_lists_problems_and_refuses_others(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_command_writes_and_compares(tmp_path, monkeypatch):
+def test_the_command_writes_a_run(tmp_path, monkeypatch):
     run = run_report([("auto", 1e-3, [1.0, 1.1, 1.2, 1.3, 1.4])])
     monkeypatch.setattr("asperity.bench.commands.run_problems", lambda *_: iter(run.reports))
-    old = tmp_path / "old.json"
-    old.write_text(run_report([("auto", 1e-3, [0.1, 0.2, 0.3, 0.4, 0.5])]).to_json())
-    out = tmp_path / "new"
-    result = CliRunner().invoke(main, ["bench", "--quick", "--out", str(out), "--compare", str(old)])
-    assert result.exit_code == 1, result.output
-    assert "worse" in result.stdout and (out / "bench.json").exists()
-    same = CliRunner().invoke(
-        main, ["bench", "--quick", "--force", "--out", str(out), "--compare", str(out / "bench.json")]
-    )
-    assert same.exit_code == 0
+    result = CliRunner().invoke(main, ["bench", "--quick", "--out", str(tmp_path / "new")])
+    assert result.exit_code == 0, result.output
+    assert BenchRun.of_json((tmp_path / "new" / "bench.json").read_text()) == run

@@ -1,16 +1,22 @@
-"""Comparison of two benchmark runs: rows that became slower or less accurate, with significance tests."""
+"""Comparison of two benchmark runs: rows that became slower or less accurate, with significance tests.
+
+``python -m campaigns.comparison EARLIER/bench.json NOW/bench.json`` exits with 1 if a row became worse. Both are runs
+of ``asperity bench`` on the same machine.
+"""
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..core.tables import table
-from ..spectral import WorkReport, WorkRow
-from .run import BenchRun
+from asperity.bench.run import BenchRun
+from asperity.core.errors import InputError
+from asperity.core.tables import table
+from asperity.spectral import WorkReport, WorkRow
 
 # A row is slower if its p-value is below SIGNIFICANT and its time ratio exceeds DRIFT, the drift of machines in a day.
 # If four repeats, the fewest of any run, are all slower than four others, the p-value is 1/70.
@@ -100,13 +106,13 @@ def compare_runs(before: BenchRun, now: BenchRun) -> Comparison:
             continue
         old = earlier[report.problem]
         if not old.machine.is_comparable_with(report.machine):
-            raise InputError(f"--compare: its times are of {old.machine}, these of {report.machine}")
+            raise InputError(f"EARLIER: its times are of {old.machine}, these of {report.machine}")
         rows = {(row.method, row.budget): row for row in old.rows if row.is_done}
         for row in report.rows:
             if (row.method, row.budget) in rows:
                 changes.append(_change(report, row, old, rows[row.method, row.budget]))
     if not changes:
-        raise InputError("--compare: expected an earlier run of the same problems, got none of them")
+        raise InputError("EARLIER: expected an earlier run of the same problems, got none of them")
     return Comparison(tuple(changes))
 
 
@@ -124,3 +130,10 @@ def _change(report: WorkReport, row: WorkRow, old_report: WorkReport, old: WorkR
     return RowChange(
         report.problem, row.method, row.budget, row.least / old.least, p_value, errors[0] / errors[1] / room
     )
+
+
+if __name__ == "__main__":
+    earlier, latest = (BenchRun.of_json(Path(name).read_text(encoding="utf-8")) for name in sys.argv[1:])
+    found = compare_runs(earlier, latest)
+    print(found.table())
+    sys.exit(1 if found.is_worse else 0)
