@@ -13,7 +13,6 @@ from threadpoolctl import threadpool_limits
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench.running.timing import least_time
 from asperity.core.tables import table
 from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.discretisation.isometry_tables import table_matrix
@@ -24,6 +23,7 @@ from campaigns.judges import precise_triangular
 from .memory import MemoryUse
 from .rays import MORE, Throughput
 from .robustness import Verdict
+from .timing import least_time
 from .wall_goals import Goal, wall_goals
 
 # <u, P u> / <u, u> for u = cos(theta): closed forms and independent quadrature, see docs/theory/closed-forms.md

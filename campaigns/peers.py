@@ -15,11 +15,11 @@ from scipy.sparse import csr_array
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench.running.timing import least_time
 from asperity.core.tables import table
 
 from .metastable import WELLS, Solution, metastable_table
 from .pieces import PICTURE, draw_pieces, measure_pieces, pieces_table
+from .timing import least_time
 
 WORKER = Path(__file__).with_name("peer_worker.py")
 # Name in `peer_worker`: precision and requirement. Embree is a system package, such as libembree-dev in Debian; its

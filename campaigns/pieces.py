@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from asperity import geometry as geo
-from asperity.bench.running.timing import least_time
 from asperity.core.tables import table
+
+from .timing import least_time
 
 if TYPE_CHECKING:
     from .peers import PeerEnvironment

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity import geometry as geo
-from asperity.bench.running.timing import least_time
 from asperity.core.tables import table
 from asperity.geometry.disk.satellites import Satellites
 from campaigns.judges.plain_collision import collide_plainly
 
 from .pages import print_table
+from .timing import least_time
 
 COLLISIONS, REPEATS = 2**18, 5
 STATES = 10**6

@@ -8,11 +8,12 @@ from copy import copy
 import numpy as np
 
 from asperity.bench.quantities.walls import standard_names, wall_of
-from asperity.bench.running.timing import side_by_side
 from asperity.core.tables import table
 from asperity.geometry import Trace, Wall, trace
 from asperity.geometry.scene.ablations import without_boxes, without_formulas, without_pairs, without_runs
 from asperity.geometry.scene.scene import Scene, scene_in_one
+
+from .timing import side_by_side
 
 # Enough rays that 10 % of their time exceeds the noise, and enough alternating runs to estimate the spread.
 RAYS, REPEATS, QUICK_REPEATS = 2**18, 7, 3

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity import geometry as geo
-from asperity.bench.running.timing import least_time
 from asperity.core.tables import table
 from asperity.spectral import Machine
 
@@ -19,6 +18,7 @@ from .rays import RAYS, measure_throughput, throughput_table
 from .rigid import measure_rigid, speed_table
 from .robustness import RAYS as AIMED_RAYS
 from .robustness import measure_robustness
+from .timing import least_time
 from .transport import PAGE_CELLS, PAGE_JOINT, transport_table
 
 REPEATS = 5

@@ -1,4 +1,4 @@
-"""Make src/asperity/bench/running/standard_references.json: ``python -m campaigns.standard_references [PROBLEM...]``.
+"""Make src/asperity/bench/standard_references.json: ``python -m campaigns.standard_references [PROBLEM...]``.
 
 The benchmark's references come from this script, not from the benchmark's own runs. Polygons that resolve into beams
 are exact and confirmed by a second method. Arcs use `exact_rows`, and grazing limits use closed forms. All other walls
@@ -23,7 +23,7 @@ from asperity import kernels as ker
 from asperity.bench.quantities.collision import DISK, correlation_of
 from asperity.bench.quantities.matrix import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
 from asperity.bench.quantities.walls import RANDOM_WALLS, wall_of
-from asperity.bench.running.references import FILE
+from asperity.bench.references import FILE
 from asperity.bench.standard_set import problem_names
 from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity import kernels as ker
-from asperity.bench.running.timing import least_time
 from asperity.core.tables import table
 from asperity.kernels.distances.transport import grid_wasserstein
+
+from .timing import least_time
 
 BINS, REPEATS = 512, 5
 # Sizes for the generated page.

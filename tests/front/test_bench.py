@@ -18,6 +18,7 @@ from campaigns.exact_rows import ArcRow
 from campaigns.extremes.report import run_extremes
 from campaigns.extremes.row import ExtremeRow
 from campaigns.sections import SECTIONS, section_text
+from campaigns.timing import side_by_side
 from click.testing import CliRunner
 from scipy.stats import norm, t
 
@@ -30,11 +31,10 @@ from asperity.bench.quantities import standard as quantities
 from asperity.bench.quantities.matrix import LAW_BASIS, resistance_of
 from asperity.bench.quantities.spectral import eta_at
 from asperity.bench.quantities.walls import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
+from asperity.bench.references import known_reference
 from asperity.bench.run import BenchRun
-from asperity.bench.running.references import known_reference
-from asperity.bench.running.time_plan import TimePlan
-from asperity.bench.running.timing import side_by_side
 from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
+from asperity.bench.time_plan import TimePlan
 from asperity.cli import main
 from asperity.core.child import ChildCrashed, ChildProcess, OutOfTime
 from asperity.errors import InputError
@@ -216,7 +216,7 @@ def test_what_has_no_independent_reference_says_so(monkeypatch):
 
 def test_a_plan_is_kept_whatever_the_parts_take(monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("asperity.bench.running.time_plan.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("asperity.bench.time_plan.time.monotonic", lambda: now[0])
     for greedy in (lambda number: True, lambda number: number % 2, lambda number: number > 6):
         start, plan = now[0], TimePlan(100.0, 10)
         for number in range(10):

@@ -39,7 +39,7 @@ FLOORS = [
     *("spectral.sweeps", "spectral.work_diagrams", "spectral"),
     # the ledger's index finds the files of its folders without naming them
     *("ledger", "ledger.plane", "ledger.disk", "ledger.proof"),
-    *("study", "bench.running", "bench.quantities", "bench", "explore"),
+    *("study", "bench.quantities", "bench", "explore"),
 ]
 # Pictures are drawn by the classes that they show, and asperity itself holds its front door.
 DRAWN_ANYWHERE = "spectral.plotting"

@@ -19,9 +19,9 @@ from ..spectral.work_diagrams.runs import measure
 from .quantities.collision import DISK, by_true_disks
 from .quantities.standard import QUANTITIES
 from .quantities.walls import scenes, standard_names, wall_of
+from .references import known_reference
 from .run import file_stem
-from .running.references import known_reference
-from .running.time_plan import TimePlan
+from .time_plan import TimePlan
 
 Say = Callable[[str], None]
 

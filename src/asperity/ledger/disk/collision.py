@@ -12,6 +12,7 @@ from ...geometry import Disk, Wall, rectangular_teeth, trace, triangular_teeth
 from ...geometry.disk.disk import contact_normal, foreshortening
 from ...verification import Verdict, agreement, every, verify
 from ..entry import Code, Formula, erratum, verified
+from ..symbols import sp, sym
 
 # Rounding error of a dozen reflections.
 TRACED = 1e-10
@@ -40,10 +41,6 @@ def explicit_matrices(m: Any, J: Any) -> list[list[list[Any]]]:
     "branches of the law, are the same.",
 )
 def matrices_of_the_two_laws(matrices: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     smooth, no_slip = (sp.Matrix(rows) for rows in matrices(sym.m, sym.J))
 
     def outgoing(theta: Any) -> Any:
@@ -68,10 +65,6 @@ def matrices_of_the_two_laws(matrices: Code) -> Verdict:
     reason="Each is checked for all m and J. The no-slip matrix also reverses the slip v₁ + ω.",
 )
 def properties_of_the_two_matrices(matrices: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     both = [sp.Matrix(rows) for rows in matrices(sym.m, sym.J)]
     slip = sp.Matrix([[1, 0, 1]])
     rolling = sp.Matrix([[-1, 0, 1]]) * sym.metric
@@ -100,10 +93,6 @@ def properties_of_the_two_matrices(matrices: Code) -> Verdict:
     "is deepened, and the disk feels it deeper still.",
 )
 def wall_that_is_felt_as_given(point: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     x1, x2 = sp.symbols("x1 x2", real=True)
     factor = foreshortening(sym.m, sym.J, sp)
     felt1, felt2 = factor * x1, x2
@@ -125,10 +114,6 @@ def wall_that_is_felt_as_given(point: Code) -> Verdict:
     "the velocity is reversed.",
 )
 def symmetry_of_the_two_laws(maps: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     def check(index: int) -> Verdict:
         theta, psi = maps(sym.theta, sym.psi, sp)[index]
         again = maps(theta, psi, sp)[index]

@@ -7,6 +7,7 @@ from typing import Any
 from ...geometry.disk.disk import direction, foreshortening, frame_rows
 from ...verification import Verdict, every, verify
 from ..entry import Code, Formula, convention, erratum, verified
+from ..symbols import sp, sym
 
 
 @verified(
@@ -22,10 +23,6 @@ from ..entry import Code, Formula, convention, erratum, verified
     reason="The kinetic-energy inner product with (-1, 0, 1) is this. It is the angular momentum about the contact.",
 )
 def rolling_momentum(momentum: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     v1, v2, omega = sp.symbols("v1 v2 omega", real=True)
     return verify(momentum(sym.m, sym.J, v1, omega), sym.inner([v1, v2, omega], [-1, 0, 1]))
 
@@ -40,10 +37,6 @@ def rolling_momentum(momentum: Code) -> Verdict:
     "have the other sign. All laws of velocities are even in χ and keep their form.",
 )
 def sign_of_the_rolling_direction(chi: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     frame = sp.Matrix([*frame_rows(sym.m, sym.J, sp)[:2], chi(sym.m, sym.J, sp)])
     orientation = verify((frame * sym.metric.applyfunc(sp.sqrt)).det(), 1)
     return every(orientation, verify(frame * sym.metric * frame.T, sp.eye(3)))
@@ -63,10 +56,6 @@ def sign_of_the_rolling_direction(chi: Code) -> Verdict:
     "which the contact's velocity, the vertical one and the rolling momentum are multiples of the components.",
 )
 def the_frame_is_orthonormal(frame_of: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     frame = sp.Matrix(frame_of(sym.m, sym.J, sp))
     w = sp.Matrix([sym.v1, sym.v2, sym.omega])
     m, J = sym.m, sym.J
@@ -88,10 +77,6 @@ def the_frame_is_orthonormal(frame_of: Code) -> Verdict:
     "ê₂, χ. The perturbed chart takes the equator for the pole, and has the density of latitude.",
 )
 def chart_of_the_half_sphere(components: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     chart = sym.frame.T * sp.Matrix(components(sym.theta, sym.psi, sp))
     area = sym.volume_density(chart, [sym.theta, sym.psi])
     quarter = sp.pi / 2
@@ -118,10 +103,6 @@ def chart_of_the_half_sphere(components: Code) -> Verdict:
     reason="e₂ has length √m in the kinetic-energy metric. The formula is right as printed for m = 1, or with ê₂.",
 )
 def vertical_component(component: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     return verify(sym.inner(sym.G, sym.e2), component(sym.m, sym.theta, sym.psi, sp))
 
 
@@ -142,10 +123,6 @@ def vertical_component(component: Code) -> Verdict:
     "kinetic-energy area and ê₂, and no symmetry depends on it.",
 )
 def invariant_measure(density: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     y1, y3 = sp.symbols("y1 y3", real=True)
     position = y1 * sym.chi_perp + y3 * sym.chi
     area = sp.Matrix([position[0], position[2]]).jacobian([y1, y3]).det()
@@ -163,10 +140,6 @@ def invariant_measure(density: Code) -> Verdict:
     "the outgoing velocity points up.",
 )
 def flip_of_the_polar_angle(flip: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     theta_out, offset = sp.symbols("theta' offset", real=True)
 
     def outgoing(angle: Any) -> Any:
@@ -198,10 +171,6 @@ def flip_of_the_polar_angle(flip: Code) -> Verdict:
     "this, for every a. The scale does not change angles; the compressed cell may be deeper than B3 allows.",
 )
 def foreshortened_wall(image: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     x1, x2, a = sp.symbols("x1 x2 a", real=True)
     position = [x1 - a, x2, a]
     projected = [sym.inner(position, sym.chi_perp), sym.inner(position, sym.e2_hat)]
@@ -218,8 +187,6 @@ def foreshortened_wall(image: Code) -> Verdict:
     "on it.",
 )
 def masses_without_loss(normalised: Code) -> Verdict:
-    from ...geometry.disk import symbolic as sym
-
     mass, inertia = normalised(sym.m, sym.J)
     same_law = verify(sym.no_slip, sym.no_slip.subs({sym.m: mass, sym.J: inertia}, simultaneous=True))
     return every(same_law, verify(mass, 1))

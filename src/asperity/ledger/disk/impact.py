@@ -10,6 +10,7 @@ from ...geometry.disk.disk import contact_normal
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, Formula, by_reading, convention, erratum, verified
 from ..samples import generator
+from ..symbols import sp, sym
 
 
 @verified(
@@ -22,8 +23,6 @@ from ..samples import generator
     reason="It is the vector product of σ - x with λk. β is counted counterclockwise.",
 )
 def impulsive_torque(torque: Code) -> Verdict:
-    import sympy as sp
-
     direction, beta = sp.symbols("direction beta", real=True)
     k = sp.cos(direction), sp.sin(direction)
     arm = -sp.cos(direction + beta), -sp.sin(direction + beta)
@@ -73,10 +72,7 @@ def range_of_the_arm(interval: Code) -> Verdict:
     reason="As printed it is that of the satellite S_0. At S_j the arm is turned by jρ more.",
 )
 def arm_of_a_satellite(sine: Code) -> Verdict:
-    import sympy as sp
-
     from ...geometry.disk import rolling
-    from ...geometry.disk import symbolic as sym
 
     direction, x1, x2, turn = sp.symbols("direction x1 x2 turn", real=True)
     k = sp.cos(direction), sp.sin(direction)
@@ -99,10 +95,6 @@ def arm_of_a_satellite(sine: Code) -> Verdict:
     "λ only.",
 )
 def impulse_is_reflection(reflected: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     direction, v1, v2, omega = sp.symbols("direction v1 v2 omega", real=True)
     k, w = (sp.cos(direction), sp.sin(direction)), (v1, v2, omega)
     n = contact_normal(sym.m, sym.J, k, sym.alpha, sp)
@@ -127,8 +119,6 @@ def impulse_is_reflection(reflected: Code) -> Verdict:
     "make up for it. The limit of eq. 3.15 still follows while positions stay bounded.",
 )
 def angular_momentum(momentum: Code) -> Verdict:
-    import sympy as sp
-
     m1, m2, j1, j2 = sp.symbols("M1 M2 J1 J2", positive=True)
     x, y, v, u, c, p = (sp.symbols(f"{name}1 {name}2", real=True) for name in "xyvucp")
     w1, w2 = sp.symbols("omega1 omega2", real=True)

@@ -7,6 +7,7 @@ import numpy as np
 from ...geometry.disk import rolling
 from ...verification import Verdict, every, no_excess, verify
 from ..entry import Code, Formula, by_reading, erratum, verified
+from ..symbols import sp
 
 
 @verified(
@@ -24,8 +25,6 @@ from ..entry import Code, Formula, by_reading, erratum, verified
     "half wrong still agree for k = 0.",
 )
 def satellites_of_the_rotated_disk(satellite: Code) -> Verdict:
-    import sympy as sp
-
     x1, x2, alpha, turn = sp.symbols("x1 x2 alpha krho", real=True)
     rotation = sp.Matrix([[sp.cos(alpha), -sp.sin(alpha)], [sp.sin(alpha), sp.cos(alpha)]])
     rotated = sp.Matrix([x1, x2]) + rotation * sp.Matrix([sp.sin(turn), -sp.cos(turn)])
@@ -74,8 +73,6 @@ def inner_disk_is_clear_of_the_wall(radius: Code) -> Verdict:
     "direction of χ.",
 )
 def rolling_about_the_lowest_satellite(centre: Code) -> Verdict:
-    import sympy as sp
-
     x1, x2, alpha = sp.symbols("x1 x2 alpha", real=True)
     moved1, moved2 = centre(x1, x2, alpha, sp)
     linear = [sp.diff(coordinate, alpha).subs(alpha, 0) for coordinate in (moved1, moved2)]
@@ -98,8 +95,6 @@ def rolling_about_the_lowest_satellite(centre: Code) -> Verdict:
     "has it right.",
 )
 def cylinder_over_the_wall(base_point: Code) -> Verdict:
-    import sympy as sp
-
     x1, x2, alpha, step = sp.symbols("x1 x2 alpha s", real=True)
     return every(
         verify(base_point(x1 - step, x2, alpha + step), base_point(x1, x2, alpha)),

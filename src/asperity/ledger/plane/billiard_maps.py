@@ -8,6 +8,7 @@ from ...core.checks import Floats
 from ...verification import Verdict, agreement, every, holds, verify
 from ..entry import Code, Formula, by_reading, erratum, verified
 from ..samples import generator
+from ..symbols import sp
 
 # Semi-axes of the elliptical table.
 AXES = np.array([[1.6], [1.0]])
@@ -177,8 +178,6 @@ singular_set = by_reading(
     reason="Its value is the pair of q and this vector, with k = -n, the normal into M₀. 'Outward' is outward from N.",
 )
 def reflection_of_the_plane(image: Code) -> Verdict:
-    import sympy as sp
-
     theta, direction = sp.symbols("theta direction", real=True)
     k = -sp.sin(direction), sp.cos(direction)
 

@@ -11,6 +11,7 @@ from ...geometry.disk.disk import foreshortening
 from ...kernels.walls.circular_arc import CircularArcLaw
 from ...verification import Verdict, agreement, every, holds, verify
 from ..entry import Code, Formula, convention, erratum, verified
+from ..symbols import sp, sym
 
 HALF_ANGLES = (0.3, 0.8, 1.3)
 RAYS = 4000
@@ -73,8 +74,6 @@ def entry_of(theta: Any, gamma: Any, xi: Any, numerator: Any, xp: Any) -> Any:
     "subtend 2ξ.",
 )
 def focusing_tooth_function(function: Code) -> Verdict:
-    import sympy as sp
-
     eps, xi = sp.Symbol("epsilon", positive=True), sp.Symbol("xi", positive=True)
     ends_and_bottom = [function(x, eps, xi, sp) for x in (sp.Integer(0), eps, eps / 2)]
     return verify(ends_and_bottom, [0, 0, -eps / 2 * sp.tan(xi / 2)], [xi < sp.pi / 2])
@@ -197,8 +196,6 @@ def outgoing_angle_of_an_arc(angle: Code) -> Verdict:
     "The second line equals it only with cos(θ − γ).",
 )
 def entry_from_the_first_hit(entry: Code) -> Verdict:
-    import sympy as sp
-
     theta, gamma, xi = sp.symbols("theta gamma xi", real=True)
     half_chord = 2 * sp.sin(xi)
     hit1, hit2 = sp.Rational(1, 2) + sp.sin(gamma) / half_chord, (sp.cos(xi) - sp.cos(gamma)) / half_chord
@@ -277,8 +274,6 @@ def first_hit_from_the_entry(position: Code) -> Verdict:
     "γ determine each other.",
 )
 def entry_increases_with_the_hit(derivative: Code) -> Verdict:
-    import sympy as sp
-
     theta, gamma, xi = sp.symbols("theta gamma xi", real=True)
     slope = sp.diff(entry_of(theta, gamma, xi, theta - gamma, sp), gamma)
     return verify(slope, derivative(theta, gamma, xi, sp))
@@ -302,10 +297,6 @@ def entry_increases_with_the_hit(derivative: Code) -> Verdict:
     "compression along x, up to scale.",
 )
 def elliptical_tooth_function(function: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     x, eps, xi = sp.symbols("x epsilon xi", positive=True)
     centre, radius = eps / (2 * sp.tan(xi)), eps / (2 * sp.sin(xi))
     root = sp.sqrt(radius**2 - (x - eps / 2) ** 2)

@@ -9,6 +9,7 @@ import numpy as np
 from ...geometry import dispersing_arcs, trace
 from ...verification import Verdict, agreement, every, holds, verify
 from ..entry import Code, Formula, by_reading, convention, erratum, verified
+from ..symbols import sp
 
 POINTS = 2000
 # Error of a sum over POINTS equal cells, for a piecewise linear integrand.
@@ -32,8 +33,6 @@ SHALLOW_ERROR = 1e-3
     "Retroreflection is the identity, which is symmetric for every measure.",
 )
 def lambert_is_symmetric(density: Code) -> Verdict:
-    import sympy as sp
-
     theta, theta_out = sp.symbols("theta theta'", real=True)
     mass = sp.integrate(density(theta_out, sp), (theta_out, 0, sp.pi))
     flux = sp.sin(theta) * density(theta_out, sp)
@@ -108,8 +107,6 @@ def generator_of_shallow_arcs(angle: Code) -> Verdict:
     "that meet it; with the factor counted twice it is π².",
 )
 def resistance_of_a_disk(integrand: Code) -> Verdict:
-    import sympy as sp
-
     angle = sp.Symbol("phi", real=True)
     incidence = integrand(sp.Integer(1), sp.cos(angle)) * sp.cos(angle)
     total = 2 * sp.pi * sp.integrate(incidence, (angle, -sp.pi / 2, sp.pi / 2))

@@ -13,6 +13,7 @@ from ...kernels.walls.rectangular import RectangularTeethLaw
 from ...verification import Verdict, agreement, verify
 from ..entry import Code, Formula, erratum
 from ..entry_probability import FRACTION_ERROR, fraction
+from ..symbols import sp, sym
 
 HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)
 
@@ -108,10 +109,6 @@ def specular_fraction_of_a_crevice(probability: Code) -> Verdict:
     "over height, which section 2.3.1 says and sections 1.2.3 and 2.2.1 do not use.",
 )
 def ratio_of_foreshortened_teeth(ratio: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     width, height = sp.symbols("width height", positive=True)
     felt = height / (foreshortening(sym.m, sym.J, sp) * width)
     return verify(ratio(height / width, sym.m, sym.J, sp), felt)

@@ -10,6 +10,7 @@ from ...geometry.tracing.tracing import trace
 from ...geometry.walls.named import dispersing_arcs, focusing_arcs, rectangular_teeth, triangular_teeth
 from ...verification import Verdict, agreement, every, holds, verify
 from ..entry import Code, Formula, by_reading, erratum, verified
+from ..symbols import sp
 
 RAYS = 400
 # Rounding error of a ray. It grows with curvature and bounces, both small here.
@@ -90,8 +91,6 @@ def reflection_preserves_the_flux(density: Code) -> Verdict:
     "without time.",
 )
 def liouville_in_entry_coordinates(density: Code) -> Verdict:
-    import sympy as sp
-
     x1, t, theta = sp.symbols("x1 t theta", real=True)
     chart = sp.Matrix([x1 + t * sp.cos(theta), t * sp.sin(theta), theta])
     return verify(chart.jacobian([x1, t, theta]).det(), density(theta, sp))

@@ -12,6 +12,7 @@ from ...kernels.walls.triangular import TriangularTeethLaw
 from ...verification import Verdict, agreement, every, holds, verify
 from ..entry import Code, Formula, convention, erratum, verified
 from ..entry_probability import FRACTION_ERROR, fraction
+from ..symbols import sp, sym
 
 APEX_ANGLES = (0.35, 0.9, 1.6, 2.4)
 ENTRIES = 2000
@@ -258,10 +259,6 @@ def flux_of_triangular_teeth(law: Code) -> Verdict:
     reason="tan(ψ/2) is half the width over the depth, and widths are compressed. Teeth become narrower.",
 )
 def apex_angle_of_foreshortened_teeth(angle: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     psi = sym.psi
     half_width, depth = sp.Rational(1, 2), sp.cot(psi / 2) / 2
     felt = foreshortening(sym.m, sym.J, sp) * half_width / depth

@@ -8,6 +8,7 @@ from ...geometry.disk import rolling
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, Formula, erratum, verified
 from ..samples import clearance, generator, is_free, residual, satellites
+from ..symbols import sp, sym
 
 SATELLITES = 40
 SPACING = 2 * np.pi / SATELLITES
@@ -105,8 +106,6 @@ def third_satellite(bound: Code) -> Verdict:
     "ε, and the bound is sharp.",
 )
 def gap_radius(radius: Code) -> Verdict:
-    import sympy as sp
-
     rho, eps = sp.symbols("rho epsilon", positive=True)
     bar = rho / 2 - radius(eps, rho, sp)
     first, second = (rolling.satellite(0, 0, angle, 1, sp)[1] for angle in (bar, bar - rho))
@@ -236,10 +235,6 @@ def rolling_from_rest(claim: Code) -> Verdict:
     reason="It is the chord of the arc ρ. Where the text says 'any two satellites' it means adjacent ones.",
 )
 def distance_of_satellites(distance: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     centres = [rolling.satellite(0, 0, sym.alpha + k * sym.rho, 1, sp) for k in (0, 1)]
     square = sum((a - b) ** 2 for a, b in zip(*centres, strict=True))
     found = distance(sym.rho, sp)

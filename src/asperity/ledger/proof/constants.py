@@ -10,6 +10,7 @@ from ...geometry.disk import rolling
 from ...verification import Verdict, agreement, every, no_excess, verify
 from ..entry import Code, Formula, by_reading, erratum, verified
 from ..samples import generator, masses, unit_velocities
+from ..symbols import sp
 
 
 @verified(
@@ -22,8 +23,6 @@ from ..samples import generator, masses, unit_velocities
     reason="The path is a point of a turning circle of radius 1/ε. What follows uses |ω| ≤ 1, that is J ≥ 1.",
 )
 def acceleration_of_the_contact(acceleration: Code) -> Verdict:
-    import sympy as sp
-
     x1, x2, bar, v1, v2, omega, t = sp.symbols("x1 x2 bar v1 v2 omega t", real=True)
     eps = sp.Symbol("epsilon", positive=True)
     path = rolling.satellite(x1 + t * v1, x2 + t * v2, bar + t * omega, eps, sp)
@@ -69,8 +68,6 @@ def constants_of_the_claims(fractions: Code) -> Verdict:
     reason="Q is f*, which has -ε⁻¹ sin. What is printed does not tend to χ = (-1, 0, 1)/(m + J)^(1/2) as ε does to 0.",
 )
 def direction_of_the_rolling(direction: Code) -> Verdict:
-    import sympy as sp
-
     s1, s2, alpha = sp.symbols("s1 s2 alpha", real=True)
     eps = sp.Symbol("epsilon", positive=True)
     configuration = (*rolling.roll(s1, s2, alpha, eps, sp), alpha)
@@ -103,8 +100,6 @@ def _dot(a: Any, b: Any) -> Any:
     "3‖w̃ - w‖ + 4‖ñ - n‖ of the difference of the reflections is right.",
 )
 def splitting_of_a_reflection(first_term: Code) -> Verdict:
-    import sympy as sp
-
     w, n, w_new, n_new = (sp.symbols(f"{name}1:4", real=True) for name in ("w", "n", "u", "k"))
     left, right = [], []
     for i in range(3):
@@ -211,8 +206,6 @@ def sum_of_the_constants(bounds: Code) -> Verdict:
     "Lemma 5.8 needs the hypothesis s ≤ 1 that its proof uses.",
 )
 def quotient_of_the_steps(quotient: Code) -> Verdict:
-    import sympy as sp
-
     kappa, s = sp.symbols("kappa s1", positive=True)
     return verify(24 * sp.sqrt(10) * kappa * s / (12 * sp.sqrt(2)), quotient(kappa, s, sp))
 

@@ -6,6 +6,7 @@ from ...geometry.disk import rolling
 from ...geometry.disk.disk import contact_normal
 from ...verification import Verdict, every, verify
 from ..entry import Code, Formula, erratum, verified
+from ..symbols import sp, sym
 
 
 @verified(
@@ -48,10 +49,6 @@ def normal_at_a_satellite(normal: Code) -> Verdict:
 
 def _is_unit_normal(normal: Code, rotated: bool) -> Verdict:
     """Whether a normal has norm 1 and the direction of the kinetic gradient of a satellite's wall distance."""
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     direction, x1, x2, angle = sp.symbols("direction x1 x2 angle", real=True)
     turn = sp.Symbol("turn", real=True) if rotated else sp.Integer(0)
     k = sp.cos(direction), sp.sin(direction)

@@ -11,14 +11,11 @@ from ...geometry.disk.disk import frame_rows
 from ...verification import Verdict, every, holds, verify
 from ..entry import Code, Formula, by_reading, convention, erratum, verified
 from ..samples import generator, masses
+from ..symbols import sp, sym
 
 
 def _orthonormal(s1: Any, s2: Any) -> Any:
     """The components along chi_perp and e2^ of a configuration above the point (s1, s2) of the plane."""
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     configuration = rolling.roll_linear(s1, s2, sym.alpha)
     return [sp.simplify(sym.inner(row, configuration)) for row in frame_rows(sym.m, sym.J, sp)[:2]]
 
@@ -37,10 +34,6 @@ def _orthonormal(s1: Any, s2: Any) -> Any:
     "common factor m^(1/2) changes no angle.",
 )
 def compression_of_the_wall(factor: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     s1, s2 = sp.symbols("s1 s2", positive=True)
     across, up = _orthonormal(s1, s2)
     return verify(across / up, factor(sym.m, sym.J, sp) * s1 / s2)
@@ -56,10 +49,6 @@ def compression_of_the_wall(factor: Code) -> Verdict:
     reason="The value arccos((1 + m/J)^(-1/2)) is right. It needs the unit vector J^(-1/2) e₃, or J = 1.",
 )
 def angle_of_the_axis(axis: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     direction = axis(sym.J, sp)
     return every(
         verify(sym.inner(direction, sym.chi), 1 / sp.sqrt(1 + sym.m / sym.J)),
@@ -83,10 +72,6 @@ def angle_of_the_axis(axis: Code) -> Verdict:
     "1/J)^(-1/2) ε, and angles are the same.",
 )
 def projection_of_the_cylinder(image: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     s1, s2 = sp.symbols("s1 s2", real=True)
     return verify(image(s1, s2, sym.m, sym.J, sp), _orthonormal(s1, s2))
 
@@ -162,10 +147,6 @@ def covering_by_squares(factor: Code) -> Verdict:
     reason="Compressing x₁ is stretching x₂ and scaling down. As printed the period would grow.",
 )
 def scale_of_the_foreshortened_wall(factor: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     s1, s2 = sp.symbols("s1 s2", real=True)
     stretch = sp.sqrt(1 + sym.m / sym.J)
     scale = factor(sym.m, sym.J, sp)

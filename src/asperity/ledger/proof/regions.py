@@ -8,6 +8,7 @@ from ...geometry.disk import rolling
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, Formula, by_reading, convention, erratum, verified
 from ..samples import generator, kinetic_norm, masses, residual, unit_velocities
+from ..symbols import sp, sym
 
 good_states = by_reading(
     id="S5.31",
@@ -180,10 +181,6 @@ def size_of_a_displacement(bound: Code) -> Verdict:
     "S²₊.",
 )
 def area_of_the_zoomed_rectangle(factor: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     eps, x1, alpha = sp.Symbol("epsilon", positive=True), sp.Symbol("x1"), sp.Symbol("alpha")
     half = sym.rho / (2 * eps)
     return verify(factor(eps, sym.rho) * sp.integrate(1, (x1, -alpha, 1 - alpha), (alpha, -half, half)), 1)

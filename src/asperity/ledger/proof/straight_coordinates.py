@@ -8,6 +8,7 @@ from ...geometry.disk import rolling
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, Formula, by_reading, convention, erratum, verified
 from ..samples import generator, is_free, kinetic_norm, masses, tooth
+from ..symbols import sp, sym
 
 
 @verified(
@@ -20,10 +21,6 @@ from ..samples import generator, is_free, kinetic_norm, masses, tooth
     "Heights are here measured from the tops, which takes the 1 away.",
 )
 def linear_chart(chart: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     s1, s2 = sp.symbols("s1 s2", real=True)
     rolled = (*rolling.roll(s1, s2, sym.alpha, 1, sp), sym.alpha)
     linear = [sp.series(e, sym.alpha, 0, 2).removeO() for e in rolled]
@@ -45,10 +42,6 @@ def linear_chart(chart: Code) -> Verdict:
     "right.",
 )
 def straightening(bend: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     s1, s2 = sp.symbols("s1 s2", real=True)
     y1, y2, _ = rolling.roll_linear(s1, s2, sym.alpha)
     bent = bend(y1, y2, sym.alpha, sp)
@@ -129,10 +122,6 @@ def size_of_the_straightening(bound: Code) -> Verdict:
     "proof.",
 )
 def point_of_the_shifted_wall(point: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     s1, s2 = sp.symbols("s1 s2", real=True)
     x1, x2, alpha = rolling.roll_linear(s1, s2 + 1, sym.alpha)  # the paper's f_lin, with heights from the centre
     return verify(point(x1, x2, alpha), (s1, s2 + 1))
@@ -149,10 +138,6 @@ def point_of_the_shifted_wall(point: Code) -> Verdict:
     "either sign keeps.",
 )
 def graph_of_the_bent_plane(graph: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     x1, x2, s = sp.symbols("x1 x2 s", real=True)
     u = graph(sym.alpha, sp)
     slid = rolling.straight_contact(x1 - s, x2, sym.alpha + s)

@@ -10,6 +10,7 @@ from ...geometry.disk import rolling
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, Formula, convention, erratum, verified
 from ..samples import generator, kinetic_norm, masses, unit_velocities
+from ..symbols import sp, sym
 
 
 @convention(
@@ -54,8 +55,6 @@ def transversal_velocities(floor: Code) -> Verdict:
     reason="⟨y, e₂⟩/⟨w, e₂⟩ is x₂/v₂ for every m. The null space of the differential is spanned by (w, 0).",
 )
 def projection_along_velocities(project: Code) -> Verdict:
-    import sympy as sp
-
     y, t = sp.symbols("x1 x2 alpha", real=True), sp.Symbol("t", real=True)
     w = (sp.Symbol("v1", real=True), sp.Symbol("v2", positive=True), sp.Symbol("omega", real=True))
     image = sp.Matrix(project(*y, *w))
@@ -80,10 +79,6 @@ def projection_along_velocities(project: Code) -> Verdict:
     reason="Only with both bars is it of the order ρ³. As printed it grows with α.",
 )
 def slip_of_the_straightening(size: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     x1, x2, bar = sp.symbols("x1 x2 bar", real=True)
     return verify(rolling.bend(x1, x2, bar, 1, sp)[0] - x1, size(sym.alpha, bar, sp))
 
@@ -149,10 +144,6 @@ def _velocity(sp: Any) -> Any:
     reason="The printed map is built from H₁⁻¹. It is recomputed from F, f_lin and the time of flight.",
 )
 def transfer_of_the_entry(transfer: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     x1, w = sp.Symbol("x1", real=True), _velocity(sp)
     s1, s2 = rolling.straight_contact(x1, 0, sym.alpha)
     c1, c2 = s1 - sp.sin(sym.alpha), s2 + sp.cos(sym.alpha) - 1
@@ -178,10 +169,6 @@ def transfer_of_the_entry(transfer: Code) -> Verdict:
     reason="As printed it is the differential of the printed map. Claim 5.2.2 is not affected.",
 )
 def differential_of_the_transfer(differential: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     x1, w = sp.Symbol("x1", real=True), _velocity(sp)
     image = sp.Matrix(rolling.transfer(x1, sym.alpha, sym.alpha, w, 1, sp))
     jacobian = sp.Matrix(differential(sym.alpha, w, sp))
@@ -265,10 +252,6 @@ def remainder_of_the_translation(start: Code) -> Verdict:
     "remains m^(1/2), which is 1 for m = 1.",
 )
 def measure_of_the_rectangle(measure: Code) -> Verdict:
-    import sympy as sp
-
-    from ...geometry.disk import symbolic as sym
-
     area = sp.Symbol("area", positive=True)
     upward = sp.simplify(sym.inner(sym.G, sym.e2))
     flux = sp.integrate(upward * sp.sin(sym.psi), (sym.theta, 0, sp.pi), (sym.psi, 0, sp.pi))

@@ -10,6 +10,7 @@ from ...geometry.disk import rolling
 from ...verification import Verdict, agreement, every, no_excess, verify
 from ..entry import Code, Formula, convention, erratum, verified
 from ..samples import generator, kinetic_norm, masses, residual, unit_velocities
+from ..symbols import sp
 
 
 def _zoom(sp: Any) -> Any:
@@ -60,8 +61,6 @@ def zoomed_residual(bar_of: Code) -> Verdict:
     "at scale 1 is row S4.13.",
 )
 def zoomed_straightening(bend: Code) -> Verdict:
-    import sympy as sp
-
     y1, y2, bar, eps = _zoom(sp)
     plain = [eps * y1 + eps * bar - sp.sin(eps * bar), eps * y2 - 1 + sp.cos(eps * bar)]
     bent = bend(y1, y2, bar, eps, sp)
@@ -111,8 +110,6 @@ def error_of_the_straightening(size: Code) -> Verdict:
     "part of the plane, and that is what the library calls G_ε.",
 )
 def contact_as_a_product(first: Code) -> Verdict:
-    import sympy as sp
-
     x1, x2, bar, eps = _zoom(sp)
     turn = sp.Symbol("turn", real=True)
     y1, y2 = rolling.straighten(x1, x2, bar, eps, sp)
@@ -134,8 +131,6 @@ def contact_as_a_product(first: Code) -> Verdict:
     reason="It is the velocity of the satellite in contact. The scale cancels.",
 )
 def differential_of_the_contact(differential: Code) -> Verdict:
-    import sympy as sp
-
     x1, x2, bar, eps = _zoom(sp)
     image = sp.Matrix(rolling.satellite(x1, x2, bar, eps, sp))
     return verify(image.jacobian([x1, x2, bar]), differential(bar, eps, sp))
@@ -220,8 +215,6 @@ def lengths_under_the_contact(null: Code) -> Verdict:
     reason="The ω² cos² x of the first component was dropped. Hence |E| ≤ (mJ)^(-1/2)|x|, for all m and J.",
 )
 def change_of_the_length(excess: Code) -> Verdict:
-    import sympy as sp
-
     v1, v2, omega, x = sp.symbols("v1 v2 omega x", real=True)
     first = (v1 + omega * sp.cos(x)) ** 2 + (v2 + omega * sp.sin(x)) ** 2
     return verify(first - (v1 + omega) ** 2 - v2**2, excess(v1, v2, omega, x, sp))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...spectral import ReferenceValue
+from ..spectral import ReferenceValue
 
 FILE = Path(__file__).with_name("standard_references.json")
 

@@ -1,1 +1,0 @@
-"""Running of measurements: processes that can be killed, timing, stored references."""
