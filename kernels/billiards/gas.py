@@ -59,11 +59,6 @@ class GasRecord(BilliardRecord):
         """The energy of all spins, J omega^2/2, shape (events + 1,)."""
         return np.asarray(0.5 * self.disk.inertia * np.sum(self.velocity[..., 2] ** 2, axis=1))
 
-    @property
-    def translational_energy(self) -> Floats:
-        """The energy of the motion of all centres, m <v, v>/2, shape (events + 1,)."""
-        return np.asarray(0.5 * self.disk.mass * np.sum(self.velocity[..., :2] ** 2, axis=(1, 2)))
-
     def rotational_fraction(self, burn_in: float = BURN_IN) -> Estimate:
         """Estimate the fraction of the energy in rotation, as a mean over time; 1/3 in equipartition.
 

@@ -163,10 +163,6 @@ class CircularArcLaw(DrivenLaw):
         summed = np.add.reduceat(piece, starts, axis=0)
         return np.asarray(summed / total.reshape((-1,) + (1,) * (summed.ndim - 1)))
 
-    def conditional_masses(self, theta: Floats, edges: Floats) -> Floats:
-        """P(theta, (edges[j], edges[j + 1])) for increasing edges, shape (angles, cells), by integrals of a sine."""
-        return np.diff(self.distribution(theta, edges).below, axis=1)
-
     def _below(self, theta: Floats, edges: Floats) -> Floats:
         """P(theta_k, (edges[0], edges[j])) for increasing edges, common ones or those of each angle."""
         ray, mirror, lower, upper, hits, rest, alone = self.pieces(theta)

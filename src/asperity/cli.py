@@ -488,6 +488,13 @@ def bench(problem: tuple[str, ...], quick: bool, out: Path, force: bool) -> None
       asperity bench --quick
       asperity bench focusing-arc/moment lambda2 --out my-bench
     """
-    from .bench.commands import run_bench
+    from .bench import run, standard_set
 
-    run_bench(problem, quick=quick, out=out, force=force)
+    names = standard_set.problem_names(problem)
+    run.prepare_folder(out, names, force=force)
+    effort = standard_set.QUICK if quick else standard_set.FULL
+    reports = standard_set.run_problems(names, effort, out, lambda line: click.echo(line, err=True))
+    found = run.BenchRun(tuple(reports))
+    click.echo(found.summary())
+    for path in found.save(out):
+        click.echo(f"wrote {path}", err=True)

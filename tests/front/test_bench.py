@@ -27,14 +27,12 @@ from asperity import spectral as spec
 from asperity.bench.quantities import collision as collision_quantities
 from asperity.bench.quantities import collision as uniform_disk
 from asperity.bench.quantities import methods as routes
-from asperity.bench.quantities import standard as quantities
 from asperity.bench.quantities.matrix import LAW_BASIS, resistance_of
 from asperity.bench.quantities.spectral import eta_at
 from asperity.bench.quantities.walls import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
 from asperity.bench.references import known_reference
 from asperity.bench.run import BenchRun
-from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
-from asperity.bench.time_plan import TimePlan
+from asperity.bench.standard_set import FULL, QUANTITIES, QUICK, Effort, TimePlan, problem_names, run_problems
 from asperity.cli import main
 from asperity.core.child import ChildCrashed, ChildProcess, OutOfTime
 from asperity.errors import InputError
@@ -77,7 +75,7 @@ def test_random_walls_are_walls_and_the_same_for_ever():
 
 
 def test_problems_are_found_by_scene_by_quantity_and_by_both():
-    assert len(problem_names()) == sum(len(one.scenes) for one in quantities.QUANTITIES.values())
+    assert len(problem_names()) == sum(len(one.scenes) for one in QUANTITIES.values())
     assert problem_names(["koch/law"]) == ["koch/law"]
     assert problem_names(["cusps"]) == [f"cusps/{name}" for name in ("law", "moment", "lambda2", "collision", "disk")]
     assert len(problem_names(["moment"])) == 8
@@ -216,7 +214,7 @@ def test_what_has_no_independent_reference_says_so(monkeypatch):
 
 def test_a_plan_is_kept_whatever_the_parts_take(monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("asperity.bench.time_plan.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("asperity.bench.standard_set.time.monotonic", lambda: now[0])
     for greedy in (lambda number: True, lambda number: number % 2, lambda number: number > 6):
         start, plan = now[0], TimePlan(100.0, 10)
         for number in range(10):
@@ -357,7 +355,7 @@ def test_the_command_lists_problems_and_refuses_others(tmp_path):
 
 def test_the_command_writes_a_run(tmp_path, monkeypatch):
     run = run_report([("auto", 1e-3, [1.0, 1.1, 1.2, 1.3, 1.4])])
-    monkeypatch.setattr("asperity.bench.commands.run_problems", lambda *_: iter(run.reports))
+    monkeypatch.setattr("asperity.bench.standard_set.run_problems", lambda *_: iter(run.reports))
     result = CliRunner().invoke(main, ["bench", "--quick", "--out", str(tmp_path / "new")])
     assert result.exit_code == 0, result.output
     assert BenchRun.of_json((tmp_path / "new" / "bench.json").read_text()) == run

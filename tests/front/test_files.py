@@ -23,7 +23,7 @@ from click.testing import CliRunner
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench import commands
+from asperity.bench import run, standard_set
 from asperity.cli import main
 from asperity.errors import AccuracyError, FileExistsRefusal, InputError, WallError
 from asperity.estimates import Estimate
@@ -299,7 +299,7 @@ def bench(*arguments: object) -> object:
 @pytest.fixture
 def measured(monkeypatch) -> None:
     """No problem is measured: a run has no reports."""
-    monkeypatch.setattr(commands, "run_problems", lambda *_: iter(()))
+    monkeypatch.setattr(standard_set, "run_problems", lambda *_: iter(()))
 
 
 @pytest.mark.usefixtures("measured")
@@ -319,7 +319,7 @@ def test_bench_goes_on_where_it_was_and_keeps_a_larger_run(tmp_path):
         spec.WorkProblem("koch/moment", spec.ReferenceValue(0.0, 0.0, "by hand")),
         [spec.WorkMethod("a", float)], spec.Machine.here(),
     )  # fmt: skip
-    (tmp_path / "bench.json").write_text(commands.BenchRun((report,)).to_json())
+    (tmp_path / "bench.json").write_text(run.BenchRun((report,)).to_json())
     assert bench("koch/law", "--out", tmp_path).exit_code == 1
     assert bench("koch", "--out", tmp_path).exit_code == 0
 

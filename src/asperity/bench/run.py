@@ -138,7 +138,12 @@ def prepare_folder(folder: Path, names: Sequence[str], *, force: bool) -> None:
     FileExistsRefusal
         If a file would be replaced that is not of an earlier run of these problems, and ``force`` is False.
     """
-    made_here(folder)
+    if os.path.exists(folder) and not folder.is_dir():
+        raise FileExistsRefusal(f"--out: {folder} is a file; name a folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise InputError(f"--out: cannot make {folder} ({reason.strerror}); choose another folder") from reason
     if force:
         for name in names:
             (folder / f"{file_stem(name)}.json").unlink(missing_ok=True)
@@ -150,16 +155,6 @@ def prepare_folder(folder: Path, names: Sequence[str], *, force: bool) -> None:
             f"--out: {', '.join(found)} in {folder} are not of an earlier run of these problems; "
             "use another folder or --force to replace them"
         )
-
-
-def made_here(folder: Path) -> None:
-    """Make the folder if it is missing; raise a FileExistsRefusal if it is a file, an InputError if it cannot be."""
-    if os.path.exists(folder) and not folder.is_dir():
-        raise FileExistsRefusal(f"--out: {folder} is a file; name a folder")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        raise InputError(f"--out: cannot make {folder} ({reason.strerror}); choose another folder") from reason
 
 
 def file_stem(name: str) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from functools import cache, partial
 from itertools import groupby
@@ -16,14 +17,52 @@ from ..core.errors import InputError
 from ..spectral import WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
 from ..spectral.work_diagrams.machine import on_few_cores
 from ..spectral.work_diagrams.runs import measure
-from .quantities.collision import DISK, by_true_disks
-from .quantities.standard import QUANTITIES
+from .quantities.collision import COLLISION, DISK, TRUE_DISK, by_true_disks
+from .quantities.distance import DISTANCE
+from .quantities.matrix import LAW, MOMENT, RESISTANCE
+from .quantities.spectral import DIFFUSIVITY, EIGENVALUE
 from .quantities.walls import scenes, standard_names, wall_of
 from .references import known_reference
 from .run import file_stem
-from .time_plan import TimePlan
 
 Say = Callable[[str], None]
+QUANTITIES = {
+    one.name: one for one in (LAW, MOMENT, EIGENVALUE, COLLISION, TRUE_DISK, RESISTANCE, DISTANCE, DIFFUSIVITY)
+}
+
+
+@dataclass
+class TimePlan:
+    """Divides ``seconds``, counted from construction, among ``parts``.
+
+    If no part exceeds its fraction, the sum is at most ``seconds``. Later parts divide the time that earlier parts
+    leave.
+
+    Examples
+    --------
+    >>> plan = TimePlan(10.0, 2)
+    >>> round(plan.next_fraction())
+    5
+    """
+
+    seconds: float
+    parts: int
+    _begun: float = field(default_factory=lambda: time.monotonic(), init=False)
+    _left: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._left = self.parts
+
+    @property
+    def remaining(self) -> float:
+        """Remaining seconds, at least 0."""
+        return max(self.seconds - (time.monotonic() - self._begun), 0.0)
+
+    def next_fraction(self, weight: float = 1.0) -> float:
+        """Seconds for the next part, which counts as ``weight`` later parts."""
+        fraction = weight / (weight + self._left - 1) * self.remaining
+        self._left = max(self._left - 1, 1)
+        return fraction
 
 
 @dataclass(frozen=True)

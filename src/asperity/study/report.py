@@ -1,11 +1,12 @@
-"""A study as text and as plain values for JSON."""
+"""A study as ten short lines, as text, and as plain values for JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
-from ..core.estimates import Estimate, estimate_as_dict, finite, rounded
+from ..core.estimates import Estimate, compact, estimate_as_dict, finite, rounded
 from ..core.version import __version__
 
 if TYPE_CHECKING:
@@ -15,6 +16,73 @@ if TYPE_CHECKING:
 
 # Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
 KAC_Z = 4.5
+# Characters; the detailed report has the whole reason.
+LONGEST_REFUSAL = 110
+CONVENTIONS = {"paper": "retroreflection is the identity", "specular": "specular reflection is the identity"}
+
+
+def summary_of(study: StudyResult) -> str:
+    """What was found, one fact a line; an error in brackets belongs to the last digits."""
+    wall, disk, found = study.wall, study.disk, study.consequences
+    symmetry = "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
+    refused, unit = study.refusals.get, f" {wall.unit}" if wall.unit else ""
+    lines = {
+        "wall": f"{study.name}: period {wall.period:g}{unit}, depth {wall.depth:.6g}{unit}, "
+        f"{counted(len(wall.pieces), 'piece')}, {symmetry}",
+        "rays": _rays(study.tracer),
+        "law": _law_line(study.matrix),
+        "gap": _gap_words(study.gap, refused("gap", "not asked for")),
+        "": _gap_words(study.specular_gap, refused("specular_gap", "not asked for")),
+        "relaxation": _relaxation(found.relaxation_time, found.without_gap),
+        "diffusion": _refused(found.refusal)
+        if found.diffusion is None
+        else f"D = {found.diffusion}; half-width 1, speed 1, tau the exit time",
+        "disk": f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
+        "as deep",
+        "collision": f"gap of that wall {_gap_words(study.collision_gap, refused('collision_gap', 'not asked for'))}",
+        "conserved": f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
+        f"{study.conservation['rolling_momentum_defect']:.0e}",
+    }
+    return "\n".join(f"{title:11s}{line}" for title, line in lines.items())
+
+
+def _refused(reason: str) -> str:
+    return shorten(f"refused: {reason}", LONGEST_REFUSAL, placeholder=" ...")
+
+
+def _rays(tracer: TracerCheck | None) -> str:
+    if tracer is None:
+        return "not tested: the wall is flat or open"
+    total, escaped = sum(tracer.counts.values()), tracer.counts.get("escaped", 0)
+    count = f"all {total}" if escaped == total else f"{escaped} of {total}"
+    return (
+        f"{count} left the wall after {compact(tracer.mean_collisions)} collisions on average, "
+        f"Kac's formula {tracer.expected_collisions:.6g}"
+    )
+
+
+def _law_line(matrix: KernelMatrix) -> str:
+    met = "" if matrix.tolerance_met is not False else f", tolerance {matrix.requested_tolerance:g} NOT met"
+    return f"{matrix.basis!r} by {matrix.method}, Frobenius error {float(matrix.error):.2g}{met}"
+
+
+def _gap_words(gap: SpectralGap | None, refusal: str) -> str:
+    if gap is None:
+        return _refused(refusal)
+    words = CONVENTIONS[gap.convention]
+    if not gap.self_adjoint:
+        norm = compact(Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method))
+        return f"norm {norm} on functions of mean 0, not self-adjoint ({words})"
+    number = "0" if gap.verdict == "no gap" else compact(gap)
+    return f"{number} {gap.verdict} ({words})"
+
+
+def _relaxation(time: Estimate | None, without_gap: bool) -> str:
+    if time is None:
+        return "refused with the gap"
+    if time.error == float("inf"):
+        return f"none: a modulus in the spectrum {'is' if without_gap else 'may be'} 1"
+    return f"{compact(time)} steps"
 
 
 def details_of(study: StudyResult) -> str:
@@ -82,9 +150,9 @@ def _matrix_lines(matrix: KernelMatrix) -> list[str]:
     rays = f" of {matrix.samples} rays" if matrix.samples else ""
     noise = "" if symmetry.z_score is None else f" (z = {symmetry.z_score:+.2f} against the sampling noise)"
     return [
-        f"{matrix.basis!r} by {matrix.method}{rays}: Frobenius error {_small(float(matrix.error))} "
+        f"{matrix.basis!r} by {matrix.method}{rays}: Frobenius error {float(matrix.error):.2g} "
         f"({matrix.error.kind}), {_met(matrix.tolerance_met, matrix.requested_tolerance)}",
-        f"asymmetry {_small(float(symmetry))}{noise}, rows sum to 1 within {_small(float(rows))}",
+        f"asymmetry {float(symmetry):.2g}{noise}, rows sum to 1 within {float(rows):.2g}",
     ]
 
 
@@ -150,10 +218,6 @@ def enclosures_as_text(found: Enclosures) -> list[str]:
     return [f"{found.convention} convention; {found.method}", *map(str, found)]
 
 
-def _small(value: float) -> str:
-    return f"{value:.2g}"
-
-
 def _met(met: bool | None, tolerance: float | None) -> str:
     if met is None or tolerance is None:
         return "no tolerance asked"
@@ -168,6 +232,7 @@ def counted(number: int, word: str) -> str:
 def study_as_dict(study: StudyResult) -> dict[str, Any]:
     """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""
     wall, disk, found = study.wall, study.disk, study.spectrum
+    gaps = [None if gap is None else gap_as_dict(gap) for gap in (study.gap, study.specular_gap, study.collision_gap)]
     return {
         "asperity": __version__,
         "tolerance": study.tolerance,
@@ -181,7 +246,7 @@ def study_as_dict(study: StudyResult) -> dict[str, Any]:
             "kac": study.tracer.expected_collisions, "z_score": study.tracer.z_score,
         },
         "law": _matrix(study.matrix),
-        "gap": {"paper": _gap(study.gap), "specular": _gap(study.specular_gap)},
+        "gap": {"paper": gaps[0], "specular": gaps[1]},
         "eigenvalues": None if found is None else {
             "convention": found.convention, "basis": repr(found.basis), "method": found.estimates()[0].method,
             "values": found.values.tolist(), "errors": finite(found.errors.total()), "kind": "estimate",
@@ -191,7 +256,7 @@ def study_as_dict(study: StudyResult) -> dict[str, Any]:
         "enclosures": study.enclosures and enclosures_as_list(study.enclosures),
         "collision": {
             "mass": disk.mass, "inertia": disk.inertia, "foreshortening": disk.foreshortening,
-            "law": _matrix(study.collision_matrix), "gap": _gap(study.collision_gap), **study.conservation,
+            "law": _matrix(study.collision_matrix), "gap": gaps[2], **study.conservation,
         },
         "consequences": study.consequences.as_dict(),
         "refusals": dict(study.refusals),
@@ -226,10 +291,6 @@ def enclosures_as_list(found: Enclosures) -> list[dict[str, Any]]:
         }
         for item in found
     ]  # fmt: skip
-
-
-def _gap(gap: SpectralGap | None) -> dict[str, Any] | None:
-    return None if gap is None else gap_as_dict(gap)
 
 
 def _matrix(matrix: KernelMatrix) -> dict[str, Any]:

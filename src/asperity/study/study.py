@@ -29,9 +29,8 @@ from ..spectral.gap.law_spectrum import with_gap
 from ..spectral.gap.methods import law_eigenvalues
 from .consequences import consequences_of
 from .pictures import RESOLUTION, save_pictures
-from .report import details_of, study_as_dict
+from .report import details_of, study_as_dict, summary_of
 from .result import StudyResult, TracerCheck
-from .summary import summary_of
 
 BINS = 128
 TOLERANCE = 1e-3

@@ -193,7 +193,7 @@ def test_the_error_between_laws_holds_against_a_finer_level(order):
 def test_rows_of_arcs_in_closed_form_are_those_that_are_traced():
     theta, edges = np.array([0.02, 0.4, 0.9, 1.5, 2.9]), np.linspace(0.0, np.pi, 33)
     traced = WallConditionals(geo.focusing_arcs(0.9), 0, edges[1:-1])(theta, 1e-10)
-    for k, masses in enumerate(ker.CircularArcLaw(0.9).conditional_masses(theta, edges)):
+    for k, masses in enumerate(np.diff(ker.CircularArcLaw(0.9).distribution(theta, edges).below, axis=1)):
         part = slice(traced.starts[k], traced.starts[k + 1])
         counted = np.histogram(traced.nodes[part], edges, weights=traced.weights[part])[0]
         # the traced rows are asked for 1e-10, an estimate that grazing rows miss

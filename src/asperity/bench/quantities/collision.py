@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import geometry as geo
 from ...core.checks import Floats
 from ...core.estimates import Estimate
+from ...geometry import Wall
 from ...kernels import CollisionLaw, Legendre
 from ...spectral import WorkMethod
 from .methods import RANDOM_ORDER
 from .quantity import QUICK_RAYS, RAYS, Methods, Quantity
 from .walls import standard_names
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 DISK = geo.Disk(1.0, 0.5)
 # Means over Lambda^2 of sin(psi)^2 and cos(psi)^2.

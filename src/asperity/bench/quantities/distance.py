@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...core.estimates import Estimate
+from ...geometry import Wall
 from ...kernels import Bins, KernelMatrix, WallLaw, discretise, distance, lambertian
 from ...spectral import WorkMethod
 from .methods import monte_carlo_matrix
 from .quantity import Methods, Quantity
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 # Scenes whose conditional distributions have a closed form.
 SCENES = ("triangular-teeth", "rectangular-teeth", "focusing-arc")

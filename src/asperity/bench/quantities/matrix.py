@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...core.checks import Floats
 from ...core.estimates import Estimate
-from ...kernels import Bins, KernelMatrix, Legendre
+from ...geometry import Wall
+from ...kernels import Basis, Bins, KernelMatrix, Legendre
 from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
 from ...spectral import WorkMethod
 from .methods import RANDOM_ORDER, MatrixMethod, declared_order, methods_for
 from .quantity import Methods, Quantity
 from .walls import standard_names
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
-    from ...kernels import Basis
 
 LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS = Bins(32), Legendre(2), Directions()
 

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kernels import KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
+from ...geometry import Wall
+from ...kernels import Basis, KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
 from ...kernels.discretisation.method import Budget
 from ...kernels.discretisation.traced import traced_matrix
 from ...kernels.matrices.matrix import frobenius_error
 from .quantity import QUICK_RAYS, RAYS
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
-    from ...kernels import Basis
 
 MakeMatrix = Callable[..., KernelMatrix]
 # The error of sampled rays decreases with order 1/2. Strata and scrambled Sobol sequences in two dimensions reach 3/4

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from ...geometry import Wall
 from ...spectral import WorkMethod
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 # Methods with their budgets in the quick set and in the full set.
 Methods = list[tuple[WorkMethod, tuple[float, ...], tuple[float, ...]]]

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...core.estimates import Estimate
+from ...geometry import Wall
 from ...kernels import Basis, Bins, Legendre, Panels, WallLaw, discretise
 from ...spectral import WorkMethod, diffusivity, spectral_gap, spectrum
 from .quantity import Methods, Quantity
 from .walls import standard_names
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 # Entry points at one grazing angle; the error of their midpoint rule is below the error of the finite angle.
 ENTRY_POINTS = 2**16
