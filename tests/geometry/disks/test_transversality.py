@@ -43,7 +43,7 @@ def test_licit_pairs_have_the_same_contacts_and_velocities_within_the_bound(name
     licit = np.array([pair.is_licit for pair in pairs])
     hit = geo.collide(disk, WALLS[name], scale, position, velocity, space.spacing)
     assert licit.mean() > least or disk is not DISKS[0]
-    assert np.all(hit.status[licit] == geo.Status.ESCAPED) and not np.any(hit.two_satellites[licit])
+    assert np.all(hit.escaped[licit]) and not np.any(hit.two_satellites[licit])
     assert np.array_equal(hit.contacts[licit], [len(pair.sines) for pair in pairs if pair.is_licit])
     apart = hit.velocity - [pair.velocity for pair in pairs]
     distance = np.sqrt(disk.inner(apart, apart))
