@@ -17,3 +17,10 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 # The same examples in every run; a first call may compile for seconds, which says nothing about the law under test.
 settings.register_profile("asperity", deadline=None, derandomize=True)
 settings.load_profile("asperity")
+
+
+def pytest_report_header() -> str:
+    """Whether the processor has AVX-512: the tests must pass with and without."""
+    from llvmlite.binding import get_host_cpu_features
+
+    return f"processor: {'with' if get_host_cpu_features().get('avx512f') else 'without'} AVX-512"
