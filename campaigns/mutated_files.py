@@ -199,7 +199,8 @@ def read_matrix(path: Path) -> str | None:
         first, second = (np.load(io.BytesIO(file.read(name))) for file in (there, here))
         if name == "record.npy":
             mine, yours = json.loads(str(second), parse_int=float), json.loads(str(first), parse_int=float)
-            if any(repr(mine[key]) != repr(yours[key]) for key in mine if key != "basis"):
+            # a file without "beyond", as there were, has None
+            if any(repr(mine[key]) != repr(yours.get(key)) for key in mine if key != "basis"):
                 return "another record"
         elif not np.array_equal(first, second):
             return f"another array {name}"
