@@ -260,7 +260,8 @@ LEFT_OUT = {
     "LaplacianComparison", "Law", "LeadingEigenvalues", "LeastResistanceLaw", "LimitStudy", "Machine",
     "MethodFacts", "MixingTime", "ModifiedCollision", "NamedWall", "PairCollision", "Reflector", "retroreflection",
     "RigidCollision", "Scattering", "Shadow", "SpectralGap", "Spectrum", "SpectrumErrors", "specular", "SpinForce",
-    "DiskStatus", "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow", "VelocityLaw",
+    "DiskStatus",
+    "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow", "VelocityLaw",
     "verify", "WallDesign", "WallForLaw", "WeakLimit", "WorkReport", "WorkRow", "zero_resistance_body",
 }  # fmt: skip
 
