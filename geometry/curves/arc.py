@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array
+from ...core.checks import Floats, finite_array, number_between
 from ...core.errors import WallError
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
@@ -255,6 +255,7 @@ class Arc(Curve):
 
     def split(self, s: float) -> tuple[Arc, Arc]:
         """Return the parts before and after the parameter ``s`` in (0, 1)."""
+        s = number_between("s", s, 0.0, 1.0, closed="low high")
         angle = self.start_angle + s * (self.end_angle - self.start_angle)
         x, y = self.point(s)
         middle = (float(x), float(y))

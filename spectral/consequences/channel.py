@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checkpoints import Stored
-from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, positive_number, whole_number
+from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.kinds import explained
@@ -24,6 +24,8 @@ from .diffusion import Arrangement, check_arrangement
 SMALLEST = float(np.spacing(np.pi))
 # Limit on the crossings of a particle; a law that retroreflects for ever reaches it.
 MOST_CROSSINGS = 1_000_000
+# Larger radii and speeds overflow in products with lengths.
+LARGEST = 1e150
 # Particles of a part: their random numbers depend on its number alone.
 TOGETHER = 4096
 
@@ -139,7 +141,7 @@ def exit_times(
     check_arrangement(arrangement)
     whole_number("particles", particles, 2)
     check_memory("particles", "all exit times", 2 * levels.size * particles)
-    width, pace = 2.0 * positive_number("radius", radius), positive_number("speed", speed)
+    width, pace = 2.0 * number_between("radius", radius, 0.0, LARGEST), number_between("speed", speed, 0.0, LARGEST)
     paper = law.in_specular_frame() if law.frame == "specular" else law
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     job = _Particles(paper, levels, particles, root, width, pace, arrangement)

@@ -108,10 +108,13 @@ def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = Non
 
 def _by_scatter(sizes: Floats, errors: Floats) -> tuple[float, float]:
     """Slope and half width of its interval, by Student's t."""
-    from scipy.stats import linregress, t
+    from scipy.stats import t
 
-    fit = linregress(np.log(sizes), np.log(errors))
-    return float(fit.slope), float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(sizes) - 2) * fit.stderr)
+    x, y = np.log(sizes) - np.mean(np.log(sizes)), np.log(errors)
+    slope = float(x @ y / (x @ x))
+    rest = y - np.mean(y) - slope * x
+    spread = float(np.sqrt(rest @ rest / (len(x) - 2) / (x @ x)))
+    return slope, float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(sizes) - 2)) * spread
 
 
 def _by_spread(sizes: Floats, errors: Floats, repeats: Floats) -> tuple[float, float]:

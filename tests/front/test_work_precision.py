@@ -278,3 +278,8 @@ def test_errors_reported_by_a_random_method_are_a_root_mean_square_as_its_errors
     assert measure(problem(), method, 1, 3, 60.0).reported == pytest.approx((25.0 / 3.0) ** 0.5)
     silent = spec.WorkMethod("silent", lambda n, rng: EXACT, is_random=True)
     assert measure(problem(), silent, 1, 3, 60.0).reported is None
+
+
+def test_equal_errors_have_the_order_0_without_an_interval_even_if_they_are_tiny():
+    found = spec.fit_order([1.0, 2.0, 4.0], [5e-324] * 3)
+    assert found.order == found.low == found.high == 0.0

@@ -242,3 +242,9 @@ def test_unsuitable_curves_are_refused_in_words(build, words):
     with pytest.raises(WallError, match=words) as caught:
         build()
     assert isinstance(caught.value, InputError | ValueError)
+
+
+@pytest.mark.parametrize("s", [1e308, -0.1, 1.1])
+def test_an_arc_is_not_divided_beyond_its_ends(s):
+    with pytest.raises(InputError, match="s: expected a number in"):
+        geo.Arc((0.0, 0.0), 1.0, 0.0, np.pi).split(s)
