@@ -1,4 +1,4 @@
-"""Run all measurements: ``python -m campaigns`` writes ``campaigns.md`` and ``extremes.md`` into a folder.
+"""Run all measurements: ``python -m campaigns`` writes ``benchmarks.md`` and ``extremes.md`` into a folder.
 
 The parts are the tables of speed and goals, the standard set, the random walls, the stability report, and the savings
 of the tracer; ``--peers`` adds the peers. Each part has a time limit, together 43 minutes. Tables and pictures go to

@@ -15,6 +15,8 @@ from mpmath import mp, mpf
 from asperity import geometry as geo
 from asperity.geometry.disk.satellites import Satellites
 
+from .pages import print_table
+
 WALLS = {
     "triangular teeth": geo.triangular_teeth(0.7),
     "rectangular teeth": geo.rectangular_teeth(0.5),
@@ -240,9 +242,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     lines = table(rows(options.disks, options.seed))
-    print("| " + " | ".join(lines[0]) + " |\n" + "|---" * len(lines[0]) + "|")
-    for line in lines:
-        print("| " + " | ".join(map(str, line.values())) + " |")
+    print_table(" | ".join(lines[0]), (tuple(line.values()) for line in lines))
 
 
 if __name__ == "__main__":

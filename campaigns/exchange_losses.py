@@ -11,9 +11,8 @@ import click
 import numpy as np
 
 from asperity import kernels as ker
-from asperity.core.tables import table_lines
 
-from .pages import write_between_marks
+from .pages import print_table, write_between_marks
 from .walls_for_laws import PAGE
 
 OPENINGS = (1e-2, 1e-3, 1e-4)
@@ -53,12 +52,9 @@ def rows() -> Iterator[str]:
 @click.option("--write", is_flag=True, help="Write the table into the page.")
 def main(write: bool) -> None:
     """Print the table."""
-    lines = []
-    for line in table_lines(HEADS, rows()):
-        click.echo(line)
-        lines.append(line)
+    measured = print_table(HEADS, rows())
     if write:
-        write_between_marks(PAGE, "\n".join(lines), "measured losses")
+        write_between_marks(PAGE, measured, "measured losses")
 
 
 if __name__ == "__main__":

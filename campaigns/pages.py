@@ -18,7 +18,10 @@ def write_between_marks(page: Path, text: str, name: str = "measured") -> None:
     page.write_text(f"{head}{begin}\n{text}\n{END}{rest.split(END, 1)[1]}", encoding="utf-8")
 
 
-def print_table(heads: str, rows: Iterable[str | Iterable[object]]) -> None:
-    """Print a table line by line, each line as soon as it is available."""
+def print_table(heads: str, rows: Iterable[str | Iterable[object]]) -> str:
+    """Print a table line by line, each line as soon as it is available; return the whole."""
+    lines = []
     for line in table_lines(heads, rows):
         print(line, flush=True)
+        lines.append(line)
+    return "\n".join(lines)

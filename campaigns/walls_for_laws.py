@@ -12,9 +12,8 @@ import click
 import numpy as np
 
 from asperity import kernels as ker
-from asperity.core.tables import table_lines
 
-from .pages import DOCS, write_between_marks
+from .pages import DOCS, print_table, write_between_marks
 
 PAGE = DOCS / "theory" / "from-a-law-to-a-wall.md"
 MOMENTS = (4, 6, 8, 10, 12, 14)
@@ -62,12 +61,9 @@ def rows() -> Iterator[str]:
 @click.option("--write", is_flag=True, help="Write the table into the page.")
 def main(write: bool) -> None:
     """Print the table."""
-    lines = []
-    for line in table_lines(HEADS, rows()):
-        click.echo(line)
-        lines.append(line)
+    measured = print_table(HEADS, rows())
     if write:
-        write_between_marks(PAGE, "\n".join(lines))
+        write_between_marks(PAGE, measured)
 
 
 if __name__ == "__main__":
