@@ -1,0 +1,61 @@
+"""Enclosures of the eigenvalues of five curved walls, against far finer ones and against a second method.
+
+The second method is the matrix in Legendre polynomials, whose eigenvalues can only have too small a modulus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from campaigns.engine import Campaign, Judged
+
+# The eigenvalue of the constants and the next two by modulus.
+LISTED = 3
+DEGREES, MATRIX_TOLERANCE = 24, 1e-6
+
+
+@dataclass(frozen=True)
+class Case:
+    """A wall, and the tolerances of its enclosures."""
+
+    name: str
+    wall: geo.Wall
+    coarse: float
+    fine: float
+
+
+def draw(number: int) -> Case:
+    """Two walls with a closed form, and three that are traced, the last without mirror symmetry."""
+    skew = geo.Wall([geo.Bezier([(0, 0), (0.2, -0.5), (0.7, -0.3), (1, 0)])], period=1.0)
+    return (
+        Case("focusing arcs, 1.2", geo.focusing_arcs(1.2), 1e-5, 1e-9),
+        Case("focusing arcs, 0.6", geo.focusing_arcs(0.6), 1e-5, 1e-9),
+        Case("dispersing arcs, 1.0", geo.dispersing_arcs(1.0), 1e-4, 1e-8),
+        Case("elliptical arcs, 1.2", geo.elliptical_arcs(1.2, geo.Disk()), 1e-4, 1e-6),
+        Case("cubic Bezier, skew", skew, 1e-3, 1e-5),
+    )[number]
+
+
+def judge(case: Case) -> Iterator[Judged]:
+    """Each enclosure off the constants must contain the far finer one and not lie inside the matrix's eigenvalue."""
+    law = ker.WallLaw(case.wall)
+    coarse, fine = (spec.enclosures(law, LISTED, tolerance=tolerance) for tolerance in (case.coarse, case.fine))
+    matrix = ker.discretise(law, ker.Legendre(DEGREES), tolerance=MATRIX_TOLERANCE)
+    values = spec.spectrum(matrix, k=LISTED).values
+    for wide, narrow, value in zip(coarse[1:], fine[1:], values[1:], strict=True):
+        fault = ""
+        if not wide.low <= narrow.low <= narrow.high <= wide.high:
+            fault = f"[{narrow.low:.12f}, {narrow.high:.12f}] is not in [{wide.low:.12f}, {wide.high:.12f}]"
+        beyond = value - wide.high if value > 0.0 else wide.low - value
+        if beyond > float(matrix.error):
+            fault += f" the matrix has {value:.9f} +- {float(matrix.error):.1e}"
+        yield Judged(case.name, 0.5 * wide.width, abs(wide.value - narrow.value), 0.5 * narrow.width, fault)
+
+
+CAMPAIGNS = (
+    Campaign("enclosures", "Does each interval contain its eigenvalue, with the right number?", draw, judge, 5, [0]),
+)
