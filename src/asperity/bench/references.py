@@ -76,8 +76,8 @@ def _finest(name: str, method: str, child: ChildProcess, seconds: float) -> Refe
         except (OutOfTime, ChildCrashed, *FAILURES):
             break
         if error is not None:
-            # the number tells walls apart whose errors agree
-            source = f"{method} with budget {budget:g}, value {crc32(np.asarray(value).tobytes()):08x}"
+            # the checksum tells walls apart whose errors agree
+            source = f"{method} with budget {budget:g}, checksum {crc32(np.asarray(value).tobytes()):08x}"
             found = ReferenceValue(value, error, source, made_by)
     return found
 

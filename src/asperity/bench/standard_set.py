@@ -13,7 +13,7 @@ from ..core.child import ChildCrashed, ChildProcess, OutOfTime
 from ..spectral import WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
 from .problems import QUANTITIES, measured, prepare
 from .quantities.walls import scenes, wall_of
-from .references import known_reference, made_references
+from .references import FINEST, known_reference, made_references
 from .run import file_stem, scene_of
 
 Say = Callable[[str], None]
@@ -118,7 +118,9 @@ def _run(name: str, effort: Effort, folder: Path | None, child: ChildProcess, wh
         child.start()
     entries = QUANTITIES[quantity].methods(wall_of(scene))
     plan = TimePlan(whole.next_fraction(), len(entries))
-    references = made_references(name, child, effort.reference_seconds) if stored is None else (stored,)
+    # half of the time at most
+    seconds = min(effort.reference_seconds, 0.5 * plan.seconds / len(FINEST))
+    references = made_references(name, child, seconds) if stored is None else (stored,)
     methods = [method for method, _, _ in entries if any(method.name not in one.made_by for one in references)]
     if not methods:
         return None

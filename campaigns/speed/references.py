@@ -1,4 +1,4 @@
-"""Make src/asperity/bench/standard_references.json: ``python -m campaigns.standard_references [PROBLEM...]``.
+"""Make src/asperity/bench/standard_references.json: ``python -m campaigns.speed.references [PROBLEM...]``.
 
 The benchmark's references come from this script, not from the benchmark's own runs. Polygons that resolve into beams
 are exact and confirmed by a second method. Arcs use `exact_rows`, and grazing limits use closed forms. All other walls
@@ -20,11 +20,11 @@ import numpy as np
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.bench.problems import problem_names
 from asperity.bench.quantities.collision import DISK, correlation_of
 from asperity.bench.quantities.matrix import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
 from asperity.bench.quantities.walls import RANDOM_WALLS, wall_of
 from asperity.bench.references import FILE
-from asperity.bench.standard_set import problem_names
 from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import traced_matrix
@@ -219,7 +219,7 @@ MAKERS = {
 
 def main() -> None:
     """Make the requested references."""
-    parser = argparse.ArgumentParser(prog="python -m campaigns.standard_references", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m campaigns.speed.references", description=__doc__)
     parser.add_argument("problems", nargs="*", help="SCENE, QUANTITY or SCENE/QUANTITY; all by default")
     options = parser.parse_args()
     names = problem_names(options.problems)
