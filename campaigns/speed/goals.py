@@ -166,7 +166,7 @@ REPORTED: Mapping[str, Callable[[float], float]] = {
     "gap of focusing arcs": partial(_gap, ARCS, right=ARC_GAP),
     **{f"law in Bins(64) by quadrature, {name}": partial(_law_in_bins, wall) for name, wall in WALLS.items()},
     **{f"resistance, {name}": partial(_resistance, wall) for name, wall in WALLS.items()},
-    "resistance, Koch 8": partial(_resistance, geo.koch(8)),
+    "resistance, Koch 8": lambda tolerance: _resistance(geo.koch(8), tolerance),
     **{f"gap of dispersing arcs of {k}": partial(_gap, geo.dispersing_arcs(curvature))
        for k, curvature in (("1/3", 1.0 / 3.0), ("2/3", 2.0 / 3.0), ("1", 1.0))},
     "Koch 5 as an exact law": lambda tolerance: _unresolved(

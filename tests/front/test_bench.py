@@ -244,7 +244,15 @@ def test_a_run_is_written_and_read_again(tmp_path):
 
 
 NOTCHES = [(0.0, 0.0), (0.2, -0.5), (0.5, -0.1), (0.7, -0.6), (1.0, 0.0)]
-SHORT = Effort(True, 1, 0.01, 20.0, 20.0, 600.0)
+SHORT = Effort(True, 1, 0.01, 20.0, 60.0, 600.0)
+
+
+@pytest.fixture
+def rough_references(monkeypatch):
+    """Budgets that take less than a second."""
+    monkeypatch.setitem(FINEST, "beams", (1e4,))
+    monkeypatch.setitem(FINEST, "adaptive angles", (1e3,))
+    monkeypatch.setitem(FINEST, "randomised QMC", (4.0**9,))
 
 
 @pytest.fixture
@@ -266,10 +274,11 @@ def test_what_is_no_problem_of_the_standard_set_is_a_wall(notches):
     ("text", "exact"), [("triangular-teeth:angle=0.7", "closed form"), ("focusing-arcs:half_angle=1.2", "closed form"),
                         ("dispersing-arcs:curvature=2", None)],
 )  # fmt: skip
+@pytest.mark.usefixtures("rough_references")
 def test_references_made_for_a_wall_are_those_that_are_stored(text, exact):
     stored = {"tri": "triangular-teeth", "foc": "focusing-arc", "dis": "cusps"}[text[:3]]
     with ChildProcess() as child:
-        found = made_references(f"{text}/moment", child, 20.0)
+        found = made_references(f"{text}/moment", child, 60.0)
     right = known_reference(f"{stored}/moment")
     for one in found:
         assert abs(float(one.value) - float(right.value)) <= 2.0 * (one.error + right.error), one.source
@@ -304,11 +313,12 @@ def test_a_method_that_is_not_done_in_time_makes_no_reference(monkeypatch):
     assert beams.made_by == ("beams", "auto") and "budget 10000" in beams.source
 
 
+@pytest.mark.usefixtures("rough_references")
 def test_a_wall_of_a_file_is_measured_and_goes_on_until_it_is_another(notches, tmp_path):
     name = f"{notches}/moment"
     (report,) = run_problems([name], SHORT, tmp_path, lambda line: None)
     assert list(report.methods) == ["auto", "beams", "adaptive angles", "randomised QMC", "stratified", "Monte Carlo"]
-    assert all(report.error(row) <= 1e-6 for row in report.rows if row.method in ("auto", "beams") and row.is_done)
+    assert all(report.error(row) <= 1e-3 for row in report.rows if row.method in ("auto", "beams") and row.is_done)
     assert any(row.is_done for row in report.rows if row.method == "auto")
     known = tmp_path / "notches.toml-moment.json"
     assert spec.WorkReport.of_json(known.read_text()) == report
@@ -385,6 +395,7 @@ def test_the_command_writes_a_run(tmp_path, monkeypatch):
     assert BenchRun.of_json((tmp_path / "new" / "bench.json").read_text()) == run
 
 
+@pytest.mark.usefixtures("rough_references")
 def test_the_command_measures_a_wall_of_a_file(tmp_path, monkeypatch, notches):
     monkeypatch.setattr("asperity.bench.problems.OWN_QUANTITIES", ("moment",))
     monkeypatch.setattr("asperity.bench.standard_set.QUICK", SHORT)
