@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.checks import Floats
+from ...core.checks import Floats, choice
 from ...core.errors import InputError
 
 if TYPE_CHECKING:
@@ -157,6 +157,5 @@ def standard_names() -> tuple[str, ...]:
 @cache
 def wall_of(name: str) -> Wall:
     """The wall of a scene, constructed once in each process."""
-    if name not in scenes():
-        raise InputError(f"scene: expected one of {', '.join(scenes())}, got {name!r}")
+    choice("scene", name, scenes())
     return scenes()[name].build()
