@@ -1,9 +1,10 @@
 """Odd arguments for every public callable and method of the rooms, and odd operands for every operator.
 
 Each call is a good one with one argument replaced: by the same numbers in another kind of array (the answer must be the
-same one, or an InputError), by what has no meaning as numbers (an InputError), or by other numbers (an answer without
-NaN, or an InputError). The calls are made in a child process: where it ends by a signal, or does not come back, the
-next child goes on with the next call.
+same one, or an error), by what has no meaning as numbers (an error), or by other numbers (an answer without NaN, or an
+error). An error is an InputError, elsewhere than in constructors and the functions of the first pages also a TypeError,
+ValueError, AttributeError or IndexError. The calls are made in a child process: where it ends by a signal, or does not
+come back, the next child goes on with the next call.
 
     python -m campaigns.argument_fuzz [calls] [seed]
 """
@@ -20,20 +21,16 @@ import re
 import signal
 import sys
 import tempfile
-import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity import spectral as spec
 from asperity.errors import AsperityError
 from campaigns.judges import public_calls
 
@@ -41,10 +38,11 @@ from .pages import print_table
 
 # Seconds of the processor for one call, and of the clock, after which the child is ended.
 LONGEST, LONGEST_WAIT = 10.0, 60.0
-ROOMS = tuple(str(Path(room.__file__).resolve().parent) for room in (geo, ker, spec))
 SAME, REFUSED, OTHER = "same numbers", "no numbers", "other numbers"
-OUTCOMES = ("answer", "InputError", "signal", "hang", "raw exception", "another answer", "accepted", "NaN")
-GOOD = OUTCOMES[:2]
+OUTCOMES = (
+    "answer", "InputError", "plain error", "signal", "hang", "raw exception", "another answer", "accepted", "NaN",
+)  # fmt: skip
+GOOD = OUTCOMES[:3]
 # Arguments that the object at hand does not need, a text, and heights, of which masked ones count as undefined.
 UNUSED = re.compile(
     r"breakpoints\(limit|turning_(points|values)\(axis|Segment.flattened|made_by|\.__\w+__\(|check_wall|\(height"
@@ -154,6 +152,7 @@ class Case:
     rule: str
     call: Callable[[], Any]
     good: Callable[[], Any] | None = None
+    strict: bool = False
 
 
 def cases(seed: int = 0) -> list[Case]:
@@ -182,10 +181,10 @@ def _of_call(name: str, function: Callable[..., Any], good: dict[str, Any], rng:
             kinds = [(REFUSED, functions(value)), (OTHER, scalars(value))]
         elif _is_number(value):
             kinds = [(SAME, same_numbers(value)), (REFUSED, no_numbers(value)), (OTHER, other_numbers(value, rng))]
-        usual = partial(function, **arrays)
+        usual, strict = partial(function, **arrays), public_calls.is_strict(name, function)
         for rule, odd in kinds:
             for kind, other in odd.items():
-                yield Case(f"{name}({one})", kind, rule, partial(function, **{**arrays, one: other}), usual)
+                yield Case(f"{name}({one})", kind, rule, partial(function, **{**arrays, one: other}), usual, strict)
 
 
 def _is_number(value: Any) -> bool:
@@ -269,9 +268,8 @@ def outcome(case: Case) -> tuple[str, str]:
     except TooLong:
         return "hang", ""
     except Exception as reason:
-        text = f"{type(reason).__name__}: {reason}"
-        by_python = case.good is None and isinstance(reason, TypeError) and not _raised_here(reason)
-        return ("InputError" if by_python else "raw exception"), text
+        plain = isinstance(reason, public_calls.PLAIN) and not case.strict
+        return ("plain error" if plain else "raw exception"), f"{type(reason).__name__}: {reason}"
     if case.rule == REFUSED:
         return "accepted", str(answer)[:80]
     if case.good is None:
@@ -285,12 +283,6 @@ def outcome(case: Case) -> tuple[str, str]:
     if case.rule == SAME and not agree(answer, usual) and agree(usual, leaves(case.good())):
         return "another answer", f"{answer} instead of {usual}"[:160]
     return ("NaN" if has_nan(answer) and not has_nan(usual) else "answer"), str(answer)[:80]
-
-
-def _raised_here(reason: BaseException) -> bool:
-    """Whether the package's code raised it, and not the operator itself or the type of the other operand."""
-    frames = traceback.extract_tb(reason.__traceback__)
-    return any("asperity" in Path(frame.filename).parts or frame.filename.startswith(ROOMS) for frame in frames)
 
 
 def _stop(*_: object) -> None:

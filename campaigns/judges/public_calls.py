@@ -11,7 +11,6 @@ import numpy as np
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.core.kinds import OPERATORS
 from asperity.estimates import Estimate
 from asperity.study import study_wall
 
@@ -38,6 +37,8 @@ def seeded(rng: int) -> ker.Law:
     return ker.maxwell(np.random.default_rng(rng).uniform())
 
 
+# Methods that operators and brackets call.
+OPERATORS = ("__call__", "__getitem__", "__matmul__", "__add__", "__sub__", "__mul__", "__rmul__", "__pow__")
 # Of every public callable arguments that it takes; each is replaced in its turn. Quick ones: some of them do work.
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Arc": (geo.Arc, {"center": (0.5, 0.0), "semi_axes": 0.5, "start": 3.0, "end": 4.0}),
@@ -249,6 +250,16 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Estimate": (Estimate, {"value": 1.0, "error": 0.1, "kind": "bound", "method": "by hand"}),
     "study_wall": (study_wall, {"wall": geo.flat(), "name": "a", "disk": None, "tolerance": 0.1, "bins": 2, "rng": 0}),
 }  # fmt: skip
+# Functions of the first pages (README.md, docs/index.md, docs/quickstart.md) and their kin; all constructors join them.
+FIRST = {
+    "accommodation", "collide", "CollisionLaw.sample", "dispersing_arcs", "discretise", "distance", "elliptical_arcs",
+    "focusing_arcs", "henyey_greenstein", "koch", "Law.apply", "Law.sample", "maxwell", "mixture", "no_slip",
+    "rectangular_teeth", "resistance", "smooth", "spectral_gap", "spectrum", "trace", "trajectory",
+    "triangular_teeth", "Wall.foreshorten", "wall_for", "wall_from_text",
+}  # fmt: skip
+# How Python and numpy refuse what has no such method, no length, no truth, or is no path; its message and the lines
+# of the call say the rest.
+PLAIN = (TypeError, ValueError, AttributeError, IndexError)
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz.
 LEFT_OUT = {
     "Accommodation", "air_resistance", "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BodyForce",
@@ -264,6 +275,11 @@ LEFT_OUT = {
     "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow", "VelocityLaw",
     "verify", "WallDesign", "WallForLaw", "WeakLimit", "WorkReport", "WorkRow", "zero_resistance_body",
 }  # fmt: skip
+
+
+def is_strict(name: str, function: Callable[..., Any]) -> bool:
+    """Whether it is a constructor or a function of the first pages, which refuse wrong arguments with InputErrors."""
+    return name in FIRST or inspect.isclass(function) or inspect.isclass(getattr(function, "__self__", None))
 
 
 def methods_of(kind: type) -> set[tuple[type, str]]:

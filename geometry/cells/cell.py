@@ -10,7 +10,6 @@ from typing import Any, Self
 
 from ...core.checks import Floats, frozen, positive_number
 from ...core.estimates import Estimate
-from ...core.kinds import explained
 from ..curves.curve import Curve, Point, point_array
 from ..curves.segment import Segment
 from .hollow import Hollow, flat_tops, hollows_between
@@ -180,7 +179,6 @@ class Cell:
             return tuple(replace(h, left=h.left + x, right=h.right + x) for h in self.cell.hollows)
         return hollows_between(flat_tops(self.pieces, self.vertices), self.vertices) if self.closes else ()
 
-    @explained
     def scaled(self, factor: float) -> Self:
         """Return the wall enlarged by ``factor`` > 0, its period included."""
         c = positive_number("factor", factor)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.checks import Floats, whole_number
+from ...core.checks import Floats, choice, whole_number
 from ...core.errors import InputError
 from ...core.long_runs import counted
 from .measured import METRES, is_slope
@@ -55,8 +55,7 @@ class Columns:
     def __post_init__(self) -> None:
         if self.delimiter is not None and (not isinstance(self.delimiter, str) or not self.delimiter):
             raise InputError(f"delimiter: expected a character such as ';', got {self.delimiter!r}")
-        if self.decimal not in (".", ","):
-            raise InputError(f"decimal: expected '.' or ',', got {self.decimal!r}")
+        choice("decimal", self.decimal, (".", ","))
         if self.delimiter == self.decimal:
             raise InputError(f"delimiter: expected another character than the decimal sign, got {self.delimiter!r}")
         whole_number("skiprows", self.skiprows, 0)

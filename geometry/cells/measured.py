@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, whole_number
+from ...core.checks import Floats, finite_array, finite_number, frozen, instance, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ..curves.curve import LARGEST_COORDINATE
 
 # Metres of the units that headers of profiles have; micro is written in three ways.
@@ -28,7 +27,6 @@ RADIANS = {
 }  # fmt: skip
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class Profile:
     """Heights above positions along a line, in one unit; ``x, height = profile`` unpacks it.
@@ -61,8 +59,7 @@ class Profile:
                 f"x and height: expected two arrays of the same length, at least 2, got shapes {x.shape} and "
                 f"{height.shape}"
             )
-        if not isinstance(self.unit, str):
-            raise InputError(f"unit: expected the name of a unit such as 'µm', got {self.unit!r}")
+        instance("unit", self.unit, str, "'µm'")
         largest = max(float(np.abs(x).max()), float(np.nanmax(np.abs(height), initial=0.0)))
         if largest > LARGEST_COORDINATE:
             raise InputError(f"x and height: expected numbers of at most {LARGEST_COORDINATE:g}, got {largest:g}")
@@ -109,7 +106,6 @@ class Profile:
         known, heights = self.x[defined][order], self.height[defined][order]
         return Profile(self.x, np.where(defined, self.height, np.interp(self.x, known, heights)), self.unit)
 
-    @explained
     def detrended(self, degree: int = 1) -> Profile:
         """Less the polynomial that fits best: degree 0 the mean, 1 the tilt too, 2 a bow too."""
         degree = whole_number("degree", degree, 0)
@@ -122,7 +118,6 @@ class Profile:
         size = np.abs(self.height[defined]).max()
         return Profile(self.x, np.where(np.abs(rest) <= FIT_ROUNDING * size, 0.0, rest), self.unit)
 
-    @explained
     def in_unit(self, unit: str) -> Profile:
         """Converted to another unit of length."""
         factor = unit_ratio(self.unit, unit)

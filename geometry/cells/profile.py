@@ -7,14 +7,13 @@ import warnings
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-from ...core.checks import Floats, whole_number
+from ...core.checks import Floats, choice, whole_number
 from ...core.errors import InputError
 from ...core.files import text_of
-from ...core.kinds import explained
 from .columns import Columns, Header, NotPairs, remedy
 from .measured import METRES, Profile, heights_of, integrated, is_slope, unit_ratio
 
@@ -50,13 +49,14 @@ def vertices_of_profile(profile: Profile, seam: Seam = "mirror") -> Floats:
             f"at row {worst + 1}; use Profile.sorted() (sort=yes), which also averages heights at one position"
         )
     _warn_of_units(profile)
+    choice("seam", seam, get_args(Seam))
     if seam == "mirror":
         x = np.concatenate([x, 2.0 * x[-1] - x[-2::-1]])
         height = np.concatenate([height, height[-2::-1]])
     elif seam == "step":
         if height[-1] != height[0]:
             x, height = np.append(x, x[-1]), np.append(height, height[0])
-    elif seam == "wrap":
+    else:
         step = (x[-1] - x[0]) / (len(x) - 1)
         if np.abs(np.diff(x) - step).max() > EVEN * step:
             raise InputError(
@@ -64,8 +64,6 @@ def vertices_of_profile(profile: Profile, seam: Seam = "mirror") -> Floats:
                 "period and pass seam='step'"
             )
         x, height = np.append(x, x[-1] + step), np.append(height, height[0])
-    else:
-        raise InputError(f"seam: expected 'mirror', 'step' or 'wrap', got {seam!r}")
     return rolled(x, height)
 
 
@@ -80,7 +78,7 @@ def _warn_of_units(profile: Profile) -> None:
         doubt = f"width is {width:.3g} and its heights differ by {change:.3g}: are the positions in a smaller unit"
     else:
         return
-    warnings.warn(f"the profile's {doubt}? Give units, for example units=('mm', 'nm')", stacklevel=5)
+    warnings.warn(f"the profile's {doubt}? Give units, for example units=('mm', 'nm')", stacklevel=4)
 
 
 def rolled(x: Floats, height: Floats) -> Floats:
@@ -97,7 +95,6 @@ def rolled(x: Floats, height: Floats) -> Floats:
     return np.asarray(np.column_stack([along, down])[keep] + 0.0)
 
 
-@explained
 def read_profile(
     path: str | PathLike[str],
     row: int | None = None,
@@ -164,8 +161,8 @@ def read_profile(
     file = Path(path)
     columns = Columns(delimiter, decimal, usecols, skiprows)
     given = _pair_of_units(units)
-    if quantity not in ("height", "slope", None):
-        raise InputError(f"quantity: expected 'height' or 'slope', got {quantity!r}")
+    if quantity is not None:
+        choice("quantity", quantity, get_args(Quantity))
     try:
         text = text_of(file, encoding)
     except InputError as reason:

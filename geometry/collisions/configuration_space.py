@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, positive_number, shaped
+from ...core.checks import Floats, finite_array, instance, positive_number, shaped
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk, contact_normal
@@ -20,7 +19,6 @@ from ..walls.interior import in_solid
 from ..walls.wall import Wall
 
 
-@explained_class
 @dataclass(frozen=True)
 class ConfigurationSpace:
     """The configuration space M of a disk above a wall, and its straightened form M_cyl.
@@ -63,10 +61,9 @@ class ConfigurationSpace:
     scale: float
     spacing: float
 
-    @explained
     def __init__(self, wall: Wall, disk: Disk, scale: float, spacing: float | None = None) -> None:
-        if not isinstance(wall, Wall) or not isinstance(disk, Disk):
-            raise InputError(f"wall, disk: expected a Wall and a Disk, got {wall!r} and {disk!r}")
+        instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
+        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
         eps = positive_number("scale", scale)
         spacing = Satellites.around(eps, eps * wall.depth, spacing).spacing
         for name, value in (("wall", wall), ("disk", disk), ("scale", eps), ("spacing", spacing)):
@@ -106,7 +103,6 @@ class ConfigurationSpace:
         bar = self.charts.residual(alpha)
         return np.asarray(np.abs(bar) <= 0.5 * self.spacing - self.gap_radius)
 
-    @explained
     def good_half_width(self, length: float = 1.0) -> float:
         """Return how far alpha may be from multiples of rho in the set Xi, in units of ``scale`` (section 5.3.5).
 

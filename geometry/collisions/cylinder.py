@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, positive_number, whole_number
-from ...core.kinds import explained
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk
@@ -48,7 +47,6 @@ class CylinderCollision(DiskCounts):
     status: NDArray[np.uint8]
 
 
-@explained
 def collide_cylinder(
     disk: Disk,
     wall: Wall,
@@ -155,7 +153,6 @@ class ModifiedCollision(DiskCounts):
     status: NDArray[np.uint8]
 
 
-@explained
 def collide_modified(
     disk: Disk,
     wall: Wall,

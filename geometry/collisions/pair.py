@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, instance, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..disk.rim import Features, SatelliteDisk
 from .amplification import DiskCounts, DiskStatus, fewest_contacts, mark_amplified
 from .encounter import MAX_CONTACTS, TOUCHING, Encounter, largest_bend_of
@@ -40,7 +39,6 @@ class PairCollision(DiskCounts):
     status: NDArray[np.uint8]
 
 
-@explained
 def collide_pair(
     first: SatelliteDisk,
     second: SatelliteDisk,

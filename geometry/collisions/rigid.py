@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, instance, positive_number, shaped, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..disk.disk import Disk
 from ..disk.satellites import Satellites
 from ..tracing.threads import in_blocks
@@ -54,7 +53,6 @@ class RigidCollision(DiskCounts):
     status: NDArray[np.uint8]
 
 
-@explained
 def collide(
     disk: Disk,
     wall: Wall,

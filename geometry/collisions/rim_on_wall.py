@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, instance, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..disk.rim import Features, SatelliteDisk
 from ..tracing.tracing import Status
 from ..walls.wall import Wall
@@ -23,7 +22,6 @@ STRIDE = 0.5
 STRAIGHT = 1e-12
 
 
-@explained
 def collide_rim(
     body: SatelliteDisk,
     wall: Wall,

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, instance, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, fraction_estimate
-from ...core.kinds import explained
 from ..curves.curvature import largest_curvature
 from ..curves.segment import Segment
 from ..disk import rolling
@@ -66,7 +65,6 @@ class CollisionConstants:
     state: float
 
     @classmethod
-    @explained
     def of(cls, disk: Disk) -> CollisionConstants:
         """Return the constants of a disk."""
         instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
@@ -116,7 +114,6 @@ class Shadow:
         return not self.reason
 
 
-@explained
 def shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayLike) -> Shadow:
     """Compare the collision of one disk with that on the cylinder which begins at the same contact and velocity.
 
@@ -170,7 +167,6 @@ def shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayLike) 
     return _Pair(_Model(space), start, moving[0]).follow()
 
 
-@explained
 def good_fraction(space: ConfigurationSpace, samples: int = 1000, rng: Rng = None) -> Estimate:
     """Estimate for which part of all states at x2 = 0 bounds show a collision as on the cylinder: the good set.
 

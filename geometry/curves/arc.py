@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, number_between
 from ...core.errors import WallError
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from .curve import LARGEST_COORDINATE, Curve, Point, as_point, stretch_factors, uniform_parameters
 
@@ -29,7 +28,6 @@ SMALLEST_AXIS = 1.0 / LARGEST_COORDINATE
 END_ROUNDING = 4.0 * EPS
 
 
-@explained_class
 @dataclass(frozen=True, init=False, repr=False)
 class Arc(Curve):
     """The arc (cx + a cos t, cy + b sin t), t from one angle to another, clockwise or counterclockwise.
@@ -82,10 +80,9 @@ class Arc(Curve):
     end: Point
     rounding: float = field(compare=False)
 
-    @explained
     def __init__(self, center: ArrayLike, semi_axes: ArrayLike, start: float, end: float) -> None:
         middle = as_point("Arc center", center)
-        axes = as_point("Arc semi_axes", (semi_axes, semi_axes) if np.ndim(semi_axes) == 0 else semi_axes)
+        axes = as_point("Arc semi_axes", semi_axes if np.iterable(semi_axes) else (semi_axes, semi_axes))
         angles = as_point("Arc start and end", (start, end))
         if min(axes) < SMALLEST_AXIS:
             raise WallError(f"Arc semi_axes: expected numbers greater than 0, at least {SMALLEST_AXIS:g}, got {axes}")

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array
+from ...core.checks import Floats, finite_array, sequence
 from ...core.errors import WallError
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
@@ -22,7 +21,6 @@ from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 FAR_MINIMUM = 2.0
 
 
-@explained_class
 @dataclass(frozen=True)
 class Bezier(Curve):
     """A Bezier curve of degree 2 or 3.
@@ -51,9 +49,8 @@ class Bezier(Curve):
     end: Point = field(init=False, repr=False, compare=False)
     rounding: float = field(default=0.0, init=False, repr=False, compare=False)
 
-    @explained
     def __init__(self, control_points: Sequence[ArrayLike]) -> None:
-        given = list(control_points)
+        given = sequence("Bezier control_points", control_points)
         if len(given) not in (3, 4):
             raise WallError(f"Bezier control_points: expected 3 or 4 points, got {len(given)}")
         points = tuple(as_point(f"Bezier control point {i}", p) for i, p in enumerate(given))

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_number, numbers, shortened
 from ...core.errors import WallError
-from ...core.kinds import explained_class
 
 # Of a coordinate; products of three lengths stay far below the largest double.
 LARGEST_COORDINATE = 1e100
@@ -24,7 +23,6 @@ Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
 
-@explained_class
 class Curve(ABC):
     """A smooth directed curve in the plane, parametrised over [0, 1]; immutable.
 

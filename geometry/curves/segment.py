@@ -12,11 +12,9 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, shaped
 from ...core.errors import WallError
-from ...core.kinds import explained_class
 from .curve import Box, Curve, Point, as_point, stretch_factors
 
 
-@explained_class
 @dataclass(frozen=True)
 class Segment(Curve):
     """A straight piece from ``start`` to ``end``.

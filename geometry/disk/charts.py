@@ -10,13 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, positive_number
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from . import rolling
 from .rolling import Matrix, Vector
 from .satellites import Satellites
 
 
-@explained_class
 @dataclass(frozen=True)
 class RollingCharts:
     """The maps between the configurations of a disk with satellites and the cylinder of straightened configurations.
@@ -185,7 +183,6 @@ class RollingCharts:
         return _matrix(entries, np.broadcast_shapes(x1.shape, w[0].shape))
 
 
-@explained
 def plane_crossing(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
     """Return (x1, alpha) at x2 = 0 on the line through a configuration along its velocity: Psi (eq. 4.66).
 
@@ -213,7 +210,6 @@ def plane_crossing(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
     return _join(rolling.project(*_split("configuration", configuration, 3), *_velocity(velocity)))
 
 
-@explained
 def plane_crossing_differential(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
     """Return the differential (..., 2, 6) of `plane_crossing` in (x1, x2, alpha, v1, v2, omega).
 

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles, broadcast, finite_array, frozen, positive_number
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 
 
 def frame_rows(mass: Any, inertia: Any, xp: Any = np) -> list[list[Any]]:
@@ -66,7 +65,6 @@ def contact_normal(mass: Any, inertia: Any, wall_normal: Any, turn: Any, xp: Any
     return [k1 / (mass * length), k2 / (mass * length), torque / (inertia * length)]
 
 
-@explained_class
 @dataclass(frozen=True)
 class Disk:
     """A disk of radius 1, free to move and rotate, with velocities w = (v1, v2, omega).
@@ -127,7 +125,6 @@ class Disk:
         """
         return frozen(frame_rows(self.mass, self.inertia))
 
-    @explained
     def inner(self, w: ArrayLike, w2: ArrayLike) -> Floats:
         """Return the kinetic-energy inner products of velocities of shape (..., 3), broadcast."""
         products = _velocities("w", w) * _velocities("w2", w2)
@@ -138,7 +135,6 @@ class Disk:
         velocity = _velocities("w", w)
         return np.asarray(-self.mass * velocity[..., 0] + self.inertia * velocity[..., 2])
 
-    @explained
     def to_angles(self, w: ArrayLike) -> tuple[Floats, Floats]:
         """Return the angles (theta, psi) of velocities, which do not depend on the speed.
 
@@ -177,7 +173,6 @@ class Disk:
         # two arctangents are accurate at grazing angles and at the poles, where arccos loses half of the digits
         return np.arctan2(upward, across), np.arctan2(np.hypot(upward, across), rolling)
 
-    @explained
     def from_angles(self, theta: ArrayLike, psi: ArrayLike, speed: ArrayLike = 1.0) -> Floats:
         """Return velocities (v1, v2, omega) with the given angles.
 

@@ -10,11 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import finite_array, finite_number, positive_number
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from . import rolling
 
 
-@explained_class
 @dataclass(frozen=True)
 class InnerDisk:
     """D_0, the disk of radius 1 - 2 rho^2 about the centre of the rough disk; its satellites are the only other points.
@@ -77,7 +75,6 @@ class InnerDisk:
     def is_clear(self) -> bool:
         return self.clearance > 0.0
 
-    @explained
     def contains(self, configuration: ArrayLike, point: ArrayLike) -> NDArray[np.bool_]:
         """Return whether points (..., 2) are in D_0, boundary included, of a disk at configurations (..., 3).
 

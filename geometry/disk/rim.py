@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, finite_number, frozen, instance, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained_class
 from .disk import Disk
 
 FEWEST = 3
@@ -33,7 +32,6 @@ class Features(NamedTuple):
     width: float
 
 
-@explained_class
 @dataclass(frozen=True)
 class SatelliteDisk:
     """A disk that touches other bodies with its satellites only, round bumps on its rim, or with teeth.
@@ -85,8 +83,8 @@ class SatelliteDisk:
         n = whole_number("count", self.count, FEWEST)
         object.__setattr__(self, "count", n)
         for name, least in (("size", 0.0), ("radius", np.finfo(float).tiny)):
-            value = getattr(self, name)
-            if np.ndim(value) == 0:
+            value: ArrayLike = getattr(self, name)
+            if not np.iterable(value):
                 if value != 0.0 or least > 0.0:
                     object.__setattr__(self, name, positive_number(name, value))
                 continue

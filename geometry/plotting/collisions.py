@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, number_between, positive_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..collisions.configuration_space import ConfigurationSpace
 from ..collisions.rigid import collide
 from ..collisions.transversality import shadow
@@ -30,7 +29,6 @@ SECTION = 500
 MOST_CONTACTS = 200
 
 
-@explained
 def collision_path(
     disk: Disk, wall: Wall, scale: float, position: ArrayLike, velocity: ArrayLike, spacing: float | None = None
 ) -> Floats:
@@ -101,7 +99,6 @@ def _first_time(
     return float(-(change @ reached) / (change @ change))
 
 
-@explained
 def draw_collision(
     disk: Disk,
     wall: Wall,
@@ -179,7 +176,6 @@ def _draw_rims(ax: Axes, space: ConfigurationSpace, path: Floats, numbers: Float
             ax.plot(*dot, "o", color=RAY_COLOURS[j % len(RAY_COLOURS)], markersize=4.5, zorder=4)
 
 
-@explained
 def draw_shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayLike, ax: Axes | None = None) -> Axes:
     """Draw the contact's path on the cylinder with the radius of transversality, and the path of the true contact.
 
@@ -253,7 +249,6 @@ def draw_shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayL
     return ax
 
 
-@explained
 def draw_configurations(space: ConfigurationSpace, height: float, ax: Axes | None = None) -> Axes:
     """Draw the section of the configuration space at one ``height`` of the lowest satellite.
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles, broadcast, finite_array
-from ...core.kinds import explained
 from ...core.tables import verbatim
 
 if TYPE_CHECKING:
@@ -40,7 +39,6 @@ FLATTEST = 0.2
 MOST_CELLS = 2
 
 
-@explained
 def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | None = None) -> Axes:
     """Draw one period of a wall, with the trajectories of the rays that enter at ``x`` with the angles ``theta``.
 

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, frozen, indices, number_between, positive_number, shaped
+from ...core.checks import Floats, finite_array, frozen, indices, number_between, positive_number, sequence, shaped
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..curves.arc import Arc
 from ..curves.curve import Curve
@@ -32,7 +31,6 @@ UNIT_TOLERANCE = 1e-12
 CORNER_ROUNDING = 16.0 * EPS
 
 
-@explained_class
 @dataclass(frozen=True)
 class Container:
     """The region in which the centre of the disk moves: {x : (x - p_i).n_i >= 0 for all i}, and inside of curves.
@@ -94,7 +92,6 @@ class Container:
         object.__setattr__(self, "curves", curves)
 
     @classmethod
-    @explained
     def from_curves(cls, curves: Sequence[Curve]) -> Container:
         """Return the inside of closed loops of curves, which run with the inside on their left.
 
@@ -127,7 +124,8 @@ class Container:
         >>> round(bowl.area, 12)
         1.333333333333
         """
-        if not len(tuple(curves)):
+        curves = sequence("curves", curves)
+        if not curves:
             raise InputError("curves: expected at least one curve, got none")
         return cls(np.empty((0, 2)), np.empty((0, 2)), boundary.checked_curves(curves))
 
@@ -271,7 +269,6 @@ class Container:
         areas = (sum(boundary.signed_area(self.curves[k]) for k in loop) for loop in boundary.loops_of(self.curves))
         return bool(self.curves) and any(area > 0.0 for area in areas)
 
-    @explained
     def contains(self, position: ArrayLike) -> NDArray[np.bool_]:
         """Return whether each of the points (n, 2) is inside or on the boundary."""
         inside = np.all(self.distances(position) >= 0.0, axis=1)

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, finite_array, instance, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..tables.boundary import TINIEST, FlightStatus
 from ..tables.container import Container
 from .tracing import MAX_COLLISIONS, Status, StatusCounts
@@ -46,7 +45,6 @@ class BoundaryStates(StatusCounts):
     status: NDArray[np.uint8]
 
 
-@explained
 def billiard_map(container: Container, s: ArrayLike, theta: ArrayLike, iterations: int = 1) -> BoundaryStates:
     r"""Apply the billiard map Phi: fly to the next wall, and reflect there.
 
@@ -95,7 +93,6 @@ def billiard_map(container: Container, s: ArrayLike, theta: ArrayLike, iteration
     return flight.states()
 
 
-@explained
 def nested_reflection(
     container: Container,
     openings: Sequence[int],

@@ -12,13 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, broadcast, finite_array, finite_number, number_between, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ..walls.mushroom import SHORTEST_STEM, mushrooms
 from ..walls.wall import Wall
 from .tracing import MAX_COLLISIONS, Status, Trace, trace
 
 
-@explained_class
 @dataclass(frozen=True)
 class MushroomGenerations:
     """The wall ``mushrooms(stem_to_cap, stem_aspect, generations)`` with any number of generations.
@@ -108,14 +106,12 @@ class MushroomGenerations:
         hollow = self.mushroom.hollows[0]
         return hollow.left, hollow.right
 
-    @explained
     def width(self, generation: int) -> float:
         """Return the width of a mushroom of the given generation, 1, ..., generations."""
         number = whole_number("generation", generation, 1)
         left, _ = self.opening
         return (left / self.per_top) ** (number - 1) if number > 1 else 1.0
 
-    @explained
     def generation(self, x: ArrayLike) -> NDArray[np.int64]:
         """Return the generation of the mushroom whose opening is at each position; 0 on a flat top."""
         numbers, _ = self._looked_up(np.ravel(finite_array("x", x)))
@@ -144,7 +140,6 @@ class MushroomGenerations:
                 top, bottom = (scaled * self.per_top) % (bottom * low), bottom * low
         return numbers, inside
 
-    @explained
     def trace(
         self, x: ArrayLike, theta: ArrayLike, *, max_collisions: int = MAX_COLLISIONS, threads: int | None = None
     ) -> Trace:

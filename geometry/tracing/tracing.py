@@ -23,7 +23,6 @@ from ...core.checks import (
     numbers,
     whole_number,
 )
-from ...core.kinds import explained
 from ..scene.columns import FORM, FORM_COLUMNS, LEFT, NO_FORM, RIGHT
 from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
@@ -133,7 +132,6 @@ class Trace(StatusCounts):
         return np.asarray((self.status == Status.CORNER) | (self.status == Status.GRAZING))
 
 
-@explained
 def trace(
     wall: Wall,
     x: ArrayLike,
@@ -332,7 +330,6 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
     return in_order if scene.boxes is not None and len(scene.boxes) >= LARGE_TREE else trace_block
 
 
-@explained
 def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_000) -> Floats:
     """Return the points of one ray: its entry at y = 0, every hit, and its exit.
 

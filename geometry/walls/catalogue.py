@@ -11,8 +11,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ...core.checks import instance
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..cells.profile import SEPARATORS, read_profile
 from ..disk.disk import Disk
 from .mushroom import mushrooms
@@ -38,7 +38,6 @@ class NamedWall:
     defaults: Mapping[str, float | int]
     summary: str
 
-    @explained
     def build(self, **parameters: float | int) -> Wall:
         """Return the wall with the given parameters and the defaults for the others."""
         return self.constructor(**{**self.defaults, **parameters})
@@ -73,7 +72,6 @@ _ENTRIES = (
 WALLS: Mapping[str, NamedWall] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
 
 
-@explained
 def wall_from_text(text: str) -> Wall:
     """Return the wall given by a name with parameters, a TOML file, or a file with a profile.
 
@@ -98,6 +96,7 @@ def wall_from_text(text: str) -> Wall:
     >>> wall_from_text("rectangular-teeth:height_to_width=4").depth
     2.0
     """
+    instance("text", text, str, "'focusing-arcs'")
     if isfile(text):
         return _wall_from_file(Path(text), {})
     name, _, tail = text.partition(":")

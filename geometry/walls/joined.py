@@ -8,9 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import whole_number
+from ...core.checks import sequence, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..curves.curve import Curve
 from .wall import Wall
 
@@ -18,7 +17,6 @@ from .wall import Wall
 MOST_PIECES = 10**6
 
 
-@explained
 def join_walls(walls: Sequence[Wall], repeats: ArrayLike = 1) -> Wall:
     """Return one wall that consists of the cells of several walls, from left to right.
 
@@ -53,8 +51,9 @@ def join_walls(walls: Sequence[Wall], repeats: ArrayLike = 1) -> Wall:
     >>> wall.vertices.tolist()
     [[0.0, 0.0], [1.0, 0.0], [1.25, -0.5], [1.5, 0.0], [1.75, -0.5], [2.0, 0.0]]
     """
-    if not isinstance(walls, Sequence) or not walls or not all(isinstance(wall, Wall) for wall in walls):
-        raise InputError("walls: expected a list of walls such as [geo.flat(), geo.triangular_teeth(0.7)]")
+    walls = sequence("walls", walls, Wall, "geo.triangular_teeth(0.7)")
+    if not walls:
+        raise InputError("walls: expected a list of walls such as [geo.flat(), geo.triangular_teeth(0.7)], got none")
     numbers = np.asarray(repeats, dtype=object)
     if numbers.ndim and numbers.shape != (len(walls),):
         raise InputError(f"repeats: expected one whole number or {len(walls)}, got shape {numbers.shape}")

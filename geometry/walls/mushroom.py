@@ -7,7 +7,6 @@ from itertools import pairwise
 
 from ...core.checks import finite_number, number_between, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ...core.rounding import EPS
 from ..curves.arc import Arc
 from ..curves.curve import Curve
@@ -22,7 +21,6 @@ MOST_PIECES = 200_000
 SHORTEST_STEM = 256.0 * EPS
 
 
-@explained
 def mushrooms(stem_to_cap: float = 0.2, stem_aspect: float = 0.0, generations: int = 1) -> Wall:
     """Return a wall of mushroom-shaped hollows.
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.checks import number_between, positive_number, whole_number
+from ...core.checks import instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.segment import Segment
@@ -33,7 +32,6 @@ def flat() -> Wall:
     return Wall([Segment((0.0, 0.0), (1.0, 0.0))])
 
 
-@explained
 def triangular_teeth(angle: float = 0.7) -> Wall:
     """Return triangular teeth with tips at the integers.
 
@@ -60,7 +58,6 @@ def triangular_teeth(angle: float = 0.7) -> Wall:
     return Wall.from_vertices([(0.0, 0.0), (0.5, -0.5 / math.tan(0.5 * psi)), (1.0, 0.0)])
 
 
-@explained
 def rectangular_teeth(height_to_width: float = 1.0) -> Wall:
     """Return rectangular teeth: a flat top on [0, 1/2] and a crevice on [1/2, 1].
 
@@ -87,7 +84,6 @@ def rectangular_teeth(height_to_width: float = 1.0) -> Wall:
     return Wall.from_vertices([(0.0, 0.0), (0.5, 0.0), (0.5, floor), (1.0, floor), (1.0, 0.0)])
 
 
-@explained
 def focusing_arcs(half_angle: float = 1.2) -> Wall:
     """Return the wall of one circular arc per period, below its chord [0, 1].
 
@@ -116,7 +112,6 @@ def focusing_arcs(half_angle: float = 1.2) -> Wall:
     return Wall([arc.pinned((0.0, 0.0), (1.0, 0.0))])
 
 
-@explained
 def dispersing_arcs(curvature: float = 1.0) -> Wall:
     """Return circular bumps with tops at the integers and a corner at x = 1/2.
 
@@ -145,7 +140,6 @@ def dispersing_arcs(curvature: float = 1.0) -> Wall:
     return Wall([fall, rise])
 
 
-@explained
 def elliptical_arcs(half_angle: float = 1.2, disk: Disk = UNIFORM_DISK) -> Wall:
     """Return the wall of elliptical arcs whose foreshortened wall is ``focusing_arcs(half_angle)``.
 
@@ -171,8 +165,7 @@ def elliptical_arcs(half_angle: float = 1.2, disk: Disk = UNIFORM_DISK) -> Wall:
     >>> elliptical_arcs(0.9, disk).foreshorten(disk).pieces[0].is_circular
     True
     """
-    if not isinstance(disk, Disk):
-        raise InputError(f"disk: expected a Disk, got {disk!r}")
+    instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
     return focusing_arcs(half_angle).unforeshorten(disk)
 
 
@@ -192,7 +185,6 @@ def double_parabola() -> Wall:
     return Wall([Bezier(left), Bezier(right)])
 
 
-@explained
 def koch(generations: int = 4) -> Wall:
     """Return the Koch curve pointing downwards, a wall of 4^generations segments.
 

@@ -12,6 +12,7 @@ import numpy as np
 from ...core.checks import (
     Floats,
     Rng,
+    choice,
     finite_array,
     finite_number,
     generator,
@@ -20,9 +21,9 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..curves.bezier import Bezier
+from ..curves.curve import LARGEST_COORDINATE
 from .wall import Wall
 
 FEWEST_POINTS, MOST_POINTS = 4, 2**20
@@ -38,7 +39,6 @@ CORRELATIONS: dict[str, Callable[[Floats], Floats]] = {
 }
 
 
-@explained_class
 @dataclass(frozen=True)
 class HeightCorrelation:
     """The correlation function of random heights.
@@ -63,11 +63,8 @@ class HeightCorrelation:
 
     def __post_init__(self) -> None:
         positive_number("length", self.length)
-        if not callable(self.shape) and self.shape not in CORRELATIONS:
-            raise InputError(
-                f"shape: expected {' or '.join(map(repr, CORRELATIONS))} or a function of distance/length, "
-                f"got {self.shape!r}"
-            )
+        if not callable(self.shape):
+            choice("shape", self.shape, CORRELATIONS)
 
     def powers(self, points: int, period: float) -> Floats:
         """The power of each frequency 0, ..., points//2 up to a factor: the transform of the correlations."""
@@ -88,7 +85,6 @@ class HeightCorrelation:
         return np.maximum(found, 0.0)
 
 
-@explained_class
 @dataclass(frozen=True)
 class SelfAffine:
     """The power spectrum q^(-1 - 2 H) of self-affine heights.
@@ -135,7 +131,6 @@ class SelfAffine:
 HeightSpectrum: TypeAlias = HeightCorrelation | SelfAffine | Callable[[Floats], Floats]
 
 
-@explained
 def random_wall(
     spectrum: HeightSpectrum,
     points: int,
@@ -198,9 +193,11 @@ def random_wall(
     squares = modes * powers / width
     if rms_slope is not None and rms_height is None:
         transfer = _smooth_slopes(wave, width / number, number) if smooth else _chord(wave, width / number) ** 2
-        powers = powers * positive_number("rms_slope", rms_slope) ** 2 / _positive_sum(squares * transfer)
+        slope = number_between("rms_slope", rms_slope, 0.0, LARGEST_COORDINATE)
+        powers = powers * slope**2 / _positive_sum(squares * transfer)
     elif rms_height is not None and rms_slope is None:
-        powers = powers * positive_number("rms_height", rms_height) ** 2 / _positive_sum(squares)
+        height = number_between("rms_height", rms_height, 0.0, LARGEST_COORDINATE)
+        powers = powers * height**2 / _positive_sum(squares)
     elif rms_slope is not None or not callable(spectrum):
         raise InputError(
             f"rms_slope: expected one of rms_slope and rms_height, got rms_slope={rms_slope}, rms_height={rms_height}"

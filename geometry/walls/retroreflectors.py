@@ -6,7 +6,6 @@ import math
 
 from ...core.checks import number_between, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from .wall import Wall
 
 # Walls with more pieces than this do not fit the memory of a laptop.
@@ -15,7 +14,6 @@ MOST_STEPS = 1_000_000
 THICKNESS = 1e-3
 
 
-@explained
 def notched_angle(angle: float, notches: int) -> Wall:
     """Return Plakhov's notched angle: a wedge that narrows downwards, its sides cut into vertical and horizontal steps.
 
@@ -56,7 +54,6 @@ def notched_angle(angle: float, notches: int) -> Wall:
     return _symmetric(steps)
 
 
-@explained
 def tube(plates: int, height: float, spacing: float = 1.0) -> Wall:
     """Return the tube of Bachurin, Khanin, Marklof and Plakhov, cut off: a shaft with thin plates on both its sides.
 

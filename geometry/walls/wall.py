@@ -12,9 +12,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, instance, numbers, positive_number
+from ...core.checks import Floats, instance, numbers, positive_number, sequence
 from ...core.errors import InputError, WallError
-from ...core.kinds import explained, explained_class
 from ...core.tables import html_table
 from ..cells.cell import Cell
 from ..cells.measured import Profile
@@ -30,7 +29,6 @@ from ..scene.plan import TracePlan, plan_of
 from ..scene.scene import Scene, scene_of
 
 
-@explained_class
 @dataclass(frozen=True, repr=False, init=False)
 class Wall(Cell):
     """One period of a wall in y <= 0, with the free side above (on the left of the direction of travel).
@@ -78,14 +76,13 @@ class Wall(Cell):
     (Hollow(left=0.0, right=1.0, first=0, last=2),)
     """
 
-    @explained
     def __init__(
         self, pieces: Sequence[Curve], period: float = 1.0, islands: Sequence[Sequence[Curve]] = (), unit: str = ""
     ) -> None:
         width = positive_number("period", period)
         path = canonical_path(pieces, width)
         size = wall_size(path, width)
-        loops = tuple(canonical_island(loop, width, size, k) for k, loop in enumerate(islands))
+        loops = tuple(canonical_island(loop, width, size, k) for k, loop in enumerate(sequence("islands", islands)))
         instance("unit", unit, str, "'µm'")
         self._fill(path, width, loops, unit)
         if loops:
@@ -96,7 +93,6 @@ class Wall(Cell):
             check_open_wall(path, loops, width, size)
 
     @classmethod
-    @explained
     def from_vertices(cls, vertices: ArrayLike, unit: str = "") -> Self:
         """Return the polygonal wall through the given points, which span one period.
 
@@ -144,7 +140,6 @@ class Wall(Cell):
         return cls(Segment.path(points), float(points[-1, 0]), unit=unit)
 
     @classmethod
-    @explained
     def from_profile(
         cls, x: ArrayLike | Profile, height: ArrayLike | None = None, seam: Seam = "mirror", unit: str = ""
     ) -> Self:
@@ -213,7 +208,6 @@ class Wall(Cell):
         """
         return plan_of(self.cell, self.cell.scene, self.is_mirror_symmetric)
 
-    @explained
     def foreshorten(self, disk: Disk) -> Self:
         """Return the foreshortened wall of the disk: y divided by ``disk.foreshortening``, same period.
 
@@ -224,12 +218,13 @@ class Wall(Cell):
         >>> Wall.from_vertices([(0, 0), (0.5, -0.25), (1, 0)]).foreshorten(Disk(1.0, 1 / 3)).depth
         0.5
         """
-        return self._image(1.0, 1.0 / _checked(disk).foreshortening, self.period)
+        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        return self._image(1.0, 1.0 / disk.foreshortening, self.period)
 
-    @explained
     def unforeshorten(self, disk: Disk) -> Self:
         """Return the wall whose foreshortened wall is this one: y multiplied by ``disk.foreshortening``."""
-        return self._image(1.0, _checked(disk).foreshortening, self.period)
+        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        return self._image(1.0, disk.foreshortening, self.period)
 
     def _repr_html_(self) -> str:
         """The wall with a small picture, in a notebook."""
@@ -240,7 +235,6 @@ class Wall(Cell):
         }  # fmt: skip
         return html_table(repr(self), lines, wall_miniature(self))
 
-    @explained
     def outline(self, tolerance: float) -> Floats:
         """Return the path of one period, without islands, as a polyline within ``tolerance``, shape (n, 2)."""
         chunks = [p.flattened(tolerance)[:-1] for p in self.pieces]
@@ -259,13 +253,6 @@ class Wall(Cell):
         save_wall(self, path, overwrite=overwrite)
 
 
-def _checked(disk: Disk) -> Disk:
-    if not isinstance(disk, Disk):
-        raise InputError(f"disk: expected a Disk such as geo.Disk(mass=1.0, inertia=0.5), got {disk!r}")
-    return disk
-
-
-@explained
 def load_wall(path: str | PathLike[str]) -> Wall:
     """Read a wall from a TOML file.
 

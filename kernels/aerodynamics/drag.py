@@ -9,10 +9,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, positive_number
+from ...core.checks import Floats, finite_array, instance, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
-from ...core.kinds import explained
 from ...core.long_runs import TIME_LIMIT
 from ...geometry.scene.scene import SEGMENT_TIME
 from ..bases.basis import AngleFunction, Basis
@@ -51,7 +50,6 @@ def air_resistance(theta: Floats, outgoing: Floats) -> Floats:
     return np.asarray(0.75 * (1.0 + np.cos(outgoing - theta)))
 
 
-@explained
 def resistance(
     law: Law,
     tolerance: float = 1e-10,
@@ -110,8 +108,7 @@ def resistance(
     >>> round(float(resistance(ker.lambertian())), 12) == round(0.75 * (1 + np.pi**2 / 16), 12)
     True
     """
-    if not isinstance(law, Law):
-        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+    instance("law", law, Law, "ker.lambertian()")
     if law.frame != "paper":
         raise InputError(f"law: expected one in the paper's convention, got {law!r}; call in_specular_frame() on it")
     wanted, seconds = positive_number("tolerance", tolerance), positive_number("time_limit", time_limit)

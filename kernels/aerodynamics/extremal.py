@@ -7,10 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from ...core.checks import Floats, positive_number, whole_number
+from ...core.checks import Floats, choice, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
-from ...core.kinds import explained
 from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
 from ..laws.interval_exchange import IntervalExchangeLaw
@@ -59,7 +58,6 @@ class ExtremalResistance:
         return IntervalExchangeLaw(self.plan)
 
 
-@explained
 def extremal_resistance(
     n: int = 1024,
     which: Literal["min", "max"] = "min",
@@ -109,8 +107,7 @@ def extremal_resistance(
     (1.5, 1.5)
     """
     whole_number("n", n, 8)
-    if which not in ("min", "max"):
-        raise InputError(f"which: expected 'min' or 'max', got {which!r}")
+    choice("which", which, ("min", "max"))
     if cost is not None:
         return _by_transport(n, which, cost, curvature)
     if which == "max":

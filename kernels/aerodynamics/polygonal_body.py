@@ -9,10 +9,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    finite_array,
+    finite_number,
+    frozen,
+    generator,
+    instance,
+    positive_number,
+    whole_number,
+)
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, mean_of_strata
-from ...core.kinds import explained, explained_class
 from ...geometry import Arc, Container
 from ..bases.measure import SINE
 
@@ -43,7 +52,6 @@ class Scattering:
     reflections: NDArray[np.int64]
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class PolygonalBody:
     """A body that consists of simple polygons with disjoint interiors, and reflects particles specularly.
@@ -91,7 +99,6 @@ class PolygonalBody:
         sides = np.concatenate([np.roll(points, -1, axis=0) - points for points in found])
         object.__setattr__(self, "_sides", frozen(sides))
 
-    @explained
     def scatter(self, position: ArrayLike, velocity: ArrayLike) -> Scattering:
         """Reflect particles until they fly free.
 
@@ -150,7 +157,6 @@ class PolygonalBody:
         side = np.argmin(time, axis=1)
         return time[np.arange(len(at)), side], side
 
-    @explained
     def force(self, direction: float, rays: int = 4096, rng: Rng = 0) -> BodyForce:
         """The force of a parallel stream on the body, in units of its momentum flux.
 
@@ -194,7 +200,6 @@ class PolygonalBody:
         mean = mean_of_strata(push, 2.0, f"{number} stratified rays")
         return replace(mean, value=width * mean.value, error=width * mean.error)
 
-    @explained
     def scatter_in_circle(
         self, n: int, rng: Rng = None, centre: ArrayLike = (0.0, 0.0), radius: float | None = None
     ) -> tuple[Floats, Floats]:
@@ -237,7 +242,6 @@ class PolygonalBody:
         circle = Container.from_curves([Arc(centre, radius, 0.0, 2.0 * math.pi)])
         return self._through_region(np.stack([radius * position, theta], axis=1), circle) / [radius, 1.0]
 
-    @explained
     def scatter_in(self, region: Container, n: int, rng: Rng = None) -> tuple[Floats, Floats]:
         """Draw states from the scattering measure of the body B in a convex set C around it: the law P^{B,C}.
 
@@ -304,8 +308,7 @@ class PolygonalBody:
 
 def _convex(region: Container) -> Container:
     """The region as curves; an InputError if it is not one convex loop, by its tangents at points of the boundary."""
-    if not isinstance(region, Container):
-        raise InputError(f"region: expected a Container, got {region!r}")
+    instance("region", region, Container, "geo.Container.circle()")
     around = region.closed()
     point, wall = around.point_at(around.perimeter * (np.arange(BOUNDARY_POINTS) + 0.5) / BOUNDARY_POINTS)
     tangent, _ = around.frames(point, wall)

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
-from ...core.kinds import explained_class
 from ..bases.basis import AngleFunction
 from ..bases.measure import SINE
 from ..laws.law import Law
@@ -33,7 +32,6 @@ LawOfNormal = Callable[[float], Law]
 Laws: TypeAlias = "Law | Sequence[Law] | LawOfNormal"
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class RoughBody:
     r"""A convex body in the plane with a rough boundary, given by boundary elements and their reflection law.

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal
 
 from ...core.checks import Floats
 from ...core.estimates import Estimate
-from ...core.kinds import explained
 from ..inverse.design import GRID, design_wall
 from ..laws.law import Law
 from .drag import resistance
@@ -39,7 +38,6 @@ class BestHollow:
     tried: Floats
 
 
-@explained
 def best_hollow(
     family: Callable[..., Wall | Law],
     bounds: Sequence[tuple[float, float]],

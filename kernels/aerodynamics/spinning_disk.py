@@ -10,7 +10,6 @@ import numpy as np
 from ...core.checks import Floats, finite_number, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
-from ...core.kinds import explained
 from ..bases.measure import gauss_rule
 from ..laws.law import Law
 
@@ -46,7 +45,6 @@ class SpinForce:
     torque: Estimate
 
 
-@explained
 def spin_force(law: Law, spin: float, radius: float = 1.0) -> SpinForce:
     r"""The force and the torque of a parallel stream on a disk with a rough rim that rotates.
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, whole_number
-from ...core.kinds import explained_class
 from .given import Vectorised
 from .intervals import cell_among
 from .measure import AngularMeasure, gauss_rule
@@ -24,7 +23,6 @@ DIFFERENCE = 1e-6
 DENSER, BETWEEN = 3, 1.02
 
 
-@explained_class
 class Basis(ABC):
     """An orthonormal family e_0, ..., e_{n-1} in L^2 of a probability measure on (0, pi).
 

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, check_memory, finite_array, frozen, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from .basis import Basis
 from .intervals import cell_among
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
@@ -20,7 +19,6 @@ from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 NODES_NARROW, NODES_WIDE, NARROW = 8, 20, 1.0
 
 
-@explained_class
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Bins(Basis):
     r"""Normalised indicators of the bins between increasing angles from 0 to pi.
@@ -56,10 +54,9 @@ class Bins(Basis):
     _measure: AngularMeasure
     _equal: bool
 
-    @explained
     def __init__(self, divisions: int | ArrayLike, weight: WeightName = "sin") -> None:
         measure = measure_by_name(weight)
-        equal = np.ndim(divisions) == 0
+        equal = not np.iterable(divisions)
         if equal:
             check_memory("bins", "the edges", whole_number("bins", divisions, 1))
         edges = _equal_edges(whole_number("bins", divisions, 1), measure) if equal else _checked_edges(divisions)
@@ -116,7 +113,6 @@ class Bins(Basis):
         guess -= angle < self._edges[guess]
         return np.maximum(guess, 0)
 
-    @explained
     def evaluate(self, angle: ArrayLike) -> Floats:
         index = self.index(angle)
         values = np.zeros((*index.shape, self.size))

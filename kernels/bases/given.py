@@ -1,4 +1,4 @@
-"""Functions of arrays and seeds, as users give them: checked, and explained where they are of another kind."""
+"""Functions of arrays and seeds, as users give them: checked."""
 
 from __future__ import annotations
 

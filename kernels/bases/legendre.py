@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, whole_number
-from ...core.kinds import explained, explained_class
 from .basis import Basis
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
@@ -19,7 +18,6 @@ DEGREES_PER_PANEL = 16
 DIGITS = 18
 
 
-@explained_class
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Legendre(Basis):
     r"""Orthonormal polynomials of degree 0, ..., n - 1 in cos(theta).
@@ -49,7 +47,6 @@ class Legendre(Basis):
     n: int
     weight: WeightName
 
-    @explained
     def __init__(self, n: int, weight: WeightName = "sin") -> None:
         object.__setattr__(self, "n", whole_number("n", n, 1))
         object.__setattr__(self, "weight", measure_by_name(weight).name)

@@ -13,9 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shaped, whole_number
-from ...core.errors import InputError
-from ...core.kinds import explained_class
+from ...core.checks import Floats, Rng, check_memory, choice, finite_array, generator, shaped, whole_number
 
 WeightName = Literal["sin", "sin2"]
 
@@ -27,7 +25,6 @@ SMALLEST_ANGLE = 1e-300
 LARGEST_ANGLE = float(np.nextafter(np.pi, 0.0))
 
 
-@explained_class
 @dataclass(frozen=True)
 class AngularMeasure:
     r"""A probability measure on (0, pi): ``"sin"`` is sin(theta)/2 d theta, ``"sin2"`` is (2/pi) sin(psi)^2 d psi.
@@ -94,7 +91,7 @@ class AngularMeasure:
 
         Returns flat arrays. The weights contain the density and sum to the measure of the whole interval.
         """
-        angle, weight = gauss_rule(edges, order)
+        angle, weight = gauss_rule(edges, whole_number("order", order, 1))
         return angle, weight * self.density(angle)
 
 
@@ -131,11 +128,8 @@ def gauss_on_intervals(low: Floats, high: Floats, order: int) -> tuple[Floats, F
 
 def measure_by_name(name: str) -> AngularMeasure:
     """Return the measure called ``"sin"`` or ``"sin2"``; raises InputError for any other name."""
-    if name == "sin":
-        return SINE
-    if name == "sin2":
-        return SINE_SQUARED
-    raise InputError(f"weight: expected 'sin' (for theta) or 'sin2' (for psi), got {name!r}")
+    choice("weight", name, ("sin", "sin2"))
+    return SINE if name == "sin" else SINE_SQUARED
 
 
 def _minus_sine(width: Floats) -> Floats:

@@ -16,11 +16,11 @@ from ...core.checks import (
     finite_array,
     frozen,
     indices,
+    instance,
     number_between,
     shaped,
     whole_number,
 )
-from ...core.kinds import explained, explained_class
 from .basis import Basis, largest
 from .bins import Bins
 from .measure import SINE, AngularMeasure, WeightName
@@ -41,7 +41,6 @@ BREAKPOINT_SPACING = 0.05
 AT_ONCE = 2048
 
 
-@explained_class
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Panels(Basis):
     r"""Polynomials of bounded degree in theta on each panel, orthonormal for the invariant measure.
@@ -75,7 +74,6 @@ class Panels(Basis):
     degree: int
     _coefficients: Floats
 
-    @explained
     def __init__(self, edges: ArrayLike, degree: int, weight: WeightName = "sin") -> None:
         cells = Bins(np.atleast_1d(finite_array("edges", edges)), weight)
         object.__setattr__(self, "_cells", cells)
@@ -84,7 +82,6 @@ class Panels(Basis):
         object.__setattr__(self, "_coefficients", frozen(self._orthonormalise()))
 
     @classmethod
-    @explained
     def for_wall(cls, wall: Wall, degree: int = 6, smallest: float = SMALLEST) -> Panels:
         """Panels for the law of a wall: graded towards grazing and, for one circular arc, its critical angles.
 
@@ -111,6 +108,7 @@ class Panels(Basis):
         special = [0.0, np.pi]
         followed: list[float] = []
         if half_angle is not None:
+            half_angle = number_between("half_angle", half_angle, 0.0, np.pi)
             special += [half_angle, np.pi - half_angle]
             last = int(np.ceil(BREAKPOINT_SPACING**-0.5))
             breakpoints = [half_angle * (1.0 + sign / n) for n in range(1, last + 1) for sign in (-1.0, 1.0)]
@@ -232,8 +230,9 @@ class Panels(Basis):
 
 
 def _single_arc_half_angle(wall: Wall) -> float | None:
-    from ...geometry import Arc
+    from ...geometry import Arc, Wall
 
+    instance("wall", wall, Wall, "geo.focusing_arcs(1.0)")
     pieces = wall.cell.pieces
     # more than a half circle would overlap the next period
     if len(pieces) == 1 and isinstance(pieces[0], Arc) and pieces[0].is_circular:

@@ -9,9 +9,8 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array
+from ...core.checks import Floats, finite_array, sequence
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from .basis import Basis
 from .given import Vectorised
 from .measure import AngularMeasure
@@ -24,7 +23,6 @@ def _kron(parts: Sequence[Floats]) -> Floats:
     return product
 
 
-@explained_class
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class TensorBasis(Basis):
     """All products e_i(theta) f_k(psi), with the last factor's index running fastest; the basis of ``P.tensor(Q)``.
@@ -49,12 +47,12 @@ class TensorBasis(Basis):
 
     factors: tuple[Basis, ...]
 
-    @explained
     def __init__(self, factors: tuple[Basis, ...], *others: Basis) -> None:
+        given = () if others else sequence("factors", factors)
         flat = tuple(
-            part for factor in factors for part in (factor.factors if isinstance(factor, TensorBasis) else (factor,))
+            part for factor in given for part in (factor.factors if isinstance(factor, TensorBasis) else (factor,))
         )
-        if others or len(flat) < 2 or not all(isinstance(factor, Basis) for factor in flat):
+        if len(flat) < 2 or not all(isinstance(factor, Basis) for factor in flat):
             raise InputError(
                 "factors: expected two bases or more, as in TensorBasis((Bins(16), Bins(8, weight='sin2'))), "
                 f"got {factors!r}"

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, finite_array, generator, instance
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...geometry import Disk
 from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 ROUNDING = 1e-9
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class CollisionAlongWall:
     r"""The collision law delta_x (x) P~(x, .) (x) delta_{pi - psi} of a disk and a wall whose cell changes along it.
@@ -63,7 +61,6 @@ class CollisionAlongWall:
         instance("disk", self.disk, Disk, "geo.Disk()")
         object.__setattr__(self, "parts", tuple(CollisionLaw(law, self.disk) for law in self.law.laws))
 
-    @explained
     @seed_by_name
     def sample_at(self, x: ArrayLike, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity (n, 3) for every incoming one with v2 < 0 at the positions x (n,)."""

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checkpoints import Stored
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shaped, shortened, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...core.long_runs import Engine, all_parts
 from ...core.version import __version__
 from ...geometry.tables.boundary import FlightStatus
@@ -41,7 +40,6 @@ class Reflector(Protocol):
         ...
 
 
-@explained_class
 @dataclass(frozen=True)
 class BilliardRecord:
     """States of n disks after each of their collisions; the first entry of every array is the initial state.
@@ -116,7 +114,6 @@ class BilliardRecord:
         return np.asarray(np.ptp(along, axis=0))
 
 
-@explained
 def play(
     container: Container,
     laws: Reflector | CollisionAlongWall | Sequence[Reflector | CollisionAlongWall],

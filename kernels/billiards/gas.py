@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, instance, number_between, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
-from ...core.kinds import explained, explained_class
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.collision_law import smooth
 from .billiard import BilliardRecord, Reflector, laws_of_walls, reflected
@@ -30,7 +29,6 @@ OVERLAP = 1e-9
 BATCHES, BURN_IN, FEWEST_EVENTS = (16, 8, 4), 0.2, 64
 
 
-@explained_class
 @dataclass(frozen=True)
 class GasRecord(BilliardRecord):
     """States of all disks of a gas after each event; the first entry of every array is the initial state.
@@ -101,7 +99,6 @@ def _batch_error(duration: Floats, deviation: Floats, batches: int) -> float:
     return student_95(batches) * float(np.std(sums, ddof=1)) * math.sqrt(batches) / float(duration.sum())
 
 
-@explained
 def play_gas(
     container: Container,
     pair: PairLaw,

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, common_shape, finite_array, instance, positive_number
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...geometry import Disk, Wall
 from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
@@ -19,7 +18,6 @@ from ..laws.law import Law, specular
 UNIT_TOLERANCE = 1e-9
 
 
-@explained_class
 @dataclass(frozen=True)
 class PairLaw:
     r"""The law of the collision of two rough disks with each other.
@@ -77,7 +75,6 @@ class PairLaw:
         _ = self.reduced_law
 
     @classmethod
-    @explained
     def from_wall(
         cls, wall: Wall, first: Disk, second: Disk | None = None, radii: tuple[float, float] = (1.0, 1.0)
     ) -> PairLaw:
@@ -108,7 +105,6 @@ class PairLaw:
         """The collision law of the reduced disk."""
         return CollisionLaw(self.law, self.reduced_disk)
 
-    @explained
     @seed_by_name
     def sample(
         self, normal: ArrayLike, first_velocity: ArrayLike, second_velocity: ArrayLike, rng: Rng = None

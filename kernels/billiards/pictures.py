@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ...core.checks import Floats, instance, positive_number, whole_number
-from ...core.errors import InputError
-from ...core.kinds import explained
+from ...core.checks import Floats, choice, instance, positive_number, whole_number
 from ...geometry.tables.boundary import FlightStatus
 from .billiard import BilliardRecord
 
@@ -25,7 +23,6 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 DRAWN_RADIUS, TRACE = 0.02, 5.0
 
 
-@explained
 def draw_paths(record: BilliardRecord, ax: Axes | None = None) -> Axes:
     """Draw the container and the path of the centre of every disk.
 
@@ -59,7 +56,6 @@ def draw_paths(record: BilliardRecord, ax: Axes | None = None) -> Axes:
     return axes
 
 
-@explained
 def phase_portrait(record: BilliardRecord, coordinates: Coordinates = "boundary") -> tuple[Floats, Floats]:
     """Return the points of a phase portrait of the outgoing states at the walls.
 
@@ -97,8 +93,7 @@ def phase_portrait(record: BilliardRecord, coordinates: Coordinates = "boundary"
     True
     """
     instance("record", record, BilliardRecord, "ker.play(container, laws, position, velocity, collisions)")
-    if coordinates not in ("boundary", "velocity"):
-        raise InputError(f"coordinates: expected 'boundary' or 'velocity', got {coordinates!r}")
+    choice("coordinates", coordinates, ("boundary", "velocity"))
     wall, position, velocity = record.wall[1:], record.position[1:], record.velocity[1:]
     met = np.arange(len(wall))[:, None] < record.collisions
     first, second = np.full(wall.shape, np.nan), np.full(wall.shape, np.nan)
@@ -117,7 +112,6 @@ def phase_portrait(record: BilliardRecord, coordinates: Coordinates = "boundary"
     return first, second
 
 
-@explained
 def draw_phase_portrait(record: BilliardRecord, coordinates: Coordinates = "boundary", ax: Axes | None = None) -> Axes:
     """Draw a phase portrait, one colour a disk; the coordinates are those of `phase_portrait`.
 
@@ -149,7 +143,6 @@ def draw_phase_portrait(record: BilliardRecord, coordinates: Coordinates = "boun
     return axes
 
 
-@explained
 def animate(record: BilliardRecord, frames: int = 200, duration: float = 10.0) -> FuncAnimation:
     """Make an animation of the disks of a record, each with a spoke that shows its rotation and a trace behind it.
 

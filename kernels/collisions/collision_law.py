@@ -27,7 +27,6 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...geometry import Disk, Wall
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
@@ -54,7 +53,6 @@ VelocityFunction = Callable[[Floats, Floats], Floats]
 StateFunction = Callable[[Floats, Floats, Floats], Floats]
 
 
-@explained_class
 class VelocityLaw(TensorLaw):
     """A law of velocities in the algebra of collision laws: a sum of P~ (x) J and Q~ (x) 1, with J the flip of psi.
 
@@ -83,7 +81,6 @@ class VelocityLaw(TensorLaw):
         return self.parts()
 
     # ---- states and velocities -------------------------------------------------------------------------------
-    @explained
     @seed_by_name
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity for every incoming one.
@@ -132,7 +129,6 @@ class VelocityLaw(TensorLaw):
                 outgoing[chosen] = law.sample(theta[chosen], rng)
         return outgoing, np.where(first, terms[0][2], terms[1][2])
 
-    @explained
     @seed_by_name
     def sample_states(self, position: ArrayLike, velocity: ArrayLike, rng: Rng = None) -> tuple[Floats, Floats]:
         """Draw an outgoing state (y', w') for every incoming one; y' = y.
@@ -248,7 +244,6 @@ class VelocityLaw(TensorLaw):
         return found
 
     # ---- matrices --------------------------------------------------------------------------------------------
-    @explained
     def operator(self, theta_basis: Basis, psi_basis: Basis, **discretisation: object) -> CollisionOperator:
         """The matrix of the law on a product of two bases, as a linear operator that never forms the product.
 
@@ -350,7 +345,6 @@ class VelocityLaw(TensorLaw):
             raise InputError(f"cannot {verb} laws of different disks, {self.disk!r} and {other.disk!r}")
 
 
-@explained_class
 @dataclass(frozen=True)
 class CollisionLaw(VelocityLaw):
     r"""The collision law K of a rough disk with a rough wall, in the limit of small roughness.
@@ -387,8 +381,7 @@ class CollisionLaw(VelocityLaw):
     disk: Disk
 
     def __post_init__(self) -> None:
-        if not isinstance(self.law, Law):
-            raise InputError(f"law: expected a Law such as ker.WallLaw(wall.foreshorten(disk)), got {self.law!r}")
+        instance("law", self.law, Law, "ker.WallLaw(wall.foreshorten(disk))")
         if isinstance(self.law, Combination):
             self.law.terms_checked()
         instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
@@ -396,7 +389,6 @@ class CollisionLaw(VelocityLaw):
             raise InputError("law: expected a law in the paper's convention, got one in the specular frame")
 
     @classmethod
-    @explained
     def from_wall(cls, wall: Wall, disk: Disk) -> CollisionLaw:
         """The collision law of a disk with a wall: P~ is the law of ``wall.foreshorten(disk)``.
 
@@ -415,7 +407,6 @@ class CollisionLaw(VelocityLaw):
         return f"CollisionLaw(law={self.law!r}, disk={self.disk!r})"
 
 
-@explained_class
 @dataclass(frozen=True)
 class CollisionCombination(VelocityLaw):
     """A law w P~ (x) J + w' Q~ (x) 1 in the algebra of collision laws; made by ``K1 @ K2``, ``0.3 * K1``, ``K ** n``.
@@ -514,7 +505,6 @@ def _with_psi(function: VelocityFunction, psi: Floats, theta: Floats) -> Floats:
     return function(theta, np.asarray(psi))
 
 
-@explained
 def no_slip(disk: Disk) -> CollisionLaw:
     """The no-slip collision law, K of retroreflection: it reverses v2 and the slip v1 + omega.
 
@@ -529,7 +519,6 @@ def no_slip(disk: Disk) -> CollisionLaw:
     return CollisionLaw(retroreflection(), disk)
 
 
-@explained
 def smooth(disk: Disk) -> CollisionLaw:
     """The smooth collision law, K of specular reflection: it reverses v2, and leaves v1 and omega unchanged.
 

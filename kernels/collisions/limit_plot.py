@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Rng, finite_array, generator, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from .satellite_law import SatelliteLaw
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ COLOURS = ("#E69F00", "#0072B2", "#D55E00", "#009E73")
 DRAWN = 1500
 
 
-@explained
 def draw_limit(
     disk: Disk,
     wall: Wall,

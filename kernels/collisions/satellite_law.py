@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, finite_array, generator
 from ...core.errors import AccuracyError
-from ...core.kinds import explained, explained_class
 from ..bases.given import seed_by_name
 
 if TYPE_CHECKING:
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 MOST_DRAWS = 20
 
 
-@explained_class
 @dataclass(frozen=True)
 class SatelliteLaw:
     """The collision law K^{Sigma, eps} of the true disk, with x1 uniform in a cell and alpha in one spacing.
@@ -61,7 +59,6 @@ class SatelliteLaw:
 
         object.__setattr__(self, "spacing", ConfigurationSpace(self.wall, self.disk, self.scale, self.spacing).spacing)
 
-    @explained
     @seed_by_name
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity (n, 3) for every incoming one with v2 < 0.

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checkpoints import Stored
-from ...core.checks import Floats, Rng, angles, check_memory, finite_array, frozen, generator, whole_number
+from ...core.checks import Floats, Rng, angles, check_memory, choice, finite_array, frozen, generator, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...core.frames import data_frame
-from ...core.kinds import explained, explained_class
 from ...core.long_runs import Engine, all_parts
 from ...core.rounding import EPS
 from ...core.version import __version__
@@ -29,7 +28,6 @@ FEWEST_SCALES = 3
 COLUMNS = ("distance", "state_distance", "floor", "psi_defect", "two_satellites", "outliers", "drift", "shift")
 
 
-@explained_class
 @dataclass(frozen=True)
 class LimitStudy:
     """Measured distances between the true disk and its limit law; each array has one entry per scale.
@@ -113,11 +111,9 @@ class LimitStudy:
         InputError
             If a name is unknown, there are fewer than three scales, or an entry is not positive.
         """
-        if column not in COLUMNS:
-            raise InputError(f"column: expected one of {', '.join(COLUMNS)}, got {column!r}")
+        choice("column", column, COLUMNS)
         bases = {"scales": self.scales, "spacings": self.spacings, "ratio": self.scales / self.spacings**2}
-        if against not in bases:
-            raise InputError(f"against: expected one of {', '.join(bases)}, got {against!r}")
+        choice("against", against, bases)
         values = getattr(self, column)
         if len(values) < FEWEST_SCALES or not np.all(values > 0.0):
             raise InputError(
@@ -136,7 +132,6 @@ class LimitStudy:
         return Estimate(float(slope), error, "estimate", f"slope of {len(x)} scales")
 
 
-@explained
 def limit_study(
     disk: Disk,
     wall: Wall,

@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
-from ...core.kinds import explained
 from ...geometry.disk.disk import branch_block
 
 if TYPE_CHECKING:
     from ...geometry import Disk
 
 
-@explained
 def smooth_matrix(disk: Disk) -> Floats:
     """The 3x3 matrix A_smooth of a smooth collision, which reverses v2 and leaves v1 and omega unchanged.
 
@@ -30,7 +28,6 @@ def smooth_matrix(disk: Disk) -> Floats:
     return isometry_matrix(disk, -1.0, np.pi)
 
 
-@explained
 def no_slip_matrix(disk: Disk) -> Floats:
     """The 3x3 matrix A_no-slip = 2 chi chi^T - I (kinetic-energy metric), which reverses v2 and the slip v1 + omega.
 

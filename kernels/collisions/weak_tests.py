@@ -10,11 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number, shortened, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    choice,
+    finite_array,
+    frozen,
+    generator,
+    positive_number,
+    shortened,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
 from ...core.frames import data_frame
-from ...core.kinds import explained, explained_class
 from ..bases.measure import SINE, SINE_SQUARED
 from .collision_law import StateFunction
 
@@ -28,7 +37,6 @@ Pair = tuple[StateFunction, StateFunction]
 DIMENSIONS = 5
 
 
-@explained_class
 @dataclass(frozen=True)
 class WeakLimit:
     """The differences of three laws, tested on pairs of functions; arrays of shape (scales, pairs).
@@ -72,8 +80,7 @@ class WeakLimit:
             If ``of`` is another name.
         """
         tables = {"cylinder": (self.cylinder, self.cylinder_error), "limit": (self.limit, self.limit_error)}
-        if of not in tables:
-            raise InputError(f"of: expected 'cylinder' or 'limit', got {of!r}")
+        choice("of", of, tables)
         value, error = tables[of]
         method = f"{self.collisions} collisions on scrambled Sobol points"
         return Estimate(float(value[scale, pair]), float(error[scale, pair]), "estimate", method)
@@ -113,7 +120,6 @@ PAIRS: dict[str, Pair] = {
 }
 
 
-@explained
 def weak_limit(
     disk: Disk,
     wall: Wall,

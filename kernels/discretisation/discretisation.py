@@ -10,10 +10,9 @@ from typing import Unpack, get_args
 
 import numpy as np
 
-from ...core.checks import Rng, check_memory, finite_number, generator, whole_number
+from ...core.checks import Rng, check_memory, choice, finite_number, generator, instance, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
-from ...core.kinds import explained
 from ...core.long_runs import Engine
 from ..bases.basis import Basis
 from ..bases.bins import Bins
@@ -31,7 +30,6 @@ from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SAMPLING, SEED_WITHOUT_RNG, S
 from .methods import recipe
 
 
-@explained
 def discretise(
     law: Law | TensorLaw,
     basis: Basis,
@@ -166,15 +164,14 @@ def discretise(
     source = generator(rng, SEED_WITHOUT_RNG)
     if not isinstance(law, Law):
         raise not_a_law("law", "a law such as WallLaw(wall)", law)
-    if not isinstance(basis, Basis):
-        raise InputError(f"basis: expected a basis such as Bins(64), got {basis!r}")
+    instance("basis", basis, Basis, "ker.Bins(64)")
     if isinstance(basis, TensorBasis):
         raise InputError(f"basis: expected a basis of one angle for {law!r}, got {basis!r}; use P.tensor(Q)")
     if basis.measure != SINE:
         return _on_roll_angles(law, basis)
     check_memory("basis", f"the matrix in {basis!r}", basis.size**2)
-    if method not in get_args(MethodName):
-        raise InputError(f"method: expected one of {', '.join(get_args(MethodName))}, got {method!r}")
+    choice("method", method, get_args(MethodName))
+    choice("symmetrise", symmetrise, (True, False))
     if finite_number("tolerance", tolerance) < 0.0:
         raise InputError(f"tolerance: expected a number of at least 0, got {tolerance!r}")
     number = DEFAULT_SAMPLES if samples is None else whole_number("samples", samples, 2 * PARTS)

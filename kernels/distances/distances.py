@@ -7,10 +7,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ...core.checks import positive_number
+from ...core.checks import choice, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
-from ...core.kinds import explained
 from ..bases.bins import Bins
 from ..bases.measure import SINE_SQUARED
 from ..discretisation.discretisation import discretise
@@ -51,7 +50,6 @@ class Distance(Estimate):
         return super().__str__() + floor
 
 
-@explained
 def distance(
     first: Law | KernelMatrix | TensorLaw,
     second: Law | KernelMatrix | TensorLaw,
@@ -126,8 +124,7 @@ def distance(
     >>> round(float(distance(ker.maxwell(0.75), ker.maxwell(0.25), tolerance=1e-3)), 3)    # pi/8
     0.393
     """
-    if kind not in get_args(Kind):
-        raise InputError(f"kind: expected one of {', '.join(get_args(Kind))}, got {kind!r}")
+    choice("kind", kind, get_args(Kind))
     power = wasserstein_order(order)
     positive_number("tolerance", tolerance)
     if isinstance(first, TensorLaw) and isinstance(second, TensorLaw):

@@ -10,7 +10,6 @@ import numpy as np
 from ...core.checks import Rng, generator, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, mean_of_strata
-from ...core.kinds import explained
 from ...geometry import Wall
 from ..bases.measure import SINE
 from ..laws.law import Law
@@ -18,7 +17,6 @@ from ..laws.law import Law
 FEWEST_RAYS = 100
 
 
-@explained
 def retroreflection_distance(reflector: Wall | Law, rays: int = 2**14, rng: Rng = None) -> Estimate:
     r"""Return the mean of abs(theta' - theta), radians, over rays that enter with density sin(theta)/2.
 

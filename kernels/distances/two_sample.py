@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, check_memory, generator, number_between, whole_number
+from ...core.checks import Floats, Rng, check_memory, choice, generator, number_between, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...core.long_runs import progress_bar
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
@@ -24,7 +23,6 @@ from .resampling import (
 from .transport import wasserstein_order
 
 
-@explained_class
 @dataclass(frozen=True)
 class DifferenceTest:
     """The outcome of `difference_test`.
@@ -53,7 +51,6 @@ class DifferenceTest:
         return self.p_value <= number_between("level", level, 0.0, 1.0)
 
 
-@explained
 def difference_test(
     first: KernelMatrix,
     second: KernelMatrix,
@@ -103,8 +100,7 @@ def difference_test(
     (True, 1.0)
     """
     check_comparable(first, second)
-    if kind not in ("rows", "sup"):
-        raise InputError(f"kind: expected 'rows' or 'sup' for a test, got {kind!r}")
+    choice("kind", kind, ("rows", "sup"))
     number = whole_number("permutations", permutations, 19)
     check_memory("permutations", "the distribution", number)
     source = generator(rng, 0)

@@ -12,7 +12,6 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.errors import InputError
 from ...core.frames import data_frame
-from ...core.kinds import explained
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
@@ -84,7 +83,6 @@ class Convergence:
         return "\n".join(rows)
 
 
-@explained
 def study_convergence(
     members: Sequence[Wall | Law | KernelMatrix],
     limit: Wall | Law | KernelMatrix | None = None,

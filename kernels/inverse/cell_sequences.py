@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number
+from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number, sequence
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95
-from ...core.kinds import explained
 from ..collisions.small_scale_limit import limit_study
 from ..distances.distances import distance
 from ..walls.wall_law import WallLaw
@@ -53,7 +52,6 @@ class Dichotomy:
     diameters: Floats
 
 
-@explained
 def dichotomy(
     cells: Sequence[Wall],
     disk: Disk | None = None,
@@ -101,7 +99,8 @@ def dichotomy(
     from ...geometry import Disk, Wall
 
     rng = generator(rng, 0)
-    if len(cells) < FEWEST_CELLS or not all(isinstance(cell, Wall) for cell in cells):
+    cells = sequence("cells", cells, Wall, "geo.flat()")
+    if len(cells) < FEWEST_CELLS:
         raise InputError(f"cells: expected at least {FEWEST_CELLS} walls, got {cells!r}")
     positive_number("tolerance", tolerance)
     eps = np.sort(finite_array("scales", scales))[::-1]

@@ -12,7 +12,6 @@ import numpy as np
 from ...core.checks import Floats, finite_array, finite_number, frozen, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
-from ...core.kinds import explained
 from ..laws.law import Law
 from ..walls.wall_law import WallLaw
 
@@ -55,7 +54,6 @@ class WallDesign:
     tried: Floats
 
 
-@explained
 def design_wall(
     objective: Objective,
     family: Callable[..., Wall | Law],

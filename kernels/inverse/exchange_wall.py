@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
-from ...core.kinds import explained, explained_class
 from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.interval_exchange import IntervalExchangeLaw
@@ -68,7 +67,6 @@ class Generations:
     distance: Estimate
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class ExchangeHollow:
     """A wall with a small opening behind which mirrors perform an exchange of intervals; made by `exchange_hollow`.
@@ -216,7 +214,7 @@ class ExchangeHollow:
         (0.9804, 0.9804, True)
         """
         whole_number("number", number, 1)
-        positive_number("neck", neck)
+        neck = positive_number("neck", neck)
         period, width = self.wall.period, self.opening[1] - self.opening[0]
         # beyond the necks
         carried = 1.0 - (1.0 + 2.0 * neck) * width / period
@@ -237,7 +235,6 @@ class ExchangeHollow:
         return np.where(traced.escaped, np.abs(traced.theta - image), np.pi)
 
 
-@explained
 def exchange_hollow(exchange: IntervalExchangeLaw, opening: float = 1e-3) -> ExchangeHollow:
     """A chamber whose mirrors send every ray where an exchange of intervals sends it, but for the order of the opening.
 

@@ -10,7 +10,6 @@ import numpy as np
 from ...core.checks import Floats, Rng, generator, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import LEVEL, Estimate
-from ...core.kinds import explained, explained_class
 from ..bases.measure import SINE
 
 if TYPE_CHECKING:
@@ -21,7 +20,6 @@ MARGIN = 0.05
 SAMPLES = 2**16
 
 
-@explained_class
 @dataclass(frozen=True)
 class TwoMirrorHollow:
     r"""A wall with a small opening behind which two confocal parabolas exchange rays near two angles.
@@ -80,7 +78,6 @@ def fraction_half_width(count: int, number: int) -> float:
     return max(high - fraction, fraction - low)
 
 
-@explained
 def two_mirrors(a: float, b: float, half_width: float = 0.02, opening: float = 1e-4) -> TwoMirrorHollow:
     """The two-mirror hollow that swaps the angles within ``half_width`` of ``a`` with an interval around ``b``.
 

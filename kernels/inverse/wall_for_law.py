@@ -9,10 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, frozen, generator, number_between, positive_number, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    frozen,
+    generator,
+    instance,
+    number_between,
+    positive_number,
+    sequence,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
@@ -57,7 +66,6 @@ DISTANCE_TOLERANCE = 1e-2
 ROUNDED = 64.0 * EPS
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class WallForLaw:
     """A wall whose law has the moments of a wanted law; made by `wall_for`.
@@ -130,7 +138,6 @@ class WallForLaw:
         )
 
 
-@explained
 def wall_for(
     law: Law | KernelMatrix,
     moments: int = 10,
@@ -231,7 +238,6 @@ def wall_for(
     )
 
 
-@explained
 def collision_for(
     collision: CollisionLaw, disk: Disk | None = None, moments: int = 10, tolerance: float = 1e-10, **search: Any
 ) -> WallForLaw:
@@ -260,10 +266,12 @@ def collision_for(
     >>> float(found.defect) < 1e-10, found.wall.foreshorten(wanted.disk).closes
     (True, True)
     """
-    if not isinstance(collision, CollisionLaw):
-        raise InputError(f"collision: expected a CollisionLaw such as ker.CollisionLaw(law, disk), got {collision!r}")
+    from ...geometry import Disk
+
+    instance("collision", collision, CollisionLaw, "ker.CollisionLaw(law, disk)")
+    felt = collision.disk if disk is None else disk
+    instance("disk", felt, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
     found = wall_for(collision.law, moments, tolerance, **search)
-    felt = disk or collision.disk
     return replace(found, wall=found.wall.unforeshorten(felt), disk=felt)
 
 
@@ -330,8 +338,8 @@ def _given(walls: Sequence[Wall]) -> list[UnitHollow]:
     from ...geometry import Wall
 
     found = []
-    for k, wall in enumerate(walls):
-        if not isinstance(wall, Wall) or not wall.closes:
+    for k, wall in enumerate(sequence("hollows", walls, Wall, "geo.focusing_arcs(1.0)")):
+        if not wall.closes:
             raise InputError(f"hollows[{k}]: expected a Wall without islands, got {wall!r}")
         found.append(UnitHollow(wall.scaled(1.0 / wall.period), f"wall {k}"))
     if not found:

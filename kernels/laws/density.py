@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, common_shape, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
@@ -46,7 +45,6 @@ PROBES = 24
 CHUNK = 2**20
 
 
-@explained_class
 class DensityLaw(Law):
     """A law with a density p(theta, theta') with respect to d theta'.
 
@@ -90,7 +88,6 @@ class DensityLaw(Law):
     _function: DensityFunction
     _panel_count: int = PANEL_COUNTS[0]
 
-    @explained
     def __init__(self, density: DensityFunction, breakpoints: ArrayLike = ()) -> None:
         if not callable(density):
             raise InputError(f"density: expected a function of (theta, theta_out), got {density!r}")

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, common_shape, finite_array, number_between
-from ...core.kinds import explained
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..expectations.basis_means import Expectations, Unconditional
@@ -62,7 +61,6 @@ def lambertian() -> LambertianLaw:
     return LambertianLaw()
 
 
-@explained
 def maxwell(diffuse_fraction: float) -> Combination:
     """The law of Maxwell and Smoluchowski: diffuse with probability ``diffuse_fraction`` in [0, 1], else specular.
 

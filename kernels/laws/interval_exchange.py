@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, angles, frozen
 from ...core.errors import InputError
-from ...core.kinds import explained_class
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
@@ -23,7 +22,6 @@ FLUX_TOLERANCE = 1e-9
 NO_MASS = 1e-14
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class IntervalExchangeLaw(Law):
     r"""A deterministic law with a given symmetric matrix: it exchanges piece (i, j) of cell i with piece (j, i) of

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
-from ...core.kinds import explained_class
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
 from ..bases.intervals import bisected
@@ -32,7 +31,6 @@ CELL_TOLERANCE = 0.25
 JUMP_TOLERANCE = 1e-9
 
 
-@explained_class
 @dataclass(frozen=True)
 class InvolutionLaw(Law):
     """The law theta' = T(theta) of a measure-preserving involution T.

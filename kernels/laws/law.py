@@ -19,13 +19,14 @@ from ...core.checks import (
     finite_array,
     foreign,
     generator,
+    instance,
     numbers,
+    sequence,
     shaped,
     shortened,
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...core.tables import html_table
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Basis, Frame
@@ -57,7 +58,6 @@ LONGEST_CHAIN, LONGEST_SAMPLE = 10**4, 10**5
 RandomMap: TypeAlias = Callable[[Floats, Floats], tuple[Floats, "NDArray[np.bool_] | None"]]
 
 
-@explained_class
 class Law(ABC):
     """A Markov kernel P~(theta, d theta') on the half circle (0, pi).
 
@@ -95,7 +95,6 @@ class Law(ABC):
     __array_ufunc__ = None
 
     # ---- sampling and expectations ---------------------------------------------------------------------------
-    @explained
     @seed_by_name
     def sample(self, theta: ArrayLike, rng: Rng = None) -> Floats:
         """Draw one outgoing angle for every incoming angle ``theta``; the same shape, radians in (0, pi).
@@ -106,7 +105,6 @@ class Law(ABC):
         source = generator(rng)
         return self._sample(angles("theta", theta), source)
 
-    @explained
     def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
         """The expectation E[f(Theta') | theta] of a vectorised f, whose values have shape ``theta.shape + extra``."""
         return self._apply(Vectorised.of(function), angles("theta", theta))
@@ -256,7 +254,6 @@ class Law(ABC):
         return Combination.of(self) + Combination.of(other)
 
 
-@explained_class
 class BranchLaw(Law):
     """A law made of isometries theta' = sign theta + offset, whose probabilities are smooth between breakpoints.
 
@@ -309,7 +306,6 @@ class BranchLaw(Law):
         return np.asarray(np.sum(weight * value, axis=theta.ndim))
 
 
-@explained_class
 class DrivenLaw(Law):
     """A law theta' = reflect(X, theta) with X uniform in (0, 1): the reflection of a ray that enters at random.
 
@@ -380,7 +376,6 @@ def entry_points(x: ArrayLike) -> Floats:
     return array
 
 
-@explained_class
 @dataclass(frozen=True, repr=False)
 class Combination(Law):
     """A weighted sum of laws, ``0.3 * law + 0.7 * other``.
@@ -411,8 +406,9 @@ class Combination(Law):
     terms: tuple[tuple[float, Law], ...]
 
     def __post_init__(self) -> None:
-        if not self.terms:
-            raise InputError("terms: expected at least one (weight, law), got none")
+        pairs = isinstance(self.terms, tuple) and all(isinstance(term, tuple) and len(term) == 2 for term in self.terms)
+        if not pairs or not self.terms:
+            raise InputError(f"terms: expected at least one (weight, law), got {shortened(self.terms)}")
         for weight, law in self.terms:
             if not isinstance(law, Law):
                 raise InputError(f"terms: expected laws, got {law!r}")
@@ -514,7 +510,6 @@ class Combination(Law):
         return " + ".join(f"{weight:.12g}*{as_factor(law)}" for weight, law in self.terms)
 
 
-@explained
 def mixture(laws: Sequence[Law], weights: ArrayLike) -> Combination:
     """The law that follows ``laws[k]`` with probability ``weights[k]``.
 
@@ -526,6 +521,7 @@ def mixture(laws: Sequence[Law], weights: ArrayLike) -> Combination:
     >>> mixture([specular(), retroreflection()], [0.5, 0.5])
     0.5*specular() + 0.5*retroreflection()
     """
+    laws = sequence("laws", laws, Law, "ker.lambertian()")
     weight = finite_array("weights", weights)
     if weight.shape != (len(laws),):
         raise InputError(f"weights: expected one for each of {len(laws)} laws, got an array of shape {weight.shape}")
@@ -559,7 +555,6 @@ def as_factor(law: Law) -> str:
     return f"({law!r})" if isinstance(law, (Combination, Composition)) else repr(law)
 
 
-@explained_class
 @dataclass(frozen=True, repr=False)
 class Composition(Law):
     """Laws applied one after the other, ``first @ second``; as an operator, f -> P_first P_second f.
@@ -585,9 +580,7 @@ class Composition(Law):
 
     def __post_init__(self) -> None:
         flat: list[Law] = []
-        for law in self.laws:
-            if not isinstance(law, Law):
-                raise InputError(f"laws: expected laws, got {law!r}")
+        for law in sequence("laws", self.laws, Law, "ker.lambertian()"):
             flat.extend(law.laws if isinstance(law, Composition) else (law,))
         if not flat:
             raise InputError("laws: expected at least one, got none")
@@ -639,7 +632,6 @@ class Composition(Law):
         return " @ ".join(as_factor(law) for law in self.laws)
 
 
-@explained_class
 @dataclass(frozen=True, repr=False)
 class Power(Law):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
@@ -658,6 +650,7 @@ class Power(Law):
     exponent: int
 
     def __post_init__(self) -> None:
+        instance("law", self.law, Law, "ker.lambertian()")
         whole_number("exponent", self.exponent, 0)
         set_properties(
             self, frame=self.law.frame, mirror_symmetric=self.law.mirror_symmetric or self.exponent == 0 or None
@@ -745,7 +738,6 @@ def _pulled_back(law: Law, function: AngleFunction) -> AngleFunction:
     return lambda angle: law.apply(function, angle)
 
 
-@explained_class
 @dataclass(frozen=True, repr=False)
 class SpecularFrame(Law):
     """P J, f -> P(J f) with J f(theta) = f(pi - theta): the law in the other frame.
@@ -766,6 +758,7 @@ class SpecularFrame(Law):
     law: Law
 
     def __post_init__(self) -> None:
+        instance("law", self.law, Law, "ker.lambertian()")
         mirror = self.law.mirror_symmetric
         set_properties(
             self, frame=_other_frame(self.law.frame), mirror_symmetric=mirror, evaluations=self.law.evaluations
@@ -857,7 +850,6 @@ class IsometryLaw(BranchLaw):
     mirror_symmetric = True
     evaluations = 1
 
-    @explained
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """One branch, of probability 1."""
         theta = angles("theta", theta)

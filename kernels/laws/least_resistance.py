@@ -8,7 +8,6 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from ...core.checks import Floats, finite_array
-from ...core.kinds import explained_class
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
@@ -22,7 +21,6 @@ SPLIT_BEGINS = np.pi / 6.0
 NODES, DOUBLINGS = 16, 10
 
 
-@explained_class
 @dataclass(frozen=True)
 class LeastResistanceLaw(Law):
     r"""The minimiser of E[1 + cos(theta' - theta)] among all symmetric laws.

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, common_shape, finite_array, frozen, shortened
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction, Basis, Frame
@@ -34,7 +33,6 @@ SAME_EDGE = 32.0 * EPS
 ENTRY_ROUNDING = 16.0 * EPS
 
 
-@explained_class
 class MatrixLaw(DensityLaw):
     """From bin i the particle goes to bin j with probability P[i, j], uniformly in cos(theta) within bin j.
 
@@ -71,7 +69,6 @@ class MatrixLaw(DensityLaw):
     edges: Floats
     _masses: Floats
 
-    @explained
     def __init__(self, matrix: KernelMatrix | ArrayLike) -> None:
         basis = matrix.basis if isinstance(matrix, KernelMatrix) else None
         array = finite_array("matrix", matrix.array if isinstance(matrix, KernelMatrix) else matrix)

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, common_shape, finite_array, number_between, shaped, whole_number
-from ...core.kinds import explained
 from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.measure import SINE
 from .density import GAUSS_NODES, DensityLaw
@@ -123,7 +122,6 @@ class HenyeyGreensteinLaw(DensityLaw):
         return f"henyey_greenstein({self.g!r})"
 
 
-@explained
 def henyey_greenstein(g: float) -> HenyeyGreensteinLaw:
     """The Henyey-Greenstein law with mean cosine ``g``, -1 < g < 1; see `HenyeyGreensteinLaw`.
 

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TypeAlias
 
-from ...core.kinds import explained_class
 from ..bases.basis import Basis
 from ..bases.tensor import TensorBasis
 from ..matrices.matrix import KernelMatrix
@@ -18,7 +17,6 @@ Term: TypeAlias = tuple[float, Law, bool]
 Discretiser: TypeAlias = Callable[[Law, Basis], KernelMatrix]
 
 
-@explained_class
 class TensorLaw(ABC):
     """A law of the angles (theta, psi), computed from laws of the single angles."""
 

@@ -13,16 +13,25 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, cast, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from ...core.checks import Floats, finite_array, finite_number, foreign, frozen, instance, number_between, whole_number
+from ...core.checks import (
+    Floats,
+    choice,
+    finite_array,
+    finite_number,
+    foreign,
+    frozen,
+    instance,
+    number_between,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.frames import data_array, data_frame
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ...core.tables import html_table
 from ..bases.basis import AngleFunction, Basis, Frame
@@ -211,7 +220,6 @@ if TYPE_CHECKING:
     Replicate: TypeAlias = "Floats | csr_array[Any, tuple[int, int]]"
 
 
-@explained_class
 @dataclass(frozen=True, eq=False, repr=False)
 class KernelMatrix:
     r"""The matrix of a Markov kernel P in a basis of L^2 of the invariant measure.
@@ -292,8 +300,7 @@ class KernelMatrix:
     __array_ufunc__ = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.basis, Basis):
-            raise InputError(f"basis: expected a basis such as Bins(64), got {self.basis!r}")
+        instance("basis", self.basis, Basis, "ker.Bins(64)")
         symmetric = finite_array("symmetric", self.symmetric)
         n = self.basis.size
         if symmetric.shape != (n, n):
@@ -335,8 +342,7 @@ class KernelMatrix:
         instance("method", self.method, str, "'exact'")
         instance("law", self.law, str, "'a smooth wall'")
         instance("metadata", self.metadata, Mapping, "{'made': 'by hand'}")
-        if self.frame not in ("paper", "specular"):
-            raise InputError(f"frame: expected 'paper' or 'specular', got {self.frame!r}")
+        choice("frame", self.frame, get_args(Frame))
         defect = self.raw_defect
         if defect is not None:
             instance("raw_defect", defect, SymmetryDefect, "SymmetryDefect(0.1)")
@@ -452,7 +458,6 @@ class KernelMatrix:
             law=self.law if self.reversible else f"adjoint of {self.law or self.method}",
         )
 
-    @explained
     def tensor(self, other: KernelMatrix) -> KernelMatrix:
         """The kernel that applies this one to the first angle and the other to the second, independently."""
         return tensor_product(self, other)
@@ -473,7 +478,6 @@ class KernelMatrix:
         return aslinearoperator(self.array)
 
     # ---- files and pictures ----------------------------------------------------------------------------------
-    @explained
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write everything to an .npz file that `load_matrix` reads; an existing file only with ``overwrite``."""
         return archive.write(path, *self._packed(), self.basis, overwrite=overwrite)
@@ -579,7 +583,6 @@ class KernelMatrix:
         return values
 
 
-@explained
 def load_matrix(path: str | Path) -> KernelMatrix:
     """Read a matrix that `KernelMatrix.save` wrote: every field, to the last bit.
 

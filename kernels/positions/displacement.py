@@ -10,7 +10,6 @@ import numpy as np
 from ...core.checks import Floats, Rng, finite_number, frozen, generator, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, fraction_estimate
-from ...core.kinds import explained, explained_class
 from ...geometry import Wall
 from ..bases.measure import SINE
 
@@ -18,7 +17,6 @@ from ..bases.measure import SINE
 LEAST_TAIL = 20
 
 
-@explained_class
 @dataclass(frozen=True)
 class Displacements:
     """Displacements x' - x of random rays, x uniform in a period and theta with density sin(theta)/2.
@@ -105,7 +103,6 @@ def _hill(decreasing: Floats, count: int) -> float:
     return float(1.0 / np.mean(np.log(decreasing[:count] / decreasing[count])))
 
 
-@explained
 def displacements(wall: Wall, rays: int = 2**16, rng: Rng = None) -> Displacements:
     """Trace random rays and return their displacements x' - x along the wall.
 

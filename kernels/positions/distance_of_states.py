@@ -9,7 +9,6 @@ import numpy as np
 from ...core.checks import Floats, Rng, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
-from ...core.kinds import explained
 from ...geometry import Wall
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE
@@ -24,7 +23,6 @@ MOST_ORDERS = 17
 REPETITIONS = 8
 
 
-@explained
 def position_distance(
     first: PositionLaw | Wall, second: PositionLaw | Wall, tolerance: float = 1e-2, *, rays: int = 2**12, rng: Rng = 0
 ) -> Estimate:

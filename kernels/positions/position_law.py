@@ -9,9 +9,19 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, angles, broadcast, finite_array, finite_number, frozen, generator, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    angles,
+    broadcast,
+    finite_array,
+    finite_number,
+    frozen,
+    generator,
+    sequence,
+    whole_number,
+)
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...geometry import Wall
 from ..bases.given import Vectorised, seed_by_name
 from ..laws.law import Combination, Law
@@ -20,7 +30,6 @@ from ..walls.wall_law import WallLaw
 PositionFunction = Callable[[Floats, Floats], Floats]
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class PositionLaw:
     r"""A law P(x, theta; dx' d theta') = delta_x(dx') P~(x, theta, d theta') whose P~ is constant on intervals of x.
@@ -59,19 +68,18 @@ class PositionLaw:
 
     def __post_init__(self) -> None:
         edges = np.atleast_1d(finite_array("edges", self.edges))
-        laws = tuple(self.laws)
+        laws = sequence("laws", self.laws, Law, "ker.lambertian()")
         if edges.ndim != 1 or len(edges) < 2 or not np.all(np.diff(edges) > 0.0):
             raise InputError(f"edges: expected at least two increasing positions, got {edges.tolist()}")
         if len(laws) != len(edges) - 1:
             raise InputError(f"laws: expected one for each of {len(edges) - 1} intervals, got {len(laws)}")
         for law in laws:
-            if not isinstance(law, Law) or law.frame != "paper":
+            if law.frame != "paper":
                 raise InputError(f"laws: expected laws in the paper's convention, got {law!r}")
         object.__setattr__(self, "edges", frozen(edges))
         object.__setattr__(self, "laws", laws)
 
     @classmethod
-    @explained
     def from_family(
         cls, family: Callable[[float], Law | Wall], left: float, right: float, intervals: int
     ) -> PositionLaw:
@@ -100,7 +108,6 @@ class PositionLaw:
         return cls(edges, tuple(WallLaw(one) if isinstance(one, Wall) else one for one in found))
 
     @classmethod
-    @explained
     def of_walls(cls, walls: Sequence[Wall], repeats: ArrayLike = 1) -> PositionLaw:
         """The limit law of ``geo.join_walls`` of the same walls, when each is repeated and made finer in proportion."""
         from ...geometry import join_walls
@@ -129,7 +136,6 @@ class PositionLaw:
         """The law for x uniform on the piece: the mixture of all laws by their lengths."""
         return Combination(tuple(zip(self.weights.tolist(), self.laws, strict=True)))
 
-    @explained
     @seed_by_name
     def sample(self, x: ArrayLike, theta: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing angle for every state (x, theta); the arrays broadcast. The position stays x."""
@@ -142,7 +148,6 @@ class PositionLaw:
                 outgoing[here] = law.sample(incoming[here], source)
         return outgoing
 
-    @explained
     def apply(self, function: PositionFunction, x: ArrayLike, theta: ArrayLike) -> Floats:
         """The expectation E[f(x', Theta') | x, theta] of a vectorised f(x, theta), with x' = x."""
         at, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, check_memory
+from ...core.checks import Floats, angles, check_memory, instance
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
@@ -23,7 +22,6 @@ TEST_BINS = 32
 WEIGHTED_BATCHES = 8
 
 
-@explained
 def estimate(
     theta_in: ArrayLike,
     theta_out: ArrayLike,
@@ -75,8 +73,7 @@ def estimate(
         raise InputError(
             f"theta_out: expected the shape of theta_in, {incoming.shape}, got {outgoing.shape}; pass pairs"
         )
-    if not isinstance(basis, Basis):
-        raise InputError(f"basis: expected a basis such as Bins(64), got {basis!r}")
+    instance("basis", basis, Basis, "ker.Bins(64)")
     check_memory("basis", f"the matrix in {basis!r}", basis.size**2)
     if basis.measure != SINE:
         raise InputError(f"basis: expected one for sin(theta), got {basis!r}")

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
 from ...core.checks import Floats, angles, check_memory, instance, shortened
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ...core.version import __version__
 from ...core.workers import connected, in_order, results
 from ..bases.basis import Basis
@@ -37,7 +36,6 @@ BLOCKS_A_WORKER = 3
 Block: TypeAlias = tuple[int, Floats, Floats]
 
 
-@explained
 def estimate_stream(
     pairs: Any,
     basis: Basis,

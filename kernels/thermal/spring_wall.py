@@ -22,7 +22,6 @@ from ...core.checks import (
 )
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import NORMAL_95, Estimate
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..bases.given import seed_by_name
 from ..matrices.defects import SymmetryDefect, relative_asymmetry, reversibility_z_score
@@ -38,7 +37,6 @@ MOST_DRAWS = 200
 OVERFLOW = "choose units in which they are moderate"
 
 
-@explained_class
 @dataclass(frozen=True)
 class SpringWall:
     r"""A plate of mass M on a spring, which moves along y below the level y = 0 and is in equilibrium at temperature T.
@@ -101,7 +99,6 @@ class SpringWall:
             raise InputError(f"expected numbers for which the plate's acceleration is finite, got {self}; {OVERFLOW}")
 
     # ---- sampling --------------------------------------------------------------------------------------------
-    @explained
     @seed_by_name
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity (n, 2) with v2 > 0 for every incoming one with v2 < 0.
@@ -126,7 +123,6 @@ class SpringWall:
             raise InputError(f"velocity: {reason} for a speed of {fastest:g} against {self}; {OVERFLOW}") from reason
         return outgoing
 
-    @explained
     @seed_by_name
     def sample_polar(self, speed: ArrayLike, theta: ArrayLike, rng: Rng = None) -> tuple[Floats, Floats]:
         """Draw speed and angle of the outgoing velocity from those of *minus* the incoming one, as laws of angles do.
@@ -145,7 +141,6 @@ class SpringWall:
         shape = size.shape
         return np.hypot(out[:, 0], out[:, 1]).reshape(shape), np.arctan2(out[:, 1], out[:, 0]).reshape(shape)
 
-    @explained
     def equilibrium(self, n: int, rng: Rng = None, temperature: float | None = None) -> Floats:
         """Draw incoming velocities (n, 2) from the flux of Maxwell's distribution, by default at the wall's T."""
         whole_number("n", n, 1)
@@ -204,7 +199,6 @@ class SpringWall:
         raise AccuracyError(f"{going.size} particles have not left after {MOST_STEPS} steps", going.size / out.size)
 
     # ---- measured properties ---------------------------------------------------------------------------------
-    @explained
     def symmetry_defect(self, n: int = 100_000, rng: Rng = None) -> SymmetryDefect:
         """How far the law is from detailed balance with Maxwell's distribution, from ``n`` reflections.
 
@@ -221,7 +215,6 @@ class SpringWall:
         level = np.exp(-0.5 * v * v / self.temperature)
         return np.minimum((level * CELLS).astype(np.int64), CELLS - 1)
 
-    @explained
     def energy_accommodation(self, gas_temperature: float, n: int = 100_000, rng: Rng = None) -> Estimate:
         """The coefficient (E_in - E_out)/(E_in - T) of the energy of motion along y, for a gas at another temperature.
 

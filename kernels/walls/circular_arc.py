@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, number_between, whole_number
-from ...core.kinds import explained_class
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
 from ..bases.basis import AngleFunction, Basis
 from ..bases.given import Vectorised
@@ -32,7 +31,6 @@ NODES = 16
 CHUNK = 2**11
 
 
-@explained_class
 @dataclass(frozen=True)
 class CircularArcLaw(DrivenLaw):
     r"""The law of focusing circular arcs of half angle xi, one arc per period, in closed form.

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, instance
 from ...core.errors import AccuracyError
-from ...core.kinds import explained_class
 from ...geometry import MushroomGenerations
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction
@@ -19,7 +18,6 @@ from .traced_map import UNRESOLVED_TOLERANCE, traced_reflection
 from .wall_law import WallLaw
 
 
-@explained_class
 @dataclass(frozen=True)
 class MushroomLaw(DrivenLaw):
     """The law P~ of `geometry.MushroomGenerations`, for rays that enter at a uniform point of the period.

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, instance, positive_number, whole_number
+from ...core.checks import Floats, finite_number, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
-from ...core.kinds import explained_class
 from ...geometry import Wall
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw
@@ -29,7 +28,6 @@ BEAM_TOLERANCE, MOST_BEAMS = 1e-13, 200_000
 MOST_PROBES = 512
 
 
-@explained_class
 @dataclass(frozen=True)
 class PolygonLaw(BranchLaw):
     r"""The exact law P~ of a wall made of segments: a finite list of isometries with their probabilities.
@@ -139,7 +137,7 @@ class PolygonLaw(BranchLaw):
 
     def resolves(self, most: float) -> bool:
         """Whether at most the fraction ``most`` of the flux stays unresolved; shapes of many vertices answer first."""
-        left = 0.0
+        left, most = 0.0, finite_number("most", most)
         for number in sorted(range(len(self._shapes)), key=lambda number: -len(self._shapes[number][0].vertices)):
             left += math.fsum(self._shapes[number][1]) * self._table_of(number).unresolved
             if left > most:

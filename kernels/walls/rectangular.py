@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, positive_number
-from ...core.kinds import explained_class
 from ..bases.angles import mirrored_angle
 from ..laws.crevice import crevice_breakpoints, crevice_retro, crossings_modulo_two
 from ..laws.isometry_table import IsometryTable
@@ -17,7 +16,6 @@ from ..laws.law import BranchLaw, entries
 LARGEST_COUNT = 2.0**62
 
 
-@explained_class
 @dataclass(frozen=True)
 class RectangularTeethLaw(BranchLaw):
     r"""The law of rectangular teeth in closed form: flat top on the first half of the period, crevice on the second.

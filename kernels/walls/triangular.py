@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, number_between, whole_number
-from ...core.kinds import explained_class
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
 from ..bases.intervals import without_extremal
@@ -22,7 +21,6 @@ BREAKPOINT_SPACING = 16.0 * EPS
 MOST_LISTED_BREAKPOINTS = 2**17
 
 
-@explained_class
 @dataclass(frozen=True)
 class TriangularTeethLaw(BranchLaw):
     r"""The law of triangular teeth of apex angle psi, one hollow per period, in closed form.

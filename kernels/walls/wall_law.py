@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, instance
 from ...core.errors import AccuracyError
-from ...core.kinds import explained_class
 from ...core.rounding import EPS
 from ...geometry import Wall
 from ..bases.basis import AngleFunction, Basis
@@ -53,7 +52,6 @@ MANY_TOLERANCE = 1e-4
 CELL_TOLERANCE = 1e-9
 
 
-@explained_class
 @dataclass(frozen=True)
 class WallLaw(DrivenLaw):
     """The law P~ of a wall, for rays that enter at a uniform point of the period.

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...core.checks import Floats, number_between, whole_number
 from ...core.estimates import Estimate
-from ...core.kinds import explained
 from ...kernels import Legendre, WallLaw, discretise
 
 # Curvatures up to this one; the arcs of curvature 2 are semicircles, which meet in cusps.
@@ -42,7 +41,6 @@ class GapBounds:
     curvature: float
 
 
-@explained
 def curvature_gap_bounds(curvature: float, bins: int = 400) -> GapBounds:
     r"""Bound the gap of `geometry.dispersing_arcs` from both sides by the curvature of its exposed arcs.
 

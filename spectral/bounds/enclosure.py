@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, positive_number, whole_number
 from ...core.estimates import ErrorKind
 from ...core.frames import data_frame
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ...core.tables import html_table
 from ...kernels import Basis, CollisionLaw, Composition, DensityLaw, Law, Legendre, Power, discretise
@@ -94,7 +93,6 @@ class Enclosure:
         return f"[{self.low:.15g}, {self.high:.15g}] {name}{parity} ({self.kind}: {self.reason})"
 
 
-@explained_class
 @dataclass(frozen=True)
 class Enclosures:
     """Enclosures, with the one of the constants first and the others by decreasing value; a sequence.
@@ -135,7 +133,6 @@ class Enclosures:
         return html_table(f"Enclosures, {self.convention} convention", {**numbers, "method": self.method})
 
 
-@explained
 def enclosures(
     law: Law | CollisionLaw, k: int = 4, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
 ) -> Enclosures:

@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Unpack
+from typing import Any, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checkpoints import Stored
-from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, number_between, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    check_memory,
+    choice,
+    finite_array,
+    frozen,
+    generator,
+    number_between,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
-from ...core.kinds import explained
 from ...core.long_runs import Engine, all_parts
 from ...core.version import __version__
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.matrix_law import not_a_law
-from .diffusion import Arrangement, check_arrangement
+from .diffusion import Arrangement
 
 # Smallest angle; below half of it, pi - theta would round to pi.
 SMALLEST = float(np.spacing(np.pi))
@@ -83,7 +92,6 @@ def _slope_weights(log: Floats) -> Floats:
     return np.asarray(deviation / np.sum(deviation**2))
 
 
-@explained
 def exit_times(
     law: Law,
     lengths: ArrayLike,
@@ -138,7 +146,7 @@ def exit_times(
     levels = finite_array("lengths", lengths).ravel()
     if levels.size < 3 or levels[0] <= 0.0 or np.any(np.diff(levels) <= 0.0):
         raise InputError(f"lengths: expected at least three increasing positive lengths, got {lengths!r}")
-    check_arrangement(arrangement)
+    choice("arrangement", arrangement, get_args(Arrangement))
     whole_number("particles", particles, 2)
     check_memory("particles", "all exit times", 2 * levels.size * particles)
     width, pace = 2.0 * number_between("radius", radius, 0.0, LARGEST), number_between("speed", speed, 0.0, LARGEST)

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...core.checks import Floats, frozen
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ..eigenvalues.spectra import matrix_spectrum
 
 if TYPE_CHECKING:
@@ -42,7 +41,6 @@ class Conductance:
     error: float
 
 
-@explained
 def conductance(matrix: KernelMatrix) -> Conductance:
     """Cheeger's bounds for a reversible matrix on bins, from the level sets of its second eigenfunction.
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-from ...core.checks import Floats, positive_number
+from ...core.checks import Floats, choice, positive_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import ErrorKind, Estimate
-from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.laws.law import IsometryLaw
@@ -20,7 +19,6 @@ from ...kernels.walls.repeated_teeth import RepeatedTeethLaw
 from ..essential.edge import grazing_symbol
 
 Arrangement = Literal["mirror", "half-turn"]
-ARRANGEMENTS: tuple[Arrangement, ...] = ("mirror", "half-turn")
 
 # Sign of the displacement of rays that leave near theta = 0 and near theta = pi.
 DIRECTION = np.array([1.0, -1.0])
@@ -73,7 +71,6 @@ class Diffusivity(Estimate):
         return f"Diffusivity({self}; eta={self.eta:.6g}, zeta={self.zeta:.6g}, kind={self.kind!r})"
 
 
-@explained
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
     r"""The slope D of L^2/tau(L) against ln(L/r) for the mean exit time tau of a long channel: see `Diffusivity`.
 
@@ -124,7 +121,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     if not isinstance(law, Law):
         raise not_a_law("law", "a law such as WallLaw(wall)", law)
     scale = 4.0 * positive_number("radius", radius) * positive_number("speed", speed) / np.pi
-    check_arrangement(arrangement)
+    choice("arrangement", arrangement, get_args(Arrangement))
     symbol = grazing_symbol(law.in_specular_frame() if law.frame == "specular" else law)
     step = _step(symbol.matrix, arrangement)
     zeta = float(0.5 * DIRECTION @ step @ DIRECTION)
@@ -191,9 +188,3 @@ def _step(symbol: Floats, arrangement: Arrangement) -> Floats:
 def _eta(step: Floats) -> float:
     resolvent = np.linalg.inv(np.eye(2) - step)
     return float(0.5 * DIRECTION @ (2.0 * resolvent - np.eye(2)) @ DIRECTION)
-
-
-def check_arrangement(arrangement: str) -> None:
-    """Raise an InputError unless ``arrangement`` is one of the two arrangements."""
-    if arrangement not in ARRANGEMENTS:
-        raise InputError(f"arrangement: expected one of {', '.join(ARRANGEMENTS)}, got {arrangement!r}")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.checks import Floats, frozen, whole_number
-from ...core.kinds import explained
 from ...kernels import Law, Legendre, discretise
 from ...kernels.laws.matrix_law import not_a_law
 
@@ -50,7 +49,6 @@ class LaplacianComparison:
     error: float
 
 
-@explained
 def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) -> LaplacianComparison:
     """Compare the diagonal of a law in Legendre polynomials with the eigenvalues of the billiard Laplacian.
 
@@ -94,7 +92,6 @@ def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) ->
     )
 
 
-@explained
 def mean_squared_slope(wall: Wall) -> float:
     """The mean squared slope h of a wall over a period; ``inf`` if a piece is vertical or overhangs.
 

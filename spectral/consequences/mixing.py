@@ -8,10 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from ...core.checks import Floats, finite_number, number_between
+from ...core.checks import Floats, choice, finite_number, number_between
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import ErrorKind, Estimate
-from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, KernelMatrix, Law
 from ...kernels.bases.measure import SINE
@@ -61,7 +60,6 @@ class MixingTime:
         return float(self.steps)
 
 
-@explained
 def mixing_time(
     kernel: Law | KernelMatrix | Spectrum,
     within: float = 0.25,
@@ -112,8 +110,7 @@ def mixing_time(
     (7, 7, 1.4427)
     """
     within = number_between("within", within, 0.0, np.inf)
-    if distance not in DISTANCES:
-        raise InputError(f"distance: expected one of {', '.join(DISTANCES)}, got {distance!r}")
+    choice("distance", distance, DISTANCES)
     steps_before, size = 0, finite_number("initial", initial)
     if size < 0.0:
         raise InputError(f"initial: expected a norm, at least 0, got {initial!r}")

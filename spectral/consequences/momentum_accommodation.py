@@ -8,10 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, angles, frozen, generator, positive_number
+from ...core.checks import Floats, Rng, angles, frozen, generator, instance, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, ErrorKind, Estimate
-from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import SINE, Combination, Law, Panels, discretise
 from ...kernels.bases.basis import Basis
@@ -82,7 +81,6 @@ class Accommodation:
     kind_at: ErrorKind
 
 
-@explained
 def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = None, rng: Rng = None) -> Accommodation:
     r"""Tangential and normal momentum accommodation coefficients, and the Maxwell fraction that fits a law best.
 
@@ -148,8 +146,7 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
     0.0 0.0 0.0 0.0
     2.0 2.0 0.0 0.0
     """
-    if not isinstance(law, Law):
-        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+    instance("law", law, Law, "ker.lambertian()")
     wanted = positive_number("tolerance", tolerance)
     incoming = _default_angles() if theta is None else _checked(theta)
     paper = law.in_specular_frame() if law.frame == "specular" else law

@@ -4,20 +4,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, positive_number, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    check_memory,
+    choice,
+    finite_array,
+    frozen,
+    generator,
+    positive_number,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
-from ...core.kinds import explained, explained_class
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.matrix_law import not_a_law
 from .channel import MOST_CROSSINGS, SMALLEST
-from .diffusion import Arrangement, check_arrangement
+from .diffusion import Arrangement
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +37,6 @@ GROUPS = 32
 FEWEST_TIMES = 3
 
 
-@explained_class
 @dataclass(frozen=True)
 class ChannelPaths:
     """Positions along a channel of particles that start at 0 on a wall, with the invariant distribution of angles.
@@ -150,7 +158,6 @@ class ChannelPaths:
         return np.stack(found, axis=1)
 
 
-@explained
 def channel_paths(
     law: Law,
     times: ArrayLike,
@@ -217,7 +224,7 @@ def channel_paths(
     moments = finite_array("times", times).ravel()
     if moments.size < FEWEST_TIMES or moments[0] <= 0.0 or np.any(np.diff(moments) <= 0.0):
         raise InputError(f"times: expected at least {FEWEST_TIMES} increasing positive times, got {times!r}")
-    check_arrangement(arrangement)
+    choice("arrangement", arrangement, get_args(Arrangement))
     check_memory("particles", "all positions", 2 * moments.size * whole_number("particles", particles, 2))
     half, pace = positive_number("radius", radius), positive_number("speed", speed)
     middle = math.inf if isinstance(bend, float) and bend == math.inf else positive_number("bend", bend)

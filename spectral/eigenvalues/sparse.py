@@ -10,7 +10,6 @@ import numpy as np
 
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, whole_number
 from ...core.errors import AccuracyError, InputError
-from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import KernelMatrix
 from .dense import ExtremalEigenvalues, extremal, symmetric_half
@@ -70,7 +69,6 @@ class LeadingEigenvalues:
     parity: tuple[Parity, ...] = ()
 
 
-@explained
 def leading_eigenvalues(
     matrix: KernelMatrix | Floats | LinearOperator | Any, k: int, rng: Rng = None
 ) -> LeadingEigenvalues:

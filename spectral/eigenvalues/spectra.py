@@ -12,7 +12,6 @@ from ...core.checks import Floats, frozen
 from ...core.errors import AccuracyError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.frames import data_frame
-from ...core.kinds import explained_class
 from ...core.rounding import EPS
 from ...core.tables import html_table
 from ...kernels import Basis, Bins, KernelMatrix
@@ -114,7 +113,6 @@ class SpectrumErrors:
         return np.asarray(self.algebraic + self.discretisation + self.quantile * self.sampling)
 
 
-@explained_class
 @dataclass(frozen=True)
 class Spectrum:
     """The k eigenvalues of largest modulus of a reversible law, sorted descending.

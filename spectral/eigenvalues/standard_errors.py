@@ -9,7 +9,6 @@ import numpy as np
 from ...core.checks import Floats, Rng, check_memory, generator, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, student_95
-from ...core.kinds import explained
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -61,7 +60,6 @@ def _count_variances(matrix: KernelMatrix, vectors: Floats) -> Floats:
     return np.asarray(((weights[:, None] * phi) ** 2 * spread / totals).sum(axis=0))
 
 
-@explained
 def bootstrap_intervals(
     matrix: KernelMatrix, k: int, rng: Rng = None, resamples: int = 200, level: float = 0.95
 ) -> Floats:

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...core.checks import instance, positive_number
 from ...core.estimates import Estimate
-from ...core.kinds import explained
 from ...kernels import DensityLaw, InvolutionLaw, Law, Legendre, MatrixLaw, WallLaw, discretise
 from ...kernels.laws.structure import Rules, fold
 from .edge import essential_edge
@@ -42,7 +41,6 @@ class HilbertSchmidtNorm(Estimate):
     reasons: tuple[str, ...]
 
 
-@explained
 def hilbert_schmidt_norm(law: Law, tolerance: float = 1e-6) -> HilbertSchmidtNorm:
     r"""Compute the norm (int int k^2 nu nu)^(1/2) of a law with kernel k, or state why there is none.
 

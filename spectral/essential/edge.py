@@ -10,7 +10,6 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.estimates import ErrorKind
-from ...core.kinds import explained
 from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import IsometryLaw
@@ -64,7 +63,6 @@ class _Part:
     fraction: float = 0.0
 
 
-@explained
 def essential_edge(law: Law) -> EssentialEdge:
     r"""The supremum of the essential spectrum of a reversible law, as an interval.
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...core.checks import Rng, generator, positive_number
 from ...core.errors import AccuracyError, InputError
-from ...core.kinds import explained
 from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
@@ -98,7 +97,6 @@ def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
     return int(found[0]) + 2 if found.size else None
 
 
-@explained
 def spectral_gap(
     law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6, rng: Rng = None, *, time_limit: float = TIME_LIMIT
 ) -> SpectralGap:
@@ -171,7 +169,6 @@ def spectral_gap(
     return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng, seconds))
 
 
-@explained
 def gaps_in_both_conventions(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> tuple[SpectralGap, SpectralGap]:
     """The gaps of a mirror-symmetric law in the convention that it carries and in the other, from the same matrices.
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...core.checks import Rng, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
 from ...core.long_runs import TIME_LIMIT
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import not_a_law
@@ -24,7 +23,6 @@ from .verdict import SpectralGap
 TOLERANCE = 1e-4
 
 
-@explained
 def spectrum(
     kernel: KernelMatrix | Law | CollisionLaw,
     k: int = 10,

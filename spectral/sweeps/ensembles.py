@@ -17,7 +17,6 @@ from ...core.checks import Floats, Rng, check_memory, generator, instance, posit
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate
 from ...core.frames import data_frame
-from ...core.kinds import explained, explained_class
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...kernels import Basis, KernelMatrix, discretise
@@ -67,7 +66,6 @@ def _cells(row: EnsembleRow) -> list[str | float | int]:
     return [row.quantity, mean.value, mean.error, spread.value, spread.error, row.realisations, row.refused]
 
 
-@explained_class
 @dataclass(frozen=True)
 class Ensemble:
     """Quantities over random walls; made by `ensemble`.
@@ -113,7 +111,6 @@ class Ensemble:
         return csv_text(MEANS, [_cells(row) for row in self.rows])
 
 
-@explained
 def ensemble(
     family: Family,
     realisations: int,
@@ -205,8 +202,8 @@ def _row(table: SweepTable, quantity: str) -> EnsembleRow:
 def _warn_of_refused(what: str, refused: int, realisations: int, reason: str) -> None:
     if refused:
         words = f"{refused} of {realisations} realisations were refused, the first because of: {reason}"
-        # of the user's line, beyond `explained`
-        warnings.warn(f"{what} those that were not: {words}", stacklevel=4)
+        # of the user's line
+        warnings.warn(f"{what} those that were not: {words}", stacklevel=3)
 
 
 @dataclass(frozen=True)
@@ -248,7 +245,6 @@ class _Matrices:
         return content
 
 
-@explained
 def mean_law(
     family: Family,
     realisations: int,

@@ -13,7 +13,6 @@ import numpy as np
 
 from ...core.checks import finite_number, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained_class
 
 Value: TypeAlias = float | int | str
 Point: TypeAlias = dict[str, Value]
@@ -26,7 +25,6 @@ RESOLUTION = 0.01
 Plan: TypeAlias = Generator[list[Point], Sequence[float], None]
 
 
-@explained_class
 @dataclass(frozen=True)
 class Between:
     """An interval of a parameter in which a sweep chooses its points: more of them where the curve bends.

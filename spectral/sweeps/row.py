@@ -9,13 +9,11 @@ from typing import Any
 
 from ...core.checks import finite_number, number_between
 from ...core.estimates import Estimate, finite
-from ...core.kinds import explained_class
 from .points import Point, Value
 
 COLUMNS = ("quantity", "value", "error", "kind", "verdict", "method", "seconds", "version", "message")
 
 
-@explained_class
 @dataclass(frozen=True)
 class SweepRow:
     """One quantity at one point.

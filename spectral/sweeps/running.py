@@ -14,7 +14,6 @@ from typing import Any, TypeAlias, cast
 from ...core.checkpoints import Checkpoint, content, told
 from ...core.checks import finite_number, positive_number
 from ...core.errors import AsperityError, InputError
-from ...core.kinds import explained
 from ...core.long_runs import progress_bar
 from ...core.version import __version__
 from ...core.workers import connected, results
@@ -70,7 +69,6 @@ class _Study:
         return [row.as_list() for row in self.rows(point)]
 
 
-@explained
 def sweep(
     family: Family,
     grid: Mapping[str, Any],

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from ...core.errors import FileExistsRefusal, InputError
 from ...core.files import write_whole
 from ...core.frames import data_frame, needed
-from ...core.kinds import explained_class
 from .extremum import Extremum, refined_extremum
 from .picture import draw_curves
 from .points import Point, key_of
@@ -31,7 +30,6 @@ UNITS = {"relaxation_time": "collisions"}
 FILES = ("table.csv", "table.json")
 
 
-@explained_class
 @dataclass(frozen=True)
 class SweepTable:
     """What a sweep found.

@@ -12,12 +12,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ...core.kinds import explained_class
-
 PACKAGES = ("asperity", "numpy", "scipy", "numba")
 
 
-@explained_class
 @dataclass(frozen=True)
 class Machine:
     """The machine and the software on which times were measured.

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 
 # Least number of points of a fit with a confidence interval.
 FEWEST_POINTS = 3
@@ -21,7 +20,6 @@ ALLOWANCE = 0.15
 OrderVerdict = Literal["agrees", "differs", "not resolved"]
 
 
-@explained_class
 @dataclass(frozen=True)
 class FittedOrder:
     """The order p of error ~ size^-p, fitted in the logarithms.
@@ -60,7 +58,6 @@ class FittedOrder:
         return f"{self.order:.2f} [{self.low:.2f}, {self.high:.2f}]"
 
 
-@explained
 def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = None) -> FittedOrder | None:
     """Fit the order by least squares of log(error) on log(size); None for fewer than three different sizes.
 

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, finite_number, frozen
+from ...core.checks import Floats, finite_array, finite_number, frozen, sequence
 from ...core.errors import InputError
-from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 
 # Relative error of a value that counts as exact: rounding of a few thousand operations.
@@ -51,12 +50,11 @@ class ReferenceValue:
     source: str
     made_by: tuple[str, ...] = ()
 
-    @explained
     def __init__(self, value: ArrayLike, error: float, source: str, made_by: tuple[str, ...] = ()) -> None:
         object.__setattr__(self, "value", frozen(finite_array("value", value)))
         object.__setattr__(self, "error", finite_number("error", error))
         object.__setattr__(self, "source", str(source))
-        object.__setattr__(self, "made_by", tuple(made_by))
+        object.__setattr__(self, "made_by", sequence("made_by", made_by, str, "'panels'"))
         if self.error < 0.0:
             raise InputError(f"error: expected a number of at least 0, got {error!r}")
         if not self.source:
@@ -88,7 +86,6 @@ ARRAY_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({"Frobenius": frobenius,
 MATRIX_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({**ARRAY_NORMS, "operator": operator_norm})
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class WorkProblem:
     """A quantity with its reference values and error norms.
@@ -122,9 +119,10 @@ class WorkProblem:
     auto: str = "auto"
 
     def __post_init__(self) -> None:
-        given = (self.references,) if isinstance(self.references, ReferenceValue) else tuple(self.references)
-        if not given or not all(isinstance(reference, ReferenceValue) for reference in given):
-            raise InputError(f"references: expected at least one ReferenceValue, got {self.references!r}")
+        given = (self.references,) if isinstance(self.references, ReferenceValue) else self.references
+        given = sequence("references", given, ReferenceValue, "spec.ReferenceValue(0.5, 0.0, 'by hand')")
+        if not given:
+            raise InputError("references: expected at least one ReferenceValue, got none")
         shapes = {reference.value.shape for reference in given}
         if len(shapes) > 1:
             raise InputError(f"references: expected values of one shape, got {sorted(shapes)}")
@@ -149,7 +147,6 @@ class WorkProblem:
         return {name: norm(found - reference) for name, norm in self.norms.items()}
 
 
-@explained_class
 @dataclass(frozen=True, eq=False)
 class WorkMethod:
     """A method that computes the quantity of a problem.

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from ...core.checks import choice
 from ...core.errors import InputError
 from ...core.frames import data_frame
-from ...core.kinds import explained_class
 from ...core.tables import table, verbatim
 from .machine import Machine
 from .order import FittedOrder, fit_order
@@ -31,7 +31,6 @@ MARKERS = "osv^D<>Ph*X"
 DECADE = 10.0
 
 
-@explained_class
 @dataclass(frozen=True)
 class WorkRow:
     """One row of a report on error against run time.
@@ -67,8 +66,7 @@ class WorkRow:
     note: str = ""
 
     def __post_init__(self) -> None:
-        if self.status not in get_args(RowStatus):
-            raise InputError(f"status: expected one of {', '.join(get_args(RowStatus))}, got {self.status!r}")
+        choice("status", self.status, get_args(RowStatus))
         object.__setattr__(self, "budget", float(self.budget))
         object.__setattr__(self, "errors", MappingProxyType(dict(self.errors)))
         object.__setattr__(self, "seconds", tuple(map(float, self.seconds)))
@@ -152,7 +150,6 @@ class MethodFacts:
     floor: float
 
 
-@explained_class
 @dataclass(frozen=True)
 class WorkReport:
     """Errors and run times measured by `work_precision`.

@@ -14,7 +14,6 @@ from ...core.checks import Floats, positive_number, shortened, whole_number
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate
 from ...core.files import regular_file, text_of, write_whole
-from ...core.kinds import explained
 from ...kernels import KernelMatrix
 from .machine import Machine, on_few_cores
 from .problem import WorkMethod, WorkProblem
@@ -79,7 +78,6 @@ def _number(error: float) -> float | None:
     return float(error) if np.isfinite(error) else None
 
 
-@explained
 def work_precision(
     problem: WorkProblem,
     methods: Sequence[WorkMethod],

@@ -16,6 +16,8 @@ from asperity.estimates import Estimate
 
 ROOT = Path(asperity.__file__).parent
 RAISED = {"InputError", "WallError", "FileExistsRefusal", "AccuracyError", "warn"}
+# Checks whose last argument is an example.
+DOORS = {"instance", "sequence"}
 ADVICE = re.compile(r"\b(pass|use|take|give|call|write|for example|such as)\b", re.IGNORECASE)
 X, H = np.linspace(0.0, 1.0, 5), np.array([0.0, 0.2, 0.1, 0.3, 0.0])
 DISK, LAW, WALL, P = geo.Disk(), ker.lambertian(), geo.koch(1), ker.discretise(ker.lambertian(), ker.Bins(4))
@@ -129,8 +131,8 @@ def messages() -> list[str]:
     for file in sorted(files):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             name = isinstance(node, ast.Call) and getattr(node.func, "id", getattr(node.func, "attr", ""))
-            if name in RAISED and node.args:
-                text = text_of(node.args[0])
+            if (name in RAISED and node.args) or (name in DOORS and len(node.args) == 4):
+                text = text_of(node.args[0]) if name in RAISED else f"such as {text_of(node.args[3])}"
                 if ADVICE.search(text) and re.search(r"[(=]", text):
                     found.append(text)
     return found
@@ -157,11 +159,15 @@ def test_what_is_given_as_an_example_is_one():
     names = {
         **{name: getattr(room, name) for room in (geo, ker) for name in dir(room)},
         "Estimate": Estimate, "geo": geo, "ker": ker, "spec": spec, "wall": WALL, "law": LAW, "disk": DISK, "n": 3,
+        "container": geo.Container.circle(), "laws": ker.smooth(DISK), "position": [0.5, 0.0], "collisions": 3,
+        "velocity": [0.0, 1.0, 0.0],
     }  # fmt: skip
     examples = {
-        code for text in messages() for code in re.findall(r"such as ((?:geo\.|ker\.)?[A-Za-z]+\.?\w*\(.*)", text)
+        code
+        for text in messages()
+        for code in re.findall(r"such as ((?:geo\.|ker\.|spec\.)?[A-Za-z]+\.?\w*\(.*)", text)
     }
-    assert len(examples) >= 8
+    assert len(examples) >= 20
     for example in examples:
         end = next(k for k in range(1, len(example) + 1) if example[:k].count("(") == example[:k].count(")") > 0)
         assert eval(example[:end], names) is not None
@@ -169,10 +175,8 @@ def test_what_is_given_as_an_example_is_one():
 
 def test_every_message_that_advises_a_call_is_run_or_explained():
     known = [*REMEDIES, *EXPLAINED]
-    missing = [
-        text for text in messages()
-        if not any(words in text for words in known) and not re.search(r"such as (geo\.|ker\.)?[A-Za-z]\w+[.(]", text)
-    ]  # fmt: skip
+    example = re.compile(r"such as ((geo|ker|spec)\.)?[A-Za-z]\w+[.(]")
+    missing = [text for text in messages() if not any(words in text for words in known) and not example.search(text)]
     assert missing == []
 
 

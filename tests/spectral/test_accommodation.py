@@ -126,7 +126,7 @@ def test_the_default_angles_are_far_from_the_poles():
 
 
 def test_what_is_no_law_is_refused():
-    with pytest.raises(InputError, match="expected a law"):
+    with pytest.raises(InputError, match="expected a Law"):
         spec.accommodation(geo.flat())
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numbers as kinds_of_numbers
 import os
-from typing import Any, TypeAlias
+from collections.abc import Iterable
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import InputError
 
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 # What `generator` takes.
 Rng: TypeAlias = np.random.Generator | np.random.BitGenerator | np.random.SeedSequence | int | None
 # Characters of a value that a message repeats.
@@ -120,7 +122,41 @@ def instance(name: str, value: object, kind: type, example: str) -> None:
     """
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
-        raise InputError(f"{name}: expected {article} {kind.__name__} such as {example}, got {value!r}")
+        raise InputError(f"{name}: expected {article} {kind.__name__} such as {example}, got {shortened(value)}")
+
+
+def sequence(name: str, value: Iterable[T], kind: type[T] | None = None, example: str = "") -> tuple[T, ...]:
+    """The entries of a sequence, all of a kind where one is given.
+
+    Examples
+    --------
+    >>> sequence("counts", [2, "two"], int, "2")
+    Traceback (most recent call last):
+    asperity.errors.InputError: counts[1]: expected an int such as 2, got 'two'
+    """
+    try:
+        found = tuple(value)
+    except TypeError as reason:
+        raise InputError(f"{name}: expected a sequence, got {shortened(value)}") from reason
+    if kind is not None:
+        for index, entry in enumerate(found):
+            instance(f"{name}[{index}]", entry, kind, example)
+    return found
+
+
+def choice(name: str, value: object, options: Iterable[object]) -> None:
+    """Refuse what is none of the options, two or more.
+
+    Examples
+    --------
+    >>> choice("which", "most", ("min", "max"))
+    Traceback (most recent call last):
+    asperity.errors.InputError: which: expected 'min' or 'max', got 'most'
+    """
+    allowed = tuple(options)
+    if not np.isscalar(value) or value not in allowed:
+        *first, last = map(repr, allowed)
+        raise InputError(f"{name}: expected {', '.join(first)} or {last}, got {shortened(value)}")
 
 
 def positive_number(name: str, value: Any) -> float:

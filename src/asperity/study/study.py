@@ -13,11 +13,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..core.checks import Rng, generator, positive_number
+from ..core.checks import Rng, choice, generator, instance, positive_number
 from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
 from ..core.estimates import NORMAL_95, Estimate
 from ..core.files import moved_when_complete
-from ..core.kinds import explained
 from ..core.long_runs import progress_bar
 from ..core.tables import html_table
 from ..geometry import Disk, Wall, trace
@@ -112,7 +111,6 @@ class Study(StudyResult):
         return [*save_pictures(self, [target / name for name in pictures], dpi), *(target / name for name in DATA)]
 
 
-@explained
 def study_wall(
     wall: Wall,
     name: str = "wall",
@@ -161,6 +159,7 @@ def study_wall(
     >>> report.gap.verdict, report.matrix.method
     ('no gap', 'exact')
     """
+    instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
     positive_number("tolerance", tolerance)
     basis = Bins(bins)
     rng = generator(rng, 0)
@@ -194,8 +193,7 @@ def study_wall(
 
 def picture_names(picture_format: str) -> tuple[str, ...]:
     """The names of the pictures of a study in a format, which is checked."""
-    if picture_format not in FORMATS:
-        raise InputError(f"picture_format: expected one of {', '.join(FORMATS)}, got {picture_format!r}")
+    choice("picture_format", picture_format, FORMATS)
     return tuple(f"{Path(name).stem}.{picture_format}" for name in PICTURES)
 
 

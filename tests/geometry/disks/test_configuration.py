@@ -236,7 +236,7 @@ def test_the_true_disk_follows_the_cylinder_if_the_entry_is_transferred():
     ("make", "message"),
     [
         (lambda: geo.ConfigurationSpace(geo.koch(2), geo.Disk(), 5.0), "at most two satellites"),
-        (lambda: geo.ConfigurationSpace(geo.flat(), None, 0.1), "a Wall and a Disk"),
+        (lambda: geo.ConfigurationSpace(geo.flat(), None, 0.1), "disk: expected a Disk such as"),
         (lambda: geo.ConfigurationSpace(geo.koch(2), geo.Disk(), 0.1, np.pi / 50), "at most two satellites"),
         (lambda: geo.ConfigurationSpace(geo.flat(), geo.Disk(), 0.1).contains([0.0, 1.0]), r"shape \(..., 3\)"),
         (lambda: geo.ConfigurationSpace(geo.flat(), geo.Disk(), 0.1).cylinder_contains([0.0]), r"shape \(..., 3\)"),

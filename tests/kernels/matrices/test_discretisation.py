@@ -213,9 +213,9 @@ def test_the_specular_frame_is_exact_in_bases_that_the_flip_does_not_keep(basis:
     ("change", "message"),
     [
         ({"law": "flat"}, "law: expected a law"),
-        ({"basis": 12}, "basis: expected a basis"),
+        ({"basis": 12}, "basis: expected a Basis such as"),
         ({"basis": ker.Bins(4, weight="sin2")}, "weight 'sin'"),
-        ({"method": "guess"}, "method: expected one of auto"),
+        ({"method": "guess"}, "method: expected 'auto', "),
         ({"method": "exact"}, "it has quadrature, monte-carlo"),
         ({"method": "qmc"}, "it has quadrature, monte-carlo"),
         ({"tolerance": -1.0}, "tolerance"),
