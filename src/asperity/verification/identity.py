@@ -45,7 +45,8 @@ def verify(
     Verdict
             ``"proved"`` rests on an exact derivation. ``"refuted"`` has a counterexample: an exact point that meets the
             assumptions and at which both sides are defined. Balls that contain the two values show that the relation
-            fails. ``"undecided"`` names the reason; integrals, derivatives, sums and limits are not evaluated.
+            fails. ``"undecided"`` names the reason. Integrals over one symbol are refuted but never
+            proved; derivatives, sums and limits are not evaluated.
 
     Raises
     ------

@@ -92,7 +92,9 @@ class Search:
         parts = [part for side in (self.left, self.right) for part in _deciding(side)]
         # an inequality may fail between two zeros of the difference
         parts += [sp.expand(self.right - self.left)] if self.relation != "==" else []
-        found = dict.fromkeys(g for part in parts for g in sp.Mul.make_args(part) if g.free_symbols)
+        factors = (g for part in parts for g in sp.Mul.make_args(part) if g.free_symbols)
+        # the symbol of an integral is none of the domain
+        found = dict.fromkeys(g for g in factors if g.free_symbols <= set(self.domain.original))
         self.deciding = list(found)[:MOST_CRITICAL]
         self._critical = [place for g in self.deciding for place in _zeros(g)]
 
