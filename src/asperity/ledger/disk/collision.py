@@ -7,12 +7,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from ...geometry import Disk, Wall, rectangular_teeth, trace, triangular_teeth
+from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import contact_normal, foreshortening
 from ...verification import Verdict, agreement, every, verify
-from ..entry import Code, Formula, erratum, verified
-from ..symbols import sp, sym
+from ..entry import Code, row
 
 # Rounding error of a dozen reflections.
 TRACED = 1e-10
@@ -26,21 +27,21 @@ def explicit_matrices(m: Any, J: Any) -> list[list[list[Any]]]:
     return [[[1, 0, 0], [0, -1, 0], [0, 0, 1]], no_slip]
 
 
-@verified(
+@row(
     id="S2.19",
     section="2.3.1",
     equation="2.25",
-    statement="The matrices of smooth and no-slip collisions are those of specular reflection and retroreflection.",
-    printed=Formula(
-        r"A_{\text{smooth}} = \mathrm{diag}(1, -1, 1), \quad A_{\text{no-slip}} = \frac1{m + J} \begin{pmatrix}"
-        r" m - J & 0 & -2J \\ 0 & -m - J & 0 \\ -2m & 0 & J - m \end{pmatrix}",
-        explicit_matrices,
-    ),
-    perturbed=lambda m, J: explicit_matrices(J, m),
-    reason="They take −w(θ, ψ) to w(θ′, π − ψ) with θ′ = π − θ and θ′ = θ. The library's matrices, made from the "
-    "branches of the law, are the same.",
+    printed=r"A_{\text{smooth}} = \mathrm{diag}(1, -1, 1), \quad A_{\text{no-slip}} = \frac1{m + J} \begin{pmatrix}"
+    r" m - J & 0 & -2J \\ 0 & -m - J & 0 \\ -2m & 0 & J - m \end{pmatrix}",
+    right=explicit_matrices,
+    wrong=lambda m, J: explicit_matrices(J, m),
 )
 def matrices_of_the_two_laws(matrices: Code) -> Verdict:
+    """The matrices of smooth and no-slip collisions are those of specular reflection and retroreflection.
+
+    They take −w(θ, ψ) to w(θ′, π − ψ) with θ′ = π − θ and θ′ = θ. The library's matrices, made from the branches of the
+    law, are the same.
+    """
     smooth, no_slip = (sp.Matrix(rows) for rows in matrices(sym.m, sym.J))
 
     def outgoing(theta: Any) -> Any:
@@ -53,18 +54,18 @@ def matrices_of_the_two_laws(matrices: Code) -> Verdict:
     )
 
 
-@verified(
+@row(
     id="S2.20",
     section="2.3.1",
-    statement="Both matrices are involutions and isometries that conserve the rolling momentum and reverse v₂.",
-    printed=Formula(
-        r"A^2 = I, \quad A^{\mathsf T} M A = M, \quad \langle Aw, \tilde\chi\rangle = \langle w, \tilde\chi\rangle",
-        explicit_matrices,
-    ),
-    perturbed=lambda m, J: explicit_matrices(2 * m, J),
-    reason="Each is checked for all m and J. The no-slip matrix also reverses the slip v₁ + ω.",
+    printed=r"A^2 = I, \quad A^{\mathsf T} M A = M, \quad \langle Aw, \tilde\chi\rangle = \langle w, \tilde\chi\rangle",
+    right=explicit_matrices,
+    wrong=lambda m, J: explicit_matrices(2 * m, J),
 )
 def properties_of_the_two_matrices(matrices: Code) -> Verdict:
+    """Both matrices are involutions and isometries that conserve the rolling momentum and reverse v₂.
+
+    Each is checked for all m and J. The no-slip matrix also reverses the slip v₁ + ω.
+    """
     both = [sp.Matrix(rows) for rows in matrices(sym.m, sym.J)]
     slip = sp.Matrix([[1, 0, 1]])
     rolling = sp.Matrix([[-1, 0, 1]]) * sym.metric
@@ -77,22 +78,21 @@ def properties_of_the_two_matrices(matrices: Code) -> Verdict:
     )
 
 
-@erratum(
+@row(
     id="S2.24",
     section="2.3.4",
-    statement="The wall Ŵ for which the disk feels the wall W: which way it is stretched.",
-    printed=Formula(
-        r"\hat W = \{(x_1, x_2) : (x_1, (1 + m/J)^{-1/2} x_2) \in W\}", lambda x1, x2, factor: (x1, factor * x2)
-    ),
-    corrected=Formula(
-        r"\hat W = \{(x_1, x_2) : ((1 + m/J)^{-1/2} x_1, x_2) \in W\}, \text{ or up to scale }"
-        r" (x_1, (1 + m/J)^{1/2} x_2) \in W",
-        lambda x1, x2, factor: (x1, x2 / factor),
-    ),
-    reason="The disk sees the wall compressed along x, so it must be stretched along x, or flattened. The printed one "
-    "is deepened, and the disk feels it deeper still.",
+    printed=r"\hat W = \{(x_1, x_2) : (x_1, (1 + m/J)^{-1/2} x_2) \in W\}",
+    wrong=lambda x1, x2, factor: (x1, factor * x2),
+    corrected=r"\hat W = \{(x_1, x_2) : ((1 + m/J)^{-1/2} x_1, x_2) \in W\}, \text{ or up to scale }"
+    r" (x_1, (1 + m/J)^{1/2} x_2) \in W",
+    right=lambda x1, x2, factor: (x1, x2 / factor),
 )
 def wall_that_is_felt_as_given(point: Code) -> Verdict:
+    """The wall Ŵ for which the disk feels the wall W: which way it is stretched.
+
+    The disk sees the wall compressed along x, so it must be stretched along x, or flattened. The printed one is
+    deepened, and the disk feels it deeper still.
+    """
     x1, x2 = sp.symbols("x1 x2", real=True)
     factor = foreshortening(sym.m, sym.J, sp)
     felt1, felt2 = factor * x1, x2
@@ -101,19 +101,20 @@ def wall_that_is_felt_as_given(point: Code) -> Verdict:
     return verify([factor * given1, factor * given2], [felt1, felt2])
 
 
-@verified(
+@row(
     id="S2.25",
     section="2.3.4",
-    statement="The smooth and the no-slip law are symmetric with respect to Λ² and keep the rolling component.",
-    printed=Formula(
-        r"(\theta, \psi) \mapsto (\pi - \theta, \pi - \psi), \quad (\theta, \psi) \mapsto (\theta, \pi - \psi)",
-        lambda theta, psi, xp: [(xp.pi - theta, xp.pi - psi), (theta, xp.pi - psi)],
-    ),
-    perturbed=lambda theta, psi, xp: [(xp.pi / 2 - theta, xp.pi - psi), (theta, xp.pi - psi)],
-    reason="Both maps are involutions under which the density sin θ sin²ψ is invariant. cos ψ changes its sign because "
-    "the velocity is reversed.",
+    printed=r"(\theta, \psi) \mapsto (\pi - \theta, \pi - \psi), \quad (\theta, \psi) \mapsto (\theta, \pi - \psi)",
+    right=lambda theta, psi, xp: [(xp.pi - theta, xp.pi - psi), (theta, xp.pi - psi)],
+    wrong=lambda theta, psi, xp: [(xp.pi / 2 - theta, xp.pi - psi), (theta, xp.pi - psi)],
 )
 def symmetry_of_the_two_laws(maps: Code) -> Verdict:
+    """The smooth and the no-slip law are symmetric with respect to Λ² and keep the rolling component.
+
+    Both maps are involutions under which the density sin θ sin²ψ is invariant. cos ψ changes its sign because the
+    velocity is reversed.
+    """
+
     def check(index: int) -> Verdict:
         theta, psi = maps(sym.theta, sym.psi, sp)[index]
         again = maps(theta, psi, sp)[index]
@@ -161,21 +162,21 @@ def bounce_on_the_cylinder(disk: Disk, wall: Wall, at: Any, velocity: Any) -> An
     return np.full(3, np.nan)
 
 
-@verified(
+@row(
     id="S2.28",
     section="5.1, 1.3.7",
     equation="3.10 and the law of rough collisions",
-    statement="On the cylinder a collision is reflection by the foreshortened wall, and free along χ.",
-    printed=Formula(
-        r"K_{\mathrm{cyl}}(\theta, \psi) = (P^{\tilde\Sigma}(\theta), \pi - \psi)",
-        lambda wall, disk: wall.foreshorten(disk),
-    ),
-    perturbed=lambda wall, disk: wall.unforeshorten(disk),
-    reason="Simulated in three dimensions with the kinetic-energy normal, the disk leaves as the particle of the "
-    "foreshortened wall does. With the inverse exponent the angles differ.",
     kind="numeric",
+    printed=r"K_{\mathrm{cyl}}(\theta, \psi) = (P^{\tilde\Sigma}(\theta), \pi - \psi)",
+    right=lambda wall, disk: wall.foreshorten(disk),
+    wrong=lambda wall, disk: wall.unforeshorten(disk),
 )
 def decoupling_on_the_cylinder(felt: Code) -> Verdict:
+    """On the cylinder a collision is reflection by the foreshortened wall, and free along χ.
+
+    Simulated in three dimensions with the kinetic-energy normal, the disk leaves as the particle of the foreshortened
+    wall does. With the inverse exponent the angles differ.
+    """
     rng = np.random.default_rng(5)
     found, expected = [], []
     for _ in range(60):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...verification import Verdict, agreement, every
-from ..entry import Code, Formula, verified
+from ..entry import Code, row
 from ..samples import generator
 
 EPS = 1e-6
@@ -16,21 +16,21 @@ RAYS = 40
 DEPTH = 0.7
 
 
-@verified(
+@row(
     id="S4.23",
     section="3, 5",
-    statement="As ε → 0 a disk whose one satellite meets the wall by the impulse law leaves as a ray does that is "
-    "reflected in the foreshortened wall.",
     kind="numeric",
-    printed=Formula(
-        r"\theta' = P^{\widetilde W}(x, \theta),\quad \widetilde W = \{((1 + m/J)^{-1/2}x_1, x_2) : x\in W\}",
-        lambda m, J: (1 + m / J) ** -0.5,
-    ),
-    perturbed=lambda m, J: (1 + m / J) ** -0.25,
-    reason="The satellite's path is followed exactly, as a point of the turning rim, and reflected by eq. 3.2. The "
-    "angles agree to the order of ε, all but those of rays that pass next to a corner.",
+    printed=r"\theta' = P^{\widetilde W}(x, \theta),\quad \widetilde W = \{((1 + m/J)^{-1/2}x_1, x_2) : x\in W\}",
+    right=lambda m, J: (1 + m / J) ** -0.5,
+    wrong=lambda m, J: (1 + m / J) ** -0.25,
 )
 def limit_of_the_disk(factor: Code) -> Verdict:
+    """As ε → 0 a disk whose one satellite meets the wall by the impulse law leaves as a ray does that is reflected in
+    the foreshortened wall.
+
+    The satellite's path is followed exactly, as a point of the turning rim, and reflected by eq. 3.2. The angles agree
+    to the order of ε, all but those of rays that pass next to a corner.
+    """
     from ...geometry import Wall
     from ...geometry.tracing.tracing import trace
 
