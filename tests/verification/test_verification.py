@@ -186,6 +186,9 @@ PROVED = {
     "complementary arcs, where both are defined": (sp.asin(x) + sp.acos(x), pi / 2, []),
     "nested roots": (sp.sqrt(2 + sp.sqrt(3)), (sp.sqrt(6) + sp.sqrt(2)) / 2, []),
     "steps": (sp.floor(x), 0, [x >= 0, x < 1]),
+    "a sum as it is written": (
+        sp.exp(sp.Add(x + half, sp.exp(11), evaluate=False)), sp.exp(x + half) * sp.exp(sp.exp(11)), [],
+    ),
     "few integers": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 1, n <= 3]),
     "logarithms where both are defined": (sp.log(x**2), 2 * sp.log(x), []),
     "powers": (p ** (x + y), p**x * p**y, []),

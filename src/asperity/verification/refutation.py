@@ -56,9 +56,13 @@ def _zeros(g: Any) -> list[tuple[Any, Any]]:
     if len(g.free_symbols) != 1 or sp.count_ops(g) > LARGEST:
         return []
     (symbol,) = g.free_symbols
-    if not g.is_polynomial(symbol) or sp.degree(g, symbol) != 2:
+    try:
+        polynomial = sp.Poly(g, symbol)
+    except sp.PolynomialError:
         return []
-    c, b, a = (sp.Poly(g, symbol).nth(k) for k in range(3))
+    if polynomial.degree() != 2:
+        return []
+    c, b, a = (polynomial.nth(k) for k in range(3))
     root = sp.sqrt(sp.expand(b**2 - 4 * a * c))
     return [(symbol, (sign * root - b) / (2 * a)) for sign in (1, -1)] if root.is_real else []
 

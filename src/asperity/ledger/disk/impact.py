@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from ...geometry import mushrooms
+from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import contact_normal
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
@@ -23,7 +25,7 @@ from ..samples import generator
     wrong=lambda beta, xp: xp.cos(beta),
 )
 def impulsive_torque(torque: Code) -> Verdict:
-    """The impulse λk at the contact σ turns the disk by the impulsive torque λ sin β, β from k to x - σ.
+    """The impulsive torque of the impulse λk at the contact σ, with β from k to x - σ.
 
     It is the vector product of σ - x with λk. β is counted counterclockwise.
     """
@@ -48,8 +50,6 @@ def range_of_the_arm(interval: Code) -> Verdict:
     A vertical side of a tooth has β = π/2 + α, and the lower side of a cap comes as close to -π and π as one likes. No
     formula uses the range.
     """
-    from ...geometry.walls.mushroom import mushrooms
-
     low, high = interval()
     normals = []
     for piece in mushrooms(0.3, 0.4).pieces:
@@ -79,8 +79,6 @@ def arm_of_a_satellite(sine: Code) -> Verdict:
 
     As printed it is that of the satellite S_0. At S_j the arm is turned by jρ more.
     """
-    from ...geometry.disk import rolling
-
     direction, x1, x2, turn = sp.symbols("direction x1 x2 turn", real=True)
     k = sp.cos(direction), sp.sin(direction)
     s1, s2 = rolling.satellite(x1, x2, sym.alpha + turn, 1, sp)
@@ -157,8 +155,7 @@ def _struck(body: Any, contact: Any, impulse: Any) -> Any:
     wrong=lambda mass, inertia: 3.9 * np.maximum(mass, inertia),
 )
 def energy_of_the_heavy_body(bound: Code) -> Verdict:
-    """A heavy body at rest takes up little energy: E₂ is at most 4 max(M₁/M₂, J₁/J₂) times the whole, given that
-    momentum and spin are exchanged and energy is kept.
+    """A heavy body at rest takes up little energy, given that momentum and spin are exchanged and energy is kept.
 
     v₂' = (M₁/M₂)(v₁ - v₁'), and each of the two has at most the whole energy. Head-on impacts come as close to the
     constant 4 as one likes.

@@ -41,7 +41,7 @@ def satellites_of_the_rotated_disk(satellite: Code) -> Verdict:
     wrong=lambda spacing: 1 - spacing**2,
 )
 def inner_disk_is_clear_of_the_wall(radius: Code) -> Verdict:
-    """The inner disk D₀, of radius 1 − 2ρ², never touches the wall: satellites do.
+    """The inner disk D₀ never touches the wall: satellites do.
 
     The lowest satellite is within ρ/2 of the vertical, so the disk sinks at most ε + 1 − cos(ρ/2). That is less than
     2ρ² if ε ≤ 15/8 ρ², for which 2 is the best constant; for ε of smaller order than ρ² it is 1/8.

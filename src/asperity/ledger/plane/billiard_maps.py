@@ -6,6 +6,7 @@ import numpy as np
 import sympy as sp
 
 from ...core.checks import Floats
+from ...geometry import focusing_arcs, trace
 from ...verification import Verdict, agreement, every, holds, verify
 from ..entry import Code, by_reading, row
 from ..samples import generator
@@ -19,6 +20,11 @@ def _states() -> tuple[Floats, Floats]:
     """Random points (2, n) of the table and inward unit directions."""
     rng = generator()
     t, angle = rng.uniform(0, 2 * np.pi, STATES), rng.uniform(0.05, np.pi - 0.05, STATES)
+    return _from_coordinates(t, angle)
+
+
+def _from_coordinates(t: Floats, angle: Floats) -> tuple[Floats, Floats]:
+    """Points of the ellipse's parameter and directions of the angle from the tangent (n2, -n1)."""
     q = AXES * np.stack([np.cos(t), np.sin(t)])
     n = _normal(q)
     return q, np.sin(angle) * n + np.cos(angle) * np.stack([n[1], -n[0]])
@@ -59,7 +65,7 @@ def reversal(q: Floats, p: Floats) -> tuple[Floats, Floats]:
     wrong=lambda q, p: reflection(*billiard_map(*reversal(q, p))),
 )
 def inverse_of_the_billiard_map(inverse: Code) -> Verdict:
-    """-R ∘ Φ ∘ -R is a left inverse of the billiard map Φ.
+    """A left inverse of the billiard map Φ, by the reversal -R.
 
     -R turns the path round. In the proof (q', p') = Gᵗ(q, p) lies in U⁻, not in U⁺.
     """
@@ -78,12 +84,10 @@ def inverse_of_the_billiard_map(inverse: Code) -> Verdict:
     wrong=lambda m, n: m + n,
 )
 def iterates_of_the_billiard_map(power: Code) -> Verdict:
-    """-R ∘ Φⁿ ∘ -R ∘ Φᵐ = Φ^(m-n), and hence the reflection law of a wall is an involution.
+    """Iterates of the billiard map between two reversals, and hence the reflection law of a wall is an involution.
 
     It is row S6.01 n times. In the definition of M, U⁺ is to be V⁻.
     """
-    from ...geometry import focusing_arcs, trace
-
     state = _states()
     verdicts = []
     for m, n in ((3, 1), (5, 2), (4, 4)):
@@ -114,7 +118,7 @@ def iterates_of_the_billiard_map(power: Code) -> Verdict:
     wrong=lambda angle: np.ones_like(angle),
 )
 def invariant_measure(density: Code) -> Verdict:
-    """Φ preserves ⟨p, n⟩ dσ dτ: sin(angle) times arc length times angle.
+    """The measure that Φ preserves: sin(angle) times arc length times angle.
 
     The Jacobian in arc length and angle is taken by central differences. It is the ratio of the sines.
     """
@@ -141,10 +145,8 @@ def _speed(t: Floats) -> Floats:
 
 
 def _in_coordinates(t: Floats, angle: Floats) -> Floats:
-    """The billiard map in the ellipse's parameter and the angle of the direction from the tangent (n2, -n1)."""
-    q = AXES * np.stack([np.cos(t), np.sin(t)])
-    n = _normal(q)
-    q, p = billiard_map(q, np.sin(angle) * n + np.cos(angle) * np.stack([n[1], -n[0]]))
+    """The billiard map in the coordinates of `_from_coordinates`."""
+    q, p = billiard_map(*_from_coordinates(t, angle))
     n = _normal(q)
     along = np.sum(p * np.stack([n[1], -n[0]]), axis=0)
     return np.stack([np.arctan2(q[1] / AXES[1], q[0] / AXES[0]), np.arctan2(np.sum(p * n, axis=0), along)])

@@ -38,9 +38,11 @@ def every_arc(check: Code) -> Verdict:
     return every(*(check(xi) for xi in HALF_ANGLES))
 
 
-def rays() -> tuple[Any, Any]:
+def rays(xi: float) -> tuple[Any, Any, Any]:
+    """Entry points, angles, and positions of the first hit."""
     rng = np.random.default_rng(4)
-    return rng.random(RAYS), rng.uniform(0.05, np.pi - 0.05, RAYS)
+    x, theta = rng.random(RAYS), rng.uniform(0.05, np.pi - 0.05, RAYS)
+    return x, theta, first_hit(x, theta, xi)
 
 
 def step_and_hits(theta: Any, gamma: Any, xi: float, rounded: Code = np.ceil) -> tuple[Any, Any]:
@@ -130,8 +132,7 @@ def hits_on_an_arc(step_and_number: Code) -> Verdict:
     """
 
     def check(xi: float) -> Verdict:
-        x, theta = rays()
-        gamma = first_hit(x, theta, xi)
+        x, theta, gamma = rays(xi)
         hits = trace(focusing_arcs(xi), x, theta).collisions
         decided = ~undecided(theta, gamma, xi)
         step, number = step_and_number(theta, gamma, xi)
@@ -168,8 +169,7 @@ def outgoing_angle_of_an_arc(angle: Code) -> Verdict:
     """
 
     def check(xi: float) -> Verdict:
-        x, theta = rays()
-        gamma = first_hit(x, theta, xi)
+        x, theta, gamma = rays(xi)
         decided = ~undecided(theta, gamma, xi)
         x, theta, gamma = x[decided], theta[decided], gamma[decided]
         out = trace(focusing_arcs(xi), x, theta).theta
@@ -228,8 +228,8 @@ def range_of_the_arccosine(condition: Code) -> Verdict:
     """
 
     def check(xi: float) -> Verdict:
-        x, theta = rays()
-        return holds(condition(theta, first_hit(x, theta, xi)), "rays", x=x, theta=theta)
+        x, theta, gamma = rays(xi)
+        return holds(condition(theta, gamma), "rays", x=x, theta=theta)
 
     # a ray hits the arc at gamma from inside if and only if it moves along the outward normal there
     rng = np.random.default_rng(5)
@@ -257,9 +257,9 @@ def first_hit_from_the_entry(position: Code) -> Verdict:
     """
 
     def check(xi: float) -> Verdict:
-        x, theta = rays()
+        x, theta, gamma = rays(xi)
         delta = np.arccos(x * np.cos(theta - xi) + (1 - x) * np.cos(theta + xi))
-        return agreement(position(theta, delta), first_hit(x, theta, xi), TRACED, x=x, theta=theta)
+        return agreement(position(theta, delta), gamma, TRACED, x=x, theta=theta)
 
     return every_arc(check)
 

@@ -14,7 +14,7 @@ from ...kernels.laws.crevice import crevice_retro
 from ...kernels.walls.rectangular import RectangularTeethLaw
 from ...verification import Verdict, agreement, verify
 from ..entry import Code, row
-from ..entry_probability import FRACTION_ERROR, fraction
+from ..simulated import FRACTION_ERROR, fraction
 
 HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)
 
@@ -38,20 +38,9 @@ def compared_with_tracing(probability: Code, low: float) -> Verdict:
     return agreement(found, traced, FRACTION_ERROR, height_to_width=ratios[:, None], theta=theta)
 
 
-def crossings(height_to_width: float, theta: Any) -> Any:
-    """The whole and fractional parts of d = 2 r |cot theta|."""
-    return np.divmod(2 * height_to_width / np.abs(np.tan(theta)), 1.0)
-
-
 def exchanged_cases(height_to_width: float, theta: Any) -> Any:
-    """p_r as printed."""
-    whole, rest = crossings(height_to_width, theta)
-    return np.where(whole % 2 == 0, 0.5 + 0.5 * rest, 1.0 - 0.5 * rest)
-
-
-def exchanged_cases_of_the_crevice(height_to_width: float, theta: Any) -> Any:
-    """The conditional probability as printed."""
-    whole, rest = crossings(height_to_width, theta)
+    """The conditional probability for a crevice as printed; p_r as printed is the mean of 1 and this."""
+    whole, rest = np.divmod(2 * height_to_width / np.abs(np.tan(theta)), 1.0)
     return np.where(whole % 2 == 0, rest, 1.0 - rest)
 
 
@@ -61,7 +50,7 @@ def exchanged_cases_of_the_crevice(height_to_width: float, theta: Any) -> Any:
     kind="numeric",
     printed=r"p_r(\theta) = \begin{cases} \frac12 + \frac12\{d\} & \lfloor d \rfloor \text{ even} \\"
     r" 1 - \frac12\{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
-    wrong=exchanged_cases,
+    wrong=lambda ratio, theta: 0.5 + 0.5 * exchanged_cases(ratio, theta),
     corrected=r"p_r(\theta) = \begin{cases} 1 - \frac12\{d\} & \lfloor d \rfloor \text{ even} \\"
     r" \frac12 + \frac12\{d\} & \lfloor d \rfloor \text{ odd} \end{cases}, \quad d = 2r\,|\cot\theta|",
     right=lambda ratio, theta: RectangularTeethLaw(ratio).branches(theta)[0][..., 0],
@@ -81,7 +70,7 @@ def specular_fraction_of_rectangular_teeth(probability: Code) -> Verdict:
     kind="numeric",
     printed=r"\begin{cases} \{d\} & \lfloor d \rfloor \text{ even} \\"
     r" 1 - \{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
-    wrong=exchanged_cases_of_the_crevice,
+    wrong=exchanged_cases,
     corrected=r"\begin{cases} 1 - \{d\} & \lfloor d \rfloor \text{ even} \\"
     r" \{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
     right=lambda ratio, theta: 1.0 - crevice_retro(ratio, theta),

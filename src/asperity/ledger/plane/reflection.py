@@ -19,10 +19,10 @@ REFLECTED = 1e-10
 STEP, DIFFERENTIATED = 1e-5, 1e-4
 
 
-def rays(margin: float = 0.2) -> tuple[Any, Any]:
+def rays() -> tuple[Any, Any]:
     """Entry points and angles, away from grazing."""
     rng = np.random.default_rng(1)
-    return rng.random(RAYS), rng.uniform(margin, np.pi - margin, RAYS)
+    return rng.random(RAYS), rng.uniform(0.2, np.pi - 0.2, RAYS)
 
 
 @row(

@@ -13,7 +13,7 @@ from ...geometry.disk.disk import foreshortening
 from ...kernels.walls.triangular import TriangularTeethLaw
 from ...verification import Verdict, agreement, every, holds, verify
 from ..entry import Code, row
-from ..entry_probability import FRACTION_ERROR, fraction
+from ..simulated import FRACTION_ERROR, fraction
 
 APEX_ANGLES = (0.35, 0.9, 1.6, 2.4)
 ENTRIES = 2000
@@ -131,7 +131,7 @@ def outgoing_angles_of_triangular_teeth(angles: Code) -> Verdict:
     wrong=lambda psi, theta: np.floor(2 * theta / psi),
 )
 def number_of_hits(most: Code) -> Verdict:
-    """N = ⌈2θ/ψ⌉ is the number of triangles that the extreme ray crosses, so that there are N − 1 or N hits.
+    """The number N of triangles that the extreme ray crosses, so that there are N − 1 or N hits.
 
     Unfolded about the bottom, the sides are rays at multiples of ψ. Traced rays with θ ≤ (π − ψ)/2 hit N − 1 or N
     times.

@@ -9,7 +9,8 @@ from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, row
-from ..samples import clearance, generator, is_free, residual, satellites
+from ..samples import generator, residual
+from ..simulated import clearance, is_free, satellites
 
 SATELLITES = 40
 SPACING = 2 * np.pi / SATELLITES
@@ -62,7 +63,7 @@ def periods_of_the_configurations(shift: Code) -> Verdict:
     wrong=lambda eps, rho: -eps - rho**2 / 9,
 )
 def heights_of_the_boundary(bound: Code) -> Verdict:
-    """The boundary of M lies between the heights -ε - ρ²/8 and 0.
+    """The heights between which the boundary of M lies.
 
     Halfway between two satellites the rim is 1 - cos(ρ/2) ≤ ρ²/8 above the lowest point, and the bound is attained to
     ρ⁴/384 where both are over bottoms. The -ρ²/2 in the proof of Prop. 4.8 is weaker and also true.
@@ -257,7 +258,7 @@ def rolling_from_rest(claim: Code) -> Verdict:
     wrong=lambda rho, xp: rho,
 )
 def distance_of_satellites(distance: Code) -> Verdict:
-    """Adjacent satellites are 2 sin(ρ/2) apart.
+    """The distance of adjacent satellites.
 
     It is the chord of the arc ρ. Where the text says 'any two satellites' it means adjacent ones.
     """

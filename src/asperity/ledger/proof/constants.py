@@ -8,9 +8,10 @@ import numpy as np
 import sympy as sp
 
 from ...geometry.disk import rolling
+from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, no_excess, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator, masses, unit_velocities
+from ..samples import generator, random_disks, unit_velocities
 
 
 @row(
@@ -22,15 +23,14 @@ from ..samples import generator, masses, unit_velocities
     wrong=lambda eps, omega: eps**2 * omega**2,
 )
 def acceleration_of_the_contact(acceleration: Code) -> Verdict:
-    """The contact of a freely moving disk runs on a path of constant acceleration ε ω².
+    """The contact of a freely moving disk runs on a path of constant acceleration.
 
     The path is a point of a turning circle of radius 1/ε. What follows uses |ω| ≤ 1, that is J ≥ 1.
     """
     x1, x2, bar, v1, v2, omega, t = sp.symbols("x1 x2 bar v1 v2 omega t", real=True)
-    eps = sp.Symbol("epsilon", positive=True)
-    path = rolling.satellite(x1 + t * v1, x2 + t * v2, bar + t * omega, eps, sp)
+    path = rolling.satellite(x1 + t * v1, x2 + t * v2, bar + t * omega, sym.epsilon, sp)
     square = sum(sp.diff(part, t, 2) ** 2 for part in path)
-    return verify(sp.sqrt(sp.simplify(square)), acceleration(eps, omega))
+    return verify(sp.sqrt(sp.simplify(square)), acceleration(sym.epsilon, omega))
 
 
 @row(
@@ -75,8 +75,8 @@ def direction_of_the_rolling(direction: Code) -> Verdict:
 
     Q is f*, which has -ε⁻¹ sin. What is printed does not tend to χ = (-1, 0, 1)/(m + J)^(1/2) as ε does to 0.
     """
-    s1, s2, alpha = sp.symbols("s1 s2 alpha", real=True)
-    eps = sp.Symbol("epsilon", positive=True)
+    s1, s2 = sp.symbols("s1 s2", real=True)
+    alpha, eps = sym.alpha, sym.epsilon
     configuration = (*rolling.roll(s1, s2, alpha, eps, sp), alpha)
     return every(
         verify([sp.diff(part, alpha) for part in configuration], direction(eps * alpha, sp)),
@@ -143,8 +143,7 @@ def denominator_of_the_estimate(bound: Code) -> Verdict:
     Only ⟨n₁, p'⟩ is small; ⟨p', χ̃⟩ is not. The factor of eq. 3.119 becomes (1 + m/J)^(1/2), which is the printed √2 if
     and only if m = J.
     """
-    rng = generator()
-    m, J = masses(rng)
+    rng, m, J = random_disks()
     direction = np.where(rng.random(m.size) < 0.1, 0.0, rng.uniform(0, 2 * np.pi, m.size))
     along = m * np.cos(direction) / np.sqrt(m) / np.sqrt(m + J)
     root = np.sqrt(1 - along**2)
@@ -194,7 +193,7 @@ def distance_along_a_curve(bound: Code) -> Verdict:
     wrong=lambda: (78, 79),
 )
 def sum_of_the_constants(bounds: Code) -> Verdict:
-    """12/5 + 24√10 is at most 79, and with the first step at most 80, and no less whole number will do.
+    """The least whole numbers that bound the sum of the constants, without and with the first step.
 
     The second sum is 79.295. The other estimates of step 4 and eqs. 3.142-3.149 are steps of a proof and rest on
     reading.

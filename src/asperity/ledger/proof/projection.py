@@ -12,7 +12,7 @@ from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import frame_rows
 from ...verification import Verdict, every, holds, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator, masses
+from ..samples import generator, random_disks
 
 
 def _orthonormal(s1: Any, s2: Any) -> Any:
@@ -30,7 +30,7 @@ def _orthonormal(s1: Any, s2: Any) -> Any:
     wrong=lambda m, J, xp: (1 + m / J) ** xp.Rational(1, 2),
 )
 def compression_of_the_wall(factor: Code) -> Verdict:
-    """The cross section of M_cyl, in orthonormal coordinates, is the wall compressed along x₁ by (1 + m/J)^(-1/2).
+    """The cross section of M_cyl, in orthonormal coordinates, is the wall compressed along x₁.
 
     χ⊥ and ê₂ are orthonormal, and x₁ + α and x₂ are what a point of M_cyl shows of itself along them. The common factor
     m^(1/2) changes no angle.
@@ -129,8 +129,7 @@ def covering_by_squares(factor: Code) -> Verdict:
 
     A step has to turn the disk by ε, and χ turns by (m + J)^(-1/2). As printed it does so if and only if J = 1.
     """
-    rng = generator()
-    m, J = masses(rng)
+    rng, m, J = random_disks()
     step = factor(m, J) / np.sqrt(m + J)  # of alpha, in units of eps; x1 changes by the opposite amount
     x1, alpha = rng.uniform(-40, 40, (2, m.size))
     # half of the points are next to the edges

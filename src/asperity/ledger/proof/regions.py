@@ -9,7 +9,7 @@ from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator, kinetic_norm, masses, residual, unit_velocities
+from ..samples import generator, kinetic_norm, random_disks, residual, unit_velocities
 
 good_states = by_reading(
     id="S5.31",
@@ -59,8 +59,7 @@ def shift_of_the_bands(shift: Code) -> Verdict:
 
     The bands have height ρ/(2εk), and χ turns by (m + J)^(-1/2). The text has x₁ and x₁ + α interchanged, too.
     """
-    rng = generator()
-    m, J = masses(rng, 400)
+    rng, m, J = random_disks(400)
     bands = 12
     band = 1 / (2 * bands)  # for rho/eps = 1
     alpha = rng.uniform(-0.5, 0.5, 400)
@@ -169,8 +168,7 @@ def size_of_a_displacement(bound: Code) -> Verdict:
     The displacement (-1, 0, 1) has G₀ = 0 and the norm (m + J)^(1/2). The final bound is O(1/log(1/ρ)) and not
     80/log(1/ρ)³, which still vanishes.
     """
-    rng = generator()
-    m, J = masses(rng)
+    rng, m, J = random_disks()
     y = rng.normal(size=(3, m.size))
     y[:2, ::4] = np.stack([-y[2], 0 * y[2]])[:, ::4]
     y[2, 1::4] = 0
@@ -248,8 +246,7 @@ def bound_of_the_spin(bound: Code) -> Verdict:
     As printed it needs J ≥ 1, but a unit disk has J ≤ m. In general constants change by J^(-1/2), and v₂ is ⟨w, e₂⟩/m
     in Claim 5.2.2.
     """
-    rng = generator()
-    m, J = masses(rng)
+    rng, m, J = random_disks()
     w = unit_velocities(rng, m, J)
     # for J > 1 the printed bound also holds; only its claim for light rims is tested
     spin = np.stack([0 * J, 0 * J, bound(J)])

@@ -9,7 +9,8 @@ from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator, is_free, kinetic_norm, masses, tooth
+from ..samples import generator, kinetic_norm, random_disks
+from ..simulated import is_free, tooth
 
 
 @row(
@@ -102,8 +103,7 @@ def size_of_the_straightening(bound: Code) -> Verdict:
     The norm is the kinetic one, and the text takes m = 1. It is of the order ρ² for every m, and the bound is attained
     up to a factor 1 + ρ/5, because the second coordinate alone moves by 1 - cos(ρ/2).
     """
-    rng = generator()
-    m, J = masses(rng)
+    rng, m, J = random_disks()
     rho = rng.uniform(0, 4, m.size)
     moved = np.stack([*rolling.bend(0.0, 0.0, rng.uniform(-0.5, 0.5, m.size) * rho, 1.0), 0 * rho])
     end = np.sqrt(m) * (0.5 * rho - np.sin(0.5 * rho) + 1 - np.cos(0.5 * rho))
@@ -142,8 +142,7 @@ def point_of_the_shifted_wall(point: Code) -> Verdict:
     wrong=lambda bar, xp: -(bar**2) / 2,
 )
 def graph_of_the_bent_plane(graph: Code) -> Verdict:
-    """u = cos ᾱ - 1 is the graph that H₁ makes of the plane x₂ = 0, concave between the gaps; sliding along χ keeps
-    M_cyl.
+    """The graph u that H₁ makes of the plane x₂ = 0, concave between the gaps; sliding along χ keeps M_cyl.
 
     The second derivative of u is -cos ᾱ < 0. M_cyl depends on x₁ + α and x₂ only, which χ̃ = (-1, 0, 1) of either sign
     keeps.

@@ -11,7 +11,9 @@ from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, row
-from ..samples import generator, kinetic_norm, masses, unit_velocities
+from ..samples import generator, kinetic_norm, random_disks, unit_velocities
+
+VELOCITY = sym.v1, sym.v2, sym.omega
 
 
 @row(
@@ -31,8 +33,7 @@ def transversal_velocities(floor: Code) -> Verdict:
     The gradient of u has norm J^(-1/2) |sin ᾱ|, and |ω| is at most J^(-1/2); the floor is sharp up to a factor 1 +
     O(ρ²). The printed set is right for m = J = 1.
     """
-    rng = generator()
-    m, J = masses(rng)
+    rng, m, J = random_disks()
     rho = rng.uniform(0.01, 1, m.size)
     w = unit_velocities(rng, m, J)
     low = floor(m, J, rho)
@@ -64,8 +65,7 @@ def projection_along_velocities(project: Code) -> Verdict:
 
     ⟨y, e₂⟩/⟨w, e₂⟩ is x₂/v₂ for every m. The null space of the differential is spanned by (w, 0).
     """
-    y, t = sp.symbols("x1 x2 alpha", real=True), sp.Symbol("t", real=True)
-    w = (sp.Symbol("v1", real=True), sp.Symbol("v2", positive=True), sp.Symbol("omega", real=True))
+    y, w, t = (sym.x1, sym.x2, sym.alpha), VELOCITY, sp.Symbol("t", real=True)
     image = sp.Matrix(project(*y, *w))
     moved = project(*(a + t * b for a, b in zip(y, w, strict=True)), *w)
     on_the_plane = project(y[0], 0, y[2], *w)
@@ -139,10 +139,6 @@ def _mirrored_differential(bar: Any, velocity: Any, xp: Any) -> Any:
     return [[2 * (i == j) - right[i][j] for j in (0, 1)] for i in (0, 1)]
 
 
-def _velocity(sp: Any) -> Any:
-    return sp.Symbol("v1", real=True), sp.Symbol("v2", positive=True), sp.Symbol("omega", real=True)
-
-
 @row(
     id="S5.09",
     section="5.2",
@@ -158,7 +154,7 @@ def transfer_of_the_entry(transfer: Code) -> Verdict:
 
     The printed map is built from H₁⁻¹. It is recomputed from F, f_lin and the time of flight.
     """
-    x1, w = sp.Symbol("x1", real=True), _velocity(sp)
+    x1, w = sym.x1, VELOCITY
     s1, s2 = rolling.straight_contact(x1, 0, sym.alpha)
     c1, c2 = s1 - sp.sin(sym.alpha), s2 + sp.cos(sym.alpha) - 1
     time = -c2 / w[1]
@@ -181,7 +177,7 @@ def differential_of_the_transfer(differential: Code) -> Verdict:
 
     As printed it is the differential of the printed map. Claim 5.2.2 is not affected.
     """
-    x1, w = sp.Symbol("x1", real=True), _velocity(sp)
+    x1, w = sym.x1, VELOCITY
     image = sp.Matrix(rolling.transfer(x1, sym.alpha, sym.alpha, w, 1, sp))
     jacobian = sp.Matrix(differential(sym.alpha, w, sp))
     # the library's differential, for any scale and including the velocity
@@ -212,8 +208,7 @@ def translation_along_the_rolling(shift: Code) -> Verdict:
     Three corrections: k for j, no factor in the ceiling, and the factor of χ. What is printed turns the disk by kρ only
     if J = 1.
     """
-    rng = generator()
-    m, J = masses(rng)
+    rng, m, J = random_disks()
     j, k = rng.integers(-20, 21, (2, m.size))
     ratio = rng.uniform(1, 50, m.size)  # rho / eps
     periods, along = shift(j, k, m, J, ratio)

@@ -8,15 +8,13 @@ import numpy as np
 import sympy as sp
 
 from ...geometry.disk import rolling
+from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, no_excess, verify
 from ..entry import Code, row
-from ..samples import generator, kinetic_norm, masses, residual, unit_velocities
+from ..samples import generator, kinetic_norm, random_disks, residual, unit_velocities
 
-
-def _zoom(sp: Any) -> Any:
-    """Symbols of a zoomed configuration and of the scale."""
-    x1, x2, bar = sp.symbols("x1 x2 bar", real=True)
-    return x1, x2, bar, sp.Symbol("epsilon", positive=True)
+# A zoomed configuration and the scale.
+ZOOMED = (*sp.symbols("x1 x2 bar", real=True), sym.epsilon)
 
 
 @row(
@@ -62,7 +60,7 @@ def zoomed_straightening(bend: Code) -> Verdict:
     Lengths are divided by ε, angles are not; the library's differential is that of this map. The same formula at scale
     1 is row S4.13.
     """
-    y1, y2, bar, eps = _zoom(sp)
+    y1, y2, bar, eps = ZOOMED
     plain = [eps * y1 + eps * bar - sp.sin(eps * bar), eps * y2 - 1 + sp.cos(eps * bar)]
     bent = bend(y1, y2, bar, eps, sp)
     jacobian = sp.Matrix([*bent, bar]).jacobian([y1, y2, bar])
@@ -112,7 +110,7 @@ def contact_as_a_product(first: Code) -> Verdict:
     As printed it is the product on Z⁰* only. On all components it is the map that takes M* onto the free part of the
     plane, and that is what the library calls G_ε.
     """
-    x1, x2, bar, eps = _zoom(sp)
+    x1, x2, bar, eps = ZOOMED
     turn = sp.Symbol("turn", real=True)
     y1, y2 = rolling.straighten(x1, x2, bar, eps, sp)
     product = rolling.straight_contact(y1, y2, bar + turn)
@@ -134,7 +132,7 @@ def differential_of_the_contact(differential: Code) -> Verdict:
 
     It is the velocity of the satellite in contact. The scale cancels.
     """
-    x1, x2, bar, eps = _zoom(sp)
+    x1, x2, bar, eps = ZOOMED
     image = sp.Matrix(rolling.satellite(x1, x2, bar, eps, sp))
     return verify(image.jacobian([x1, x2, bar]), differential(bar, eps, sp))
 
@@ -162,8 +160,7 @@ def lengths_under_the_linear_contact(norm: Code) -> Verdict:
 
     The norm on Q₀ is the kinetic one, as on the configurations. For m = 1 there is no difference.
     """
-    rng = generator()
-    m, J = masses(rng)
+    rng, m, J = random_disks()
     w = unit_velocities(rng, m, J)
     length = norm(np.stack([w[0] + w[2], w[1]]), m)
     sine = _sine_to(w, np.stack([-np.ones_like(m), 0 * m, np.ones_like(m)]), m, J)
@@ -189,8 +186,7 @@ def lengths_under_the_contact(null: Code) -> Verdict:
     The null direction of dG_ε turns with the disk: at w = χ any multiple of sin φ is 0, but dG_ε(χ) is not. Additively
     sin φ - (m/J)^(1/2)|x| ≤ ‖dG_ε(w)‖ ≤ (1 + m/J)^(1/2) sin φ + (m/J)^(1/2)|x|.
     """
-    rng = generator()
-    m, J = masses(rng)
+    rng, m, J = random_disks()
     x = rng.uniform(-0.5, 0.5, m.size)
     w = unit_velocities(rng, m, J)
     w[:, ::4] = (np.stack([-np.ones_like(m), 0 * m, np.ones_like(m)]) / np.sqrt(m + J))[:, ::4]
