@@ -134,7 +134,7 @@ def row(*, status: Status | None = None, **fields: Any) -> Callable[[Check], Ent
 
     def decorator(check: Check) -> Entry:
         statement, _, reason = cleandoc(check.__doc__ or "").partition("\n\n")
-        words = {"statement": " ".join(statement.split()), "reason": " ".join(reason.split())}
+        words: dict[str, Any] = {"statement": " ".join(statement.split()), "reason": " ".join(reason.split())}
         return Entry(status=known, check=check, **words, **fields)
 
     return decorator

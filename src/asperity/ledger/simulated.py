@@ -30,7 +30,7 @@ def outgoing_velocity(disk: Disk, wall: Wall, position: Any, velocity: Any, scal
     position, velocity = np.array(position, dtype=float), np.array(velocity, dtype=float)
     weights = np.array([disk.mass, disk.mass, disk.inertia])
     for _ in range(MOST_BOUNCES):
-        times = [_time_to(*side, position, velocity, scale) for side in pairwise(wall.vertices)]
+        times = [_time_to(*ends, position, velocity, scale) for ends in pairwise(wall.vertices)]
         if min(times) == math.inf:
             return velocity
         position = position + min(times) * velocity
@@ -43,7 +43,8 @@ def outgoing_velocity(disk: Disk, wall: Wall, position: Any, velocity: Any, scal
 
 def _time_to(start: Floats, end: Floats, position: Floats, velocity: Floats, scale: float) -> float:
     """The time at which the satellite meets a side from above; infinity if it does not."""
-    k, time = _normal(start, end), 0.0
+    k: Floats = _normal(start, end)
+    time = 0.0
     if _satellite(position, velocity, scale, time)[1] @ k >= 0:
         return math.inf
     for _ in range(STEPS):
@@ -56,7 +57,7 @@ def _time_to(start: Floats, end: Floats, position: Floats, velocity: Floats, sca
 
 def _normal(start: Floats, end: Floats) -> Floats:
     edge = end - start
-    return np.array([-edge[1], edge[0]]) / np.hypot(*edge)
+    return np.asarray(np.array([-edge[1], edge[0]]) / np.hypot(*edge))
 
 
 def _satellite(position: Floats, velocity: Floats, scale: float, time: float) -> tuple[Floats, Floats]:

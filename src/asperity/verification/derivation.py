@@ -13,6 +13,7 @@ import sympy as sp
 
 from ..core.errors import InputError
 from .balls import Unclear
+from .claims import Claim
 from .constants import visible, written
 from .domain import Domain
 from .normal_form import NOT_NEGATIVE, POSITIVE, vanishes
@@ -35,11 +36,9 @@ SQUARES = "neither side is negative, and the polynomial normal forms of the squa
 SIGN = "the sign of the difference"
 NOWHERE = "defined nowhere on the domain"
 
-Claim = tuple[Any, Any, str]
-
 
 def decide(claims: list[Claim], relations: list[Any]) -> Verdict:
-    """The verdict on claims (left, right, "==", "<=" or "<") under the same assumptions."""
+    """The verdict on claims under the same assumptions."""
     verdicts = []
     for claim in claims:
         try:
