@@ -49,7 +49,7 @@ def _time_to(start: Floats, end: Floats, position: Floats, velocity: Floats, sca
         return math.inf
     for _ in range(STEPS):
         point, along = _satellite(position, velocity, scale, time)
-        time -= (point - start) @ k / (along @ k)
+        time -= float((point - start) @ k / (along @ k))
     point, _ = _satellite(position, velocity, scale, time)
     fraction = (point - start) @ (end - start) / np.sum((end - start) ** 2)
     return time if time > -TOLERANCE and -TOLERANCE <= fraction <= 1 + TOLERANCE else math.inf
