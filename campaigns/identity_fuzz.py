@@ -29,8 +29,8 @@ from asperity.core.tables import table
 DIGITS = 50
 # Values that differ only in the last quarter of the digits count as equal.
 SAME = 0.75
-# An argument this close to a jump counts as on the jump.
-ON_A_JUMP = mpmath.mpf(10) ** -40
+# An argument that differs from a jump only in the last fifth of the digits counts as on the jump.
+ON_A_JUMP = 0.8
 POINTS = 80
 SECONDS = 10.0
 
@@ -83,8 +83,12 @@ def value(e: Any, point: dict[Any, Any]) -> Any:
     return FUNCTIONS[e.func](*args)
 
 
+def is_zero(x: Any) -> bool:
+    return bool(abs(x) < mpmath.mpf(10) ** (-ON_A_JUMP * mpmath.mp.dps))
+
+
 def sign_of(x: Any) -> int:
-    return 0 if abs(x) < ON_A_JUMP else 1 if x > 0 else -1
+    return 0 if is_zero(x) else 1 if x > 0 else -1
 
 
 def truth(condition: Any, point: dict[Any, Any]) -> bool:
@@ -99,7 +103,7 @@ def truth(condition: Any, point: dict[Any, Any]) -> bool:
 
 
 def power(base: Any, exponent: Any, exact: Any) -> Any:
-    if abs(exponent - mpmath.nint(exponent)) < ON_A_JUMP:
+    if is_zero(exponent - mpmath.nint(exponent)):
         whole = int(mpmath.nint(exponent))
         if sign_of(base) == 0:
             if whole < 0:
@@ -117,12 +121,12 @@ def power(base: Any, exponent: Any, exact: Any) -> Any:
 
 def floor(x: Any) -> Any:
     near = mpmath.nint(x)
-    return near if abs(x - near) < ON_A_JUMP else mpmath.floor(x)
+    return near if is_zero(x - near) else mpmath.floor(x)
 
 
 def inside(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     def image(x: Any) -> Any:
-        if abs(x) > 1 + ON_A_JUMP:
+        if abs(x) > 1 and not is_zero(abs(x) - 1):
             raise NotReal
         return function(min(max(x, mpmath.mpf(-1)), mpmath.mpf(1)))
 
