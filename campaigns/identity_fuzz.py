@@ -71,13 +71,16 @@ def value(e: Any, point: dict[Any, Any]) -> Any:
             mpmath.inf if end is sp.oo else -mpmath.inf if end is -sp.oo else value(end, point) for end in (low, high)
         ]
         return mpmath.quad(lambda t: value(e.function, {**point, variable: t}), ends)
+    if e.is_Pow and e.base is sp.zoo:
+        # sympy writes 0**(-x) so
+        return power(mpmath.mpf(0), -value(e.exp, point))
     args = [value(argument, point) for argument in e.args]
     if e.is_Add:
         return mpmath.fsum(args)
     if e.is_Mul:
         return mpmath.fprod(args)
     if e.is_Pow:
-        return power(args[0], args[1], e.exp)
+        return power(args[0], args[1])
     if e.func not in FUNCTIONS:
         raise Unsure
     return FUNCTIONS[e.func](*args)
@@ -102,7 +105,7 @@ def truth(condition: Any, point: dict[Any, Any]) -> bool:
     ]
 
 
-def power(base: Any, exponent: Any, exact: Any) -> Any:
+def power(base: Any, exponent: Any) -> Any:
     if is_zero(exponent - mpmath.nint(exponent)):
         whole = int(mpmath.nint(exponent))
         if sign_of(base) == 0:
