@@ -29,8 +29,8 @@ from asperity.core.tables import table
 DIGITS = 50
 # Values that differ only in the last quarter of the digits count as equal.
 SAME = 0.75
-# An argument this close to a jump counts as on the jump.
-ON_A_JUMP = mpmath.mpf(10) ** -40
+# An argument that differs from a jump only in the last fifth of the digits counts as on the jump.
+ON_A_JUMP = 0.8
 POINTS = 80
 SECONDS = 10.0
 
@@ -71,20 +71,27 @@ def value(e: Any, point: dict[Any, Any]) -> Any:
             mpmath.inf if end is sp.oo else -mpmath.inf if end is -sp.oo else value(end, point) for end in (low, high)
         ]
         return mpmath.quad(lambda t: value(e.function, {**point, variable: t}), ends)
+    if e.is_Pow and e.base is sp.zoo:
+        # sympy writes 0**(-x) so
+        return power(mpmath.mpf(0), -value(e.exp, point))
     args = [value(argument, point) for argument in e.args]
     if e.is_Add:
         return mpmath.fsum(args)
     if e.is_Mul:
         return mpmath.fprod(args)
     if e.is_Pow:
-        return power(args[0], args[1], e.exp)
+        return power(args[0], args[1])
     if e.func not in FUNCTIONS:
         raise Unsure
     return FUNCTIONS[e.func](*args)
 
 
+def is_zero(x: Any) -> bool:
+    return bool(abs(x) < mpmath.mpf(10) ** (-ON_A_JUMP * mpmath.mp.dps))
+
+
 def sign_of(x: Any) -> int:
-    return 0 if abs(x) < ON_A_JUMP else 1 if x > 0 else -1
+    return 0 if is_zero(x) else 1 if x > 0 else -1
 
 
 def truth(condition: Any, point: dict[Any, Any]) -> bool:
@@ -98,8 +105,8 @@ def truth(condition: Any, point: dict[Any, Any]) -> bool:
     ]
 
 
-def power(base: Any, exponent: Any, exact: Any) -> Any:
-    if abs(exponent - mpmath.nint(exponent)) < ON_A_JUMP:
+def power(base: Any, exponent: Any) -> Any:
+    if is_zero(exponent - mpmath.nint(exponent)):
         whole = int(mpmath.nint(exponent))
         if sign_of(base) == 0:
             if whole < 0:
@@ -117,12 +124,12 @@ def power(base: Any, exponent: Any, exact: Any) -> Any:
 
 def floor(x: Any) -> Any:
     near = mpmath.nint(x)
-    return near if abs(x - near) < ON_A_JUMP else mpmath.floor(x)
+    return near if is_zero(x - near) else mpmath.floor(x)
 
 
 def inside(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     def image(x: Any) -> Any:
-        if abs(x) > 1 + ON_A_JUMP:
+        if abs(x) > 1 and not is_zero(abs(x) - 1):
             raise NotReal
         return function(min(max(x, mpmath.mpf(-1)), mpmath.mpf(1)))
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from asperity import InputError
 from asperity.cli import main
-from asperity.ledger import Formula, by_reading, erratum, verified
+from asperity.ledger import by_reading, row
 from asperity.ledger import index as ledger
 from asperity.ledger.text import latex_of, page_of, table_of
 from asperity.verification import Verdict, agreement
@@ -47,7 +47,7 @@ def test_the_formulas_are_balanced_latex():
     for entry in ROWS:
         for formula in (entry.printed, entry.corrected):
             if formula is not None:
-                latex = formula.latex.replace(r"\{", "").replace(r"\}", "")
+                latex = formula.replace(r"\{", "").replace(r"\}", "")
                 assert latex.strip() and latex.count("{") == latex.count("}"), entry.id
                 assert latex.count(r"\left") - latex.count(r"\leftarrow") == latex.count(r"\right") - latex.count(
                     r"\rightarrow"
@@ -98,16 +98,14 @@ def test_an_unknown_id_is_refused_in_one_line():
 def double(printed, corrected):
     """An entry on 2 x, with formulas that may or may not be what it says."""
 
-    @erratum(
-        id="S9.01",
-        section="0",
-        statement="Twice x.",
-        printed=Formula("x", printed),
-        corrected=Formula("2x", corrected),
-        reason="One. Two.",
-        kind="numeric",
-    )
+    @row(id="S9.01", section="0", kind="numeric", printed="x", wrong=printed, corrected="2x", right=corrected)
     def entry(formula):
+        """Twice
+        x.
+
+        One.
+        Two.
+        """
         return agreement(formula(3.0), 6.0, 1e-12)
 
     return entry
@@ -144,14 +142,20 @@ def test_a_row_by_reading_is_not_counted_as_checked():
 
 
 def test_unsuitable_entries_are_refused_in_words():
-    formula = Formula("x", lambda x: x)
-    check = verified(id="S9.3", section="", statement="", printed=formula, perturbed=formula.code, reason="")
+    def check(_):
+        return Verdict("agrees", "")
+
     with pytest.raises(InputError, match="two digits"):
-        check(lambda _: Verdict("agrees", ""))
+        row(id="S9.3", section="", printed="x", right=abs, wrong=abs)(check)
     with pytest.raises(InputError, match="as code"):
-        erratum(id="S9.04", section="", statement="", printed=Formula("x"), corrected=formula, reason="")(
-            lambda _: Verdict("agrees", "")
-        )
+        row(id="S9.04", section="", printed="x", corrected="2x", right=abs)(check)
+    with pytest.raises(InputError, match="corrected formula"):
+        row(id="S9.05", status="convention", section="", printed="x", right=abs, wrong=abs)(check)
+
+
+def test_the_words_of_a_row_are_those_of_its_check():
+    entry = double(abs, abs)
+    assert (entry.status, entry.statement, entry.reason) == ("erratum", "Twice x.", "One. Two.")
 
 
 def test_the_page_has_every_row_and_the_errata_first():

@@ -8,8 +8,8 @@ from campaigns.judges.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LI
 from campaigns.ledger_mutants import Mutant, changes, judged, library, mutants_of, noticed
 
 from asperity.geometry.disk import disk, rolling
-from asperity.ledger import Formula, verified
 from asperity.ledger import index as ledger
+from asperity.ledger import row
 from asperity.verification import agreement
 
 ROWS = {entry.id: entry for entry in ledger.entries() if entry.check is not None}
@@ -87,10 +87,7 @@ def test_a_change_is_undone():
 
 
 def test_a_check_that_looks_at_nothing_accepts_what_is_wrong():
-    @verified(
-        id="S9.01", section="0", statement="Twice x.", reason="One. Two.", kind="numeric",
-        printed=Formula("2x", lambda x: 2 * x), perturbed=lambda x: x,
-    )  # fmt: skip
+    @row(id="S9.01", section="0", kind="numeric", printed="2x", right=lambda x: 2 * x, wrong=lambda x: x)
     def entry(formula):
         return agreement(formula(0.0), 0.0, 1e-12)
 

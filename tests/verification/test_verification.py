@@ -186,12 +186,15 @@ PROVED = {
     "complementary arcs, where both are defined": (sp.asin(x) + sp.acos(x), pi / 2, []),
     "nested roots": (sp.sqrt(2 + sp.sqrt(3)), (sp.sqrt(6) + sp.sqrt(2)) / 2, []),
     "steps": (sp.floor(x), 0, [x >= 0, x < 1]),
+    "a sum as it is written": (
+        sp.exp(sp.Add(x + half, sp.exp(11), evaluate=False)), sp.exp(x + half) * sp.exp(sp.exp(11)), [],
+    ),
     "few integers": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 1, n <= 3]),
     "logarithms where both are defined": (sp.log(x**2), 2 * sp.log(x), []),
     "powers": (p ** (x + y), p**x * p**y, []),
     "geometric and arithmetic mean": (2 * sp.sqrt(p * q) <= p + q, None, ()),
 }  # fmt: skip
-# Undecided, though true: by a derivative, cuts at zeros of sines, parity, integrals.
+# Undecided, though true: by a derivative, cuts at zeros of sines, parity, integrals, which are refuted only.
 UNDECIDED = {
     "complementary arctangents": (sp.atan(x) + sp.atan(1 / x), sp.pi / 2, [x > 0]),
     "atan2": (sp.atan2(p * sp.sin(x), p * sp.cos(x)), x, [x > -pi, x <= pi]),
@@ -228,6 +231,17 @@ REFUTED = {
     "a shifted square above a small number": (sp.Rational(1, 10**25) <= (3 * x + 1) ** 2, [x > -3, x <= 0], ()),
     "a square above a small number": (x**2 >= sp.Rational(1, 10**25), None, ()),
     "on the diagonal": (sp.sign(x**2 - y**2) ** 2, 1, []),
+    "an integral, by 1e-25": (
+        sp.Integral(t * sp.sin(t), (t, 0, x)),
+        sp.sin(x) - x * sp.cos(x) + sp.Rational(1, 10**25),
+        [],
+    ),
+    "an integral between symbols": (sp.Integral(1 / t, (t, x, 2 * x)), sp.log(3), [x > 0]),
+    "an integral backwards": (sp.Integral(1 / (1 + t**2), (t, 1, 0)), pi / 4, []),
+    "an integral of a root": (sp.Integral(sp.sqrt(1 - t**2), (t, 0, half)), pi / 5, []),
+    "an integral of a logarithm": (sp.Integral(sp.log(t) ** 2, (t, 1, 2)), 1, []),
+    "an integral up to its own symbol": (sp.Integral(sp.sin(x), (x, 0, x)), 2 - sp.cos(x), []),
+    "a bound of an integral": (sp.Integral(sp.sin(t), (t, 0, x)) <= 1, [x > 0], ()),
     "a strict inequality with equality at one point": (sp.Lt(sp.sin(x), x), [x >= 0], ()),
 }
 
@@ -335,9 +349,13 @@ def test_a_counterexample_is_certainly_in_the_domain():
 
 
 def test_what_is_not_evaluated_is_undecided_and_the_evidence_says_so():
-    # the first diverges, the second fails where its interval has no length, the third is false
+    # two diverge, one fails where its interval has no length, the others are false
     for lhs, rhs, assumptions in [
         (sp.Integral(1 / t, (t, -1, 1)), 0, []),
+        (sp.Integral(sp.tan(t), (t, 0, 3)), 1, []),
+        (sp.Integral(sp.exp(-t), (t, 0, sp.oo)), 2, []),
+        (sp.Integral(sp.Abs(t), (t, -1, 1)), 2, []),
+        (sp.Integral(t * x, (t, 0, 1), (x, 0, 1)), 2, []),
         (sp.Integral(1 / t, (t, x, 2 * x)), sp.log(2), [x >= 0]),
         (sp.Integral(sp.sqrt(1 - t**2), (t, 0, 1)), pi / 5, []),
         (sp.Derivative(sp.sin(x), x), sp.cos(x), []),
@@ -353,6 +371,8 @@ def test_what_is_not_evaluated_is_undecided_and_the_evidence_says_so():
         (sp.acos(x), sp.acos(x), [x > 1]),
         (sp.log(x), sp.log(-x), []),
         (sp.sqrt(x) * sp.sqrt(-1 - x), x, []),
+        # the integrand is real where its roots are not
+        (sp.Integral(sp.Mul(sp.sqrt(t), sp.sqrt(t), evaluate=False), (t, -1, 1)), 5, []),
     ],
 )
 def test_what_is_defined_nowhere_is_an_error(lhs, rhs, assumptions):

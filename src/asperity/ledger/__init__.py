@@ -1,17 +1,14 @@
 """The ledger of formulas: its index, its text, and its entries on the plane, the disk and the proof."""
 
-from .entry import Entry, Finding, Formula, by_reading, convention, erratum, verified
+from .entry import Entry, Finding, by_reading, row
 from .index import entries, findings, selected
 
 __all__ = [
     "Entry",
     "Finding",
-    "Formula",
     "by_reading",
-    "convention",
     "entries",
-    "erratum",
     "findings",
+    "row",
     "selected",
-    "verified",
 ]

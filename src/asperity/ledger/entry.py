@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from inspect import cleandoc
 from time import perf_counter
 from typing import Any, Literal
 
@@ -21,14 +22,6 @@ _ID = re.compile(r"S\d\.\d\d")
 
 
 @dataclass(frozen=True)
-class Formula:
-    """A formula in LaTeX and, if a check calls it, as code."""
-
-    latex: str
-    code: Code | None = None
-
-
-@dataclass(frozen=True)
 class Entry:
     r"""One row of the ledger.
 
@@ -40,13 +33,14 @@ class Entry:
         The position in Rudzis 2022; the equation may be empty.
     statement : str
         The statement in words.
-    printed : Formula
-        The formula as printed. For an erratum the check must refute its code.
-    corrected : Formula or None
-        The correct formula, or the formula in the named convention; None for a verified entry.
-    perturbed : callable or None
-        A slightly wrong formula that the check must refute. It is needed for a verified entry, and for an erratum whose
-        printed formula the audit describes but does not quote.
+    printed : str
+        The formula as printed, in LaTeX.
+    corrected : str or None
+        The correct formula, or the formula in the named convention, in LaTeX; None for a verified entry.
+    right, wrong : callable or None
+        The formula that the check must accept, and one that it must refute, as code. The right one is the corrected
+        formula, or the printed one of a verified entry. The wrong one is the printed formula of an erratum or
+        convention, or a slightly perturbed formula if the printed one is right, or described but not quoted.
     status : {"verified", "erratum", "convention"}
     reason : str
         Two sentences: why the formula is right or wrong, and the consequence or the method of the check.
@@ -55,18 +49,22 @@ class Entry:
     check : callable or None
         Takes a formula's code and returns a `Verdict`.
 
-    Entries are written with the decorators `verified`, `erratum` and `convention`, and with `by_reading`.
+    Entries are written with the decorator `row`, and with `by_reading`.
 
     Examples
     --------
-    >>> from asperity.ledger import Formula, erratum
+    >>> from asperity.ledger import row
     >>> from asperity.verification import agreement
-    >>> @erratum(
-    ...     id="S9.01", section="0", statement="The area of a disk of radius r.", kind="numeric",
-    ...     printed=Formula(r"2\pi r", lambda r: 6.283 * r), corrected=Formula(r"\pi r^2", lambda r: 3.1416 * r**2),
-    ...     reason="The printed formula is the circumference. A disk inscribed in a square has a smaller area.",
+    >>> @row(
+    ...     id="S9.01", section="0", kind="numeric",
+    ...     printed=r"2\pi r", wrong=lambda r: 6.283 * r,
+    ...     corrected=r"\pi r^2", right=lambda r: 3.1416 * r**2,
     ... )
     ... def area(formula):
+    ...     '''The area of a disk of radius r.
+    ...
+    ...     The printed formula is the circumference. A disk inscribed in a square has a smaller area.
+    ...     '''
     ...     return agreement(formula(1.0), 3.14159, allowed=1e-4)
     >>> area.run().as_stated
     True
@@ -75,12 +73,13 @@ class Entry:
     id: str
     section: str
     statement: str
-    printed: Formula
+    printed: str
     status: Status
     reason: str
     kind: Kind = "symbolic"
-    corrected: Formula | None = None
-    perturbed: Code | None = None
+    corrected: str | None = None
+    right: Code | None = None
+    wrong: Code | None = None
     equation: str = ""
     check: Check | None = None
 
@@ -93,16 +92,6 @@ class Entry:
             )
         if self.kind != "by reading" and None in (self.check, self.right, self.wrong):
             raise InputError(f"{self.id}: expected a check, a formula that it accepts and one that it refutes, as code")
-
-    @property
-    def right(self) -> Code | None:
-        """The formula that the check must accept: corrected, or as printed in a verified entry."""
-        return (self.corrected or self.printed).code
-
-    @property
-    def wrong(self) -> Code | None:
-        """The formula that the check must refute: ``perturbed`` if given, else the printed formula."""
-        return self.perturbed if self.perturbed is not None else self.printed.code
 
     def run(self) -> Finding:
         """Run the check on the right and on the wrong formula."""
@@ -135,17 +124,20 @@ class Finding:
         return self.right.answer == expected and self.wrong.answer == "refuted"
 
 
-def _decorator(status: Status, words: str) -> Callable[..., Callable[[Check], Entry]]:
-    def decorator(**row: Any) -> Callable[[Check], Entry]:
-        return lambda check: Entry(status=status, check=check, **row)
+def row(*, status: Status | None = None, **fields: Any) -> Callable[[Check], Entry]:
+    """Make a check the entry of a formula; takes the other fields of `Entry`.
 
-    decorator.__doc__ = f"Make a check the entry of {words}; takes the fields of `Entry`."
+    The statement and the reason are the first and the second part of the check's docstring. The status of an entry with
+    a corrected formula is *erratum* if it is not given.
+    """
+    known: Status = status or ("erratum" if "corrected" in fields else "verified")
+
+    def decorator(check: Check) -> Entry:
+        statement, _, reason = cleandoc(check.__doc__ or "").partition("\n\n")
+        words: dict[str, Any] = {"statement": " ".join(statement.split()), "reason": " ".join(reason.split())}
+        return Entry(status=known, check=check, **words, **fields)
+
     return decorator
-
-
-verified = _decorator("verified", "a formula that is right as printed")
-erratum = _decorator("erratum", "a formula that is wrong or misprinted")
-convention = _decorator("convention", "a formula that is right only under a convention that the text does not name")
 
 
 def by_reading(
@@ -153,6 +145,4 @@ def by_reading(
     status: Status = "erratum", equation: str = "",
 ) -> Entry:  # fmt: skip
     """The entry of a slip that only reading can show; its formulas are LaTeX without code."""
-    return Entry(
-        id, section, statement, Formula(printed), status, reason, "by reading", Formula(corrected), equation=equation
-    )
+    return Entry(id, section, statement, printed, status, reason, "by reading", corrected, equation=equation)

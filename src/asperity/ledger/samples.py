@@ -1,4 +1,4 @@
-"""Samples for the numeric checks of the ledger: random disks, velocities, and clearances over a wall."""
+"""Samples for the numeric checks of the ledger: random disks and velocities, and kinetic norms."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ def generator() -> np.random.Generator:
     return np.random.default_rng(2022)
 
 
-def masses(rng: np.random.Generator, count: int = SAMPLES) -> tuple[Floats, Floats]:
-    """Random m and J between 1/10 and 10."""
-    return np.exp(rng.uniform(-np.log(10), np.log(10), count)), np.exp(rng.uniform(-np.log(10), np.log(10), count))
+def random_disks(count: int = SAMPLES) -> tuple[np.random.Generator, Floats, Floats]:
+    """The generator, and random m and J between 1/10 and 10."""
+    rng = generator()
+    return rng, *np.exp(rng.uniform(-np.log(10), np.log(10), (2, count)))
 
 
 def kinetic_norm(w: Floats, m: Floats | float, J: Floats | float) -> Floats:
@@ -30,29 +31,6 @@ def unit_velocities(rng: np.random.Generator, m: Floats | float, J: Floats | flo
     w = rng.normal(size=(3, SAMPLES)) * np.exp(rng.uniform(-4, 0, (3, SAMPLES)))
     w[1] = np.abs(w[1])
     return w / kinetic_norm(w, m, J)
-
-
-def tooth(x: Floats) -> Floats:
-    """The height of the sampled wall: triangular teeth of period 1 and depth 1, with corners at the integers."""
-    return np.abs(2.0 * (x - np.floor(x)) - 1.0) - 1.0
-
-
-def satellites(configuration: Floats, count: int) -> Floats:
-    """The positions (2, n, count) of all satellites of a rotated disk, with heights relative to the lowest contact."""
-    x1, x2, alpha = configuration
-    rotated = np.exp(1j * (alpha[:, np.newaxis] + 2 * np.pi * np.arange(count) / count)) * -1j
-    return np.stack([x1[:, np.newaxis] + rotated.real, x2[:, np.newaxis] + 1.0 + rotated.imag])
-
-
-def clearance(configuration: Floats, eps: float, count: int) -> Floats:
-    """The least height (n,) of all satellites over the wall eps W; negative if a satellite is in the solid."""
-    x, height = satellites(configuration, count)
-    return np.asarray(np.min(height - eps * tooth(x / eps), axis=-1))
-
-
-def is_free(configuration: Floats, eps: float, count: int) -> NDArray[np.bool_]:
-    """Whether configurations (3, n) are in M, tested at every satellite."""
-    return clearance(configuration, eps, count) >= 0.0
 
 
 def residual(alpha: Floats, spacing: float) -> tuple[NDArray[np.int64], Floats]:

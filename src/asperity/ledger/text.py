@@ -54,7 +54,7 @@ def finding_as_dict(finding: Finding) -> dict[str, Any]:
     return {
         "id": entry.id, "section": entry.section, "equation": entry.equation, "statement": entry.statement,
         "status": entry.status, "kind": entry.kind, "reason": entry.reason,
-        "printed": entry.printed.latex, "corrected": entry.corrected.latex if entry.corrected else None,
+        "printed": entry.printed, "corrected": entry.corrected,
         "right": _verdict(finding.right), "wrong": _verdict(finding.wrong),
         "as_stated": finding.as_stated, "seconds": round(finding.seconds, 3),
     }  # fmt: skip
@@ -105,7 +105,5 @@ def _equation(equation: str) -> str:
 
 
 def _formulas(entry: Entry) -> list[tuple[str, str]]:
-    formulas = [("printed", entry.printed.latex)]
-    if entry.corrected is not None:
-        formulas.append((AMENDED[entry.status], entry.corrected.latex))
-    return formulas
+    corrected = [] if entry.corrected is None else [(AMENDED[entry.status], entry.corrected)]
+    return [("printed", entry.printed), *corrected]

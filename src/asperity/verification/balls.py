@@ -9,13 +9,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import sympy as sp
-from flint import arb, ctx, fmpq
+from flint import acb, arb, ctx, fmpq
 
 # Bits that suffice for most constants, and bits at which a sign stays unknown.
 FEW_BITS, MANY_BITS = 100, 2000
+# Of an integral: cells on which its integrand is examined, evaluations, and the largest number of bits of its value.
+CELLS, EVALUATIONS, INTEGRAL_BITS = 64, 2000, 256
 
 
 class Undefined(Exception):
@@ -144,6 +147,9 @@ def _value(e: Any, point: Mapping[Any, Value]) -> Value:
             if _truth(condition, point):
                 return _value(branch, point)
         raise Undefined
+    if isinstance(e, sp.Integral):
+        with ctx.workprec(min(ctx.prec, INTEGRAL_BITS)):
+            return Value(_integral(e, point))
     if not (e.is_Add or e.is_Mul or e.is_Pow or e.func in _FUNCTIONS):
         raise Unclear
     parts = [_value(argument, point) for argument in e.args]
@@ -166,6 +172,44 @@ def _value(e: Any, point: Mapping[Any, Value]) -> Value:
     if result.is_nan():
         raise Unclear
     return Value(result)
+
+
+def _integral(e: Any, point: Mapping[Any, Value]) -> Any:
+    """A ball that contains an integral over one symbol, if the integrand is certainly finite on the whole interval."""
+    if len(e.limits) != 1 or len(e.limits[0]) != 3 or e.limits[0].has(sp.oo, -sp.oo):
+        raise Unclear
+    t, *ends = e.limits[0]
+    low, high = (_value(end, point).ball for end in ends)
+    for k in range(CELLS):
+        cell = low + (high - low) * arb(k).union(k + 1) / CELLS
+        if not _value(e.function, {**point, t: Value(cell)}).ball.is_finite():
+            raise Unclear
+    _around(e.function, t, acb(low), False, point)
+
+    def values(z: Any, analytic: bool) -> Any:
+        try:
+            return _around(e.function, t, z, analytic, point)
+        except (Undefined, Unclear):
+            return acb("nan")
+
+    found = acb.integral(values, low, high, eval_limit=EVALUATIONS).real
+    return found if found.is_finite() else _unclear()
+
+
+def _around(e: Any, t: Any, z: Any, analytic: bool, point: Mapping[Any, Value]) -> Any:
+    """The values for t in a complex ball: not finite if ``analytic`` is asked for and a branch cut is near."""
+    if e == t:
+        return z
+    if t not in e.free_symbols:
+        return acb(_value(e, point).ball)
+    parts = [_around(argument, t, z, analytic, point) for argument in e.args]
+    if e.is_Add or e.is_Mul:
+        return sum(parts, acb(0)) if e.is_Add else prod(parts, start=acb(1))
+    if e.is_Pow:
+        return parts[0] ** int(e.exp) if e.exp.is_Integer else parts[0].pow(parts[1], analytic=analytic)
+    if e.func is sp.log:
+        return parts[0].log(analytic=analytic)
+    return getattr(parts[0], e.func.__name__)() if e.func.__name__ in _MEROMORPHIC else _unclear()
 
 
 def _exact_result(function: Any, parts: list[Value]) -> Value | None:
@@ -282,11 +326,12 @@ _CONSTANTS: dict[Any, Any] = {
     sp.pi: arb.pi, sp.E: arb.const_e, sp.EulerGamma: arb.const_euler, sp.Catalan: arb.const_catalan,
     sp.GoldenRatio: lambda: (1 + arb(5).sqrt()) / 2,
 }  # fmt: skip
+_MEROMORPHIC = (
+    "sin", "cos", "tan", "cot", "sec", "csc", "exp", "sinh", "cosh", "tanh", "coth", "sech", "csch", "erf", "erfc",
+    "erfi", "gamma",
+)  # fmt: skip
 _FUNCTIONS: dict[Any, Any] = {
-    **{getattr(sp, name): _by(name) for name in (
-        "sin", "cos", "tan", "cot", "sec", "csc", "exp", "sinh", "cosh", "tanh", "coth", "sech", "csch", "atan", "erf",
-        "erfc", "erfi", "gamma",
-    )},
+    **{getattr(sp, name): _by(name) for name in (*_MEROMORPHIC, "atan")},
     sp.log: _logarithm,
     sp.asin: _of_sine("asin"),
     sp.acos: _of_sine("acos"),

@@ -13,6 +13,7 @@ import sympy as sp
 
 from ..core.errors import InputError
 from .balls import Unclear
+from .claims import Claim
 from .constants import visible, written
 from .domain import Domain
 from .normal_form import NOT_NEGATIVE, POSITIVE, vanishes
@@ -26,7 +27,7 @@ MORE_POINTS = 60
 # Parts that are tried, and points of every part at which a counterexample is sought.
 PARTS = 60
 FEW_POINTS = 3
-# Neither transformed nor evaluated here.
+# Not transformed, so that nothing about them is proved.
 UNFINISHED = (sp.Integral, sp.Derivative, sp.Sum, sp.Product, sp.Limit, sp.Subs)
 
 EXPANSION = "expansion"
@@ -35,11 +36,9 @@ SQUARES = "neither side is negative, and the polynomial normal forms of the squa
 SIGN = "the sign of the difference"
 NOWHERE = "defined nowhere on the domain"
 
-Claim = tuple[Any, Any, str]
-
 
 def decide(claims: list[Claim], relations: list[Any]) -> Verdict:
-    """The verdict on claims (left, right, "==", "<=" or "<") under the same assumptions."""
+    """The verdict on claims under the same assumptions."""
     verdicts = []
     for claim in claims:
         try:
@@ -59,12 +58,8 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
     for side in claim[:2]:
         if side.has(sp.I):
             raise InputError(f"{side}: expected a real expression, got one with the imaginary unit")
-        if side.has(*UNFINISHED):
-            return Verdict(
-                "undecided", "an integral, a derivative, a sum or a limit is not evaluated; try .doit() first"
-            )
     search = Search(*claim, domain)
-    found = _found(search, domain, tuple(map(visible, claim[:2])))
+    found = _found(search, domain)
     if search.undefined == search.tried or found.evidence == NOWHERE:
         raise InputError(
             f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {claim[0]} and {claim[1]}, "
@@ -81,8 +76,10 @@ def _as_real(symbol: Any) -> Any:
     return symbol if symbol.is_real else sp.Dummy(symbol.name, **{**symbol._assumptions_orig, "real": True})
 
 
-def _found(search: Search, domain: Domain, sides: tuple[Any, Any]) -> Verdict:
+def _found(search: Search, domain: Domain) -> Verdict:
     """A counterexample, a proof on every part of the domain, or *undecided* with a reason."""
+    unfinished = search.left.has(*UNFINISHED) or search.right.has(*UNFINISHED)
+    sides = (sp.nan, sp.nan) if unfinished else (visible(search.left), visible(search.right))
     expands = search.relation == "==" and expands_to_zero(sides[0] - sides[1])
     points = POINTS if search.relation == "==" else MORE_POINTS
     found = search.refutation(domain, points, until_defined=expands)
@@ -93,6 +90,8 @@ def _found(search: Search, domain: Domain, sides: tuple[Any, Any]) -> Verdict:
     if expands and search.defined:
         return Verdict("proved", EXPANSION)
     reason = f"no counterexample among {search.tried} points, and "
+    if unfinished:
+        return Verdict("undecided", reason + "no integral, derivative, sum or limit is evaluated; try .doit() first")
     waiting = domain.faces()
     if waiting is None:
         return Verdict("undecided", reason + "the domain has too many faces")

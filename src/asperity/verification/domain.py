@@ -295,6 +295,7 @@ class Domain:
         Half of the first ``count`` points are simple.
         """
         found = 0
+        count, most = (count, most) if self.intervals else (1, 1)
         for attempt in range(ATTEMPTS * count):
             simple = attempt < 4 * count and found < count // 2
             point = self._point(rng, simple)

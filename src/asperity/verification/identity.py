@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import pickle
-import reprlib
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any
@@ -45,7 +44,8 @@ def verify(
     Verdict
             ``"proved"`` rests on an exact derivation. ``"refuted"`` has a counterexample: an exact point that meets the
             assumptions and at which both sides are defined. Balls that contain the two values show that the relation
-            fails. ``"undecided"`` names the reason; integrals, derivatives, sums and limits are not evaluated.
+            fails. ``"undecided"`` names the reason. Integrals over one symbol are refuted but never
+            proved; derivatives, sums and limits are not evaluated.
 
     Raises
     ------
@@ -76,19 +76,14 @@ def verify(
     >>> verify(2 * m <= m**2 + 1).answer
     'proved'
     """
-    import sympy as sp
+    from .claims import claims_of
 
-    if rhs is None or _are_relations(sp, lhs):
-        if rhs is not None and assumptions != ():
-            raise InputError("rhs: expected none beside a relation; assumptions are the second argument then")
-        claims, given = _relations_as_claims(sp, lhs), assumptions if rhs is None else rhs
-    else:
-        claims, given = _equations(sp, lhs, rhs), assumptions
+    claims, relations = claims_of(lhs, rhs, assumptions)
     if time_limit is not None:
-        return _decided_in_time(claims, _relations(sp, given), positive_number("time_limit", time_limit))
+        return _decided_in_time(claims, relations, positive_number("time_limit", time_limit))
     from .derivation import decide
 
-    return decide(claims, _relations(sp, given))
+    return decide(claims, relations)
 
 
 def _decided_in_time(claims: list[Any], relations: list[Any], seconds: float) -> Verdict:
@@ -134,69 +129,3 @@ def _answer(question: bytes) -> tuple[Any, ...]:
         # some errors of sympy cannot be pickled
         raise RuntimeError(f"{type(error).__name__}: {error}") from error
     return found.answer, found.evidence, dict(found.counterexample), found.values
-
-
-def _are_relations(sp: Any, side: Any) -> bool:
-    if isinstance(side, list | tuple):
-        return bool(side) and all(_are_relations(sp, part) for part in side)
-    return isinstance(side, sp.logic.boolalg.Boolean | bool) and not isinstance(side, sp.Symbol)
-
-
-def _relations_as_claims(sp: Any, given: Any) -> list[tuple[Any, Any, str]]:
-    if isinstance(given, list | tuple):
-        return [claim for part in given for claim in _relations_as_claims(sp, part)]
-    if isinstance(given, sp.And):
-        return [claim for part in given.args for claim in _relations_as_claims(sp, part)]
-    if given in (True, False, sp.true, sp.false):
-        # sympy or Python has already decided it
-        return [(sp.Integer(0), sp.Integer(0 if given else 1), "==")]
-    kinds = {sp.Eq: "==", sp.Le: "<=", sp.Ge: "<=", sp.Lt: "<", sp.Gt: "<"}
-    if type(given) not in kinds:
-        raise InputError(f"lhs: expected two sides, or a relation such as a <= b, got {given!r} alone")
-    left, right = (_exact(sp, "lhs", side) for side in given.args)
-    return [
-        (right, left, kinds[type(given)]) if isinstance(given, sp.Ge | sp.Gt) else (left, right, kinds[type(given)])
-    ]
-
-
-def _equations(sp: Any, lhs: Any, rhs: Any) -> list[tuple[Any, Any, str]]:
-    left, right = _entries(sp, lhs), _entries(sp, rhs)
-    if len(left) != len(right):
-        raise InputError(f"lhs, rhs: expected one shape, got {len(left)} and {len(right)} entries")
-    if isinstance(lhs, sp.MatrixBase) and isinstance(rhs, sp.MatrixBase) and lhs.shape != rhs.shape:
-        raise InputError(f"lhs, rhs: expected matrices of one shape, got {lhs.shape} and {rhs.shape}")
-    return [(a, b, "==") for a, b in zip(left, right, strict=True)]
-
-
-def _entries(sp: Any, side: Any) -> list[Any]:
-    if isinstance(side, sp.MatrixBase | list | tuple):
-        return [entry for part in side for entry in _entries(sp, part)]
-    return [_exact(sp, "lhs, rhs", side)]
-
-
-def _exact(sp: Any, name: str, given: Any) -> Any:
-    """The sympy object; text is refused, because sympy would execute it."""
-    try:
-        return sp.sympify(given, strict=True)
-    except sp.SympifyError as reason:
-        raise InputError(
-            f"{name}: expected expressions, equations or inequalities of sympy, or numbers, got "
-            f"{reprlib.repr(given)}; build expressions from sympy.Symbol"
-        ) from reason
-
-
-def _relations(sp: Any, assumptions: Any) -> list[Any]:
-    if isinstance(assumptions, Mapping):
-        try:
-            bounds = [(symbol, low, high) for symbol, (low, high) in assumptions.items()]
-        except (TypeError, ValueError) as reason:
-            raise InputError(
-                f"assumptions: expected an interval (low, high) for each symbol, got {reprlib.repr(assumptions)}"
-            ) from reason
-        exact = [[_exact(sp, "assumptions", part) for part in bound] for bound in bounds]
-        return [sp.Lt(*side, evaluate=False) for symbol, low, high in exact for side in ((low, symbol), (symbol, high))]
-    given = [assumptions] if isinstance(assumptions, sp.Basic | bool | str) else assumptions
-    try:
-        return [_exact(sp, "assumptions", one) for one in given]
-    except TypeError as reason:
-        raise InputError(f"assumptions: expected relations, got {reprlib.repr(assumptions)}") from reason

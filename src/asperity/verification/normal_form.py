@@ -55,7 +55,7 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
     # a function without a normal form becomes a symbol; equal functions are already equal expressions
     e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function, sp.Max, sp.Min) if f.func is not sp.Abs})
     roots: dict[Any, tuple[Any, int]] = {}
-    e = _without_roots(e, roots)
+    e = _with_root_symbols(e, roots)
     e = sp.together(e).as_numer_denom()[0]
     # from the outermost root to the innermost, because a radicand may contain other roots
     for root, (radicand, index) in reversed(roots.items()):
@@ -356,15 +356,15 @@ def _logarithm(e: Any) -> Any:
     return built(sp.log, [sp.factor(e)])
 
 
-def _without_roots(e: Any, roots: dict[Any, tuple[Any, int]]) -> Any:
+def _with_root_symbols(e: Any, roots: dict[Any, tuple[Any, int]]) -> Any:
     """Replace every root by a symbol; ``roots`` receives the radicands, inner roots first."""
     if not e.args:
         return e
     if e.func is sp.Abs:
-        return _root(_without_roots(e.args[0], roots) ** 2, 2, roots)
+        return _root(_with_root_symbols(e.args[0], roots) ** 2, 2, roots)
     if e.is_Pow and e.exp.is_Rational and not e.exp.is_Integer:
-        return _root(_without_roots(e.base, roots), int(e.exp.q), roots) ** e.exp.p
-    return e.func(*(_without_roots(part, roots) for part in e.args))
+        return _root(_with_root_symbols(e.base, roots), int(e.exp.q), roots) ** e.exp.p
+    return e.func(*(_with_root_symbols(part, roots) for part in e.args))
 
 
 def _root(radicand: Any, index: int, roots: dict[Any, tuple[Any, int]]) -> Any:

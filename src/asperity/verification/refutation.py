@@ -56,9 +56,13 @@ def _zeros(g: Any) -> list[tuple[Any, Any]]:
     if len(g.free_symbols) != 1 or sp.count_ops(g) > LARGEST:
         return []
     (symbol,) = g.free_symbols
-    if not g.is_polynomial(symbol) or sp.degree(g, symbol) != 2:
+    try:
+        polynomial = sp.Poly(g, symbol)
+    except sp.PolynomialError:
         return []
-    c, b, a = (sp.Poly(g, symbol).nth(k) for k in range(3))
+    if polynomial.degree() != 2:
+        return []
+    c, b, a = (polynomial.nth(k) for k in range(3))
     root = sp.sqrt(sp.expand(b**2 - 4 * a * c))
     return [(symbol, (sign * root - b) / (2 * a)) for sign in (1, -1)] if root.is_real else []
 
@@ -92,7 +96,9 @@ class Search:
         parts = [part for side in (self.left, self.right) for part in _deciding(side)]
         # an inequality may fail between two zeros of the difference
         parts += [sp.expand(self.right - self.left)] if self.relation != "==" else []
-        found = dict.fromkeys(g for part in parts for g in sp.Mul.make_args(part) if g.free_symbols)
+        factors = (g for part in parts for g in sp.Mul.make_args(part) if g.free_symbols)
+        # the symbol of an integral is none of the domain
+        found = dict.fromkeys(g for g in factors if g.free_symbols <= set(self.domain.original))
         self.deciding = list(found)[:MOST_CRITICAL]
         self._critical = [place for g in self.deciding for place in _zeros(g)]
 

@@ -53,7 +53,7 @@ class Part:
             if found == ANY:
                 found = self._enclosed(e)
             if found == ANY and sp.count_ops(e) < LARGEST:
-                found = sign_in(_without_roots(self.parameters.factored(e)))
+                found = sign_in(_with_squares(self.parameters.factored(e)))
             self._known[e] = found
         return self._known[e]
 
@@ -190,7 +190,7 @@ class Part:
         return sp.nan if self.signs(e.args[0]) <= NOT_POSITIVE else e
 
 
-def _without_roots(e: Any) -> Any:
+def _with_squares(e: Any) -> Any:
     """Replace a positive parameter under a square root by a square, and factor."""
     squares = {p.base: sp.Dummy(positive=True) ** 2 for p in e.atoms(sp.Pow) if p.exp == sp.S.Half and p.base.is_Dummy}
     return sp.factor(e.xreplace({t: square for t, square in squares.items() if t.is_positive}))

@@ -5,43 +5,51 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
+from ...geometry import mushrooms
+from ...geometry.disk import rolling
+from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import contact_normal
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
-from ..entry import Code, Formula, by_reading, convention, erratum, verified
+from ..entry import Code, by_reading, row
 from ..samples import generator
-from ..symbols import sp, sym
 
 
-@verified(
+@row(
     id="S3.01",
     section="3",
     equation="3.2",
-    statement="The impulse λk at the contact σ turns the disk by the impulsive torque λ sin β, β from k to x - σ.",
-    printed=Formula(r"\tau = \lambda\sin\beta", lambda beta, xp: xp.sin(beta)),
-    perturbed=lambda beta, xp: xp.cos(beta),
-    reason="It is the vector product of σ - x with λk. β is counted counterclockwise.",
+    printed=r"\tau = \lambda\sin\beta",
+    right=lambda beta, xp: xp.sin(beta),
+    wrong=lambda beta, xp: xp.cos(beta),
 )
 def impulsive_torque(torque: Code) -> Verdict:
+    """The impulsive torque of the impulse λk at the contact σ, with β from k to x - σ.
+
+    It is the vector product of σ - x with λk. β is counted counterclockwise.
+    """
     direction, beta = sp.symbols("direction beta", real=True)
     k = sp.cos(direction), sp.sin(direction)
     arm = -sp.cos(direction + beta), -sp.sin(direction + beta)
     return verify(arm[0] * k[1] - arm[1] * k[0], torque(beta, sp))
 
 
-@erratum(
+@row(
     id="S3.02",
     section="3",
-    statement="The range of the angle β between the wall's normal and the arm of the contact.",
     kind="numeric",
-    printed=Formula(r"\beta\in(-\pi/2, \pi/2)", lambda: (-np.pi / 2, np.pi / 2)),
-    corrected=Formula(r"\beta\in(-\pi, \pi]", lambda: (-np.pi, np.pi)),
-    reason="A vertical side of a tooth has β = π/2 + α, and the lower side of a cap comes as close to -π and π as one "
-    "likes. No formula uses the range.",
+    printed=r"\beta\in(-\pi/2, \pi/2)",
+    wrong=lambda: (-np.pi / 2, np.pi / 2),
+    corrected=r"\beta\in(-\pi, \pi]",
+    right=lambda: (-np.pi, np.pi),
 )
 def range_of_the_arm(interval: Code) -> Verdict:
-    from ...geometry.walls.mushroom import mushrooms
+    """The range of the angle β between the wall's normal and the arm of the contact.
 
+    A vertical side of a tooth has β = π/2 + α, and the lower side of a cap comes as close to -π and π as one likes. No
+    formula uses the range.
+    """
     low, high = interval()
     normals = []
     for piece in mushrooms(0.3, 0.4).pieces:
@@ -57,23 +65,20 @@ def range_of_the_arm(interval: Code) -> Verdict:
     )
 
 
-@convention(
+@row(
     id="S3.03",
+    status="convention",
     section="3",
-    statement="The sine of β in the coordinates of a configuration.",
-    printed=Formula(
-        r"\sin\beta = k_1\cos\alpha + k_2\sin\alpha",
-        lambda k, alpha, turn, xp: k[0] * xp.cos(alpha) + k[1] * xp.sin(alpha),
-    ),
-    corrected=Formula(
-        r"\sin\beta = k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho)\quad\text{at } S_j",
-        lambda k, alpha, turn, xp: k[0] * xp.cos(alpha + turn) + k[1] * xp.sin(alpha + turn),
-    ),
-    reason="As printed it is that of the satellite S_0. At S_j the arm is turned by jρ more.",
+    printed=r"\sin\beta = k_1\cos\alpha + k_2\sin\alpha",
+    wrong=lambda k, alpha, turn, xp: k[0] * xp.cos(alpha) + k[1] * xp.sin(alpha),
+    corrected=r"\sin\beta = k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho)\quad\text{at } S_j",
+    right=lambda k, alpha, turn, xp: k[0] * xp.cos(alpha + turn) + k[1] * xp.sin(alpha + turn),
 )
 def arm_of_a_satellite(sine: Code) -> Verdict:
-    from ...geometry.disk import rolling
+    """The sine of β in the coordinates of a configuration.
 
+    As printed it is that of the satellite S_0. At S_j the arm is turned by jρ more.
+    """
     direction, x1, x2, turn = sp.symbols("direction x1 x2 turn", real=True)
     k = sp.cos(direction), sp.sin(direction)
     s1, s2 = rolling.satellite(x1, x2, sym.alpha + turn, 1, sp)
@@ -81,20 +86,19 @@ def arm_of_a_satellite(sine: Code) -> Verdict:
     return verify(k[0] * arm[1] - k[1] * arm[0], sine(k, sym.alpha, turn, sp))
 
 
-@verified(
+@row(
     id="S3.04",
     section="3, 6",
     equation="3.2, 6.9, 6.19 (Prop. 3.2)",
-    statement="The impulse law with conserved energy is specular reflection in the kinetic-energy metric.",
-    printed=Formula(
-        r"w' = w - 2\langle w, n(q)\rangle\,n(q)",
-        lambda w, n, product: [a - 2 * product * b for a, b in zip(w, n, strict=True)],
-    ),
-    perturbed=lambda w, n, product: [a - product * b for a, b in zip(w, n, strict=True)],
-    reason="The change of velocity (λk/m, λ sin β/J) is a multiple of n(q). The energy is kept by λ = 0 and by this "
-    "λ only.",
+    printed=r"w' = w - 2\langle w, n(q)\rangle\,n(q)",
+    right=lambda w, n, product: [a - 2 * product * b for a, b in zip(w, n, strict=True)],
+    wrong=lambda w, n, product: [a - product * b for a, b in zip(w, n, strict=True)],
 )
 def impulse_is_reflection(reflected: Code) -> Verdict:
+    """The impulse law with conserved energy is specular reflection in the kinetic-energy metric.
+
+    The change of velocity (λk/m, λ sin β/J) is a multiple of n(q). The energy is kept by λ = 0 and by this λ only.
+    """
     direction, v1, v2, omega = sp.symbols("direction v1 v2 omega", real=True)
     k, w = (sp.cos(direction), sp.sin(direction)), (v1, v2, omega)
     n = contact_normal(sym.m, sym.J, k, sym.alpha, sp)
@@ -105,20 +109,21 @@ def impulse_is_reflection(reflected: Code) -> Verdict:
     return verify(after, given)
 
 
-@erratum(
+@row(
     id="S3.05",
     section="3",
     equation="Prop. 3.3",
-    statement="The angular momentum that an impact of two bodies conserves.",
-    printed=Formula(r"J_1\omega_1 + J_2\omega_2", lambda bodies: sum(J * omega for _, J, _, _, omega in bodies)),
-    corrected=Formula(
-        r"\sum_i (J_i\omega_i + M_i\,x_i\times v_i)",
-        lambda bodies: sum(J * omega + M * _cross(x, v) for M, J, x, v, omega in bodies),
-    ),
-    reason="An impulse at a contact away from a centre changes the spins by different amounts, and the orbital parts "
-    "make up for it. The limit of eq. 3.15 still follows while positions stay bounded.",
+    printed=r"J_1\omega_1 + J_2\omega_2",
+    wrong=lambda bodies: sum(J * omega for _, J, _, _, omega in bodies),
+    corrected=r"\sum_i (J_i\omega_i + M_i\,x_i\times v_i)",
+    right=lambda bodies: sum(J * omega + M * _cross(x, v) for M, J, x, v, omega in bodies),
 )
 def angular_momentum(momentum: Code) -> Verdict:
+    """The angular momentum that an impact of two bodies conserves.
+
+    An impulse at a contact away from a centre changes the spins by different amounts, and the orbital parts make up for
+    it. The limit of eq. 3.15 still follows while positions stay bounded.
+    """
     m1, m2, j1, j2 = sp.symbols("M1 M2 J1 J2", positive=True)
     x, y, v, u, c, p = (sp.symbols(f"{name}1 {name}2", real=True) for name in "xyvucp")
     w1, w2 = sp.symbols("omega1 omega2", real=True)
@@ -140,22 +145,21 @@ def _struck(body: Any, contact: Any, impulse: Any) -> Any:
     return M, J, x, (v[0] + impulse[0] / M, v[1] + impulse[1] / M), omega + _cross(arm, impulse) / J
 
 
-@verified(
+@row(
     id="S3.06",
     section="6",
     equation="6.4, 6.6",
-    statement="A heavy body at rest takes up little energy: E₂ is at most 4 max(M₁/M₂, J₁/J₂) times the whole, given "
-    "that momentum and spin are exchanged and energy is kept.",
     kind="numeric",
-    printed=Formula(
-        r"M_2|v_2'|^2 + J_2|\omega_2'|^2 \le 4\max\{M_1/M_2, J_1/J_2\}\,E",
-        lambda mass, inertia: 4 * np.maximum(mass, inertia),
-    ),
-    perturbed=lambda mass, inertia: 3.9 * np.maximum(mass, inertia),
-    reason="v₂' = (M₁/M₂)(v₁ - v₁'), and each of the two has at most the whole energy. Head-on impacts come as close "
-    "to the constant 4 as one likes.",
+    printed=r"M_2|v_2'|^2 + J_2|\omega_2'|^2 \le 4\max\{M_1/M_2, J_1/J_2\}\,E",
+    right=lambda mass, inertia: 4 * np.maximum(mass, inertia),
+    wrong=lambda mass, inertia: 3.9 * np.maximum(mass, inertia),
 )
 def energy_of_the_heavy_body(bound: Code) -> Verdict:
+    """A heavy body at rest takes up little energy, given that momentum and spin are exchanged and energy is kept.
+
+    v₂' = (M₁/M₂)(v₁ - v₁'), and each of the two has at most the whole energy. Head-on impacts come as close to the
+    constant 4 as one likes.
+    """
     rng = generator()
     count = 20_000
     own = np.exp(rng.uniform(-2, 2, (3, count)))
@@ -178,17 +182,20 @@ def energy_of_the_heavy_body(bound: Code) -> Verdict:
     )
 
 
-@verified(
+@row(
     id="S3.07",
     section="3",
     equation="3.15",
-    statement="As the second body becomes infinitely heavy, the first keeps its energy.",
     kind="numeric",
-    printed=Formula(r"m|v'|^2 + J\omega'^2 = m|v|^2 + J\omega^2", lambda energy, heavy: energy),
-    perturbed=lambda energy, heavy: energy * (1 - 10 / heavy**0.5),
-    reason="The defect is of the order of 1/M₂ for bounded positions. It is measured at M₂ = J₂ = 10⁸ and 10¹⁰.",
+    printed=r"m|v'|^2 + J\omega'^2 = m|v|^2 + J\omega^2",
+    right=lambda energy, heavy: energy,
+    wrong=lambda energy, heavy: energy * (1 - 10 / heavy**0.5),
 )
 def energy_of_the_light_body(limit: Code) -> Verdict:
+    """As the second body becomes infinitely heavy, the first keeps its energy.
+
+    The defect is of the order of 1/M₂ for bounded positions. It is measured at M₂ = J₂ = 10⁸ and 10¹⁰.
+    """
     rng = generator()
     verdicts = []
     for heavy in (1e8, 1e10):

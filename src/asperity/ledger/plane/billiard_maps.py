@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import sympy as sp
 
 from ...core.checks import Floats
+from ...geometry import focusing_arcs, trace
 from ...verification import Verdict, agreement, every, holds, verify
-from ..entry import Code, Formula, by_reading, erratum, verified
+from ..entry import Code, by_reading, row
 from ..samples import generator
-from ..symbols import sp
 
 # Semi-axes of the elliptical table.
 AXES = np.array([[1.6], [1.0]])
@@ -19,6 +20,11 @@ def _states() -> tuple[Floats, Floats]:
     """Random points (2, n) of the table and inward unit directions."""
     rng = generator()
     t, angle = rng.uniform(0, 2 * np.pi, STATES), rng.uniform(0.05, np.pi - 0.05, STATES)
+    return _from_coordinates(t, angle)
+
+
+def _from_coordinates(t: Floats, angle: Floats) -> tuple[Floats, Floats]:
+    """Points of the ellipse's parameter and directions of the angle from the tangent (n2, -n1)."""
     q = AXES * np.stack([np.cos(t), np.sin(t)])
     n = _normal(q)
     return q, np.sin(angle) * n + np.cos(angle) * np.stack([n[1], -n[0]])
@@ -49,38 +55,39 @@ def reversal(q: Floats, p: Floats) -> tuple[Floats, Floats]:
     return q, -p
 
 
-@verified(
+@row(
     id="S6.01",
     section="6.1.2",
     equation="Lemma 6.1 (i)",
-    statement="-R ∘ Φ ∘ -R is a left inverse of the billiard map Φ.",
     kind="numeric",
-    printed=Formula(
-        r"(-R)\circ\Phi\circ(-R)\circ\Phi = \mathrm{id}",
-        lambda q, p: reversal(*billiard_map(*reversal(q, p))),
-    ),
-    perturbed=lambda q, p: reflection(*billiard_map(*reversal(q, p))),
-    reason="-R turns the path round. In the proof (q', p') = Gᵗ(q, p) lies in U⁻, not in U⁺.",
+    printed=r"(-R)\circ\Phi\circ(-R)\circ\Phi = \mathrm{id}",
+    right=lambda q, p: reversal(*billiard_map(*reversal(q, p))),
+    wrong=lambda q, p: reflection(*billiard_map(*reversal(q, p))),
 )
 def inverse_of_the_billiard_map(inverse: Code) -> Verdict:
+    """A left inverse of the billiard map Φ, by the reversal -R.
+
+    -R turns the path round. In the proof (q', p') = Gᵗ(q, p) lies in U⁻, not in U⁺.
+    """
     q, p = _states()
     back = inverse(*billiard_map(q, p))
     return agreement(np.stack(back), np.stack([q, p]), 1e-12)
 
 
-@verified(
+@row(
     id="S6.02",
     section="6.2.1",
     equation="6.24, 6.29'",
-    statement="-R ∘ Φⁿ ∘ -R ∘ Φᵐ = Φ^(m-n), and hence the reflection law of a wall is an involution.",
     kind="numeric",
-    printed=Formula(r"(-R)\circ\Phi^n\circ(-R)\circ\Phi^m = \Phi^{m-n}", lambda m, n: m - n),
-    perturbed=lambda m, n: m + n,
-    reason="It is row S6.01 n times. In the definition of M, U⁺ is to be V⁻.",
+    printed=r"(-R)\circ\Phi^n\circ(-R)\circ\Phi^m = \Phi^{m-n}",
+    right=lambda m, n: m - n,
+    wrong=lambda m, n: m + n,
 )
 def iterates_of_the_billiard_map(power: Code) -> Verdict:
-    from ...geometry import focusing_arcs, trace
+    """Iterates of the billiard map between two reversals, and hence the reflection law of a wall is an involution.
 
+    It is row S6.01 n times. In the definition of M, U⁺ is to be V⁻.
+    """
     state = _states()
     verdicts = []
     for m, n in ((3, 1), (5, 2), (4, 4)):
@@ -101,17 +108,20 @@ def iterates_of_the_billiard_map(power: Code) -> Verdict:
     return every(*verdicts, agreement(twice.theta, theta, 1e-9, x=x, theta=theta))
 
 
-@verified(
+@row(
     id="S6.03",
     section="6.1.3",
     equation="Lemma 6.2",
-    statement="Φ preserves ⟨p, n⟩ dσ dτ: sin(angle) times arc length times angle.",
     kind="numeric",
-    printed=Formula(r"\langle p, n\rangle\,d\sigma\,d\tau_1", np.sin),
-    perturbed=lambda angle: np.ones_like(angle),
-    reason="The Jacobian in arc length and angle is taken by central differences. It is the ratio of the sines.",
+    printed=r"\langle p, n\rangle\,d\sigma\,d\tau_1",
+    right=np.sin,
+    wrong=lambda angle: np.ones_like(angle),
 )
 def invariant_measure(density: Code) -> Verdict:
+    """The measure that Φ preserves: sin(angle) times arc length times angle.
+
+    The Jacobian in arc length and angle is taken by central differences. It is the ratio of the sines.
+    """
     rng = generator()
     t, angle = rng.uniform(0, 2 * np.pi, STATES), rng.uniform(0.3, np.pi - 0.3, STATES)
     step = 1e-5
@@ -135,10 +145,8 @@ def _speed(t: Floats) -> Floats:
 
 
 def _in_coordinates(t: Floats, angle: Floats) -> Floats:
-    """The billiard map in the ellipse's parameter and the angle of the direction from the tangent (n2, -n1)."""
-    q = AXES * np.stack([np.cos(t), np.sin(t)])
-    n = _normal(q)
-    q, p = billiard_map(q, np.sin(angle) * n + np.cos(angle) * np.stack([n[1], -n[0]]))
+    """The billiard map in the coordinates of `_from_coordinates`."""
+    q, p = billiard_map(*_from_coordinates(t, angle))
     n = _normal(q)
     along = np.sum(p * np.stack([n[1], -n[0]]), axis=0)
     return np.stack([np.arctan2(q[1] / AXES[1], q[0] / AXES[0]), np.arctan2(np.sum(p * n, axis=0), along)])
@@ -166,18 +174,18 @@ singular_set = by_reading(
 )
 
 
-@verified(
+@row(
     id="S6.06",
     section="6.2.1",
-    statement="The reflection on A₃ turns the angle θ into π - θ and is an isometric involution.",
-    printed=Formula(
-        r"p \mapsto -p + 2\langle p, k\rangle k",
-        lambda p, k, product: [-a + 2 * product * b for a, b in zip(p, k, strict=True)],
-    ),
-    perturbed=lambda p, k, product: [a - 2 * product * b for a, b in zip(p, k, strict=True)],
-    reason="Its value is the pair of q and this vector, with k = -n, the normal into M₀. 'Outward' is outward from N.",
+    printed=r"p \mapsto -p + 2\langle p, k\rangle k",
+    right=lambda p, k, product: [-a + 2 * product * b for a, b in zip(p, k, strict=True)],
+    wrong=lambda p, k, product: [a - 2 * product * b for a, b in zip(p, k, strict=True)],
 )
 def reflection_of_the_plane(image: Code) -> Verdict:
+    """The reflection on A₃ turns the angle θ into π - θ and is an isometric involution.
+
+    Its value is the pair of q and this vector, with k = -n, the normal into M₀. 'Outward' is outward from N.
+    """
     theta, direction = sp.symbols("theta direction", real=True)
     k = -sp.sin(direction), sp.cos(direction)
 
@@ -191,16 +199,20 @@ def reflection_of_the_plane(image: Code) -> Verdict:
     return every(verify(reflected, at(sp.pi - theta)), verify(reflect(reflected), at(theta)))
 
 
-@erratum(
+@row(
     id="S6.07",
     section="6.2.3",
-    statement="The joint measure G ν of a kernel and its first marginal G ν(K × X) = ν(K).",
     kind="numeric",
-    printed=Formula(r"\int f\,d(G\nu) = \iint f(x, y)\,G(y, dx)\,\nu(dy)", lambda G, nu: (G * nu[:, np.newaxis]).T),
-    corrected=Formula(r"\int f\,d(G\nu) = \iint f(y, x)\,G(y, dx)\,\nu(dy)", lambda G, nu: G * nu[:, np.newaxis]),
-    reason="The first slot is to be the state before. With the printed order it is the second marginal that is ν.",
+    printed=r"\int f\,d(G\nu) = \iint f(x, y)\,G(y, dx)\,\nu(dy)",
+    wrong=lambda G, nu: (G * nu[:, np.newaxis]).T,
+    corrected=r"\int f\,d(G\nu) = \iint f(y, x)\,G(y, dx)\,\nu(dy)",
+    right=lambda G, nu: G * nu[:, np.newaxis],
 )
 def marginal_of_the_joint_measure(joint: Code) -> Verdict:
+    """The joint measure G ν of a kernel and its first marginal G ν(K × X) = ν(K).
+
+    The first slot is to be the state before. With the printed order it is the second marginal that is ν.
+    """
     rng = generator()
     G, nu = rng.random((7, 7)), rng.random(7)
     G, nu = G / G.sum(axis=1, keepdims=True), nu / nu.sum()

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from ...geometry import focusing_arcs, trace
+from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import foreshortening
 from ...kernels.walls.circular_arc import CircularArcLaw
 from ...verification import Verdict, agreement, every, holds, verify
-from ..entry import Code, Formula, convention, erratum, verified
-from ..symbols import sp, sym
+from ..entry import Code, row
 
 HALF_ANGLES = (0.3, 0.8, 1.3)
 RAYS = 4000
@@ -37,9 +38,11 @@ def every_arc(check: Code) -> Verdict:
     return every(*(check(xi) for xi in HALF_ANGLES))
 
 
-def rays() -> tuple[Any, Any]:
+def rays(xi: float) -> tuple[Any, Any, Any]:
+    """Entry points, angles, and positions of the first hit."""
     rng = np.random.default_rng(4)
-    return rng.random(RAYS), rng.uniform(0.05, np.pi - 0.05, RAYS)
+    x, theta = rng.random(RAYS), rng.uniform(0.05, np.pi - 0.05, RAYS)
+    return x, theta, first_hit(x, theta, xi)
 
 
 def step_and_hits(theta: Any, gamma: Any, xi: float, rounded: Code = np.ceil) -> tuple[Any, Any]:
@@ -59,47 +62,46 @@ def entry_of(theta: Any, gamma: Any, xi: Any, numerator: Any, xp: Any) -> Any:
     return (xp.cos(numerator) - xp.cos(theta + xi)) / (xp.cos(theta - xi) - xp.cos(theta + xi))
 
 
-@verified(
+@row(
     id="S2.09",
     section="2.2.3",
-    statement="Focusing arcs: the tooth function, its centre and radius.",
-    printed=Formula(
-        r"t_n(x) = \tfrac{\epsilon_n}2 \cot\xi - \sqrt{\tfrac{\epsilon_n^2}4 \csc^2\xi - (x - \tfrac{\epsilon_n}2)^2}",
-        lambda x, eps, xi, xp: eps / (2 * xp.tan(xi)) - xp.sqrt((eps / (2 * xp.sin(xi))) ** 2 - (x - eps / 2) ** 2),
-    ),
-    perturbed=lambda x, eps, xi, xp: (
-        eps / (2 * xp.sin(xi)) - xp.sqrt((eps / (2 * xp.sin(xi))) ** 2 - (x - eps / 2) ** 2)
-    ),
-    reason="It vanishes at both ends of the cell and is (ε/2) tan(ξ/2) deep. The radius (ε/2)/sin ξ makes the arc "
-    "subtend 2ξ.",
+    printed=r"t_n(x) = \tfrac{\epsilon_n}2 \cot\xi - \sqrt{\tfrac{\epsilon_n^2}4 \csc^2\xi - (x -"
+    r" \tfrac{\epsilon_n}2)^2}",
+    right=lambda x, eps, xi, xp: eps / (2 * xp.tan(xi)) - xp.sqrt((eps / (2 * xp.sin(xi))) ** 2 - (x - eps / 2) ** 2),
+    wrong=lambda x, eps, xi, xp: eps / (2 * xp.sin(xi)) - xp.sqrt((eps / (2 * xp.sin(xi))) ** 2 - (x - eps / 2) ** 2),
 )
 def focusing_tooth_function(function: Code) -> Verdict:
+    """Focusing arcs: the tooth function, its centre and radius.
+
+    It vanishes at both ends of the cell and is (ε/2) tan(ξ/2) deep. The radius (ε/2)/sin ξ makes the arc subtend 2ξ.
+    """
     eps, xi = sp.Symbol("epsilon", positive=True), sp.Symbol("xi", positive=True)
     ends_and_bottom = [function(x, eps, xi, sp) for x in (sp.Integer(0), eps, eps / 2)]
     return verify(ends_and_bottom, [0, 0, -eps / 2 * sp.tan(xi / 2)], [xi < sp.pi / 2])
 
 
-@convention(
+@row(
     id="S2.10",
+    status="convention",
     section="2.2.3",
-    statement="Focusing arcs: where rays that enter at the two ends of the cell hit.",
-    printed=Formula(
-        r"X = 0 \implies \gamma = -\xi, \quad X = 1 \implies \gamma = \xi",
-        lambda theta, xi: (np.full_like(theta, -xi), np.full_like(theta, xi)),
-    ),
-    corrected=Formula(
-        r"\gamma|_{X=0} = \begin{cases} -\xi & \theta \le \pi - \xi \\ 2\theta + \xi - 2\pi & \text{else} \end{cases},"
-        r"\quad \gamma|_{X=1} = \begin{cases} \xi & \theta \ge \xi \\ 2\theta - \xi & \text{else} \end{cases}",
-        lambda theta, xi: (
-            np.where(theta <= np.pi - xi, -xi, 2 * theta + xi - 2 * np.pi),
-            np.where(theta >= xi, xi, 2 * theta - xi),
-        ),
-    ),
-    reason="A ray flatter than the arc's tangent at the corner leaves the corner and hits the far side. The printed "
-    "values hold for the steeper ones.",
     kind="numeric",
+    printed=r"X = 0 \implies \gamma = -\xi, \quad X = 1 \implies \gamma = \xi",
+    wrong=lambda theta, xi: (np.full_like(theta, -xi), np.full_like(theta, xi)),
+    corrected=r"\gamma|_{X=0} = \begin{cases} -\xi & \theta \le \pi - \xi \\ 2\theta + \xi - 2\pi & \text{else}"
+    r" \end{cases},"
+    r"\quad \gamma|_{X=1} = \begin{cases} \xi & \theta \ge \xi \\ 2\theta - \xi & \text{else} \end{cases}",
+    right=lambda theta, xi: (
+        np.where(theta <= np.pi - xi, -xi, 2 * theta + xi - 2 * np.pi),
+        np.where(theta >= xi, xi, 2 * theta - xi),
+    ),
 )
 def hits_at_the_ends(positions: Code) -> Verdict:
+    """Focusing arcs: where rays that enter at the two ends of the cell hit.
+
+    A ray flatter than the arc's tangent at the corner leaves the corner and hits the far side. The printed values hold
+    for the steeper ones.
+    """
+
     def check(xi: float) -> Verdict:
         theta = np.linspace(0.05, np.pi - 0.05, 301)
         theta = theta[np.minimum(np.abs(theta - xi), np.abs(theta - np.pi + xi)) > 0.01]
@@ -112,25 +114,25 @@ def hits_at_the_ends(positions: Code) -> Verdict:
     return every_arc(check)
 
 
-@verified(
+@row(
     id="S2.11",
     section="2.2.3",
-    statement="Focusing arcs: the step Δγ of the hits, its direction, and their number N.",
-    printed=Formula(
-        r"\Delta\gamma = \begin{cases} 2(\pi - \theta + \gamma) & \theta \ge \frac\pi2 + \gamma \\"
-        r" -2(\theta - \gamma) & \text{else} \end{cases}, \quad"
-        r" N = \Bigl\lceil \frac{\xi \mp \gamma}{|\Delta\gamma|} \Bigr\rceil",
-        step_and_hits,
-    ),
-    perturbed=lambda theta, gamma, xi: step_and_hits(theta, gamma, xi, np.floor),
-    reason="Equal chords of a circle follow each other, and the ray leaves when the next would end beyond ±ξ. Where "
-    "the quotient is whole the ray meets a corner.",
     kind="numeric",
+    printed=r"\Delta\gamma = \begin{cases} 2(\pi - \theta + \gamma) & \theta \ge \frac\pi2 + \gamma \\"
+    r" -2(\theta - \gamma) & \text{else} \end{cases}, \quad"
+    r" N = \Bigl\lceil \frac{\xi \mp \gamma}{|\Delta\gamma|} \Bigr\rceil",
+    right=step_and_hits,
+    wrong=lambda theta, gamma, xi: step_and_hits(theta, gamma, xi, np.floor),
 )
 def hits_on_an_arc(step_and_number: Code) -> Verdict:
+    """Focusing arcs: the step Δγ of the hits, its direction, and their number N.
+
+    Equal chords of a circle follow each other, and the ray leaves when the next would end beyond ±ξ. Where the quotient
+    is whole the ray meets a corner.
+    """
+
     def check(xi: float) -> Verdict:
-        x, theta = rays()
-        gamma = first_hit(x, theta, xi)
+        x, theta, gamma = rays(xi)
         hits = trace(focusing_arcs(xi), x, theta).collisions
         decided = ~undecided(theta, gamma, xi)
         step, number = step_and_number(theta, gamma, xi)
@@ -147,25 +149,27 @@ def hits_on_an_arc(step_and_number: Code) -> Verdict:
     return every_arc(check)
 
 
-@convention(
+@row(
     id="S2.12",
+    status="convention",
     section="2.2.3",
     equation="2.17",
-    statement="Focusing arcs: the outgoing angle.",
-    printed=Formula(r"\Theta' = \theta + N \Delta\gamma", lambda rotated, forward: rotated),
-    corrected=Formula(
-        r"\Theta' = \theta + N \Delta\gamma - \pi \ (\theta \ge \tfrac\pi2 + \gamma), \quad"
-        r" \Theta' = \theta + N \Delta\gamma + \pi \text{ else}",
-        lambda rotated, forward: rotated + np.where(forward, -np.pi, np.pi),
-    ),
-    reason="The incoming velocity has the angle π + θ, so the formula is right mod π, for unoriented lines. In "
-    "(0, π) it needs the π, as in the law of the library.",
     kind="numeric",
+    printed=r"\Theta' = \theta + N \Delta\gamma",
+    wrong=lambda rotated, forward: rotated,
+    corrected=r"\Theta' = \theta + N \Delta\gamma - \pi \ (\theta \ge \tfrac\pi2 + \gamma), \quad"
+    r" \Theta' = \theta + N \Delta\gamma + \pi \text{ else}",
+    right=lambda rotated, forward: rotated + np.where(forward, -np.pi, np.pi),
 )
 def outgoing_angle_of_an_arc(angle: Code) -> Verdict:
+    """Focusing arcs: the outgoing angle.
+
+    The incoming velocity has the angle π + θ, so the formula is right mod π, for unoriented lines. In (0, π) it needs
+    the π, as in the law of the library.
+    """
+
     def check(xi: float) -> Verdict:
-        x, theta = rays()
-        gamma = first_hit(x, theta, xi)
+        x, theta, gamma = rays(xi)
         decided = ~undecided(theta, gamma, xi)
         x, theta, gamma = x[decided], theta[decided], gamma[decided]
         out = trace(focusing_arcs(xi), x, theta).theta
@@ -179,23 +183,21 @@ def outgoing_angle_of_an_arc(angle: Code) -> Verdict:
     return every_arc(check)
 
 
-@erratum(
+@row(
     id="S2.13",
     section="2.2.3",
     equation="2.18, second line",
-    statement="Focusing arcs: the position of entry as a function of the position of the first hit.",
-    printed=Formula(
-        r"X = \frac{\cos(\theta + \gamma) - \cos(\theta + \xi)}{\cos(\theta - \xi) - \cos(\theta + \xi)}",
-        lambda theta, gamma, xi, xp: entry_of(theta, gamma, xi, theta + gamma, xp),
-    ),
-    corrected=Formula(
-        r"X = \frac{\cos(\theta - \gamma) - \cos(\theta + \xi)}{\cos(\theta - \xi) - \cos(\theta + \xi)}",
-        lambda theta, gamma, xi, xp: entry_of(theta, gamma, xi, theta - gamma, xp),
-    ),
-    reason="Going back from the point of the arc along the ray gives the first line of the equation, which is right. "
-    "The second line equals it only with cos(θ − γ).",
+    printed=r"X = \frac{\cos(\theta + \gamma) - \cos(\theta + \xi)}{\cos(\theta - \xi) - \cos(\theta + \xi)}",
+    wrong=lambda theta, gamma, xi, xp: entry_of(theta, gamma, xi, theta + gamma, xp),
+    corrected=r"X = \frac{\cos(\theta - \gamma) - \cos(\theta + \xi)}{\cos(\theta - \xi) - \cos(\theta + \xi)}",
+    right=lambda theta, gamma, xi, xp: entry_of(theta, gamma, xi, theta - gamma, xp),
 )
 def entry_from_the_first_hit(entry: Code) -> Verdict:
+    """Focusing arcs: the position of entry as a function of the position of the first hit.
+
+    Going back from the point of the arc along the ray gives the first line of the equation, which is right. The second
+    line equals it only with cos(θ − γ).
+    """
     theta, gamma, xi = sp.symbols("theta gamma xi", real=True)
     half_chord = 2 * sp.sin(xi)
     hit1, hit2 = sp.Rational(1, 2) + sp.sin(gamma) / half_chord, (sp.cos(xi) - sp.cos(gamma)) / half_chord
@@ -206,26 +208,28 @@ def entry_from_the_first_hit(entry: Code) -> Verdict:
     )
 
 
-@erratum(
+@row(
     id="S2.14",
     section="2.2.3",
-    statement="Focusing arcs: the range of the angle whose arccosine is taken, and hence the branch.",
-    printed=Formula(
-        r"\theta + \gamma \in [-\tfrac\pi2, 0] \cup [\pi, \tfrac{3\pi}2)",
-        lambda theta, gamma: (
-            ((-np.pi / 2 <= theta + gamma) & (theta + gamma <= 0))
-            | ((np.pi <= theta + gamma) & (theta + gamma < 3 * np.pi / 2))
-        ),
-    ),
-    corrected=Formula(r"\theta - \gamma \in (0, \pi)", lambda theta, gamma: (theta > gamma) & (theta - gamma < np.pi)),
-    reason="A ray hits the arc from inside, so sin(θ − γ) > 0. The ordinary arccosine is the right one, and no other "
-    "branch is needed.",
     kind="numeric",
+    printed=r"\theta + \gamma \in [-\tfrac\pi2, 0] \cup [\pi, \tfrac{3\pi}2)",
+    wrong=lambda theta, gamma: (
+        ((-np.pi / 2 <= theta + gamma) & (theta + gamma <= 0))
+        | ((np.pi <= theta + gamma) & (theta + gamma < 3 * np.pi / 2))
+    ),
+    corrected=r"\theta - \gamma \in (0, \pi)",
+    right=lambda theta, gamma: (theta > gamma) & (theta - gamma < np.pi),
 )
 def range_of_the_arccosine(condition: Code) -> Verdict:
+    """Focusing arcs: the range of the angle whose arccosine is taken, and hence the branch.
+
+    A ray hits the arc from inside, so sin(θ − γ) > 0. The ordinary arccosine is the right one, and no other branch is
+    needed.
+    """
+
     def check(xi: float) -> Verdict:
-        x, theta = rays()
-        return holds(condition(theta, first_hit(x, theta, xi)), "rays", x=x, theta=theta)
+        x, theta, gamma = rays(xi)
+        return holds(condition(theta, gamma), "rays", x=x, theta=theta)
 
     # a ray hits the arc at gamma from inside if and only if it moves along the outward normal there
     rng = np.random.default_rng(5)
@@ -236,67 +240,64 @@ def range_of_the_arccosine(condition: Code) -> Verdict:
     return every(every_arc(check), holds(condition(theta, gamma) == outward, "directions", theta=theta, gamma=gamma))
 
 
-@erratum(
+@row(
     id="S2.15",
     section="2.2.3",
-    statement="Focusing arcs: the position of the first hit as a function of the position of entry.",
-    printed=Formula(
-        r"\gamma = -\theta + \mathrm{Arccos}(X \cos(\theta - \xi) + (1 - X) \cos(\theta + \xi))",
-        lambda theta, delta: -theta + delta,
-    ),
-    corrected=Formula(
-        r"\gamma = \theta - \arccos(X \cos(\theta - \xi) + (1 - X) \cos(\theta + \xi))",
-        lambda theta, delta: theta - delta,
-    ),
-    reason="It solves the corrected eq. 2.18, in which θ − γ lies in (0, π). The printed sign puts the hit elsewhere "
-    "for every ray.",
     kind="numeric",
+    printed=r"\gamma = -\theta + \mathrm{Arccos}(X \cos(\theta - \xi) + (1 - X) \cos(\theta + \xi))",
+    wrong=lambda theta, delta: -theta + delta,
+    corrected=r"\gamma = \theta - \arccos(X \cos(\theta - \xi) + (1 - X) \cos(\theta + \xi))",
+    right=lambda theta, delta: theta - delta,
 )
 def first_hit_from_the_entry(position: Code) -> Verdict:
+    """Focusing arcs: the position of the first hit as a function of the position of entry.
+
+    It solves the corrected eq. 2.18, in which θ − γ lies in (0, π). The printed sign puts the hit elsewhere for every
+    ray.
+    """
+
     def check(xi: float) -> Verdict:
-        x, theta = rays()
+        x, theta, gamma = rays(xi)
         delta = np.arccos(x * np.cos(theta - xi) + (1 - x) * np.cos(theta + xi))
-        return agreement(position(theta, delta), first_hit(x, theta, xi), TRACED, x=x, theta=theta)
+        return agreement(position(theta, delta), gamma, TRACED, x=x, theta=theta)
 
     return every_arc(check)
 
 
-@verified(
+@row(
     id="S2.16",
     section="2.2.3",
-    statement="Focusing arcs: X increases with γ.",
-    printed=Formula(
-        r"\frac{dX}{d\gamma} = \frac{\sin(\theta - \gamma)}{2 \sin\theta \sin\xi} > 0",
-        lambda theta, gamma, xi, xp: xp.sin(theta - gamma) / (2 * xp.sin(theta) * xp.sin(xi)),
-    ),
-    perturbed=lambda theta, gamma, xi, xp: xp.sin(theta + gamma) / (2 * xp.sin(theta) * xp.sin(xi)),
-    reason="This is the derivative of the corrected eq. 2.18, and it is positive because θ − γ is in (0, π). So X and "
-    "γ determine each other.",
+    printed=r"\frac{dX}{d\gamma} = \frac{\sin(\theta - \gamma)}{2 \sin\theta \sin\xi} > 0",
+    right=lambda theta, gamma, xi, xp: xp.sin(theta - gamma) / (2 * xp.sin(theta) * xp.sin(xi)),
+    wrong=lambda theta, gamma, xi, xp: xp.sin(theta + gamma) / (2 * xp.sin(theta) * xp.sin(xi)),
 )
 def entry_increases_with_the_hit(derivative: Code) -> Verdict:
+    """Focusing arcs: X increases with γ.
+
+    This is the derivative of the corrected eq. 2.18, and it is positive because θ − γ is in (0, π). So X and γ
+    determine each other.
+    """
     theta, gamma, xi = sp.symbols("theta gamma xi", real=True)
     slope = sp.diff(entry_of(theta, gamma, xi, theta - gamma, sp), gamma)
     return verify(slope, derivative(theta, gamma, xi, sp))
 
 
-@erratum(
+@row(
     id="S2.22",
     section="2.3.3",
-    statement="The elliptical arcs whose foreshortened wall is the wall of circular arcs.",
-    printed=Formula(
-        r"t_n = \tfrac{\epsilon_n}2 \cot\xi - (1 + m/J)^{-1/2} \sqrt{\tfrac{\epsilon_n^2}4 \csc^2\xi -"
-        r" (x - \tfrac{\epsilon_n}2)^2} \quad\text{(the shift is described, not quoted)}",
-        lambda centre, root, factor: centre - factor * root,
-    ),
-    corrected=Formula(
-        r"t_n = (1 + m/J)^{-1/2} \Bigl[\tfrac{\epsilon_n}2 \cot\xi - \sqrt{\tfrac{\epsilon_n^2}4 \csc^2\xi -"
-        r" (x - \tfrac{\epsilon_n}2)^2}\Bigr]",
-        lambda centre, root, factor: factor * (centre - root),
-    ),
-    reason="With the shift unscaled the function is positive at 0. Scaled as a whole, it is the circular arc after "
-    "compression along x, up to scale.",
+    printed=r"t_n = \tfrac{\epsilon_n}2 \cot\xi - (1 + m/J)^{-1/2} \sqrt{\tfrac{\epsilon_n^2}4 \csc^2\xi -"
+    r" (x - \tfrac{\epsilon_n}2)^2} \quad\text{(the shift is described, not quoted)}",
+    wrong=lambda centre, root, factor: centre - factor * root,
+    corrected=r"t_n = (1 + m/J)^{-1/2} \Bigl[\tfrac{\epsilon_n}2 \cot\xi - \sqrt{\tfrac{\epsilon_n^2}4 \csc^2\xi -"
+    r" (x - \tfrac{\epsilon_n}2)^2}\Bigr]",
+    right=lambda centre, root, factor: factor * (centre - root),
 )
 def elliptical_tooth_function(function: Code) -> Verdict:
+    """The elliptical arcs whose foreshortened wall is the wall of circular arcs.
+
+    With the shift unscaled the function is positive at 0. Scaled as a whole, it is the circular arc after compression
+    along x, up to scale.
+    """
     x, eps, xi = sp.symbols("x epsilon xi", positive=True)
     centre, radius = eps / (2 * sp.tan(xi)), eps / (2 * sp.sin(xi))
     root = sp.sqrt(radius**2 - (x - eps / 2) ** 2)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from ...geometry import dispersing_arcs, trace
 from ...verification import Verdict, agreement, every, holds, verify
-from ..entry import Code, Formula, by_reading, convention, erratum, verified
-from ..symbols import sp
+from ..entry import Code, by_reading, row
 
 POINTS = 2000
 # Error of a sum over POINTS equal cells, for a piecewise linear integrand.
@@ -18,21 +18,21 @@ GRID_ERROR = 1e-5
 SHALLOW_ERROR = 1e-3
 
 
-@verified(
+@row(
     id="S1.07",
     section="1.2.5",
     equation="1.18'",
-    statement="Lambert's kernel is symmetric with respect to sin θ dθ, and so is retroreflection.",
-    printed=Formula(
-        r"\tilde P(\theta, d\theta') = \tfrac12 \sin\theta'\, d\theta', \quad "
-        r"\tilde P(\theta, d\theta') = \delta_\theta(d\theta')",
-        lambda theta_out, xp: xp.sin(theta_out) / 2,
-    ),
-    perturbed=lambda theta_out, xp: 1 / xp.pi,
-    reason="The flux sin θ · sin θ′/2 does not change when θ and θ′ are exchanged, and the density integrates to 1. "
-    "Retroreflection is the identity, which is symmetric for every measure.",
+    printed=r"\tilde P(\theta, d\theta') = \tfrac12 \sin\theta'\, d\theta', \quad "
+    r"\tilde P(\theta, d\theta') = \delta_\theta(d\theta')",
+    right=lambda theta_out, xp: xp.sin(theta_out) / 2,
+    wrong=lambda theta_out, xp: 1 / xp.pi,
 )
 def lambert_is_symmetric(density: Code) -> Verdict:
+    """Lambert's kernel is symmetric with respect to sin θ dθ, and so is retroreflection.
+
+    The flux sin θ · sin θ′/2 does not change when θ and θ′ are exchanged, and the density integrates to 1.
+    Retroreflection is the identity, which is symmetric for every measure.
+    """
     theta, theta_out = sp.symbols("theta theta'", real=True)
     mass = sp.integrate(density(theta_out, sp), (theta_out, 0, sp.pi))
     flux = sp.sin(theta) * density(theta_out, sp)
@@ -40,39 +40,42 @@ def lambert_is_symmetric(density: Code) -> Verdict:
     return every(verify(mass, 1), verify(flux, backward))
 
 
-@erratum(
+@row(
     id="S1.08",
     section="1.2.5",
-    statement="Which transformations T of (0, 1) give a symmetric deterministic law.",
-    printed=Formula(r"T \text{ preserves the measure}", lambda u: (u + 0.3) % 1.0),
-    corrected=Formula(r"T \text{ preserves the measure and } T \circ T = \mathrm{id}", lambda u: (u + 0.5) % 1.0),
-    reason="Symmetry of δ_T forces T ∘ T = id. A rotation by 0.3 preserves the measure "
-    "without being symmetric, one by 1/2 is an involution and symmetric.",
     kind="numeric",
+    printed=r"T \text{ preserves the measure}",
+    wrong=lambda u: (u + 0.3) % 1.0,
+    corrected=r"T \text{ preserves the measure and } T \circ T = \mathrm{id}",
+    right=lambda u: (u + 0.5) % 1.0,
 )
 def symmetric_deterministic_laws(transformation: Code) -> Verdict:
+    """Which transformations T of (0, 1) give a symmetric deterministic law.
+
+    Symmetry of δ_T forces T ∘ T = id. A rotation by 0.3 preserves the measure without being symmetric, one by 1/2 is an
+    involution and symmetric.
+    """
     u = (np.arange(POINTS) + 0.5) / POINTS
     image = transformation(u)
     return agreement(np.mean(u * image**2), np.mean(u**2 * image), GRID_ERROR)
 
 
-@convention(
+@row(
     id="S1.09",
+    status="convention",
     section="1.2.6",
-    statement="Shallow dispersing arcs: the generator of the limit, and the convention in which it is one.",
-    printed=Formula(
-        r"\tilde P u - u = \tfrac{k_2}{6} \mathcal L u + O(K^3), \quad \mathcal L u = \bigl((1 - z^2) u'\bigr)'",
-        lambda theta_out: theta_out,
-    ),
-    corrected=Formula(
-        r"\tilde P u(\pi - \theta) - u(\theta) = \tfrac{K^2}{6} \mathcal L u(\theta) + O(K^3)",
-        lambda theta_out: np.pi - theta_out,
-    ),
-    reason="k₂ is not defined: the coefficient is K²/6 with K the period over the radius of the arcs. It presumes that "
-    "specular reflection is the identity, while here it is θ′ = π − θ, where P̃u − u does not become small.",
     kind="numeric",
+    printed=r"\tilde P u - u = \tfrac{k_2}{6} \mathcal L u + O(K^3), \quad \mathcal L u = \bigl((1 - z^2) u'\bigr)'",
+    wrong=lambda theta_out: theta_out,
+    corrected=r"\tilde P u(\pi - \theta) - u(\theta) = \tfrac{K^2}{6} \mathcal L u(\theta) + O(K^3)",
+    right=lambda theta_out: np.pi - theta_out,
 )
 def generator_of_shallow_arcs(angle: Code) -> Verdict:
+    """Shallow dispersing arcs: the generator of the limit, and the convention in which it is one.
+
+    k₂ is not defined: the coefficient is K²/6 with K the period over the radius of the arcs. It presumes that specular
+    reflection is the identity, while here it is θ′ = π − θ, where P̃u − u does not become small.
+    """
     curvature, number = 0.1, 400
     z, weight = np.polynomial.legendre.leggauss(number)
     x = (np.arange(number) + 0.5) / number
@@ -95,18 +98,20 @@ def generator_of_shallow_arcs(angle: Code) -> Verdict:
     )
 
 
-@erratum(
+@row(
     id="S1.10",
     section="1.2.7",
-    statement="The functional of resistance: the flux factor is counted once.",
-    printed=Formula(
-        r"\int c(u, u')\, (u \cdot n)\, \nu(du\, du'\, dn)", lambda cost, normal_component: cost * normal_component
-    ),
-    corrected=Formula(r"\int c(u, u')\, \nu(du\, du'\, dn)", lambda cost, normal_component: cost),
-    reason="ν already contains (u · n)₊. For c = 1 and the unit disk the resistance is 4π, the measure of all lines "
-    "that meet it; with the factor counted twice it is π².",
+    printed=r"\int c(u, u')\, (u \cdot n)\, \nu(du\, du'\, dn)",
+    wrong=lambda cost, normal_component: cost * normal_component,
+    corrected=r"\int c(u, u')\, \nu(du\, du'\, dn)",
+    right=lambda cost, normal_component: cost,
 )
 def resistance_of_a_disk(integrand: Code) -> Verdict:
+    """The functional of resistance: the flux factor is counted once.
+
+    ν already contains (u · n)₊. For c = 1 and the unit disk the resistance is 4π, the measure of all lines that meet
+    it; with the factor counted twice it is π².
+    """
     angle = sp.Symbol("phi", real=True)
     incidence = integrand(sp.Integer(1), sp.cos(angle)) * sp.cos(angle)
     total = 2 * sp.pi * sp.integrate(incidence, (angle, -sp.pi / 2, sp.pi / 2))
@@ -114,23 +119,22 @@ def resistance_of_a_disk(integrand: Code) -> Verdict:
     return verify(total, 4 * sp.pi)
 
 
-@erratum(
+@row(
     id="S2.26",
     section="2.3.4",
     equation="Remark",
-    statement="Which continuous transformations of (−1, 1) are ±x.",
-    printed=Formula(
-        r"T \text{ continuous and measure preserving} \implies T(x) = \pm x", lambda preserves, twice: preserves
-    ),
-    corrected=Formula(
-        r"T \text{ continuous, measure preserving, } T \circ T = \mathrm{id} \implies T(x) = \pm x",
-        lambda preserves, twice: preserves and twice,
-    ),
-    reason="The tent map 1 − 2|x| is continuous and preserves the measure. A deterministic rough reflection is also an "
-    "involution, and with that added the remark is true; the involution (1 - 2x)/(2 - x) shows that both are needed.",
     kind="numeric",
+    printed=r"T \text{ continuous and measure preserving} \implies T(x) = \pm x",
+    wrong=lambda preserves, twice: preserves,
+    corrected=r"T \text{ continuous, measure preserving, } T \circ T = \mathrm{id} \implies T(x) = \pm x",
+    right=lambda preserves, twice: preserves and twice,
 )
 def continuous_reflections(hypothesis: Code) -> Verdict:
+    """Which continuous transformations of (−1, 1) are ±x.
+
+    The tent map 1 − 2|x| is continuous and preserves the measure. A deterministic rough reflection is also an
+    involution, and with that added the remark is true; the involution (1 - 2x)/(2 - x) shows that both are needed.
+    """
     x = -1 + (2 * np.arange(POINTS) + 1) / POINTS
     maps: list[Code] = [
         lambda x: x, lambda x: -x, lambda x: 1 - 2 * np.abs(x), lambda x: x**3, lambda x: (1 - 2 * x) / (2 - x),

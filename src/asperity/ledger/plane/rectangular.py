@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from ...geometry import rectangular_teeth, trace
+from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import foreshortening
 from ...kernels.laws.crevice import crevice_retro
 from ...kernels.walls.rectangular import RectangularTeethLaw
 from ...verification import Verdict, agreement, verify
-from ..entry import Code, Formula, erratum
-from ..entry_probability import FRACTION_ERROR, fraction
-from ..symbols import sp, sym
+from ..entry import Code, row
+from ..simulated import FRACTION_ERROR, fraction
 
 HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)
 
@@ -37,78 +38,67 @@ def compared_with_tracing(probability: Code, low: float) -> Verdict:
     return agreement(found, traced, FRACTION_ERROR, height_to_width=ratios[:, None], theta=theta)
 
 
-def crossings(height_to_width: float, theta: Any) -> Any:
-    """The whole and fractional parts of d = 2 r |cot theta|."""
-    return np.divmod(2 * height_to_width / np.abs(np.tan(theta)), 1.0)
-
-
 def exchanged_cases(height_to_width: float, theta: Any) -> Any:
-    """p_r as printed."""
-    whole, rest = crossings(height_to_width, theta)
-    return np.where(whole % 2 == 0, 0.5 + 0.5 * rest, 1.0 - 0.5 * rest)
-
-
-def exchanged_cases_of_the_crevice(height_to_width: float, theta: Any) -> Any:
-    """The conditional probability as printed."""
-    whole, rest = crossings(height_to_width, theta)
+    """The conditional probability for a crevice as printed; p_r as printed is the mean of 1 and this."""
+    whole, rest = np.divmod(2 * height_to_width / np.abs(np.tan(theta)), 1.0)
     return np.where(whole % 2 == 0, rest, 1.0 - rest)
 
 
-@erratum(
+@row(
     id="S2.01",
     section="2.2.1",
-    statement="Rectangular teeth: the probability of specular reflection, r the height over the width.",
-    printed=Formula(
-        r"p_r(\theta) = \begin{cases} \frac12 + \frac12\{d\} & \lfloor d \rfloor \text{ even} \\"
-        r" 1 - \frac12\{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
-        exchanged_cases,
-    ),
-    corrected=Formula(
-        r"p_r(\theta) = \begin{cases} 1 - \frac12\{d\} & \lfloor d \rfloor \text{ even} \\"
-        r" \frac12 + \frac12\{d\} & \lfloor d \rfloor \text{ odd} \end{cases}, \quad d = 2r\,|\cot\theta|",
-        lambda ratio, theta: RectangularTeethLaw(ratio).branches(theta)[0][..., 0],
-    ),
-    reason="Steep rays, with d near 0, meet no side and are specular, so the even case is the one that starts at 1. "
-    "The two cases are exchanged.",
     kind="numeric",
+    printed=r"p_r(\theta) = \begin{cases} \frac12 + \frac12\{d\} & \lfloor d \rfloor \text{ even} \\"
+    r" 1 - \frac12\{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
+    wrong=lambda ratio, theta: 0.5 + 0.5 * exchanged_cases(ratio, theta),
+    corrected=r"p_r(\theta) = \begin{cases} 1 - \frac12\{d\} & \lfloor d \rfloor \text{ even} \\"
+    r" \frac12 + \frac12\{d\} & \lfloor d \rfloor \text{ odd} \end{cases}, \quad d = 2r\,|\cot\theta|",
+    right=lambda ratio, theta: RectangularTeethLaw(ratio).branches(theta)[0][..., 0],
 )
 def specular_fraction_of_rectangular_teeth(probability: Code) -> Verdict:
+    """Rectangular teeth: the probability of specular reflection, r the height over the width.
+
+    Steep rays, with d near 0, meet no side and are specular, so the even case is the one that starts at 1. The two
+    cases are exchanged.
+    """
     return compared_with_tracing(probability, 0.0)
 
 
-@erratum(
+@row(
     id="S2.02",
     section="2.2.1",
-    statement="Rectangular teeth: the probability of specular reflection for rays that enter a crevice.",
-    printed=Formula(
-        r"\begin{cases} \{d\} & \lfloor d \rfloor \text{ even} \\"
-        r" 1 - \{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
-        exchanged_cases_of_the_crevice,
-    ),
-    corrected=Formula(
-        r"\begin{cases} 1 - \{d\} & \lfloor d \rfloor \text{ even} \\"
-        r" \{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
-        lambda ratio, theta: 1.0 - crevice_retro(ratio, theta),
-    ),
-    reason="Unfolded, the ray crosses d widths, hence ⌊d⌋ or ⌊d⌋ + 1 sides, the latter with probability {d}. An even "
-    "number of sides makes it specular.",
     kind="numeric",
+    printed=r"\begin{cases} \{d\} & \lfloor d \rfloor \text{ even} \\"
+    r" 1 - \{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
+    wrong=exchanged_cases,
+    corrected=r"\begin{cases} 1 - \{d\} & \lfloor d \rfloor \text{ even} \\"
+    r" \{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
+    right=lambda ratio, theta: 1.0 - crevice_retro(ratio, theta),
 )
 def specular_fraction_of_a_crevice(probability: Code) -> Verdict:
+    """Rectangular teeth: the probability of specular reflection for rays that enter a crevice.
+
+    Unfolded, the ray crosses d widths, hence ⌊d⌋ or ⌊d⌋ + 1 sides, the latter with probability {d}. An even number of
+    sides makes it specular.
+    """
     return compared_with_tracing(probability, 0.5)
 
 
-@erratum(
+@row(
     id="S2.18",
     section="2.3.1",
     equation="2.5",
-    statement="The ratio r̃ of the foreshortened rectangular teeth.",
-    printed=Formula(r"\tilde r = (1 + m/J)^{-1/2} r", lambda r, m, J, xp: r / xp.sqrt(1 + m / J)),
-    corrected=Formula(r"\tilde r = (1 + m/J)^{1/2} r", lambda r, m, J, xp: r * xp.sqrt(1 + m / J)),
-    reason="Widths are compressed and heights are not, so height over width grows. The printed exponent is for width "
-    "over height, which section 2.3.1 says and sections 1.2.3 and 2.2.1 do not use.",
+    printed=r"\tilde r = (1 + m/J)^{-1/2} r",
+    wrong=lambda r, m, J, xp: r / xp.sqrt(1 + m / J),
+    corrected=r"\tilde r = (1 + m/J)^{1/2} r",
+    right=lambda r, m, J, xp: r * xp.sqrt(1 + m / J),
 )
 def ratio_of_foreshortened_teeth(ratio: Code) -> Verdict:
+    """The ratio r̃ of the foreshortened rectangular teeth.
+
+    Widths are compressed and heights are not, so height over width grows. The printed exponent is for width over
+    height, which section 2.3.1 says and sections 1.2.3 and 2.2.1 do not use.
+    """
     width, height = sp.symbols("width height", positive=True)
     felt = height / (foreshortening(sym.m, sym.J, sp) * width)
     return verify(ratio(height / width, sym.m, sym.J, sp), felt)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from ...geometry.tracing.tracing import trace
 from ...geometry.walls.named import dispersing_arcs, focusing_arcs, rectangular_teeth, triangular_teeth
 from ...verification import Verdict, agreement, every, holds, verify
-from ..entry import Code, Formula, by_reading, erratum, verified
-from ..symbols import sp
+from ..entry import Code, by_reading, row
 
 RAYS = 400
 # Rounding error of a ray. It grows with curvature and bounces, both small here.
@@ -19,24 +19,28 @@ REFLECTED = 1e-10
 STEP, DIFFERENTIATED = 1e-5, 1e-4
 
 
-def rays(margin: float = 0.2) -> tuple[Any, Any]:
+def rays() -> tuple[Any, Any]:
     """Entry points and angles, away from grazing."""
     rng = np.random.default_rng(1)
-    return rng.random(RAYS), rng.uniform(margin, np.pi - margin, RAYS)
+    return rng.random(RAYS), rng.uniform(0.2, np.pi - 0.2, RAYS)
 
 
-@verified(
+@row(
     id="S1.01",
     section="1.2.2",
     equation="Proposition on deterministic reflections (i)",
-    statement="The reflection by a wall is an involution: the ray that leaves comes back where it entered.",
-    printed=Formula(r"P^W \circ P^W = \mathrm{id}", lambda theta: theta),
-    perturbed=lambda theta: np.pi - theta,
-    reason="Angles are those of minus the incoming and of the outgoing velocity, so time reversal exchanges them. With "
-    "another identification of the two half circles the square is not the identity.",
     kind="numeric",
+    printed=r"P^W \circ P^W = \mathrm{id}",
+    right=lambda theta: theta,
+    wrong=lambda theta: np.pi - theta,
 )
 def reflection_is_an_involution(identified: Code) -> Verdict:
+    """The reflection by a wall is an involution: the ray that leaves comes back where it entered.
+
+    Angles are those of minus the incoming and of the outgoing velocity, so time reversal exchanges them. With another
+    identification of the two half circles the square is not the identity.
+    """
+
     def check(wall: Any) -> Verdict:
         x, theta = rays()
         there = trace(wall, x, theta)
@@ -49,18 +53,21 @@ def reflection_is_an_involution(identified: Code) -> Verdict:
     return every(*(check(wall) for wall in (focusing_arcs(1.2), triangular_teeth(0.9))))
 
 
-@verified(
+@row(
     id="S1.02",
     section="1.2.2",
     equation="1.5; Proposition on deterministic reflections (ii)",
-    statement="The reflection by a wall preserves sin θ dx dθ.",
-    printed=Formula(r"\Lambda^1(dx\, d\theta) = \sin\theta\, dx\, d\theta", np.sin),
-    perturbed=lambda theta: np.sin(theta) ** 2,
-    reason="The Jacobian determinant, by differences between rays of one itinerary, is the quotient of the densities. "
-    "It is Liouville's theorem for a section of the flow.",
     kind="numeric",
+    printed=r"\Lambda^1(dx\, d\theta) = \sin\theta\, dx\, d\theta",
+    right=np.sin,
+    wrong=lambda theta: np.sin(theta) ** 2,
 )
 def reflection_preserves_the_flux(density: Code) -> Verdict:
+    """The reflection by a wall preserves sin θ dx dθ.
+
+    The Jacobian determinant, by differences between rays of one itinerary, is the quotient of the densities. It is
+    Liouville's theorem for a section of the flow.
+    """
     x, theta = rays()
 
     def differences(wall: Any, dx: float, dtheta: float) -> tuple[Any, Any, Any]:
@@ -80,33 +87,40 @@ def reflection_preserves_the_flux(density: Code) -> Verdict:
     return every(*(check(wall) for wall in (focusing_arcs(0.8), dispersing_arcs(0.5))))
 
 
-@verified(
+@row(
     id="S1.03",
     section="1.2.2",
     equation="figure",
-    statement="In the coordinates (x₁, t, θ) of entry and time, Liouville's measure is sin θ dx₁ dt dθ.",
-    printed=Formula(r"x_2 = t \sin\theta: \quad \sin\theta\, dx_1\, dt\, d\theta", lambda theta, xp: xp.sin(theta)),
-    perturbed=lambda theta, xp: xp.cos(theta),
-    reason="The Jacobian determinant of (x₁ + t cos θ, t sin θ, θ) is sin θ. The flux measure Λ¹ is what is left of it "
-    "without time.",
+    printed=r"x_2 = t \sin\theta: \quad \sin\theta\, dx_1\, dt\, d\theta",
+    right=lambda theta, xp: xp.sin(theta),
+    wrong=lambda theta, xp: xp.cos(theta),
 )
 def liouville_in_entry_coordinates(density: Code) -> Verdict:
+    """In the coordinates (x₁, t, θ) of entry and time, Liouville's measure is sin θ dx₁ dt dθ.
+
+    The Jacobian determinant of (x₁ + t cos θ, t sin θ, θ) is sin θ. The flux measure Λ¹ is what is left of it without
+    time.
+    """
     x1, t, theta = sp.symbols("x1 t theta", real=True)
     chart = sp.Matrix([x1 + t * sp.cos(theta), t * sp.sin(theta), theta])
     return verify(chart.jacobian([x1, t, theta]).det(), density(theta, sp))
 
 
-@erratum(
+@row(
     id="S1.05",
     section="1.2.3, 2.2.1",
-    statement="The period of the wall of rectangular teeth of width ε.",
-    printed=Formula(r"W_n \text{ is } \epsilon_n\text{-periodic}", lambda width: width),
-    corrected=Formula(r"W_n = W(\Sigma, 2\epsilon_n), \text{ tooth on } [0, \tfrac12]", lambda width: 2 * width),
-    reason="A tooth and a crevice of width ε each make a period of 2ε. Then X is uniform on the cell, a ray meets a "
-    "tooth with probability 1/2, and the crevice of the cell is r/2 deep.",
     kind="numeric",
+    printed=r"W_n \text{ is } \epsilon_n\text{-periodic}",
+    wrong=lambda width: width,
+    corrected=r"W_n = W(\Sigma, 2\epsilon_n), \text{ tooth on } [0, \tfrac12]",
+    right=lambda width: 2 * width,
 )
 def period_of_rectangular_teeth(period: Code) -> Verdict:
+    """The period of the wall of rectangular teeth of width ε.
+
+    A tooth and a crevice of width ε each make a period of 2ε. Then X is uniform on the cell, a ray meets a tooth with
+    probability 1/2, and the crevice of the cell is r/2 deep.
+    """
     height_to_width, width = 1.5, 0.25
     x = np.random.default_rng(2).random(RAYS)
 
@@ -118,20 +132,20 @@ def period_of_rectangular_teeth(period: Code) -> Verdict:
     return every(shifted, agreement(height_to_width * width / period(width), cell.depth / cell.period, 1e-15))
 
 
-@verified(
+@row(
     id="S1.06",
     section="1.2.3, 2.2.1",
-    statement="Rectangular teeth reverse the vertical velocity, and the horizontal one or not.",
-    printed=Formula(
-        r"v^+ \in \{(v_1, -v_2), -v\}, \quad \theta' \in \{\pi - \theta, \theta\}",
-        lambda v1, v2: [(v1, -v2), (-v1, -v2)],
-    ),
-    perturbed=lambda v1, v2: [(v1, -v2)],
-    reason="Each hit reverses one component, and a ray that leaves has hit floor or top once. Traced rays leave with "
-    "one of the two velocities.",
     kind="numeric",
+    printed=r"v^+ \in \{(v_1, -v_2), -v\}, \quad \theta' \in \{\pi - \theta, \theta\}",
+    right=lambda v1, v2: [(v1, -v2), (-v1, -v2)],
+    wrong=lambda v1, v2: [(v1, -v2)],
 )
 def rectangular_teeth_reverse_components(outgoing: Code) -> Verdict:
+    """Rectangular teeth reverse the vertical velocity, and the horizontal one or not.
+
+    Each hit reverses one component, and a ray that leaves has hit floor or top once. Traced rays leave with one of the
+    two velocities.
+    """
     x, theta = rays()
     found = trace(rectangular_teeth(1.3), x, theta).theta
     distances = [

@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from ...geometry import focusing_arcs, rectangular_teeth, trace, triangular_teeth
+from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import foreshortening
 from ...kernels.walls.triangular import TriangularTeethLaw
 from ...verification import Verdict, agreement, every, holds, verify
-from ..entry import Code, Formula, convention, erratum, verified
-from ..entry_probability import FRACTION_ERROR, fraction
-from ..symbols import sp, sym
+from ..entry import Code, row
+from ..simulated import FRACTION_ERROR, fraction
 
 APEX_ANGLES = (0.35, 0.9, 1.6, 2.4)
 ENTRIES = 2000
@@ -61,27 +62,24 @@ def two_outgoing_angles(psi: float, theta: Any) -> tuple[Any, Any]:
     return np.stack([fewer, 1.0 - fewer], axis=-1), np.stack(outgoing_angles(psi, theta, np.floor), axis=-1)
 
 
-@erratum(
+@row(
     id="S2.03",
     section="2.2.2",
-    statement="The tooth function of triangular teeth of period ε and apex angle ψ.",
-    printed=Formula(
-        r"t_n(x) = -\cot\tfrac\psi2\, x, \quad \cot\tfrac\psi2\, (x - 1) \quad\text{(on every cell)}",
-        lambda x, cell, period, cotangent, left: np.where(left, -cotangent * x, cotangent * (x - 1.0)),
-    ),
-    corrected=Formula(
-        r"t_n(x) = \begin{cases} -\cot\frac\psi2\, (x - \epsilon_n k) &"
-        r" \epsilon_n k \le x < \epsilon_n (k + \frac12) \\"
-        r" \cot\frac\psi2\, (x - \epsilon_n (k + 1)) & \epsilon_n (k + \frac12) \le x < \epsilon_n (k + 1) \end{cases}",
-        lambda x, cell, period, cotangent, left: np.where(
-            left, -cotangent * (x - period * cell), cotangent * (x - period * (cell + 1))
-        ),
-    ),
-    reason="The printed function is right for ε = 1 and k = 0 only. On other cells it is not periodic and takes "
-    "positive values.",
     kind="numeric",
+    printed=r"t_n(x) = -\cot\tfrac\psi2\, x, \quad \cot\tfrac\psi2\, (x - 1) \quad\text{(on every cell)}",
+    wrong=lambda x, cell, period, cotangent, left: np.where(left, -cotangent * x, cotangent * (x - 1.0)),
+    corrected=r"t_n(x) = \begin{cases} -\cot\frac\psi2\, (x - \epsilon_n k) &"
+    r" \epsilon_n k \le x < \epsilon_n (k + \frac12) \\"
+    r" \cot\frac\psi2\, (x - \epsilon_n (k + 1)) & \epsilon_n (k + \frac12) \le x < \epsilon_n (k + 1) \end{cases}",
+    right=lambda x, cell, period, cotangent, left: np.where(
+        left, -cotangent * (x - period * cell), cotangent * (x - period * (cell + 1))
+    ),
 )
 def tooth_function(function: Code) -> Verdict:
+    """The tooth function of triangular teeth of period ε and apex angle ψ.
+
+    The printed function is right for ε = 1 and k = 0 only. On other cells it is not periodic and takes positive values.
+    """
     period, x = 0.25, np.linspace(0.0, 2.0, 401)[:-1]
     cell = np.floor(x / period)
 
@@ -94,27 +92,26 @@ def tooth_function(function: Code) -> Verdict:
     return every_apex(check)
 
 
-@erratum(
+@row(
     id="S2.04",
     section="2.2.2",
     equation="2.10",
-    statement="Triangular teeth: the two outgoing angles for θ ≤ (π − ψ)/2, after N − 1 and after N hits.",
-    printed=Formula(
-        r"\text{the formulas below with } \lceil N/2 \rceil \text{ for } \lfloor N/2 \rfloor"
-        r"\text{ and a stray } -\theta \quad\text{(described, not quoted)}",
-        lambda psi, theta: outgoing_angles(psi, theta, np.ceil),
-    ),
-    corrected=Formula(
-        r"\theta' = \begin{cases} \psi(N-1) - \theta,\ \pi + \theta - \psi N & N \text{ even} \\"
-        r" \pi + \theta - \psi(N-1),\ \psi N - \theta & N \text{ odd} \end{cases}, \quad"
-        r" N = \lceil 2\theta/\psi \rceil",
-        lambda psi, theta: outgoing_angles(psi, theta, np.floor),
-    ),
-    reason="N triangles are crossed by N − 1 reflections, not by N. With that, floors replace the ceilings, the stray "
-    "term goes, and every angle lies in (0, π).",
     kind="numeric",
+    printed=r"\text{the formulas below with } \lceil N/2 \rceil \text{ for } \lfloor N/2 \rfloor"
+    r"\text{ and a stray } -\theta \quad\text{(described, not quoted)}",
+    wrong=lambda psi, theta: outgoing_angles(psi, theta, np.ceil),
+    corrected=r"\theta' = \begin{cases} \psi(N-1) - \theta,\ \pi + \theta - \psi N & N \text{ even} \\"
+    r" \pi + \theta - \psi(N-1),\ \psi N - \theta & N \text{ odd} \end{cases}, \quad"
+    r" N = \lceil 2\theta/\psi \rceil",
+    right=lambda psi, theta: outgoing_angles(psi, theta, np.floor),
 )
 def outgoing_angles_of_triangular_teeth(angles: Code) -> Verdict:
+    """Triangular teeth: the two outgoing angles for θ ≤ (π − ψ)/2, after N − 1 and after N hits.
+
+    N triangles are crossed by N − 1 reflections, not by N. With that, floors replace the ceilings, the stray term goes,
+    and every angle lies in (0, π).
+    """
+
     def check(psi: float) -> Verdict:
         _, theta, traced = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)
         fewer, more = angles(psi, theta)
@@ -125,17 +122,21 @@ def outgoing_angles_of_triangular_teeth(angles: Code) -> Verdict:
     return every_apex(check)
 
 
-@verified(
+@row(
     id="S2.05",
     section="2.2.2",
-    statement="N = ⌈2θ/ψ⌉ is the number of triangles that the extreme ray crosses, so that there are N − 1 or N hits.",
-    printed=Formula(r"N = \lceil 2\theta/\psi \rceil", most_hits),
-    perturbed=lambda psi, theta: np.floor(2 * theta / psi),
-    reason="Unfolded about the bottom, the sides are rays at multiples of ψ. Traced rays with θ ≤ (π − ψ)/2 hit N − 1 "
-    "or N times.",
     kind="numeric",
+    printed=r"N = \lceil 2\theta/\psi \rceil",
+    right=most_hits,
+    wrong=lambda psi, theta: np.floor(2 * theta / psi),
 )
 def number_of_hits(most: Code) -> Verdict:
+    """The number N of triangles that the extreme ray crosses, so that there are N − 1 or N hits.
+
+    Unfolded about the bottom, the sides are rays at multiples of ψ. Traced rays with θ ≤ (π − ψ)/2 hit N − 1 or N
+    times.
+    """
+
     def check(psi: float) -> Verdict:
         _, theta, traced = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)
         missing = most(psi, theta) - traced.collisions
@@ -152,21 +153,23 @@ def number_of_hits(most: Code) -> Verdict:
     return every_apex(check)
 
 
-@erratum(
+@row(
     id="S2.06",
     section="2.2.2",
-    statement="Triangular teeth: the probability of N − 1 hits for θ ≤ (π − ψ)/2.",
-    printed=Formula(r"p_\psi(\theta) = [\ldots]_+ \quad\text{(off by up to 0.49; described, not quoted)}"),
-    corrected=Formula(
-        r"p_\psi(\theta) = \frac{\cos(\theta - \psi/2) - \cos((N - \frac12)\psi - \theta)}{2 \sin\theta \sin(\psi/2)}",
-        lambda psi, theta: TriangularTeethLaw(psi).branches(theta)[0][..., 0],
-    ),
-    perturbed=lambda psi, theta: np.clip(fraction_of_fewer(psi, theta, shift=1.0), 0.0, 1.0),
-    reason="This is the fraction of entry points left of the ray through the last corner, and it is positive. "
-    "No shift of N makes the printed formula right; the check is shown to refute one with N + 1 for N.",
     kind="numeric",
+    printed=r"p_\psi(\theta) = [\ldots]_+ \quad\text{(off by up to 0.49; described, not quoted)}",
+    wrong=lambda psi, theta: np.clip(fraction_of_fewer(psi, theta, shift=1.0), 0.0, 1.0),
+    corrected=r"p_\psi(\theta) = \frac{\cos(\theta - \psi/2) - \cos((N - \frac12)\psi - \theta)}{2 \sin\theta"
+    r" \sin(\psi/2)}",
+    right=lambda psi, theta: TriangularTeethLaw(psi).branches(theta)[0][..., 0],
 )
 def probability_of_fewer_hits(probability: Code) -> Verdict:
+    """Triangular teeth: the probability of N − 1 hits for θ ≤ (π − ψ)/2.
+
+    This is the fraction of entry points left of the ray through the last corner, and it is positive. No shift of N
+    makes the printed formula right; the check is shown to refute one with N + 1 for N.
+    """
+
     def check(psi: float) -> Verdict:
         theta = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)[1]
         wall = triangular_teeth(psi)
@@ -177,30 +180,29 @@ def probability_of_fewer_hits(probability: Code) -> Verdict:
     return every_apex(check)
 
 
-@erratum(
+@row(
     id="S2.07",
     section="2.2.2",
-    statement="Triangular teeth: the law for all θ, ray by ray.",
-    printed=Formula(
-        r"\text{two outcomes, for all } \theta",
-        lambda psi, x, theta: np.where(
-            x < fraction_of_fewer(psi, theta),
-            outgoing_angles(psi, theta, np.floor)[0],
-            outgoing_angles(psi, theta, np.floor)[1],
-        ),
-    ),
-    corrected=Formula(
-        r"h = \arccos\bigl(\cos(\theta - \tfrac\psi2) - 2X \sin\theta \sin\tfrac\psi2\bigr),\ "
-        r"n = \Bigl\lfloor \frac{\theta + h}{\psi} + \frac12 \Bigr\rfloor,\ "
-        r"\theta' = \begin{cases} \pi + \theta - n\psi & n \text{ even} \\ n\psi - \theta & n \text{ odd} \end{cases}"
-        r"\ (h < \tfrac\pi2); \text{ else the mirror image}",
-        lambda psi, x, theta: TriangularTeethLaw(psi).reflect(x, theta),
-    ),
-    reason="Rays with θ > (π − ψ)/2 may pass the bottom on its right, where the mirror image of the law holds: up to "
-    "four outcomes. The corrected law agrees with traced rays for all ψ and θ.",
     kind="numeric",
+    printed=r"\text{two outcomes, for all } \theta",
+    wrong=lambda psi, x, theta: np.where(
+        x < fraction_of_fewer(psi, theta),
+        outgoing_angles(psi, theta, np.floor)[0],
+        outgoing_angles(psi, theta, np.floor)[1],
+    ),
+    corrected=r"h = \arccos\bigl(\cos(\theta - \tfrac\psi2) - 2X \sin\theta \sin\tfrac\psi2\bigr),\ "
+    r"n = \Bigl\lfloor \frac{\theta + h}{\psi} + \frac12 \Bigr\rfloor,\ "
+    r"\theta' = \begin{cases} \pi + \theta - n\psi & n \text{ even} \\ n\psi - \theta & n \text{ odd} \end{cases}"
+    r"\ (h < \tfrac\pi2); \text{ else the mirror image}",
+    right=lambda psi, x, theta: TriangularTeethLaw(psi).reflect(x, theta),
 )
 def law_of_triangular_teeth(reflection: Code) -> Verdict:
+    """Triangular teeth: the law for all θ, ray by ray.
+
+    Rays with θ > (π − ψ)/2 may pass the bottom on its right, where the mirror image of the law holds: up to four
+    outcomes. The corrected law agrees with traced rays for all ψ and θ.
+    """
+
     def check(psi: float) -> Verdict:
         x, theta, traced = rays_between(psi, 0.05, np.pi - 0.05, 23)
         return agreement(reflection(psi, x[:, None], theta), traced.theta, TRACED, x=x[:, None], theta=theta)
@@ -208,20 +210,21 @@ def law_of_triangular_teeth(reflection: Code) -> Verdict:
     return every_apex(check)
 
 
-@erratum(
+@row(
     id="S2.08",
     section="2.2.2",
-    statement="Triangular teeth: the law leaves sin θ dθ invariant.",
-    printed=Formula(r"\int E[\cos^2\theta'] \sin\theta\, d\theta = 1.039 \ne \tfrac23", two_outgoing_angles),
-    corrected=Formula(
-        r"\int_0^\pi \tilde P f(\theta) \sin\theta\, d\theta = \int_0^\pi f(\theta) \sin\theta\, d\theta",
-        lambda psi, theta: TriangularTeethLaw(psi).branches(theta),
-    ),
-    reason="A law of a wall preserves the flux, and the printed one does not. The check refutes even its repair, two "
-    "outcomes for all θ, whose mass is right and whose flux is not.",
     kind="numeric",
+    printed=r"\int E[\cos^2\theta'] \sin\theta\, d\theta = 1.039 \ne \tfrac23",
+    wrong=two_outgoing_angles,
+    corrected=r"\int_0^\pi \tilde P f(\theta) \sin\theta\, d\theta = \int_0^\pi f(\theta) \sin\theta\, d\theta",
+    right=lambda psi, theta: TriangularTeethLaw(psi).branches(theta),
 )
 def flux_of_triangular_teeth(law: Code) -> Verdict:
+    """Triangular teeth: the law leaves sin θ dθ invariant.
+
+    A law of a wall preserves the flux, and the printed one does not. The check refutes even its repair, two outcomes
+    for all θ, whose mass is right and whose flux is not.
+    """
     z = -1 + (2 * np.arange(20_000) + 1) / 20_000
     theta = np.arccos(z)
 
@@ -247,38 +250,41 @@ def flux_of_triangular_teeth(law: Code) -> Verdict:
     return every_apex(check)
 
 
-@verified(
+@row(
     id="S2.21",
     section="2.3.2",
-    statement="The apex angle of foreshortened triangular teeth.",
-    printed=Formula(
-        r"\tilde\psi = 2 \arctan\bigl((1 + m/J)^{-1/2} \tan(\psi/2)\bigr)",
-        lambda psi, m, J, xp: 2 * xp.atan(xp.tan(psi / 2) / xp.sqrt(1 + m / J)),
-    ),
-    perturbed=lambda psi, m, J, xp: 2 * xp.atan(xp.tan(psi / 2) * xp.sqrt(1 + m / J)),
-    reason="tan(ψ/2) is half the width over the depth, and widths are compressed. Teeth become narrower.",
+    printed=r"\tilde\psi = 2 \arctan\bigl((1 + m/J)^{-1/2} \tan(\psi/2)\bigr)",
+    right=lambda psi, m, J, xp: 2 * xp.atan(xp.tan(psi / 2) / xp.sqrt(1 + m / J)),
+    wrong=lambda psi, m, J, xp: 2 * xp.atan(xp.tan(psi / 2) * xp.sqrt(1 + m / J)),
 )
 def apex_angle_of_foreshortened_teeth(angle: Code) -> Verdict:
+    """The apex angle of foreshortened triangular teeth.
+
+    tan(ψ/2) is half the width over the depth, and widths are compressed. Teeth become narrower.
+    """
     psi = sym.psi
     half_width, depth = sp.Rational(1, 2), sp.cot(psi / 2) / 2
     felt = foreshortening(sym.m, sym.J, sp) * half_width / depth
     return verify(sp.tan(angle(psi, sym.m, sym.J, sp) / 2), felt, [psi > 0, psi < sp.pi])
 
 
-@convention(
+@row(
     id="S2.29",
+    status="convention",
     section="2.2",
-    statement="Which cells of the examples are at most one period deep, as condition B3 asks.",
-    printed=Formula(r"\text{all of them}", lambda psi, ratio: (psi > 0, ratio > 0)),
-    corrected=Formula(
-        r"\psi \ge 2 \arctan\tfrac12 \text{ (triangular)}, \quad r \le 2 \text{ (rectangular)}, \quad \text{all arcs}",
-        lambda psi, ratio: (psi >= 2 * np.arctan(0.5), ratio <= 2),
-    ),
-    reason="The depths are cot(ψ/2)/2, r/2 and tan(ξ/2)/2. The laws hold for all parameters, so that B3 is only a "
-    "matter of units of depth.",
     kind="numeric",
+    printed=r"\text{all of them}",
+    wrong=lambda psi, ratio: (psi > 0, ratio > 0),
+    corrected=r"\psi \ge 2 \arctan\tfrac12 \text{ (triangular)}, \quad r \le 2 \text{ (rectangular)}, \quad"
+    r" \text{all arcs}",
+    right=lambda psi, ratio: (psi >= 2 * np.arctan(0.5), ratio <= 2),
 )
 def cells_within_one_period(condition: Code) -> Verdict:
+    """Which cells of the examples are at most one period deep, as condition B3 asks.
+
+    The depths are cot(ψ/2)/2, r/2 and tan(ξ/2)/2. The laws hold for all parameters, so that B3 is only a matter of
+    units of depth.
+    """
     beside = np.array([-1e-4, 1e-4])
     psi = np.append(np.linspace(0.1, 3.0, 57), 2 * np.arctan(0.5) + beside)
     ratio, half_angle = np.append(np.linspace(0.05, 4.0, 57), 2 + beside), np.linspace(0.1, np.pi / 2, 59)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import sympy as sp
 
 from ...geometry.disk import rolling
+from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
-from ..entry import Code, Formula, erratum, verified
-from ..samples import clearance, generator, is_free, residual, satellites
-from ..symbols import sp, sym
+from ..entry import Code, row
+from ..samples import generator, residual
+from ..simulated import clearance, is_free, satellites
 
 SATELLITES = 40
 SPACING = 2 * np.pi / SATELLITES
@@ -27,17 +29,20 @@ def _lowest(x1: np.ndarray, alpha: np.ndarray, eps: float) -> np.ndarray:
     return -clearance(np.stack([x1, 0 * x1, alpha]), eps, SATELLITES)
 
 
-@verified(
+@row(
     id="S4.01",
     section="4.1",
     equation="Prop. 4.1 (i), (ii)",
-    statement="M has the periods ε e₁ and ρ e₃ and contains the half-space x₂ ≥ 0.",
     kind="numeric",
-    printed=Formula(r"M + j\varepsilon e_1 + k\rho e_3 = M", lambda j, k, eps, rho: (j * eps, k * rho)),
-    perturbed=lambda j, k, eps, rho: (j * eps, k * rho / 2),
-    reason="The wall has period ε and the rim period ρ. All satellites are looked at, without the charts.",
+    printed=r"M + j\varepsilon e_1 + k\rho e_3 = M",
+    right=lambda j, k, eps, rho: (j * eps, k * rho),
+    wrong=lambda j, k, eps, rho: (j * eps, k * rho / 2),
 )
 def periods_of_the_configurations(shift: Code) -> Verdict:
+    """M has the periods ε e₁ and ρ e₃ and contains the half-space x₂ ≥ 0.
+
+    The wall has period ε and the rim period ρ. All satellites are looked at, without the charts.
+    """
     rng = generator()
     c = _configurations()
     j, k = rng.integers(-5, 6, (2, c.shape[1]))
@@ -48,18 +53,21 @@ def periods_of_the_configurations(shift: Code) -> Verdict:
     return every(agreement(there, here, 1e-12, k=k), holds(above, "configurations with x2 >= 0"))
 
 
-@verified(
+@row(
     id="S4.02",
     section="4.1",
     equation="4.9, Prop. 4.1 (v)",
-    statement="The boundary of M lies between the heights -ε - ρ²/8 and 0.",
     kind="numeric",
-    printed=Formula(r"-\varepsilon - \rho^2/8 \le x_2 \le 0", lambda eps, rho: -eps - rho**2 / 8),
-    perturbed=lambda eps, rho: -eps - rho**2 / 9,
-    reason="Halfway between two satellites the rim is 1 - cos(ρ/2) ≤ ρ²/8 above the lowest point, and the bound is "
-    "attained to ρ⁴/384 where both are over bottoms. The -ρ²/2 in the proof of Prop. 4.8 is weaker and also true.",
+    printed=r"-\varepsilon - \rho^2/8 \le x_2 \le 0",
+    right=lambda eps, rho: -eps - rho**2 / 8,
+    wrong=lambda eps, rho: -eps - rho**2 / 9,
 )
 def heights_of_the_boundary(bound: Code) -> Verdict:
+    """The heights between which the boundary of M lies.
+
+    Halfway between two satellites the rim is 1 - cos(ρ/2) ≤ ρ²/8 above the lowest point, and the bound is attained to
+    ρ⁴/384 where both are over bottoms. The -ρ²/2 in the proof of Prop. 4.8 is weaker and also true.
+    """
     rng = generator()
     # the two lowest satellites both reach bottoms if their distance is a whole number of periods
     eps = 2 * np.sin(SPACING / 2) / 157
@@ -74,18 +82,21 @@ def heights_of_the_boundary(bound: Code) -> Verdict:
     )
 
 
-@verified(
+@row(
     id="S4.03",
     section="4.1",
     equation="Prop. 4.1 (vi)",
-    statement="A third satellite is more than ρ²/4 above the lowest, so at most two, adjacent ones, touch the wall.",
     kind="numeric",
-    printed=Formula(r"-1 + \cos\rho \le -\rho^2/4", lambda rho: rho**2 / 4),
-    perturbed=lambda rho: rho**2 / 2,
-    reason="The third lowest satellite is at least 1 - cos ρ above the lowest, and the contradiction needs a wall of "
-    "depth below that. The bound is half of the truth: the best constant is 1/2 as ρ → 0, 0.437 for 5 satellites.",
+    printed=r"-1 + \cos\rho \le -\rho^2/4",
+    right=lambda rho: rho**2 / 4,
+    wrong=lambda rho: rho**2 / 2,
 )
 def third_satellite(bound: Code) -> Verdict:
+    """A third satellite is more than ρ²/4 above the lowest, so at most two, adjacent ones, touch the wall.
+
+    The third lowest satellite is at least 1 - cos ρ above the lowest, and the contradiction needs a wall of depth below
+    that. The bound is half of the truth: the best constant is 1/2 as ρ → 0, 0.437 for 5 satellites.
+    """
     count = np.arange(3, 300)
     verdicts = [no_excess(bound(2 * np.pi / count[2:]), 1 - np.cos(2 * np.pi / count[2:]), satellites=count[2:])]
     alpha = np.linspace(-np.pi, np.pi, 2001)
@@ -95,17 +106,20 @@ def third_satellite(bound: Code) -> Verdict:
     return every(*verdicts, agreement(2 * np.sin(small / 2) ** 2 / bound(small), 2.0, 1e-4, rho=small))
 
 
-@verified(
+@row(
     id="S4.04",
     section="4.1",
     equation="Claim 4.2.1",
-    statement="δ₀: at this distance from an odd multiple of ρ/2 adjacent satellites differ in height by the depth ε.",
-    printed=Formula(r"2\sin(\rho/2)\sin\delta_0 = \varepsilon", rolling.gap_radius),
-    perturbed=lambda depth, spacing, xp: depth / spacing,
-    reason="The heights differ by 2 sin(ρ/2) sin(ρ/2 - |α|). Beyond δ₀ at most one satellite is in a strip of height "
-    "ε, and the bound is sharp.",
+    printed=r"2\sin(\rho/2)\sin\delta_0 = \varepsilon",
+    right=rolling.gap_radius,
+    wrong=lambda depth, spacing, xp: depth / spacing,
 )
 def gap_radius(radius: Code) -> Verdict:
+    """δ₀: at this distance from an odd multiple of ρ/2 adjacent satellites differ in height by the depth ε.
+
+    The heights differ by 2 sin(ρ/2) sin(ρ/2 - |α|). Beyond δ₀ at most one satellite is in a strip of height ε, and the
+    bound is sharp.
+    """
     rho, eps = sp.symbols("rho epsilon", positive=True)
     bar = rho / 2 - radius(eps, rho, sp)
     first, second = (rolling.satellite(0, 0, angle, 1, sp)[1] for angle in (bar, bar - rho))
@@ -113,17 +127,21 @@ def gap_radius(radius: Code) -> Verdict:
     return verify(sp.simplify(difference), eps, [rho < 3, eps < rho / 4])
 
 
-@erratum(
+@row(
     id="S4.05",
     section="4.1",
-    statement="The measure of the angles in [-R, R] at which two satellites may touch.",
     kind="numeric",
-    printed=Formula(r"|[-R, R]\setminus Z| = O(\delta_0)", lambda gap, rho: gap),
-    corrected=Formula(r"|[-R, R]\setminus Z| = O(\delta_0/\rho) = O(\varepsilon/\rho^2)", lambda gap, rho: gap / rho),
-    reason="There are about 2R/ρ gaps of width 2δ₀, hence the measure tends to 4R δ₀/ρ. It still vanishes as ε does, "
-    "because ρ² is much greater than ε.",
+    printed=r"|[-R, R]\setminus Z| = O(\delta_0)",
+    wrong=lambda gap, rho: gap,
+    corrected=r"|[-R, R]\setminus Z| = O(\delta_0/\rho) = O(\varepsilon/\rho^2)",
+    right=lambda gap, rho: gap / rho,
 )
 def measure_of_the_gaps(order: Code) -> Verdict:
+    """The measure of the angles in [-R, R] at which two satellites may touch.
+
+    There are about 2R/ρ gaps of width 2δ₀, hence the measure tends to 4R δ₀/ρ. It still vanishes as ε does, because ρ²
+    is much greater than ε.
+    """
     ratios, scales = [], np.array([1e-4, 1e-6, 1e-8])
     for eps in scales:
         rho = 2 * np.pi / np.floor(2 * np.pi / eps**0.4)
@@ -134,21 +152,23 @@ def measure_of_the_gaps(order: Code) -> Verdict:
     return agreement(ratios, 4.0, 0.1, eps=scales)
 
 
-@erratum(
+@row(
     id="S4.06",
     section="4.1",
     equation="proof of Prop. 4.2 (ii), (iii)",
-    statement="Lower bounds for the centre and for the other satellites while the disk rolls about one.",
     kind="numeric",
-    printed=Formula(r"x_2 \ge -\varepsilon,\quad S_j\in\mathbb R\times(0,\infty)", lambda eps, rho: (-eps, 0.0)),
-    corrected=Formula(
-        r"x_2 \ge -\varepsilon - \rho^2/8,\quad S_j\in\mathbb R\times(-1,\infty)",
-        lambda eps, rho: (-eps - rho**2 / 8, -1.0),
-    ),
-    reason="The rolling centre sinks by up to 1 - cos(ρ/2), and the other satellites are just above the tops, which "
-    "are at -1. Both bounds are attained, the first one to ρ⁴/384 as ε → 0.",
+    printed=r"x_2 \ge -\varepsilon,\quad S_j\in\mathbb R\times(0,\infty)",
+    wrong=lambda eps, rho: (-eps, 0.0),
+    corrected=r"x_2 \ge -\varepsilon - \rho^2/8,\quad S_j\in\mathbb R\times(-1,\infty)",
+    right=lambda eps, rho: (-eps - rho**2 / 8, -1.0),
 )
 def heights_while_rolling(bounds: Code) -> Verdict:
+    """Lower bounds for the centre and for the other satellites while the disk rolls about one.
+
+    The rolling centre sinks by up to 1 - cos(ρ/2), and the other satellites are just above the tops, which are at -1.
+    Both bounds are attained, the first one to ρ⁴/384 as ε → 0.
+    """
+
     def check(eps: float) -> Verdict:
         rng = generator()
         limit = SPACING / 2 - float(rolling.gap_radius(eps, SPACING))
@@ -169,22 +189,22 @@ def heights_while_rolling(bounds: Code) -> Verdict:
     return every(check(EPS), check(1e-8))
 
 
-@verified(
+@row(
     id="S4.07",
     section="4.1",
     equation="4.4",
-    statement="F(x₁, x₂, α), with ᾱ the part of α beyond the nearest multiple of ρ, parametrises the configurations "
-    "where one satellite touches.",
     kind="numeric",
-    printed=Formula(
-        r"F(x_1, x_2, \alpha) = (x_1 - \sin\bar\alpha,\ x_2 + \cos\bar\alpha,\ \alpha)",
-        lambda s1, s2, alpha, bar: rolling.roll(s1, s2, bar, 1.0),
-    ),
-    perturbed=lambda s1, s2, alpha, bar: rolling.roll(s1, s2, alpha, 1.0),
-    reason="The satellite in contact is S₋ₖ modulo N, with k the nearest multiple, not Sₖ. Membership in M is "
-    "compared with a search over all satellites.",
+    printed=r"F(x_1, x_2, \alpha) = (x_1 - \sin\bar\alpha,\ x_2 + \cos\bar\alpha,\ \alpha)",
+    right=lambda s1, s2, alpha, bar: rolling.roll(s1, s2, bar, 1.0),
+    wrong=lambda s1, s2, alpha, bar: rolling.roll(s1, s2, alpha, 1.0),
 )
 def rolling_chart(chart: Code) -> Verdict:
+    """F(x₁, x₂, α), with ᾱ the part of α beyond the nearest multiple of ρ, parametrises the configurations where one
+    satellite touches.
+
+    The satellite in contact is S₋ₖ modulo N, with k the nearest multiple, not Sₖ. Membership in M is compared with a
+    search over all satellites.
+    """
     rng = generator()
     s1, s2 = rng.uniform(-1, 1, 3000), rng.uniform(-EPS, 0, 3000)
     alpha = rng.uniform(-np.pi, np.pi, 3000)
@@ -201,18 +221,22 @@ def rolling_chart(chart: Code) -> Verdict:
     )
 
 
-@erratum(
+@row(
     id="S4.08",
     section="4.1",
     equation="remark after Prop. 4.2",
-    statement="Which satellite a disk at (x₁, x₂, kρ) rolls about, and where it is after turning to α.",
     kind="numeric",
-    printed=Formula(r"S_k,\quad F(x_1, x_2, \alpha)", lambda x1, x2, k: (k, x2)),
-    corrected=Formula(r"S_{-k},\quad F(x_1, x_2 - 1, \alpha)", lambda x1, x2, k: (-k, x2 - 1)),
-    reason="At α = kρ the satellite at the lowest point of the rim is S₋ₖ, at (x₁, x₂ - 1). F takes the satellite's "
-    "position, not the centre's.",
+    printed=r"S_k,\quad F(x_1, x_2, \alpha)",
+    wrong=lambda x1, x2, k: (k, x2),
+    corrected=r"S_{-k},\quad F(x_1, x_2 - 1, \alpha)",
+    right=lambda x1, x2, k: (-k, x2 - 1),
 )
 def rolling_from_rest(claim: Code) -> Verdict:
+    """Which satellite a disk at (x₁, x₂, kρ) rolls about, and where it is after turning to α.
+
+    At α = kρ the satellite at the lowest point of the rim is S₋ₖ, at (x₁, x₂ - 1). F takes the satellite's position,
+    not the centre's.
+    """
     rng = generator()
     k, bar = rng.integers(-15, 16, 500), rng.uniform(-0.5, 0.5, 500) * SPACING
     x1, x2 = rng.uniform(-1, 1, (2, 500))
@@ -225,16 +249,19 @@ def rolling_from_rest(claim: Code) -> Verdict:
     return agreement(np.stack([centre.real, centre.imag]), np.stack([expected.real, expected.imag]), 1e-13, k=k)
 
 
-@verified(
+@row(
     id="S4.09",
     section="4.1",
     equation="1.38, 4.23",
-    statement="Adjacent satellites are 2 sin(ρ/2) apart.",
-    printed=Formula(r"|S_{k+1} - S_k| = 2\sin(\rho/2)", lambda rho, xp: 2 * xp.sin(rho / 2)),
-    perturbed=lambda rho, xp: rho,
-    reason="It is the chord of the arc ρ. Where the text says 'any two satellites' it means adjacent ones.",
+    printed=r"|S_{k+1} - S_k| = 2\sin(\rho/2)",
+    right=lambda rho, xp: 2 * xp.sin(rho / 2),
+    wrong=lambda rho, xp: rho,
 )
 def distance_of_satellites(distance: Code) -> Verdict:
+    """The distance of adjacent satellites.
+
+    It is the chord of the arc ρ. Where the text says 'any two satellites' it means adjacent ones.
+    """
     centres = [rolling.satellite(0, 0, sym.alpha + k * sym.rho, 1, sp) for k in (0, 1)]
     square = sum((a - b) ** 2 for a, b in zip(*centres, strict=True))
     found = distance(sym.rho, sp)

@@ -2,48 +2,47 @@
 
 from __future__ import annotations
 
+import sympy as sp
+
 from ...geometry.disk import rolling
+from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import contact_normal
 from ...verification import Verdict, every, verify
-from ..entry import Code, Formula, erratum, verified
-from ..symbols import sp, sym
+from ..entry import Code, row
 
 
-@verified(
+@row(
     id="S4.10",
     section="4.1",
     equation="remark 4.6",
-    statement="The unit normal n(q) of M where S₀ touches: of norm 1, orthogonal to rolling and to sliding, inward.",
-    printed=Formula(
-        r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos\alpha + k_2\sin\alpha)\bigr)",
-        lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha, xp),
-    ),
-    perturbed=lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, -alpha, xp),
-    reason="Rolling about S₀ is (-cos α, -sin α, 1), sliding along the wall (k₂, -k₁, 0). The kinetic-energy metric "
-    "raises the gradient of the satellite's distance.",
+    printed=r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos\alpha + k_2\sin\alpha)\bigr)",
+    right=lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha, xp),
+    wrong=lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, -alpha, xp),
 )
 def normal_of_the_boundary(normal: Code) -> Verdict:
+    """The unit normal n(q) of M where S₀ touches: of norm 1, orthogonal to rolling and to sliding, inward.
+
+    Rolling about S₀ is (-cos α, -sin α, 1), sliding along the wall (k₂, -k₁, 0). The kinetic-energy metric raises the
+    gradient of the satellite's distance.
+    """
     return _is_unit_normal(normal, rotated=False)
 
 
-@erratum(
+@row(
     id="S4.11",
     section="4.1",
     equation="3.26",
-    statement="The unit normal n(q) of M where the satellite S_j touches.",
-    printed=Formula(
-        r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos(\alpha - j\rho) + k_2\sin(\alpha - j\rho))\bigr)",
-        lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha - turn, xp),
-    ),
-    corrected=Formula(
-        r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))\bigr),\quad "
-        r"R = \bigl(m^{-1} + J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))^2\bigr)^{1/2}",
-        lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha + turn, xp),
-    ),
-    reason="S_j is at the angle α + jρ of the rim. In R a parenthesis is misplaced too, and n(q) would not have norm "
-    "1.",
+    printed=r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos(\alpha - j\rho) + k_2\sin(\alpha - j\rho))\bigr)",
+    wrong=lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha - turn, xp),
+    corrected=r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))\bigr),\quad "
+    r"R = \bigl(m^{-1} + J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))^2\bigr)^{1/2}",
+    right=lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha + turn, xp),
 )
 def normal_at_a_satellite(normal: Code) -> Verdict:
+    """The unit normal n(q) of M where the satellite S_j touches.
+
+    S_j is at the angle α + jρ of the rim. In R a parenthesis is misplaced too, and n(q) would not have norm 1.
+    """
     return _is_unit_normal(normal, rotated=True)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import sympy as sp
 
 from ...geometry.disk import rolling
+from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
-from ..entry import Code, Formula, by_reading, convention, erratum, verified
-from ..samples import generator, kinetic_norm, masses, residual, unit_velocities
-from ..symbols import sp, sym
+from ..entry import Code, by_reading, row
+from ..samples import generator, kinetic_norm, random_disks, residual, unit_velocities
 
 good_states = by_reading(
     id="S5.31",
@@ -21,17 +22,20 @@ good_states = by_reading(
 )
 
 
-@erratum(
+@row(
     id="S5.32",
     section="5.3.5",
-    statement="The lower end of the angles of R̂*_ε, which tiles the plane in steps of ρ/ε.",
     kind="numeric",
-    printed=Formula(r"-\rho/\varepsilon \le \alpha < \rho/(2\varepsilon)", lambda height: -height),
-    corrected=Formula(r"-\rho/(2\varepsilon) \le \alpha < \rho/(2\varepsilon)", lambda height: -height / 2),
-    reason="The height must be the step. As printed it is one and a half steps, and half of the plane is covered "
-    "twice.",
+    printed=r"-\rho/\varepsilon \le \alpha < \rho/(2\varepsilon)",
+    wrong=lambda height: -height,
+    corrected=r"-\rho/(2\varepsilon) \le \alpha < \rho/(2\varepsilon)",
+    right=lambda height: -height / 2,
 )
 def height_of_the_region(low: Code) -> Verdict:
+    """The lower end of the angles of R̂*_ε, which tiles the plane in steps of ρ/ε.
+
+    The height must be the step. As printed it is one and a half steps, and half of the plane is covered twice.
+    """
     rng = generator()
     height = rng.uniform(5, 50, 400)
     alpha = rng.uniform(-3, 3, 400) * height
@@ -41,21 +45,21 @@ def height_of_the_region(low: Code) -> Verdict:
     return holds(times == 1, "angles are covered once", alpha=alpha, height=height)
 
 
-@erratum(
+@row(
     id="S5.33",
     section="5.3.5",
-    statement="The shift from one of the 2k bands of R*_ε to the next, R*⁰ being {0 ≤ x₁ + α ≤ 1, -ρ/(2εk) ≤ α ≤ 0}.",
     kind="numeric",
-    printed=Formula(
-        r"(1 + m/J)^{-1/2}\,\frac{\rho j}{\varepsilon k}\,\chi", lambda m, J, band: 2 * band / np.sqrt(1 + m / J)
-    ),
-    corrected=Formula(r"(m + J)^{1/2}\,\frac{\rho j}{2\varepsilon k}\,\chi", lambda m, J, band: np.sqrt(m + J) * band),
-    reason="The bands have height ρ/(2εk), and χ turns by (m + J)^(-1/2). The text has x₁ and x₁ + α interchanged, "
-    "too.",
+    printed=r"(1 + m/J)^{-1/2}\,\frac{\rho j}{\varepsilon k}\,\chi",
+    wrong=lambda m, J, band: 2 * band / np.sqrt(1 + m / J),
+    corrected=r"(m + J)^{1/2}\,\frac{\rho j}{2\varepsilon k}\,\chi",
+    right=lambda m, J, band: np.sqrt(m + J) * band,
 )
 def shift_of_the_bands(shift: Code) -> Verdict:
-    rng = generator()
-    m, J = masses(rng, 400)
+    """The shift from one of the 2k bands of R*_ε to the next, R*⁰ being {0 ≤ x₁ + α ≤ 1, -ρ/(2εk) ≤ α ≤ 0}.
+
+    The bands have height ρ/(2εk), and χ turns by (m + J)^(-1/2). The text has x₁ and x₁ + α interchanged, too.
+    """
+    rng, m, J = random_disks(400)
     bands = 12
     band = 1 / (2 * bands)  # for rho/eps = 1
     alpha = rng.uniform(-0.5, 0.5, 400)
@@ -67,23 +71,21 @@ def shift_of_the_bands(shift: Code) -> Verdict:
     return holds(times == 1, "angles are covered once", m=m, J=J)
 
 
-@erratum(
+@row(
     id="S5.34",
     section="5.3.5",
-    statement="The half-width of the angles in Ξ, which must be nearly all of ρ/(2ε).",
     kind="numeric",
-    printed=Formula(
-        r"\varepsilon^{-1}\Bigl(\frac\rho2 - \frac{12(L + 1)}{5\log^2(1/\rho)}\Bigr)",
-        lambda rho, eps, L: (rho / 2 - 12 * (L + 1) / (5 * np.log(1 / rho) ** 2)) / eps,
-    ),
-    corrected=Formula(
-        r"\varepsilon^{-1}(\rho/2 - \delta_0) - (L\log(1/\rho) + 1) - \frac{L\log(1/\rho)^2}{4\log\log(1/\rho)}",
-        lambda rho, eps, L: rolling.good_half_width(eps, eps, rho, L),
-    ),
-    reason="As printed it is negative for every ρ < 1 and L ≥ 1, so Ξ is empty. From the corrected edge, a fraction "
-    "that tends to 1, the flights of the iteration end at the gap; R'_ε is to be changed likewise.",
+    printed=r"\varepsilon^{-1}\Bigl(\frac\rho2 - \frac{12(L + 1)}{5\log^2(1/\rho)}\Bigr)",
+    wrong=lambda rho, eps, L: (rho / 2 - 12 * (L + 1) / (5 * np.log(1 / rho) ** 2)) / eps,
+    corrected=r"\varepsilon^{-1}(\rho/2 - \delta_0) - (L\log(1/\rho) + 1) - \frac{L\log(1/\rho)^2}{4\log\log(1/\rho)}",
+    right=lambda rho, eps, L: rolling.good_half_width(eps, eps, rho, L),
 )
 def width_of_the_good_angles(width: Code) -> Verdict:
+    """The half-width of the angles in Ξ, which must be nearly all of ρ/(2ε).
+
+    As printed it is negative for every ρ < 1 and L ≥ 1, so Ξ is empty. From the corrected edge, a fraction that tends
+    to 1, the flights of the iteration end at the gap; R'_ε is to be changed likewise.
+    """
     rho = np.array([1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
     eps = rho**2.5  # the gaps are a fraction of 2 rho^(1/2)
 
@@ -100,18 +102,22 @@ def width_of_the_good_angles(width: Code) -> Verdict:
     return every(check(1.0), check(2.0))
 
 
-@erratum(
+@row(
     id="S5.35",
     section="5.3.5",
     equation="3.96",
-    statement="The exponent of the lower bound log(1/ρ)^(-e) for log(1/ρ)^(-(3N+4)).",
     kind="numeric",
-    printed=Formula(r"\log(1/\rho)^{-5N}", lambda N: 5 * N),
-    corrected=Formula(r"\log(1/\rho)^{-(3N+4)}", lambda N: 3 * N + 4),
-    reason="As printed it fails for N = 1. The product log^(-(3N+4)) C^(-N) is at least ρ for N ≤ log/(4 loglog) and "
-    "small ρ, and the conclusions hold.",
+    printed=r"\log(1/\rho)^{-5N}",
+    wrong=lambda N: 5 * N,
+    corrected=r"\log(1/\rho)^{-(3N+4)}",
+    right=lambda N: 3 * N + 4,
 )
 def exponent_of_the_lower_bound(exponent: Code) -> Verdict:
+    """The exponent of the lower bound log(1/ρ)^(-e) for log(1/ρ)^(-(3N+4)).
+
+    As printed it fails for N = 1. The product log^(-(3N+4)) C^(-N) is at least ρ for N ≤ log/(4 loglog) and small ρ,
+    and the conclusions hold.
+    """
     N = np.arange(1, 200)
     ell = np.array([1e8, 1e10, 1e12])  # log(1/rho)
     last = ell / (4 * np.log(ell))
@@ -120,18 +126,22 @@ def exponent_of_the_lower_bound(exponent: Code) -> Verdict:
     return every(agreement(exponent(N), 3 * N + 4, 0.0, N=N), no_excess(product, ell))
 
 
-@erratum(
+@row(
     id="S5.36",
     section="5.3.5",
     equation="Claim 5.3.1",
-    statement="The bound of ε times the zoomed angle.",
     kind="numeric",
-    printed=Formula(r"|\varepsilon\tilde\alpha_0| \le \varepsilon\rho/2", lambda eps, rho: eps * rho / 2),
-    corrected=Formula(r"|\varepsilon\tilde\alpha_0| \le \rho/2", lambda eps, rho: rho / 2),
-    reason="The zoomed angle is at most ρ/(2ε). The final bound by sin ρ still holds, because sin ν cos θ₀ is at "
-    "least a multiple of 1/log².",
+    printed=r"|\varepsilon\tilde\alpha_0| \le \varepsilon\rho/2",
+    wrong=lambda eps, rho: eps * rho / 2,
+    corrected=r"|\varepsilon\tilde\alpha_0| \le \rho/2",
+    right=lambda eps, rho: rho / 2,
 )
 def bound_of_the_zoomed_angle(bound: Code) -> Verdict:
+    """The bound of ε times the zoomed angle.
+
+    The zoomed angle is at most ρ/(2ε). The final bound by sin ρ still holds, because sin ν cos θ₀ is at least a
+    multiple of 1/log².
+    """
     eps, rho = 1e-3, 2 * np.pi / 100
     alpha = generator().uniform(-3, 3, 4000) / eps
     alpha[0] = (0.5 + 1e-9) * rho / eps
@@ -142,23 +152,23 @@ def bound_of_the_zoomed_angle(bound: Code) -> Verdict:
     )
 
 
-@erratum(
+@row(
     id="S5.37",
     section="5.3.5",
     equation="3.107",
-    statement="The size of a displacement y in terms of its contact G₀(y) and its turn Δα.",
     kind="numeric",
-    printed=Formula(r"\|y\| \le |G_0(y)| + |\Delta\alpha|", lambda g, turn, m, J: g + turn),
-    corrected=Formula(
-        r"\|y\| \le m^{1/2}|G_0(y)| + (m + J)^{1/2}|\Delta\alpha|",
-        lambda g, turn, m, J: np.sqrt(m) * g + np.sqrt(m + J) * turn,
-    ),
-    reason="The displacement (-1, 0, 1) has G₀ = 0 and the norm (m + J)^(1/2). The final bound is O(1/log(1/ρ)) and "
-    "not 80/log(1/ρ)³, which still vanishes.",
+    printed=r"\|y\| \le |G_0(y)| + |\Delta\alpha|",
+    wrong=lambda g, turn, m, J: g + turn,
+    corrected=r"\|y\| \le m^{1/2}|G_0(y)| + (m + J)^{1/2}|\Delta\alpha|",
+    right=lambda g, turn, m, J: np.sqrt(m) * g + np.sqrt(m + J) * turn,
 )
 def size_of_a_displacement(bound: Code) -> Verdict:
-    rng = generator()
-    m, J = masses(rng)
+    """The size of a displacement y in terms of its contact G₀(y) and its turn Δα.
+
+    The displacement (-1, 0, 1) has G₀ = 0 and the norm (m + J)^(1/2). The final bound is O(1/log(1/ρ)) and not
+    80/log(1/ρ)³, which still vanishes.
+    """
+    rng, m, J = random_disks()
     y = rng.normal(size=(3, m.size))
     y[:2, ::4] = np.stack([-y[2], 0 * y[2]])[:, ::4]
     y[2, 1::4] = 0
@@ -171,35 +181,38 @@ def size_of_a_displacement(bound: Code) -> Verdict:
     )
 
 
-@verified(
+@row(
     id="S5.38",
     section="5.3.5",
-    statement="The zoomed rectangle R*_ε has the area ρ/ε, so ερ⁻¹ makes measures of parts of it fractions.",
-    printed=Formula(r"\varepsilon\rho^{-1}|R^*_\varepsilon| = 1", lambda eps, rho: eps / rho),
-    perturbed=lambda eps, rho: eps**2 / rho,
-    reason="R_ε has the sides ε and ρ, and both are divided by ε. Where the text has P × S² minus Ω* it means R*_ε × "
-    "S²₊.",
+    printed=r"\varepsilon\rho^{-1}|R^*_\varepsilon| = 1",
+    right=lambda eps, rho: eps / rho,
+    wrong=lambda eps, rho: eps**2 / rho,
 )
 def area_of_the_zoomed_rectangle(factor: Code) -> Verdict:
+    """The zoomed rectangle R*_ε has the area ρ/ε, so ερ⁻¹ makes measures of parts of it fractions.
+
+    R_ε has the sides ε and ρ, and both are divided by ε. Where the text has P × S² minus Ω* it means R*_ε × S²₊.
+    """
     eps, x1, alpha = sp.Symbol("epsilon", positive=True), sp.Symbol("x1"), sp.Symbol("alpha")
     half = sym.rho / (2 * eps)
     return verify(factor(eps, sym.rho) * sp.integrate(1, (x1, -alpha, 1 - alpha), (alpha, -half, half)), 1)
 
 
-@verified(
+@row(
     id="S5.39",
     section="5.2",
     equation="Claim 5.2.1",
-    statement="How many translates of the ε × ρ rectangle meet a rectangle of sides 2a and 2b, for ε, ρ ≤ 1/2.",
     kind="numeric",
-    printed=Formula(
-        r"\frac{(2a + 1)(2b + 1)}{\varepsilon\rho}", lambda a, b, eps, rho: (2 * a + 1) * (2 * b + 1) / (eps * rho)
-    ),
-    perturbed=lambda a, b, eps, rho: 4 * a * b / (eps * rho),
-    reason="At most 2a/ε + 2 and 2b/ρ + 2 translates meet it in either direction, counted for random positions. For "
-    "ε = ρ = 1/2 the bound is attained.",
+    printed=r"\frac{(2a + 1)(2b + 1)}{\varepsilon\rho}",
+    right=lambda a, b, eps, rho: (2 * a + 1) * (2 * b + 1) / (eps * rho),
+    wrong=lambda a, b, eps, rho: 4 * a * b / (eps * rho),
 )
 def number_of_rectangles(bound: Code) -> Verdict:
+    """How many translates of the ε × ρ rectangle meet a rectangle of sides 2a and 2b, for ε, ρ ≤ 1/2.
+
+    At most 2a/ε + 2 and 2b/ρ + 2 translates meet it in either direction, counted for random positions. For ε = ρ = 1/2
+    the bound is attained.
+    """
     rng = generator()
     a, b = rng.uniform(0.01, 5, (2, 4000))
     eps, rho = np.exp(rng.uniform(np.log(1e-3), np.log(0.5), (2, 4000)))
@@ -216,20 +229,24 @@ def number_of_rectangles(bound: Code) -> Verdict:
     )
 
 
-@convention(
+@row(
     id="S5.40",
+    status="convention",
     section="5.2, 5.3",
     equation="3.95, 3.113, 5.143",
-    statement="The bound of the angular velocity of a unit velocity.",
     kind="numeric",
-    printed=Formula(r"|\omega| \le \|w\| = 1", lambda J: np.ones_like(J)),
-    corrected=Formula(r"|\omega| \le J^{-1/2}", lambda J: J**-0.5),
-    reason="As printed it needs J ≥ 1, but a unit disk has J ≤ m. In general constants change by J^(-1/2), and v₂ is "
-    "⟨w, e₂⟩/m in Claim 5.2.2.",
+    printed=r"|\omega| \le \|w\| = 1",
+    wrong=lambda J: np.ones_like(J),
+    corrected=r"|\omega| \le J^{-1/2}",
+    right=lambda J: J**-0.5,
 )
 def bound_of_the_spin(bound: Code) -> Verdict:
-    rng = generator()
-    m, J = masses(rng)
+    """The bound of the angular velocity of a unit velocity.
+
+    As printed it needs J ≥ 1, but a unit disk has J ≤ m. In general constants change by J^(-1/2), and v₂ is ⟨w, e₂⟩/m
+    in Claim 5.2.2.
+    """
+    rng, m, J = random_disks()
     w = unit_velocities(rng, m, J)
     # for J > 1 the printed bound also holds; only its claim for light rims is tested
     spin = np.stack([0 * J, 0 * J, bound(J)])

@@ -5,28 +5,35 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from ...geometry.disk import rolling
+from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
-from ..entry import Code, Formula, convention, erratum, verified
-from ..samples import generator, kinetic_norm, masses, unit_velocities
-from ..symbols import sp, sym
+from ..entry import Code, row
+from ..samples import generator, kinetic_norm, random_disks, unit_velocities
+
+VELOCITY = sym.v1, sym.v2, sym.omega
 
 
-@convention(
+@row(
     id="S4.18",
+    status="convention",
     section="4.3.3",
     equation="4.65, Lemma 4.13",
-    statement="The velocities S²₊ρ/₂ that cross the graph of u upwards wherever they meet it.",
     kind="numeric",
-    printed=Formula(r"\{\langle w, e_2\rangle > \sin(\rho/2)\}", lambda m, J, rho: np.sin(rho / 2) / m),
-    corrected=Formula(r"\{v_2 > J^{-1/2}\sin(\rho/2)\}", lambda m, J, rho: np.sin(rho / 2) / np.sqrt(J)),
-    reason="The gradient of u has norm J^(-1/2) |sin ᾱ|, and |ω| is at most J^(-1/2); the floor is sharp up to a "
-    "factor 1 + O(ρ²). The printed set is right for m = J = 1.",
+    printed=r"\{\langle w, e_2\rangle > \sin(\rho/2)\}",
+    wrong=lambda m, J, rho: np.sin(rho / 2) / m,
+    corrected=r"\{v_2 > J^{-1/2}\sin(\rho/2)\}",
+    right=lambda m, J, rho: np.sin(rho / 2) / np.sqrt(J),
 )
 def transversal_velocities(floor: Code) -> Verdict:
-    rng = generator()
-    m, J = masses(rng)
+    """The velocities S²₊ρ/₂ that cross the graph of u upwards wherever they meet it.
+
+    The gradient of u has norm J^(-1/2) |sin ᾱ|, and |ω| is at most J^(-1/2); the floor is sharp up to a factor 1 +
+    O(ρ²). The printed set is right for m = J = 1.
+    """
+    rng, m, J = random_disks()
     rho = rng.uniform(0.01, 1, m.size)
     w = unit_velocities(rng, m, J)
     low = floor(m, J, rho)
@@ -45,18 +52,20 @@ def transversal_velocities(floor: Code) -> Verdict:
     )
 
 
-@verified(
+@row(
     id="S4.19",
     section="4.3.3",
     equation="4.66",
-    statement="Ψ carries a configuration along its velocity to the plane x₂ = 0.",
-    printed=Formula(r"\Psi(y, w) = (y - (x_2/v_2)\,w,\ w)", rolling.project),
-    perturbed=lambda x1, x2, alpha, v1, v2, omega: (x1 - x2 * v1, alpha - x2 * omega),
-    reason="⟨y, e₂⟩/⟨w, e₂⟩ is x₂/v₂ for every m. The null space of the differential is spanned by (w, 0).",
+    printed=r"\Psi(y, w) = (y - (x_2/v_2)\,w,\ w)",
+    right=rolling.project,
+    wrong=lambda x1, x2, alpha, v1, v2, omega: (x1 - x2 * v1, alpha - x2 * omega),
 )
 def projection_along_velocities(project: Code) -> Verdict:
-    y, t = sp.symbols("x1 x2 alpha", real=True), sp.Symbol("t", real=True)
-    w = (sp.Symbol("v1", real=True), sp.Symbol("v2", positive=True), sp.Symbol("omega", real=True))
+    """Ψ carries a configuration along its velocity to the plane x₂ = 0.
+
+    ⟨y, e₂⟩/⟨w, e₂⟩ is x₂/v₂ for every m. The null space of the differential is spanned by (w, 0).
+    """
+    y, w, t = (sym.x1, sym.x2, sym.alpha), VELOCITY, sp.Symbol("t", real=True)
     image = sp.Matrix(project(*y, *w))
     moved = project(*(a + t * b for a, b in zip(y, w, strict=True)), *w)
     on_the_plane = project(y[0], 0, y[2], *w)
@@ -69,32 +78,39 @@ def projection_along_velocities(project: Code) -> Verdict:
     )
 
 
-@erratum(
+@row(
     id="S4.20",
     section="4.3.3",
     equation="before 4.75",
-    statement="The first coordinate of H₁(y) - y.",
-    printed=Formula(r"|\alpha - \sin\bar\alpha|", lambda alpha, bar, xp: alpha - xp.sin(bar)),
-    corrected=Formula(r"|\bar\alpha - \sin\bar\alpha|", lambda alpha, bar, xp: bar - xp.sin(bar)),
-    reason="Only with both bars is it of the order ρ³. As printed it grows with α.",
+    printed=r"|\alpha - \sin\bar\alpha|",
+    wrong=lambda alpha, bar, xp: alpha - xp.sin(bar),
+    corrected=r"|\bar\alpha - \sin\bar\alpha|",
+    right=lambda alpha, bar, xp: bar - xp.sin(bar),
 )
 def slip_of_the_straightening(size: Code) -> Verdict:
+    """The first coordinate of H₁(y) - y.
+
+    Only with both bars is it of the order ρ³. As printed it grows with α.
+    """
     x1, x2, bar = sp.symbols("x1 x2 bar", real=True)
     return verify(rolling.bend(x1, x2, bar, 1, sp)[0] - x1, size(sym.alpha, bar, sp))
 
 
-@verified(
+@row(
     id="S4.21",
     section="4.3.3",
     equation="4.75",
-    statement="η is within a multiple of ρ of the identity; the constant depends on m and J.",
     kind="numeric",
-    printed=Formula(r"\|\eta - \mathrm{Id}\| \le C\rho", lambda: 1.0),
-    perturbed=lambda: 2.0,
-    reason="1 - cos ᾱ is of the order ρ², and v₂ may be as small as ρ. The fitted order is 1, and C is J^(1/2)/4 "
-    "where v₂ > J^(-1/2) sin(ρ/2), m/4 on the printed set.",
+    printed=r"\|\eta - \mathrm{Id}\| \le C\rho",
+    right=lambda: 1.0,
+    wrong=lambda: 2.0,
 )
 def size_of_the_transfer(order: Code) -> Verdict:
+    """η is within a multiple of ρ of the identity; the constant depends on m and J.
+
+    1 - cos ᾱ is of the order ρ², and v₂ may be as small as ρ. The fitted order is 1, and C is J^(1/2)/4 where v₂ >
+    J^(-1/2) sin(ρ/2), m/4 on the printed set.
+    """
     counts = np.array([1e4, 1e5, 1e6])
     slopes, factors = [], []
     for m, J in ((1.0, 1.0), (9.0, 1.0), (1.0, 0.3)):
@@ -123,28 +139,22 @@ def _mirrored_differential(bar: Any, velocity: Any, xp: Any) -> Any:
     return [[2 * (i == j) - right[i][j] for j in (0, 1)] for i in (0, 1)]
 
 
-def _velocity(sp: Any) -> Any:
-    return sp.Symbol("v1", real=True), sp.Symbol("v2", positive=True), sp.Symbol("omega", real=True)
-
-
-@erratum(
+@row(
     id="S5.09",
     section="5.2",
-    statement="φ_w: where the free flight with velocity w, started on the bent plane H₁(x₁, 0, α), meets x₂ = 0.",
-    printed=Formula(
-        r"\phi_w = \Bigl(x_1 - \bar\alpha + \sin\bar\alpha - (1 - \cos\bar\alpha)\frac{v_1}{v_2},\ "
-        r"\alpha - (1 - \cos\bar\alpha)\frac{\omega}{v_2}\Bigr)",
-        _mirrored,
-    ),
-    corrected=Formula(
-        r"\phi_w = \Bigl(x_1 + \bar\alpha - \sin\bar\alpha + (1 - \cos\bar\alpha)\frac{v_1}{v_2},\ "
-        r"\alpha + (1 - \cos\bar\alpha)\frac{\omega}{v_2}\Bigr)",
-        rolling.transfer,
-    ),
-    reason="The printed map is built from H₁⁻¹. It is recomputed from F, f_lin and the time of flight.",
+    printed=r"\phi_w = \Bigl(x_1 - \bar\alpha + \sin\bar\alpha - (1 - \cos\bar\alpha)\frac{v_1}{v_2},\ "
+    r"\alpha - (1 - \cos\bar\alpha)\frac{\omega}{v_2}\Bigr)",
+    wrong=_mirrored,
+    corrected=r"\phi_w = \Bigl(x_1 + \bar\alpha - \sin\bar\alpha + (1 - \cos\bar\alpha)\frac{v_1}{v_2},\ "
+    r"\alpha + (1 - \cos\bar\alpha)\frac{\omega}{v_2}\Bigr)",
+    right=rolling.transfer,
 )
 def transfer_of_the_entry(transfer: Code) -> Verdict:
-    x1, w = sp.Symbol("x1", real=True), _velocity(sp)
+    """φ_w: where the free flight with velocity w, started on the bent plane H₁(x₁, 0, α), meets x₂ = 0.
+
+    The printed map is built from H₁⁻¹. It is recomputed from F, f_lin and the time of flight.
+    """
+    x1, w = sym.x1, VELOCITY
     s1, s2 = rolling.straight_contact(x1, 0, sym.alpha)
     c1, c2 = s1 - sp.sin(sym.alpha), s2 + sp.cos(sym.alpha) - 1
     time = -c2 / w[1]
@@ -152,24 +162,22 @@ def transfer_of_the_entry(transfer: Code) -> Verdict:
     return verify(transfer(x1, sym.alpha, sym.alpha, w, 1, sp), landed)
 
 
-@erratum(
+@row(
     id="S5.10",
     section="5.2",
-    statement="The differential of φ_w and its determinant U.",
-    printed=Formula(
-        r"d\phi_w = \begin{pmatrix}1 & -(1 - \cos\bar\alpha) - \sin\bar\alpha\,v_1/v_2\\"
-        r" 0 & 1 - \sin\bar\alpha\,\omega/v_2\end{pmatrix},\quad U = |1 - \sin\bar\alpha\,\omega/v_2|",
-        _mirrored_differential,
-    ),
-    corrected=Formula(
-        r"d\phi_w = \begin{pmatrix}1 & 1 - \cos\bar\alpha + \sin\bar\alpha\,v_1/v_2\\"
-        r" 0 & 1 + \sin\bar\alpha\,\omega/v_2\end{pmatrix},\quad U = |1 + \sin\bar\alpha\,\omega/v_2|",
-        lambda bar, velocity, xp: [row[:2] for row in rolling.transfer_differential(bar, velocity, 1, xp)],
-    ),
-    reason="As printed it is the differential of the printed map. Claim 5.2.2 is not affected.",
+    printed=r"d\phi_w = \begin{pmatrix}1 & -(1 - \cos\bar\alpha) - \sin\bar\alpha\,v_1/v_2\\"
+    r" 0 & 1 - \sin\bar\alpha\,\omega/v_2\end{pmatrix},\quad U = |1 - \sin\bar\alpha\,\omega/v_2|",
+    wrong=_mirrored_differential,
+    corrected=r"d\phi_w = \begin{pmatrix}1 & 1 - \cos\bar\alpha + \sin\bar\alpha\,v_1/v_2\\"
+    r" 0 & 1 + \sin\bar\alpha\,\omega/v_2\end{pmatrix},\quad U = |1 + \sin\bar\alpha\,\omega/v_2|",
+    right=lambda bar, velocity, xp: [row[:2] for row in rolling.transfer_differential(bar, velocity, 1, xp)],
 )
 def differential_of_the_transfer(differential: Code) -> Verdict:
-    x1, w = sp.Symbol("x1", real=True), _velocity(sp)
+    """The differential of φ_w and its determinant U.
+
+    As printed it is the differential of the printed map. Claim 5.2.2 is not affected.
+    """
+    x1, w = sym.x1, VELOCITY
     image = sp.Matrix(rolling.transfer(x1, sym.alpha, sym.alpha, w, 1, sp))
     jacobian = sp.Matrix(differential(sym.alpha, w, sp))
     # the library's differential, for any scale and including the velocity
@@ -182,28 +190,25 @@ def differential_of_the_transfer(differential: Code) -> Verdict:
     )
 
 
-@erratum(
+@row(
     id="S5.11",
     section="5.2",
     equation="step 3",
-    statement="τ′_jk, a translation along the rolling direction that turns the disk by kρ and is a whole number of "
-    "periods and a remainder in [0, ε) along the wall.",
     kind="numeric",
-    printed=Formula(
-        r"\tau'_{jk}(y) = y + (j + \lceil(1 + m/J)^{1/2}j\rho/\varepsilon\rceil)\varepsilon e_1 + (1 + "
-        r"m/J)^{1/2}k\rho\chi",
-        lambda j, k, m, J, ratio: (j + np.ceil(np.sqrt(1 + m / J) * j * ratio), np.sqrt(1 + m / J) * k * ratio),
-    ),
-    corrected=Formula(
-        r"\tau'_{jk}(y) = y + (j + \lceil k\rho/\varepsilon\rceil)\varepsilon e_1 + (m + J)^{1/2}k\rho\chi",
-        lambda j, k, m, J, ratio: (j + np.ceil(k * ratio), np.sqrt(m + J) * k * ratio),
-    ),
-    reason="Three corrections: k for j, no factor in the ceiling, and the factor of χ. What is printed turns the "
-    "disk by kρ only if J = 1.",
+    printed=r"\tau'_{jk}(y) = y + (j + \lceil(1 + m/J)^{1/2}j\rho/\varepsilon\rceil)\varepsilon e_1 + (1 + "
+    r"m/J)^{1/2}k\rho\chi",
+    wrong=lambda j, k, m, J, ratio: (j + np.ceil(np.sqrt(1 + m / J) * j * ratio), np.sqrt(1 + m / J) * k * ratio),
+    corrected=r"\tau'_{jk}(y) = y + (j + \lceil k\rho/\varepsilon\rceil)\varepsilon e_1 + (m + J)^{1/2}k\rho\chi",
+    right=lambda j, k, m, J, ratio: (j + np.ceil(k * ratio), np.sqrt(m + J) * k * ratio),
 )
 def translation_along_the_rolling(shift: Code) -> Verdict:
-    rng = generator()
-    m, J = masses(rng)
+    """τ′_jk, a translation along the rolling direction that turns the disk by kρ and is a whole number of periods and a
+    remainder in [0, ε) along the wall.
+
+    Three corrections: k for j, no factor in the ceiling, and the factor of χ. What is printed turns the disk by kρ only
+    if J = 1.
+    """
+    rng, m, J = random_disks()
     j, k = rng.integers(-20, 21, (2, m.size))
     ratio = rng.uniform(1, 50, m.size)  # rho / eps
     periods, along = shift(j, k, m, J, ratio)
@@ -215,19 +220,21 @@ def translation_along_the_rolling(shift: Code) -> Verdict:
     )
 
 
-@erratum(
+@row(
     id="S5.12",
     section="5.2",
     equation="step 3",
-    statement="ϑ(y, w) = (y - ε(⌈kρ/ε⌉ - kρ/ε)e₁, w) on P_k takes the remainder off: ϑ ∘ τ′_jk is the symmetry y + "
-    "jεe₁ + kρe₃.",
     kind="numeric",
-    printed=Formula(r"\vartheta\circ\tau'_{jk} = \tau_{jk}\text{ on }P_k", lambda k: k),
-    corrected=Formula(r"\vartheta\circ\tau'_{jk} = \tau_{jk}\text{ on }P_0", lambda k: 0 * k),
-    reason="τ′_jk takes P₀ to P_k, where ϑ takes off what τ′_jk added. From P_k it goes to P_2k, whose remainder is "
-    "another.",
+    printed=r"\vartheta\circ\tau'_{jk} = \tau_{jk}\text{ on }P_k",
+    wrong=lambda k: k,
+    corrected=r"\vartheta\circ\tau'_{jk} = \tau_{jk}\text{ on }P_0",
+    right=lambda k: 0 * k,
 )
 def remainder_of_the_translation(start: Code) -> Verdict:
+    """ϑ(y, w) = (y - ε(⌈kρ/ε⌉ - kρ/ε)e₁, w) on P_k takes the remainder off: ϑ ∘ τ′_jk is the symmetry y + jεe₁ + kρe₃.
+
+    τ′_jk takes P₀ to P_k, where ϑ takes off what τ′_jk added. From P_k it goes to P_2k, whose remainder is another.
+    """
     rng = generator()
     j, k = rng.integers(-20, 21, (2, 4000))
     ratio = rng.uniform(1, 50, 4000)
@@ -237,21 +244,20 @@ def remainder_of_the_translation(start: Code) -> Verdict:
     return holds(np.abs(shift - j) < 1e-9, "compositions", j=j, k=k, ratio=ratio)
 
 
-@erratum(
+@row(
     id="S5.13",
     section="5.2",
-    statement="The measure Λ² of R_ε × S²₊, R_ε being the rectangle of sides ε and ρ.",
-    printed=Formula(
-        r"\Lambda^2(R_\varepsilon\times\mathbb S^2_+) = 2\pi\rho\varepsilon", lambda m, area, xp: 2 * xp.pi * area
-    ),
-    corrected=Formula(
-        r"\Lambda^2(R_\varepsilon\times\mathbb S^2_+) = \pi m^{1/2}\rho\varepsilon",
-        lambda m, area, xp: xp.pi * xp.sqrt(m) * area,
-    ),
-    reason="2π is the area of the hemisphere, without the factor ⟨w, e₂⟩ of the measure. With dx₁ dα and e₂ there "
-    "remains m^(1/2), which is 1 for m = 1.",
+    printed=r"\Lambda^2(R_\varepsilon\times\mathbb S^2_+) = 2\pi\rho\varepsilon",
+    wrong=lambda m, area, xp: 2 * xp.pi * area,
+    corrected=r"\Lambda^2(R_\varepsilon\times\mathbb S^2_+) = \pi m^{1/2}\rho\varepsilon",
+    right=lambda m, area, xp: xp.pi * xp.sqrt(m) * area,
 )
 def measure_of_the_rectangle(measure: Code) -> Verdict:
+    """The measure Λ² of R_ε × S²₊, R_ε being the rectangle of sides ε and ρ.
+
+    2π is the area of the hemisphere, without the factor ⟨w, e₂⟩ of the measure. With dx₁ dα and e₂ there remains
+    m^(1/2), which is 1 for m = 1.
+    """
     area = sp.Symbol("area", positive=True)
     upward = sp.simplify(sym.inner(sym.G, sym.e2))
     flux = sp.integrate(upward * sp.sin(sym.psi), (sym.theta, 0, sp.pi), (sym.psi, 0, sp.pi))
