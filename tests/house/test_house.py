@@ -20,12 +20,9 @@ import asperity
 ROOT = Path(__file__).resolve().parents[2]
 HEAVY = {"numba", "sympy", "ot", "matplotlib", "shapely", "dask", "distributed", "pandas", "xarray", "adaptive"}
 PAGES = [
-    "README.md",
-    "docs/index.md",
-    "docs/quickstart.md",
-    "docs/verifying.md",
-    "docs/errors.md",
-    "docs/theory/configurations.md",
+    str(page.relative_to(ROOT))
+    for page in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+    if not {"_build", "generated"} & set(page.parts) and "```pycon" in page.read_text(encoding="utf-8")
 ]
 
 

@@ -1,4 +1,4 @@
-"""The gallery's short examples are right, and the reference lists all public names."""
+"""Examples and scripts of pages run and are right, and the reference lists all public names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 import asperity
+from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity import spectral as spec
 
 DOCS = Path(__file__).parents[2] / "docs"
 HOW_TO = sorted(path.stem for path in (DOCS / "how-to").glob("*.py"))
@@ -168,3 +170,39 @@ def test_inventories_have_the_links_of_the_table(reference, tmp_path):
     page = "api/_as_gen/matplotlib.axes.Axes.html#matplotlib.axes.Axes"
     for name in ("Axes", "matplotlib.axes.Axes"):
         assert f"{name} py:class 1 {page} -" in zlib.decompress(packed).decode().splitlines()
+
+
+# What a block of these pages expects before it, and its numbers in small.
+BEFORE = {"sweeps.md": "law, client = ker.lambertian(), None"}
+SMALLER = {
+    "1.5, 50)": "1.5, 3)", "points=50": "points=8", "family, 100": "family, 4", "client=2": "client=None",
+    "10**10": "2**12", "0.1), 64": "0.1), 8", "resolution=0.01": "resolution=0.5", "1e-6,": "1e-2,", "1e-4,": "1e-1,",
+    # tests of their own have the extremum of a sweep, which takes a minute, and gaps of random walls
+    'table.extremum("gap")': "table.extremum", '"gap_specular", "resistance"]': '"resistance", "eta"]',
+    'of("gap_specular")': 'of("resistance")',
+}  # fmt: skip
+
+
+def python_blocks():
+    pages = [page for page in DOCS.rglob("*.md") if not {"_build", "generated"} & set(page.parts)]
+    for page in [*pages, DOCS.parent / "README.md"]:
+        blocks = re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
+        # neither a batch system nor a package that the library does not use is at hand
+        blocks = [block for block in blocks if not re.search("SLURMCluster|uncertainties", block)]
+        if blocks:
+            yield pytest.param(page.name, blocks, id=page.name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("page", "blocks"), list(python_blocks()))
+def test_the_scripts_on_a_page_run_in_small(page, blocks, tmp_path, monkeypatch):
+    h5py = pytest.importorskip("h5py")
+    monkeypatch.chdir(tmp_path)
+    with h5py.File("pairs.h5", "w") as file:
+        file["in"], file["out"] = np.arccos(np.random.default_rng(0).uniform(-1.0, 1.0, (2, 1000)))
+    names = {"__name__": "__main__", "h5py": h5py, "geo": geo, "ker": ker, "spec": spec}
+    exec(BEFORE.get(page, ""), names)
+    for block in blocks:
+        for full, small in SMALLER.items():
+            block = block.replace(full, small)
+        exec(compile(block, page, "exec"), names)
