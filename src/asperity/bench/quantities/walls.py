@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.checks import Floats, choice
+from ...core.checks import Floats
 from ...core.errors import InputError
 
 if TYPE_CHECKING:
