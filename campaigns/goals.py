@@ -20,8 +20,8 @@ from asperity.kernels.walls.polygon import table_of_beams
 from asperity.spectral.work_diagrams.runs import measure
 from campaigns.judges import precise_triangular
 
+from .bounces import MORE, Throughput
 from .memory import MemoryUse
-from .rays import MORE, Throughput
 from .robustness import Verdict
 from .timing import least_time
 from .wall_goals import Goal, wall_goals

@@ -12,14 +12,13 @@ from asperity import geometry as geo
 from asperity.core.tables import table
 from asperity.spectral import Machine
 
+from .bounces import RAYS, measure_throughput, throughput_table
 from .goals import all_goals, goal_table
 from .memory import measure_memory
-from .rays import RAYS, measure_throughput, throughput_table
 from .rigid import measure_rigid, speed_table
 from .robustness import RAYS as AIMED_RAYS
 from .robustness import measure_robustness
 from .timing import least_time
-from .transport import PAGE_CELLS, PAGE_JOINT, transport_table
 
 REPEATS = 5
 # Walls, entry points and angles with very long runs of hits. On an arc, 10^9 hits would need a ray within 1e-18 of a
@@ -61,7 +60,7 @@ def speed_and_goals(quick: bool) -> str:
         start, robustness, measure_memory(), min(row.one_thread for row in disks),
     )  # fmt: skip
     tables = (
-        throughput_table(throughput), _runs_table(runs), speed_table(disks), transport_table(PAGE_JOINT, PAGE_CELLS),
+        throughput_table(throughput), _runs_table(runs), speed_table(disks),
         table("start | seconds", (f"{what} | {least:.2f}" for what, least in start.items())),
     )  # fmt: skip
     return "\n\n".join([f"Machine: {Machine.here()}.", "## Goals", goal_table(goals), "## Speed", *tables])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from campaigns import goals, memory, rays, robustness, wall_goals
+from campaigns import bounces, goals, memory, robustness, wall_goals
 
 from asperity import geometry as geo
 from asperity.estimates import Estimate
@@ -55,4 +55,4 @@ def test_a_goal_of_a_tolerance_needs_the_error_and_the_seconds():
 
 
 def test_every_wall_whose_bounces_are_counted_has_a_goal():
-    assert set(goals.BOUNCE_GOALS) == set(rays.WALLS)
+    assert set(goals.BOUNCE_GOALS) == set(bounces.WALLS)
