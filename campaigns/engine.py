@@ -23,7 +23,7 @@ from typing import Any, Literal
 
 from scipy.stats import binomtest
 
-from asperity.core.child import ChildCrashed, ChildProcess, OutOfTime
+from asperity.core.child import ChildProcess, OutOfTime
 
 Verdict = Literal["holds", "fails", "open"]
 HEADS = "kind | cases | fail | open | held | median of reported/true | largest true/reported | outcomes"
@@ -114,8 +114,8 @@ class Campaign:
                 found: list[Judged] = owned.child.call(judged, self.name, number, seconds=self.seconds)
             except OutOfTime:
                 return [Judged("time limit", fault=f"not judged within {self.seconds:g} s")]
-            except ChildCrashed as reason:
-                return [Judged("crash", fault=str(reason))]
+            except Exception as reason:
+                return [Judged("exception", fault=f"{type(reason).__name__}: {reason}")]
             return found
 
         with ThreadPoolExecutor(jobs) as pool:

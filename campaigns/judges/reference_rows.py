@@ -248,28 +248,23 @@ def stratified_mean(table, left, right, random):
     return total / n**2
 
 
+def references():
+    """The stored references by number of the wall: angles, expectations, the first moment, and their errors."""
+    return json.loads(FILE.read_text(encoding="utf-8"))
+
+
 def main() -> None:
-    """Compute and write the references of the walls whose numbers are given, or of all: rows first, then moments."""
-    kinds = [int(word) for word in sys.argv[1:]] or list(range(COUNT))
-    found = {entry["kind"]: entry for entry in json.loads(FILE.read_text(encoding="utf-8"))} if FILE.exists() else {}
-    for kind in kinds:
-        rows = [row_of(random_curved_wall(kind), theta) for theta in ANGLES]
-        found.setdefault(kind, {"kind": kind}).update(
-            angles=list(ANGLES), rows=[value.hex() for value, _ in rows], mean_errors=[error for _, error in rows]
-        )
-        _write(found)
-        print(kind, [f"{value:.12f}+-{error:.0e}" for value, error in rows], flush=True)
-    for kind in kinds:
-        moment, error = moment_of(random_curved_wall(kind))
-        if error < found[kind].get("moment_error", math.inf):
-            found[kind] |= {"moment": float(moment).hex(), "moment_error": float(error)}
-            _write(found)
-        print(kind, f"{moment:.10f} +- {error:.1e}", flush=True)
-
-
-def _write(found):
-    text = json.dumps([found[kind] for kind in sorted(found)], indent=1)
-    FILE.write_text(text + "\n", encoding="utf-8")
+    """Compute and write the references of the walls whose numbers are given, or of all."""
+    found = references()
+    for kind in map(int, sys.argv[1:] or range(COUNT)):
+        wall, entry = random_curved_wall(kind), found[kind]
+        rows = [row_of(wall, theta) for theta in ANGLES]
+        entry |= {"rows": [value.hex() for value, _ in rows], "row_errors": [error for _, error in rows]}
+        moment, error = moment_of(wall)
+        if error < entry["moment_error"]:
+            entry |= {"moment": float(moment).hex(), "moment_error": float(error)}
+        FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        print(entry, flush=True)
 
 
 if __name__ == "__main__":

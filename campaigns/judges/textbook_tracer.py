@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 from numba import njit
@@ -216,3 +217,30 @@ def follow(table, x, theta):
         own, own_s = piece, place
         label = label * np.uint64(6364136223846793005) + np.uint64(2 * piece + 3)
     return theta, np.uint64(0)
+
+
+@compiled
+def follow_all(table, x, theta):
+    """Outgoing angles; nan for rays that are lost."""
+    out = np.empty(x.shape[0])
+    for k in range(x.shape[0]):
+        angle, label = follow(table, x[k], theta[k])
+        out[k] = angle if label > 0 else np.nan
+    return out
+
+
+def outgoing_angles(wall, x, theta):
+    """Outgoing angles of rays into a wall with its islands, specular on flat tops; nan for rays that are lost."""
+    flat = np.zeros(x.shape, dtype=bool)
+    for piece in wall.pieces:
+        if isinstance(piece, Segment) and piece.start[1] == 0.0 == piece.end[1]:
+            flat |= (piece.start[0] <= x) & (x <= piece.end[0])
+    pieces = [*wall.pieces, *(piece for loop in wall.islands for piece in loop)]
+    out = np.pi - theta
+    out[~flat] = follow_all(table_of(SimpleNamespace(pieces=pieces)), x[~flat], theta[~flat])
+    return out
+
+
+def legendre_functions(theta, degrees):
+    """Orthonormal Legendre polynomials of the cosine, of degrees 1 to ``degrees``, shape (angles, degrees)."""
+    return np.polynomial.legendre.legvander(np.cos(theta), degrees)[:, 1:] * np.sqrt(2.0 * np.arange(degrees) + 3.0)

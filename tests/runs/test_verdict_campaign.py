@@ -1,4 +1,4 @@
-"""Verdicts, spectra to a tolerance, powers, and laws that are not self-adjoint: `campaigns.verdicts` in small."""
+"""Verdicts, spectra to a tolerance, powers, and laws that are not self-adjoint: beside `campaigns.spectra.verdicts`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaigns import verdicts
+from campaigns.judges.random_curved_walls import random_curved_wall
+from campaigns.spectra import verdicts
 from click.testing import CliRunner
 
 from asperity import geometry as geo
@@ -25,10 +26,10 @@ ARROW = ker.WallLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.4), (1, 0)]))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wall", [verdicts.random_curved_wall(11), verdicts.island_wall(0)], ids=["mixed", "island"])
+@pytest.mark.parametrize("wall", [random_curved_wall(11), verdicts.island_wall(0)], ids=["mixed", "island"])
 def test_the_straight_part_reaches_as_far_as_straight_rays_of_the_textbook(wall):
     """A matrix of these rays reaches a little less far, the root of (Q^m 1) a little farther."""
-    low, high = verdicts.Judge(wall).straight()
+    low, high = verdicts.straight_edge(wall)
     found = straight_part(ker.WallLaw(wall))
     assert low - 6e-3 <= found.low <= found.high <= high + 6e-3
     assert found.high - found.low < 8e-3
@@ -77,17 +78,17 @@ def test_one_segment_among_curves_reaches_as_far_as_its_best_pair_of_angles():
     assert found.low - 2e-3 <= expected <= found.high + 1e-3
 
 
-@pytest.mark.slow
-def test_a_mixed_wall_that_was_undecided_has_a_verdict_that_the_judge_does_not_refute():
-    wall = verdicts.random_curved_wall(9)
-    row = next(verdicts.rows_of("mixed 9", wall, 1e-2, more=False))
-    assert row.gap.verdict == "essential edge" and not row.refutation
-    # a judge that refutes: a gap that is too large, and an edge elsewhere
-    for wrong in (0.5, 0.05):
-        changed = verdicts.Row("wrong", spec.SpectralGap(
-            wrong, 1e-4, "estimate", "", "essential edge", (), "paper"
-        ), row.reference, row.edge)  # fmt: skip
-        assert changed.refutation
+@pytest.mark.parametrize(
+    ("verdict", "gap", "stands"),
+    [
+        ("essential edge", 0.16, True), ("essential edge", 0.05, False), ("essential edge", 0.3, False),
+        ("isolated", 0.163, True), ("isolated", 0.05, False), ("isolated", 0.3, False), ("no gap", 0.0, False),
+    ],
+)  # fmt: skip
+def test_the_judge_of_verdicts_refutes_wrong_gaps_and_edges(verdict, gap, stands):
+    found = spec.SpectralGap(gap, 1e-4, "estimate", "", verdict, (), "paper")
+    known, edge = (np.array([0.82, 0.83, 0.835]), 1e-3), (0.83, 0.85)
+    assert (verdicts.refutation(found, known, edge) == "") is stands
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-8])

@@ -113,7 +113,7 @@ def test_the_gap_of_the_arc_is_known_to_a_billionth():
 
 
 def test_enclosures_of_a_traced_wall_hold_the_far_finer_run_of_the_benchmark():
-    """python -m campaigns.enclosures: dispersing arcs of curvature 1."""
+    """The campaign `enclosures`: dispersing arcs of curvature 1."""
     found = spec.enclosures(ker.WallLaw(geo.dispersing_arcs(1.0)), 3, tolerance=1e-4)
     for item, value in zip(found.items[1:], (0.28381035719, -0.65746451545), strict=True):
         assert item.label == "indexed" and item.width < 2e-4 and value in item

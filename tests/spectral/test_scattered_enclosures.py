@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaigns.scattered_enclosures import COARSE, diagonal_case, given_case, judged, refused_case, teeth_case
 from scipy.special import eval_legendre
 
 from asperity import geometry as geo
@@ -14,15 +13,6 @@ from asperity.errors import InputError
 from asperity.spectral.bounds.enclosure import Enclosure, _with_ties
 from asperity.spectral.bounds.operator_residuals import image_rule
 from asperity.spectral.bounds.separation import rest_of_spectrum
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("make, numbers", [(diagonal_case, range(40)), (teeth_case, range(2))], ids=["words", "teeth"])
-def test_random_compositions_are_enclosed_and_indexed_as_known_otherwise(make, numbers):
-    for number in numbers:
-        for tolerance in (1e-8, COARSE):
-            found = judged(make(number), tolerance)
-            assert found["without an eigenvalue"] == found["indexed falsely"] == 0, (number, tolerance)
 
 
 def test_products_of_scatterings_are_narrow_and_indexed():
@@ -52,20 +42,6 @@ def test_a_composition_whose_images_have_no_known_error_is_refused():
     with pytest.raises(InputError, match="has a scattering that leaves"):
         near = ker.henyey_greenstein(0.96)
         spec.enclosures(near @ ker.TriangularTeethLaw(0.7) @ near, 2, tolerance=1e-12)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [0, 2, 3, 4, 5, 8, 9, 13, 14, 18, 19, 28])
-def test_laws_in_given_bases_are_enclosed_and_indexed_as_known_otherwise(number):
-    found = judged(given_case(number))
-    assert (
-        found["intervals"] > 1 and found["without an eigenvalue"] == found["indexed falsely"] == found["refused"] == 0
-    )
-
-
-@pytest.mark.parametrize("number", range(8))
-def test_a_law_by_apply_alone_is_refused_in_every_basis_and_composition(number):
-    assert judged(refused_case(number)) == {"refused": 1}
 
 
 def test_errors_of_images_of_arcs_and_of_unresolved_polygons_are_counted():

@@ -8,7 +8,6 @@ import mpmath as mp
 import numpy as np
 import pytest
 from campaigns.judges.textbook_tracer import follow, table_of
-from campaigns.small_gaps import cases, held, random_rows
 from scipy.linalg import eigh
 
 from asperity import geometry as geo
@@ -24,24 +23,6 @@ from asperity.spectral.gap.verdict import SpectralGap, isolated
 
 def parabola(depth):
     return geo.Wall([geo.Bezier([(0, 0), (0.5, -depth), (1, 0)])])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", list(cases(small=True)), ids=lambda case: case.name)
-def test_small_gaps_hold_against_rays_in_fifty_digits(case):
-    rows = list(held(case))
-    assert rows
-    for row in rows:
-        assert row.is_confirmed, row
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [1, 6, 10])
-def test_small_gaps_of_random_walls_and_mixtures_hold_against_rays_in_fifty_digits(number):
-    rows = list(random_rows(number))
-    assert rows
-    for row in rows:
-        assert row.is_confirmed, row
 
 
 @pytest.mark.parametrize("size", [1e-8, 1e-6, 1e-4, 1e-3])

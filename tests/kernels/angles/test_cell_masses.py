@@ -26,7 +26,7 @@ def entry(position):
     return position**2 * (3.0 - 2.0 * position)
 
 
-# In the channels of rectangular teeth the error is that of a sample; `campaigns.errors` counts how often it holds.
+# In the channels of rectangular teeth the error is that of a sample; campaign `traced-teeth` counts how often it holds.
 @pytest.mark.parametrize(
     ("name", "tolerance"), [(name, 1e-3) for name in WALLS] + [("triangular teeth", 1e-5), ("focusing arcs", 1e-5)]
 )

@@ -1,40 +1,25 @@
-"""Reported errors of matrices of random compositions, mixtures, powers, frames and adjoints, against references.
+"""Matrices of composed laws by operators on functions, which share no formula with the library.
 
-``python -m campaigns.composed_laws --count 2000`` draws laws and bases from seeds 0, 1, ... It prints how many
-reported errors hold, by method and by basis, and lists the cases that fail or are undecided. Outcomes are stored in the
-file ``--record``, so that a run can be continued, or split into ranges (``--first``, ``--count``). From seed 2000 on,
-the bases have narrow cells, on which the rounding of angles is large.
-
-The reference expands the expression into words. It applies the laws of a word, from the last one back, to the functions
-of the basis as functions of any angle. Teeth and arcs use formulas of single rays, scatterings their eigenvalues, and
-consecutive rectangular teeth their action on even and odd functions. Integrals are composite Gauss rules between all
-angles at which the integrand may not be smooth. The arithmetic is extended precision, except for the conditionals of
-arcs. The reference's error is twice the difference of a coarse and a fine rule, plus rounding.
+A law is a sum of words. The laws of a word act, from the last one back, on the functions of the basis as functions of
+any angle. Teeth and arcs use formulas of single rays, scatterings their eigenvalues, and consecutive rectangular teeth
+their action on even and odd functions. Integrals are composite Gauss rules between all angles at which the integrand
+may not be smooth. The arithmetic is extended precision, except for the conditionals of arcs. The error is twice the
+difference of a coarse and a fine rule, plus rounding.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
-import time
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erfc
-from threadpoolctl import threadpool_limits
 
 from asperity import kernels as ker
-from asperity.core.tables import table
-from asperity.errors import AccuracyError, InputError
 
 # Extended precision if the processor has it, so that errors near rounding are resolved; conditionals of arcs are
 # float64.
@@ -43,8 +28,6 @@ Extended = np.longdouble
 PI = 4.0 * np.arctan(Extended(1.0))
 # Rounding error of the reference for each basis function, in ulps: sums of about ten thousand terms.
 ROUNDING = 25.0
-# Rays of sampled matrices.
-SAMPLES = 2**14
 # Function values held in memory at a time.
 CHUNK = 2**20
 
@@ -104,15 +87,17 @@ def nodes_between(low: Floats, high: Floats, number: int) -> tuple[Floats, Float
 
 @cache
 def gauss(number: int) -> tuple[Floats, Floats]:
-    """Gauss nodes and weights on (-1, 1) in extended precision, by two Newton steps from the float64 values."""
+    """Gauss nodes and weights on (-1, 1) in extended precision, by Newton steps from the float64 values."""
     x = np.polynomial.legendre.leggauss(number)[0].astype(Extended)
-    for _ in range(2):
-        table = np.polynomial.legendre.legvander(x, number)
+    for _ in range(3):
+        table = _legendre(number, x)
         slope = number * (table[:, -2] - x * table[:, -1]) / (1 - x * x)
         x = x - table[:, -1] / slope
-    table = np.polynomial.legendre.legvander(x, number)
-    slope = number * (table[:, -2] - x * table[:, -1]) / (1 - x * x)
     return x, 2 / ((1 - x * x) * slope**2)
+
+
+def _legendre(degree: int, x: Floats) -> Floats:
+    return np.polynomial.legendre.legvander(x, degree)
 
 
 Operator = Callable[[Function, Rule], Function]
@@ -121,7 +106,7 @@ Operator = Callable[[Function, Rule], Function]
 def polynomials(number: int, angle: Floats) -> Floats:
     """Orthonormal Legendre polynomials in the cosine."""
     norms = np.sqrt(2 * np.arange(number).astype(angle.dtype) + 1)
-    return np.asarray(np.polynomial.legendre.legvander(np.cos(angle), number - 1) * norms)
+    return np.asarray(_legendre(number - 1, np.cos(angle)) * norms)
 
 
 @dataclass(frozen=True)
@@ -137,8 +122,8 @@ class Diagonal:
 
         def evaluate(theta: Floats) -> Floats:
             step, moments = max(CHUNK // (4 * size), 1), image.astype(theta.dtype)
-            parts = [theta[start : start + step] for start in range(0, theta.size, step)]
-            return np.concatenate([polynomials(size, part) @ moments for part in parts] or [moments[:0]])
+            parts = (theta[start : start + step] for start in range(0, max(theta.size, 1), step))
+            return np.concatenate([polynomials(size, part) @ moments for part in parts])
 
         return Function(evaluate, np.empty(0))
 
@@ -149,16 +134,16 @@ def scattering(g: float) -> Operator:
     return Diagonal(Extended(g) ** np.arange(last))
 
 
-def piecewise(array: Floats) -> Operator:
+@dataclass(frozen=True, eq=False)
+class Piecewise:
     """Transitions between bins of equal measure, uniform within the bin."""
-    edges = equal_bins(len(array))
 
-    def act(function: Function, rule: Rule) -> Function:
-        means = rule.moments(lambda angle: indicators(edges, angle), function, edges)
-        image = array @ means
-        return Function(lambda theta: indicators(edges, theta) @ image.astype(theta.dtype), edges[1:-1])
+    array: Floats
 
-    return act
+    def __call__(self, function: Function, rule: Rule) -> Function:
+        bins = piecewise_polynomials(equal_bins(len(self.array)), 0)
+        image = self.array @ rule.moments(bins.evaluate, function, bins.breaks)
+        return Function(lambda theta: bins.evaluate(theta) @ image.astype(theta.dtype), bins.breaks)
 
 
 def equal_bins(size: int) -> Floats:
@@ -166,12 +151,34 @@ def equal_bins(size: int) -> Floats:
     return np.arccos(1 - 2 * np.arange(size + 1, dtype=Extended) / size)
 
 
-def indicators(edges: Floats, angle: Floats) -> Floats:
-    """The normalised indicators of bins, shape (angles, bins)."""
-    cell = np.clip(np.searchsorted(edges.astype(angle.dtype), angle, side="right") - 1, 0, edges.size - 2)
-    # the difference of two cosines as a product, which avoids cancellation
-    mass = np.sin((edges[1:] + edges[:-1]) / 2) * np.sin((edges[1:] - edges[:-1]) / 2)
-    return np.asarray(np.eye(mass.size, dtype=angle.dtype)[cell] / np.sqrt(mass).astype(angle.dtype))
+def piecewise_polynomials(edges: Floats, degree: int) -> Function:
+    """Orthonormal polynomials in the angle on each cell, the normalised indicators of the cells if ``degree`` is 0."""
+    width, changes = degree + 1, [_orthonormal(*ends, degree) for ends in pairwise(edges)]
+
+    def values(angle: Floats) -> Floats:
+        ends = edges.astype(angle.dtype)
+        cell = np.clip(np.searchsorted(ends, angle, side="right") - 1, 0, len(changes) - 1)
+        found = np.zeros((angle.size, len(changes) * width), dtype=angle.dtype)
+        for k, change in enumerate(changes):
+            row = np.flatnonzero(cell == k)
+            local = (2 * angle[row] - ends[k] - ends[k + 1]) / (ends[k + 1] - ends[k])
+            found[row, k * width : (k + 1) * width] = _legendre(degree, local) @ change.astype(angle.dtype)
+        return found
+
+    return Function(values, edges[1:-1])
+
+
+def _orthonormal(low: Any, high: Any, degree: int) -> Floats:
+    """Combinations of Legendre polynomials that are orthonormal on (low, high), by Gram-Schmidt."""
+    node, weight = gauss(degree + 16)
+    mass = (high - low) * weight * np.sin(low + (high - low) * (1 + node) / 2) / 4
+    table, found = _legendre(degree, node), np.eye(degree + 1, dtype=Extended)
+    for column in range(degree + 1):
+        for before in [*range(column), *range(column)]:
+            overlap = np.sum(mass * (table @ found[:, before]) * (table @ found[:, column]))
+            found[:, column] -= overlap * found[:, before]
+        found[:, column] /= np.sqrt(np.sum(mass * (table @ found[:, column]) ** 2))
+    return found
 
 
 def flip(function: Function, rule: Rule) -> Function:
@@ -432,8 +439,8 @@ class Arcs:
         return every[(every > 0.0) & (every < np.pi)]
 
 
-# ---- random expressions -------------------------------------------------------------------------------------------
-Word = tuple[Operator, ...]
+# ---- sums of words ------------------------------------------------------------------------------------------------
+Words = tuple[tuple[float, tuple[Operator, ...]], ...]
 
 
 @dataclass(frozen=True)
@@ -441,173 +448,41 @@ class Expression:
     """A law and the words whose sum it is; the operators of a word are listed from the first to the last."""
 
     law: ker.Law
-    words: tuple[tuple[float, Word], ...]
-    adjoint_words: tuple[tuple[float, Word], ...] = field(repr=False)
-    cost: int
+    words: Words
 
     def __matmul__(self, other: Expression) -> Expression:
-        pairs = [(a * b, first + second) for a, first in self.words for b, second in other.words]
-        back = [(a * b, second + first) for a, first in self.adjoint_words for b, second in other.adjoint_words]
-        return Expression(self.law @ other.law, tuple(pairs), tuple(back), self.cost + other.cost)
+        pairs = tuple((a * b, first + second) for a, first in self.words for b, second in other.words)
+        return Expression(self.law @ other.law, pairs)
 
     def power(self, exponent: int) -> Expression:
         """The law applied several times."""
         found = self
         for _ in range(exponent - 1):
             found = found @ self
-        return Expression(self.law**exponent, found.words, found.adjoint_words, found.cost)
+        return Expression(self.law**exponent, found.words)
 
     def mixed(self, other: Expression, fraction: float) -> Expression:
         """A mixture."""
-        words, back = (
-            tuple((fraction * a, word) for a, word in mine) + tuple(((1.0 - fraction) * a, word) for a, word in yours)
-            for mine, yours in ((self.words, other.words), (self.adjoint_words, other.adjoint_words))
-        )
-        law = fraction * self.law + (1.0 - fraction) * other.law
-        return Expression(law, words, back, max(self.cost, other.cost))
+        weighted = (fraction, self.words), (1.0 - fraction, other.words)
+        words = tuple((weight * a, word) for weight, words in weighted for a, word in words)
+        return Expression(fraction * self.law + (1.0 - fraction) * other.law, words)
 
     def turned(self) -> Expression:
         """The law in the other frame."""
-        words = tuple((a, (*word, flip)) for a, word in self.words)
-        back = tuple((a, (flip, *word)) for a, word in self.adjoint_words)
-        return Expression(self.law.in_specular_frame(), words, back, self.cost)
+        return Expression(self.law.in_specular_frame(), tuple((a, (*word, flip)) for a, word in self.words))
 
     def adjoint(self) -> Expression:
-        """The adjoint."""
-        return Expression(self.law.adjoint(), self.adjoint_words, self.words, self.cost)
+        """The adjoint; all operators but transitions between bins are symmetric."""
+        words = (
+            (a, tuple(Piecewise(one.array.T) if isinstance(one, Piecewise) else one for one in reversed(word)))
+            for a, word in self.words
+        )
+        return Expression(self.law.adjoint(), tuple(words))
 
 
-def leaf(law: ker.Law, operator: Operator, cost: int = 0, adjoint: Operator | None = None) -> Expression:
+def leaf(law: ker.Law, operator: Operator) -> Expression:
     """A single law."""
-    return Expression(law, ((1.0, (operator,)),), ((1.0, (adjoint or operator,)),), cost)
-
-
-LOPSIDED = np.array([[0.5, 0.5, 0.0], [0.5, 0.25, 0.25], [0.0, 0.25, 0.75]])
-CYCLE = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-# Cost of a law of isometries or of arcs in a word, and limits on the cost of a word and on the number of words.
-TEETH, ARCS, DEAREST, MOST_WORDS = 1, 4, 4, 12
-# The seed from which bases have narrow cells.
-FIRST_NARROW = 2000
-
-
-def random_leaf(rng: np.random.Generator) -> Expression:
-    """One law."""
-    kind = rng.choice(
-        ["retro", "specular", "lambert", "scattering", "triangular", "rectangular", "density", "matrix", "map", "arcs"],
-        p=[0.08, 0.1, 0.06, 0.26, 0.2, 0.12, 0.07, 0.05, 0.04, 0.02],
-    )
-    if kind == "retro":
-        return leaf(ker.retroreflection(), identity)
-    if kind == "specular":
-        return leaf(ker.specular(), flip)
-    if kind == "lambert":
-        return leaf(ker.lambertian(), Diagonal(np.ones(1)))
-    if kind == "scattering":
-        g = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.9))
-        return leaf(ker.henyey_greenstein(g), scattering(g))
-    if kind == "triangular":
-        psi = float(rng.uniform(0.4, 2.8))
-        return leaf(ker.TriangularTeethLaw(psi), Triangular(psi), TEETH)
-    if kind == "rectangular":
-        r = float(np.exp(rng.uniform(np.log(0.1), np.log(3.0))))
-        return leaf(ker.RectangularTeethLaw(r), Rectangular({r: 1}), TEETH)
-    if kind == "density":
-        a, b = rng.uniform(-0.5, 0.5, 2)
-        values = np.array([1.0, a / 3.0, b / 5.0])
-        return leaf(ker.DensityLaw(_two_moments(float(a), float(b))), Diagonal(values))
-    if kind == "matrix":
-        if rng.random() < 0.5:
-            return leaf(ker.MatrixLaw(LOPSIDED), piecewise(LOPSIDED))
-        return leaf(ker.MatrixLaw(CYCLE), piecewise(CYCLE), adjoint=piecewise(CYCLE.T))
-    if kind == "map":
-        return leaf(ker.InvolutionLaw(exchanged), exchange)
-    xi = float(rng.uniform(0.3, 1.5))
-    return leaf(ker.CircularArcLaw(xi), Arcs(xi), ARCS)
-
-
-def _two_moments(a: float, b: float) -> Callable[[Floats, Floats], Floats]:
-    def density(theta: Floats, out: Floats) -> Floats:
-        u, v = np.cos(theta), np.cos(out)
-        return 0.5 * np.sin(out) * (1.0 + a * u * v + b * (1.5 * u * u - 0.5) * (1.5 * v * v - 0.5))
-
-    return density
-
-
-def random_expression(rng: np.random.Generator, depth: int, turned: bool) -> Expression:
-    """A random tree of at most ``depth``, all of whose laws are in one frame."""
-    if depth == 0:
-        one = random_leaf(rng)
-        return one.turned() if turned else one
-    kind = rng.choice(["compose", "mix", "power", "adjoint", "leaf"], p=[0.45, 0.25, 0.12, 0.08, 0.1])
-    first = random_expression(rng, depth - 1, turned)
-    if kind == "leaf":
-        return first
-    if kind == "power":
-        return first.power(int(rng.integers(2, 4)))
-    if kind == "adjoint":
-        return first.adjoint()
-    second = random_expression(rng, depth - 1, turned)
-    return first @ second if kind == "compose" else first.mixed(second, float(rng.uniform(0.1, 0.9)))
-
-
-def random_basis(rng: np.random.Generator) -> tuple[str, ker.Basis]:
-    """Random bins, polynomials or panels, and the kind of the basis."""
-    kind = rng.choice(["Bins(n)", "Bins(edges)", "Legendre", "Panels"], p=[0.25, 0.2, 0.35, 0.2])
-    if kind == "Bins(n)":
-        return kind, ker.Bins(int(rng.choice([2, 4, 8, 16])))
-    if kind == "Legendre":
-        return kind, ker.Legendre(int(rng.choice([4, 8, 16, 32, 64], p=[0.25, 0.3, 0.25, 0.1, 0.1])))
-    edges = np.concatenate(([0.0], np.sort(rng.uniform(0.05, 3.09, int(rng.integers(1, 6)))), [np.pi]))
-    return kind, ker.Bins(edges) if kind == "Bins(edges)" else ker.Panels(edges, int(rng.integers(0, 4)))
-
-
-def narrow_basis(rng: np.random.Generator) -> tuple[str, ker.Basis]:
-    """Bins or panels with a narrow cell, in the middle or at both ends, on which the rounding of angles is large."""
-    if rng.random() < 0.7:
-        middle, width = rng.uniform(0.3, 2.8), 10.0 ** rng.uniform(-6.0, -2.0)
-        edges = np.array([0.0, 0.5 * middle, middle, middle + width, 0.5 * (middle + np.pi), np.pi])
-    else:
-        # The references sum a limited number of crossings of crevices, so that cells at grazing cannot be narrower.
-        width = 10.0 ** rng.uniform(-2.0, -1.0)
-        edges = np.array([0.0, width, 1.0, 2.0, np.pi - width, np.pi])
-    if rng.random() < 0.4:
-        return "narrow bins", ker.Bins(edges)
-    return "narrow panels", ker.Panels(edges, int(rng.integers(0, 5)))
-
-
-# ---- outcomes -----------------------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class Outcome:
-    """One matrix: its case, its method, its reported error, its true error, and the reference's own error."""
-
-    seed: int
-    law: str
-    basis: str
-    method: str
-    reported: float
-    distance: float
-    reference: float
-    seconds: float
-
-    @property
-    def exceeds(self) -> bool:
-        """Whether the true error certainly exceeds the reported error, given the reference's error."""
-        return self.distance - self.reference > self.reported
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the reference is too coarse to decide."""
-        return not self.exceeds and not self.holds
-
-    @property
-    def holds(self) -> bool:
-        """Whether the true error is certainly below the reported error, given the reference's error."""
-        return self.distance + self.reference <= self.reported
-
-    @property
-    def factor(self) -> float:
-        """True over reported error."""
-        return max(self.distance - self.reference, 0.0) / self.reported if self.reported else np.inf
+    return Expression(law, ((1.0, (operator,)),))
 
 
 COARSE, FINE = Rule(40, 16, 400, 40), Rule(56, 20, 600, 64)
@@ -650,149 +525,6 @@ def _functions(basis: ker.Basis) -> Function:
         return Function(lambda angle: polynomials(basis.size, angle), np.empty(0))
     edges = basis.edges.astype(Extended)
     edges[-1] = PI
-    if isinstance(basis, ker.Bins):
-        if np.abs(edges - equal_bins(basis.size)).max() < 1e-14:
-            edges = equal_bins(basis.size)
-        return Function(lambda angle: indicators(edges, angle), edges[1:-1])
-    triangles = [_orthonormal(low, high, basis.degree) for low, high in pairwise(edges)]
-
-    def values(angle: Floats) -> Floats:
-        cell = np.clip(np.searchsorted(edges.astype(angle.dtype), angle, side="right") - 1, 0, len(triangles) - 1)
-        found = np.zeros((angle.size, basis.size), dtype=angle.dtype)
-        for place, triangle in enumerate(triangles):
-            row = np.flatnonzero(cell == place)
-            local = np.polynomial.legendre.legvander(_local(angle[row], edges, place), basis.degree)
-            width = basis.degree + 1
-            found[row, place * width : (place + 1) * width] = local @ triangle.astype(angle.dtype)
-        return found
-
-    return Function(values, edges[1:-1])
-
-
-def _local(angle: Floats, edges: Floats, place: int) -> Floats:
-    low, high = edges[place : place + 2].astype(angle.dtype)
-    return np.asarray((2 * angle - low - high) / (high - low))
-
-
-def _orthonormal(low: Any, high: Any, degree: int) -> Floats:
-    """Combinations of Legendre polynomials that are orthonormal on (low, high), by Gram-Schmidt."""
-    node, weight = gauss(degree + 16)
-    angle = low + (high - low) * (1 + node) / 2
-    mass = (high - low) * weight * np.sin(angle) / 4
-    table = np.polynomial.legendre.legvander(node, degree)
-    found = np.eye(degree + 1, dtype=Extended)
-    for column in range(degree + 1):
-        for _ in range(2):
-            for before in range(column):
-                overlap = np.sum(mass * (table @ found[:, before]) * (table @ found[:, column]))
-                found[:, column] -= overlap * found[:, before]
-        found[:, column] /= np.sqrt(np.sum(mass * (table @ found[:, column]) ** 2))
-    return found
-
-
-def drawn(seed: int) -> tuple[Expression, str, ker.Basis, str]:
-    """The expression, the kind of its basis, the basis and the method of a seed."""
-    rng = np.random.default_rng([seed, 16])
-    dearest = DEAREST if seed < FIRST_NARROW else DEAREST // 2
-    while True:
-        depth, turned = int(rng.integers(1, 4)), bool(rng.random() < 0.25)
-        try:
-            expression = random_expression(rng, depth, turned)
-        except InputError:
-            # the adjoint has no closed form
-            continue
-        if rng.random() < 0.1:
-            expression = expression.turned()
-        if expression.cost <= dearest and len(expression.words) <= MOST_WORDS:
-            break
-    kind, basis = narrow_basis(rng) if seed >= FIRST_NARROW else random_basis(rng)
-    method = rng.choice(["auto", "quadrature", "exact", "qmc", "monte-carlo"], p=[0.6, 0.2, 0.08, 0.04, 0.08])
-    return expression, kind, basis, str(method)
-
-
-def outcome(seed: int) -> tuple[str, Outcome] | None:
-    """The kind of basis and the outcome of a seed; None if the law does not have the drawn method, or if no ray of a
-    sample enters one of the cells."""
-    begun = time.process_time()
-    expression, kind, basis, method = drawn(seed)
-    try:
-        matrix = ker.discretise(expression.law, basis, method=method, samples=SAMPLES, rng=np.random.default_rng(seed))
-    except InputError:
-        return None
-    except AccuracyError:
-        # only rays may miss a narrow cell; any other refusal is a failure
-        if method not in ("qmc", "monte-carlo"):
-            raise
-        return None
-    exact, error = reference(expression, basis)
-    distance = float(np.linalg.norm(matrix.symmetric - exact))
-    name = "rays" if matrix.samples else matrix.method if matrix.method in ("exact", "quadrature") else "sum of several"
-    return kind, Outcome(
-        seed, repr(expression.law), repr(basis), name, float(matrix.error), distance, error, time.process_time() - begun
-    )
-
-
-def recorded(seeds: Iterable[int], record: Path, jobs: int) -> list[tuple[str, Outcome]]:
-    """The outcomes of all seeds whose law has the drawn method, in order; recorded seeds are not repeated.
-
-    The record is a file of JSON lines: the seed, and the kind of basis with the outcome, or null.
-    """
-    lines = record.read_text(encoding="utf-8").splitlines() if record.exists() else []
-    known: dict[int, Any] = dict(map(json.loads, lines))
-    missing = [seed for seed in seeds if seed not in known]
-    with ProcessPoolExecutor(jobs, initializer=threadpool_limits, initargs=(1,)) as pool:
-        waiting = {pool.submit(outcome, seed): seed for seed in missing}
-        for done in as_completed(waiting):
-            seed, found = waiting[done], done.result()
-            known[seed] = None if found is None else [found[0], asdict(found[1])]
-            with record.open("a", encoding="utf-8") as file:
-                file.write(json.dumps([seed, known[seed]]) + "\n")
-    return [(known[seed][0], Outcome(**known[seed][1])) for seed in sorted(known) if known[seed]]
-
-
-def summary(found: Sequence[Outcome]) -> str:
-    """Counts of all outcomes and of those that hold, fail or are undecided; largest error ratio, median of its
-    inverse."""
-    told = [one for one in found if not one.is_open]
-    false = sum(one.exceeds for one in told)
-    unknown = len(found) - len(told)
-    worst = max((one.factor for one in told), default=0.0)
-    sharp = [one.reported / one.distance for one in told if one.distance > one.reference]
-    median = f"{np.median(sharp):.2g}" if sharp else "-"
-    return f"{len(found)} | {len(told) - false} | {false} | {unknown} | {worst:.2g} | {median}"
-
-
-def table_of(found: Sequence[tuple[str, Outcome]]) -> str:
-    """A line for each method and kind of basis."""
-    groups: dict[tuple[str, str], list[Outcome]] = defaultdict(list)
-    for kind, one in found:
-        groups[one.method, kind].append(one)
-    lines = [f"{method} | {kind} | {summary(some)}" for (method, kind), some in sorted(groups.items())]
-    lines.append(f"all but rays |  | {summary([one for _, one in found if one.method != 'rays'])}")
-    heads = "method | basis | matrices | hold | do not | cannot be told | largest true/reported | median reported/true"
-    return table(heads, lines)
-
-
-def main() -> None:
-    """Print the table and the cases whose errors fail or are undecided."""
-    parser = argparse.ArgumentParser(prog="python -m campaigns.composed_laws", description=__doc__)
-    parser.add_argument("--count", type=int, default=2000)
-    parser.add_argument("--first", type=int, default=0, help="the first seed")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
-    parser.add_argument(
-        "--record", type=Path, default=Path("composed-laws.jsonl"), help="outcomes so far, to go on from"
-    )
-    arguments = parser.parse_args()
-    seeds = range(arguments.first, arguments.first + arguments.count)
-    found = recorded(seeds, arguments.record, arguments.jobs)
-    for _, one in found:
-        if one.exceeds or one.is_open:
-            print(one)
-    dearest = max(found, key=lambda pair: pair[1].seconds)[1]
-    print(f"\n{table_of(found)}\n")
-    print(f"{sum(one.seconds for _, one in found):.0f} s of CPU, at most {dearest.seconds:.0f} s:")
-    print(dearest)
-
-
-if __name__ == "__main__":
-    main()
+    if isinstance(basis, ker.Bins) and np.abs(edges - equal_bins(basis.size)).max() < 1e-14:
+        edges = equal_bins(basis.size)
+    return piecewise_polynomials(edges, basis.degree if isinstance(basis, ker.Panels) else 0)
