@@ -201,12 +201,17 @@ class WorkReport:
         return replace(self, rows=(*self.rows, row))
 
     def continued(self, earlier: WorkReport) -> WorkReport:
-        """This report with the rows of an earlier one; an InputError if its problem or machine differs."""
+        """This report with the rows of an earlier one; an InputError if its problem or machine differs.
+
+        Rows of a method that was compared with another reference are left out, so that they are measured again.
+        """
         if (earlier.problem, earlier.norms) != (self.problem, self.norms):
             raise InputError(f"path: expected rows of {self.problem!r}, got {earlier.problem!r}; name another file")
         if not earlier.machine.is_comparable_with(self.machine):
             raise InputError(f"path: its times are of {earlier.machine}, not of {self.machine}; name another file")
-        return replace(self, methods=MappingProxyType({**earlier.methods, **self.methods}), rows=earlier.rows)
+        methods = {**earlier.methods, **self.methods}
+        rows = tuple(row for row in earlier.rows if earlier.methods.get(row.method) == methods.get(row.method))
+        return replace(self, methods=MappingProxyType(methods), rows=rows)
 
     def error(self, row: WorkRow) -> float:
         """Error of a completed row in the first norm."""

@@ -22,6 +22,8 @@ from .report import WorkReport, WorkRow
 
 # Seed of the generators of the repeats, together with the number of the repeat.
 SEED = 20220
+# Errors of a method that make a row, not an end.
+FAILURES = (AsperityError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 Budgets = Sequence[float] | Mapping[str, Sequence[float]]
 # A function that measures one row from problem, method, budget, repeats and seconds, in this or another process.
 Runner = Callable[[WorkProblem, WorkMethod, float, int, float], WorkRow]
@@ -39,13 +41,13 @@ def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: in
     try:
         while len(times) < repeats and spent <= seconds:
             start = time.perf_counter()
-            result = _solve(method, budget, len(times))
+            result = solve_once(method, budget, len(times))
             times.append(time.perf_counter() - start)
             spent += times[-1]
-            value, reported, note = _parts(result)
+            value, reported, note = parts_of(result)
             errors.append(problem.errors(value, method.name))
             reports.append(reported)
-    except (AsperityError, ArithmeticError, MemoryError, np.linalg.LinAlgError) as reason:
+    except FAILURES as reason:
         words = " ".join(f"{type(reason).__name__}: {reason}".split())
         return WorkRow(method.name, budget, "failed", seconds=tuple(times), note=words)
     norms = {name: _root_mean_square([one[name] for one in errors]) for name in problem.norms}
@@ -58,12 +60,13 @@ def _root_mean_square(values: Sequence[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def _solve(method: WorkMethod, budget: float, repeat: int) -> Any:
+def solve_once(method: WorkMethod, budget: float, repeat: int) -> Any:
+    """The result of a method; the number of the repeat chooses the generator of a random one."""
     size = int(budget) if float(budget).is_integer() else budget
     return method.solve(size, np.random.default_rng([SEED, repeat])) if method.is_random else method.solve(size)
 
 
-def _parts(result: Any) -> tuple[Floats, float | None, str]:
+def parts_of(result: Any) -> tuple[Floats, float | None, str]:
     """Value, reported error and description from the result of a method."""
     if isinstance(result, KernelMatrix):
         return result.symmetric, _number(result.error.value), result.method

@@ -469,28 +469,32 @@ def warm_up() -> None:
     click.echo(f"stored in {folder()}")
 
 
-@main.command()
-@click.argument("problem", nargs=-1)
+@main.command(epilog=WALL_HELP)
+@click.argument("problems", nargs=-1, metavar="[PROBLEM|WALL]...")
 @click.option("--quick", is_flag=True, help="Short ladders and cheap references: under three minutes.")
 @click.option(
     "--out", default="bench-results", show_default=True, type=click.Path(path_type=Path), help="Folder for results."
 )
 @click.option(
-    "--force",
-    is_flag=True,
-    help="Measure these problems again and replace reports in the folder; by default a run goes on.",
+    "--force", is_flag=True, help="Measure again and replace reports in the folder; by default a run goes on."
 )
-def bench(problem: tuple[str, ...], quick: bool, out: Path, force: bool) -> None:
-    """Error against run time on the standard set, or on PROBLEMs of it: SCENE, QUANTITY or SCENE/QUANTITY.
+def bench(problems: tuple[str, ...], quick: bool, out: Path, force: bool) -> None:
+    """Error against run time, with tables and a picture of each wall.
+
+    PROBLEM is SCENE, QUANTITY or SCENE/QUANTITY of the standard set, which is the default; its references are stored.
+    Of another WALL all methods are measured that apply to its law, for the law in bins, its first moment and the
+    resistance, beside references made from the finest run of each method, and from rays.
 
     \b
     Examples:
       asperity bench --quick
       asperity bench focusing-arc/moment lambda2 --out my-bench
+      asperity bench my-wall.toml --quick --out my-wall
     """
+    from .bench import problems as known
     from .bench import run, standard_set
 
-    names = standard_set.problem_names(problem)
+    names = known.problem_names(problems)
     run.prepare_folder(out, names, force=force)
     effort = standard_set.QUICK if quick else standard_set.FULL
     reports = standard_set.run_problems(names, effort, out, lambda line: click.echo(line, err=True))

@@ -1,27 +1,49 @@
-"""The table of goals and what it rests on: errors in a time, memory, robustness."""
+"""The table of goals and what it rests on: limits, errors in a time, memory, robustness."""
 
 from __future__ import annotations
 
 import numpy as np
-from campaigns import goals, memory, rays, robustness, wall_goals
+import pytest
+from campaigns import robustness
+from campaigns.speed import goals, throughput
 
 from asperity import geometry as geo
-from asperity.estimates import Estimate
+
+
+def test_every_goal_can_be_measured_by_its_name():
+    names = {kind: {goal.name for goal in goals.all_goals() if goal.kind == kind} for kind in goals.MEASURES}
+    assert sum(map(len, names.values())) == len(goals.all_goals()) > 60
+    assert names["bounces"] == names["two threads against one"] == set(throughput.WALLS)
+    assert names["error in a time"] == set(goals.EXACT) and names["reported error in a time"] == set(goals.REPORTED)
+    assert names["run of hits in one step"] == set(goals.RUNS) and names["lost or wrong rays"] == set(robustness.KINDS)
+    assert {name.partition(", ")[0] for name in names["start"]} >= set(goals.PROGRAMS)
+
+
+def test_a_goal_is_met_if_all_numbers_are_within_their_limits():
+    most = goals.Goal("error in a time", "a law", "{:.0e} in {:g} s", (1e-4, 5.0), False)
+    assert most.row((1e-5, 4.0)) == ("error in a time: a law", "1e-04 in 5 s", "1e-05 in 4 s", "yes")
+    assert [most.is_met(reached) for reached in ((1e-3, 4.0), (1e-5, 6.0), (np.nan, 4.0))] == [False] * 3
+    least = goals.Goal("bounces", "a wall", "{:g}", (50.0,), True)
+    assert [least.is_met((reached,)) for reached in (51.0, 49.0, np.nan)] == [True, False, False]
+
+
+@pytest.mark.parametrize(("right", "is_infinite"), [(goals.ARC_GAP, False), (goals.ARC_GAP + 1e-3, True)])
+def test_a_reported_error_that_does_not_hold_reaches_no_goal(right, is_infinite):
+    assert np.isinf(goals._gap(goals.ARCS, 1e-4, right)) == is_infinite
+
+
+def test_the_table_says_what_is_missed_and_the_exit_code_too(monkeypatch, capsys):
+    monkeypatch.setitem(goals.MEASURES, "run of hits in one step", lambda name, limits: (2.0 * (name == "arc"),))
+    assert goals.main(["channel", "wedge"]) == 0
+    assert goals.main(["run of *"]) == 1
+    table = capsys.readouterr().out
+    assert "| run of hits in one step: arc | 1.00 us a ray | 2.00 us a ray | **no** |" in table
+    assert "1 of 3 goals are missed" in table and goals.main(["no such goal"]) == 1
 
 
 def test_the_memory_of_an_estimate_does_not_grow_with_its_rays():
     # several chunks of 65,536 rays each
-    used = memory.measure_memory((2**20, 2**21))
-    assert not used.grows and min(used.peaks) > used.matrix
-    assert memory.MemoryUse((1, 2, 4), (100, 100, 103), 1).grows
-    assert not memory.MemoryUse((1, 2, 4), (100, 101, 90), 1).grows
-
-
-def test_a_lost_or_wrong_ray_misses_the_goal():
-    right = robustness.Verdict(100, 0, 7, 3, 0, 1.0, (), ())
-    assert goals._robust("corners", right).is_met
-    assert not goals._robust("corners", robustness.Verdict(100, 1, 7, 3, 0, 1.0, (), ())).is_met
-    assert not goals._robust("grazing", robustness.Verdict(100, 0, 7, 3, 1, 1.0, (), ())).is_met
+    assert goals.growth_of_memory(2**20, 2**21) <= 0.02
 
 
 def test_rays_of_all_walls_are_counted_together(monkeypatch):
@@ -38,21 +60,3 @@ def test_a_ray_that_was_moved_is_wrong_and_no_conditioning_explains_it():
     traced = geo.trace(wall, x, theta)
     assert robustness._explained(wall, traced, x, theta, robustness.twin_trace).all()
     assert not robustness._explained(wall, traced, x, theta + 1e-9, robustness.twin_trace).any()
-
-
-def test_a_goal_of_error_and_time_needs_both_and_an_error_that_holds():
-    for found, reported, limit, is_met in ((1.25, 0.3, 9.0, True), (1.25, 0.1, 9.0, False), (1.25, 0.3, 0.0, False)):
-        answer = Estimate(found, reported, "bound", "by hand")
-        goal = goals._in_time("a number", 1.0, lambda answer=answer: answer, 0.5, limit, holds=True)
-        assert goal.is_met == is_met and f"reported {reported:.1e}" in goal.reached
-    assert not goals._in_time("a number", 1.0, lambda: 1.75, 0.5, 9.0).is_met
-
-
-def test_a_goal_of_a_tolerance_needs_the_error_and_the_seconds():
-    for error, seconds, is_met in ((1e-5, 4.0, True), (1e-3, 4.0, False), (1e-5, 6.0, False)):
-        goal = wall_goals.in_time("a law", 1e-4, 5.0, error, seconds)
-        assert goal.is_met == is_met and goal.goal == "1e-04 in 5 s"
-
-
-def test_every_wall_whose_bounces_are_counted_has_a_goal():
-    assert set(goals.BOUNCE_GOALS) == set(rays.WALLS)

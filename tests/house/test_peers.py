@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaigns import peers
+from campaigns.speed import peers
 
 
 @pytest.fixture
@@ -59,3 +59,32 @@ def test_the_limits_hold(tmp_path, data, monkeypatch):
     assert "ended after 0 s" in peers.PeerEnvironment(tmp_path / "a").run("deeptime", "deeptime", data)
     monkeypatch.setattr(peers, "ALL_SECONDS", 0.0)
     assert "time was up" in peers.PeerEnvironment(tmp_path / "b").run("deeptime", "deeptime", data)
+
+
+def test_every_solver_finds_the_gaps_of_a_chain_of_wells(tmp_path, monkeypatch):
+    monkeypatch.setattr(peers.PeerEnvironment, "run", lambda *_: "not here")
+    monkeypatch.setattr(peers, "MAXWELL_GAPS", (0.5,))
+    monkeypatch.setattr(peers, "STATES", (10,))
+    rows = list(peers.solve_with_all(tmp_path, peers.PeerEnvironment(tmp_path / "environment")))
+    assert [row[3] for row in rows] == [0, "-", "-", 0, 0, "-"]
+    assert [row[-1] for row in rows if row[3] == "-"] == ["not here"] * 3
+
+
+def test_a_gap_that_is_missing_or_no_number_is_wrong():
+    right = np.array([0.0, 1e-9, 1e-3])
+    for gaps, wrong in (([0.0, 1e-9, 1e-3], 0), ([0.0, 1e-9], 1), ([0.0, np.nan, 1e-3], 2), ([0.0, 0.0, 1e-3], 1)):
+        assert peers._row("a chain", "a solver", right, np.array(gaps), 1.0, "-")[3] == wrong
+
+
+def test_every_tracer_has_a_row_for_every_polygon_and_the_picture_is_drawn(tmp_path, monkeypatch):
+    answers = {"embree": {"version": "1", "rate": 1e6, "wrong": 0.1, "lost": 0.2, "error": 1e-6}, "mitsuba": "fails"}
+    monkeypatch.setattr(peers.PeerEnvironment, "run", lambda self, peer, *_: answers[peer])
+    monkeypatch.setattr(peers, "SIDES", (10,))
+    monkeypatch.setattr(peers, "RAYS", 2**8)
+    measured = []
+    rows = list(peers.trace_with_all(tmp_path, peers.PeerEnvironment(tmp_path / "environment"), measured))
+    assert [row[0] for row in rows] == [2, 2, 2, 10, 10, 10] and [row[3] for row in rows][2::3] == ["fails"] * 2
+    assert [(sides, tracer) for sides, tracer, *_ in measured][1::2] == [(2, "embree"), (10, "embree")]
+    assert measured[1][2:] == pytest.approx((1e6, 0.3))
+    peers.draw_speeds(measured, tmp_path / peers.PICTURE)
+    assert (tmp_path / peers.PICTURE).stat().st_size > 0

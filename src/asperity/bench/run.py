@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,57 +37,54 @@ class BenchRun:
     reports: tuple[WorkReport, ...]
 
     def summary(self) -> str:
-        """A table with the library's choice, its error and its time relative to the best method, for each problem."""
+        """The library's choice beside the best method for each problem; declared orders, references, the machine."""
         heads = "problem | chosen | error | reported | seconds"
         heads += " | times the best at equal error | at equal known error | front"
-        lines = [table(heads, map(_cells, self.reports)), "", *self._choices(), ""]
-        agree, differ, unsure = self.orders()
-        lines.append(
-            f"Declared orders: {len(agree)} agree within 0.15, {len(differ)} differ, {len(unsure)} are not resolved "
-            "(their 95 % interval holds the declared one, but is wide)."
+        references = (
+            (report.problem, source, f"{floor:.1e}")
+            for report in self.reports
+            for source, floor in dict.fromkeys((record.reference, record.floor) for record in report.methods.values())
         )
-        lines += ["", *(f"- differs: {line}" for line in differ), ""] if differ else [""]
-        if self.reports:
-            lines.append(f"Machine: {self.reports[0].machine}.")
-        return "\n".join(lines)
+        parts = [table(heads, map(_cells, self.reports)), *self._choices(), *self._orders()]
+        parts += [table("problem | reference | known to", references)]
+        parts += [f"Machine: {report.machine}." for report in self.reports[:1]]
+        return "\n\n".join(parts)
 
     def _choices(self) -> list[str]:
         """The number of good choices in words, and a list of the others."""
         choosing = [report for report in self.reports if report.auto in report.methods]
         done = [report for report in choosing if any(row.is_done for row in _chosen(report))]
-        choices = [(report.problem, choice) for report in done if (choice := report.choice()) is not None]
-        good = sum(choice <= GOOD_CHOICE for _, choice in choices)
-        known = [choice for report in done if (choice := report.choice(known=True)) is not None]
-        lines = [
-            f"The library chooses in {len(choosing)} problems. It is within a factor {GOOD_CHOICE:g} of the best on "
-            f"{good} of the {len(choices)} where another method gets as far; on {len(done) - len(choices)} none does; "
-            f"on {len(choosing) - len(done)} it was not done in time. Where errors count as far as they are known, it "
-            f"is within that factor on {sum(choice <= GOOD_CHOICE for choice in known)} of {len(known)}."
+        choices = {report.problem: choice for report in done if (choice := report.choice()) is not None}
+        slow = [
+            f"- {problem}: {choice:.2g} times the best" for problem, choice in choices.items() if choice > GOOD_CHOICE
         ]
-        slow = [f"- {problem}: {choice:.2g} times the best" for problem, choice in choices if choice > GOOD_CHOICE]
-        return [*lines, "", *slow] if slow else lines
-
-    def references(self) -> str:
-        """A table of each problem's reference and the accuracy of the reference."""
-        rows = (
-            f"{report.problem} | {source} | {floor:.1e}"
-            for report in self.reports
-            for source, floor in dict.fromkeys((record.reference, record.floor) for record in report.methods.values())
+        known = [choice for report in done if (choice := report.choice(known=True)) is not None]
+        words = (
+            f"The library chooses in {len(choosing)} problems. It is within a factor {GOOD_CHOICE:g} of the best on "
+            f"{len(choices) - len(slow)} of the {len(choices)} where another method gets as far; on "
+            f"{len(done) - len(choices)} none does; on {len(choosing) - len(done)} it was not done in time. Where "
+            f"errors count as far as they are known, it is within that factor on "
+            f"{sum(choice <= GOOD_CHOICE for choice in known)} of {len(known)}."
         )
-        return table("problem | reference | known to", rows)
+        return [words, "\n".join(slow)] if slow else [words]
 
-    def orders(self) -> tuple[list[str], list[str], list[str]]:
-        """Declared orders in three lists: confirmed, contradicted or not resolved by the fits."""
-        groups: tuple[list[str], list[str], list[str]] = ([], [], [])
+    def _orders(self) -> list[str]:
+        """The number of declared orders that the fits confirm in words, and a list of those that they contradict."""
+        verdicts, differ = [], []
         for report in self.reports:
             for name, record in report.methods.items():
                 fitted = report.order(name)
                 if record.declared_order is None or fitted is None:
                     continue
-                verdict = fitted.verdict(record.declared_order)
-                line = f"{report.problem}, {name}: {fitted}, declared {record.declared_order:g}"
-                groups[("agrees", "differs", "not resolved").index(verdict)].append(line)
-        return groups
+                verdicts.append(fitted.verdict(record.declared_order))
+                if verdicts[-1] == "differs":
+                    differ.append(f"- differs: {report.problem}, {name}: {fitted}, declared {record.declared_order:g}")
+        words = (
+            f"Declared orders: {verdicts.count('agrees')} agree within 0.15, {len(differ)} differ, "
+            f"{verdicts.count('not resolved')} are not resolved (their 95 % interval holds the declared one, but is "
+            "wide)."
+        )
+        return [words, "\n".join(differ)] if differ else [words]
 
     def tables(self) -> str:
         """Tables of all rows, one for each problem."""
@@ -94,23 +92,16 @@ class BenchRun:
 
     def save(self, folder: Path) -> list[Path]:
         """Write summary, tables, data and a figure for each scene; return the written paths."""
-        written = [folder / SUMMARY, folder / TABLES, folder / DATA]
+        texts = {SUMMARY: self.summary(), TABLES: self.tables(), DATA: self.to_json()}
+        drawn = [report for report in self.reports if any(row.is_done for row in report.rows)]
+        drawn.sort(key=lambda report: scene_of(report.problem))
         with moved_when_complete(folder) as beside:
-            for path, text in zip(written, (self.summary(), self.tables(), self.to_json()), strict=True):
-                (beside / path.name).write_text(text + "\n", encoding="utf-8")
-            for scene, reports in self.by_scene().items():
-                drawn = [report for report in reports if any(row.is_done for row in report.rows)]
-                if drawn:
-                    written.append(folder / f"{scene}.png")
-                    draw_scene(drawn).savefig(beside / written[-1].name, dpi=100)
-        return written
-
-    def by_scene(self) -> dict[str, list[WorkReport]]:
-        """The reports of each scene."""
-        found: dict[str, list[WorkReport]] = {}
-        for report in self.reports:
-            found.setdefault(report.problem.split("/")[0], []).append(report)
-        return found
+            for name, text in texts.items():
+                (beside / name).write_text(text + "\n", encoding="utf-8")
+            for scene, reports in groupby(drawn, key=lambda report: scene_of(report.problem)):
+                _draw(list(reports)).savefig(beside / f"{label(scene)}.png", dpi=100)
+            names = sorted(path.name for path in beside.iterdir() if path.name not in texts)
+        return [folder / name for name in (*texts, *names)]
 
     def to_json(self) -> str:
         """All reports as JSON."""
@@ -148,7 +139,7 @@ def prepare_folder(folder: Path, names: Sequence[str], *, force: bool) -> None:
         for name in names:
             (folder / f"{file_stem(name)}.json").unlink(missing_ok=True)
         return
-    pictures = {f"{name.split('/')[0]}.png" for name in names}
+    pictures = {f"{label(scene_of(name))}.png" for name in names}
     found = sorted(name for name in (SUMMARY, TABLES, DATA, *pictures) if os.path.exists(folder / name))
     if found and not _is_earlier(folder / DATA, names):
         raise FileExistsRefusal(
@@ -157,9 +148,24 @@ def prepare_folder(folder: Path, names: Sequence[str], *, force: bool) -> None:
         )
 
 
+def scene_of(name: str) -> str:
+    """The scene of a problem SCENE/QUANTITY; the text of a wall may have slashes of its own."""
+    return name.rpartition("/")[0]
+
+
+def label(scene: str) -> str:
+    """What the picture of a scene is called: a wall's file by its last name.
+
+    >>> label("koch"), label("walls/mine.txt:units=um/nm")
+    ('koch', 'mine.txt-units=um-nm')
+    """
+    path, colon, parameters = scene.partition(":")
+    return (Path(path).name + colon + parameters).replace("/", "-").replace(":", "-")
+
+
 def file_stem(name: str) -> str:
     """What the files of a problem are called."""
-    return name.replace("/", "-")
+    return f"{label(scene_of(name))}-{name.rpartition('/')[2]}"
 
 
 def _is_earlier(data: Path, names: Sequence[str]) -> bool:
@@ -185,14 +191,17 @@ def _cells(report: WorkReport) -> tuple[str, ...]:
         words = states or ("not run" if report.auto in report.methods else "nothing to choose")
         return report.problem, words, *"-----", front
     best = min(rows, key=report.error)
-    reported = "-" if best.reported is None else f"{best.reported:.1e}"
-    ratios = [report.choice(), report.choice(known=True)]
-    true, known = ("-" if ratio is None else f"{ratio:.2g}" for ratio in ratios)
-    error, seconds = f"{report.error(best):.1e}", f"{best.least:.2g}"
-    return report.problem, best.note, error, reported, seconds, true, known, front
+    numbers = (
+        (best.reported, ".1e"),
+        (best.least, ".2g"),
+        (report.choice(), ".2g"),
+        (report.choice(known=True), ".2g"),
+    )
+    cells = ("-" if number is None else format(number, digits) for number, digits in numbers)
+    return report.problem, best.note, f"{report.error(best):.1e}", *cells, front
 
 
-def draw_scene(reports: Sequence[WorkReport]) -> Figure:
+def _draw(reports: Sequence[WorkReport]) -> Figure:
     """Draw one panel for each report, three panels in a row."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

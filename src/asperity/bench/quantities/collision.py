@@ -120,5 +120,6 @@ def by_true_disks(wall: Wall, scale: float, rng: np.random.Generator, number: in
     return found / square_of_v1()
 
 
-COLLISION = Quantity("collision", "<v1, K v1>/<v1, v1> of a uniform disk", _collision_methods, standard_names())
-TRUE_DISK = Quantity("disk", "that of the true disk at scale eps, against the limit", _disk_methods, DISK_SCENES)
+# <v1, K v1>/<v1, v1> of a uniform disk, in the small-scale limit and for the true disk at a scale.
+COLLISION = Quantity("collision", _collision_methods, standard_names())
+TRUE_DISK = Quantity("disk", _disk_methods, DISK_SCENES)

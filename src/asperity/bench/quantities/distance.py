@@ -41,4 +41,4 @@ def _to_lambert(matrix: KernelMatrix) -> Estimate:
     return distance(matrix, discretise(lambertian(), matrix.basis))
 
 
-DISTANCE = Quantity("distance", "the distance of the rows from Lambert's", _methods, SCENES)
+DISTANCE = Quantity("distance", _methods, SCENES)

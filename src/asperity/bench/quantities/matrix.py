@@ -50,12 +50,9 @@ def _resistance(matrix: KernelMatrix) -> Estimate:
     return Estimate(resistance_of(matrix.symmetric), size * matrix.error.value, matrix.error.kind, matrix.method)
 
 
-LAW = Quantity(
-    "law", "the matrix of the law in 32 bins", _by_methods(LAW_BASIS, lambda matrix: matrix, in_bins=True),
-    standard_names(),
-)  # fmt: skip
-MOMENT = Quantity("moment", "<u, P u>/<u, u>", _by_methods(MOMENT_BASIS, moment_of), standard_names())
+# The matrix of the law in bins, <u, P u>/<u, u>, and the mean resistance of a body with this wall.
+LAW = Quantity("law", _by_methods(LAW_BASIS, lambda matrix: matrix, in_bins=True), standard_names())
+MOMENT = Quantity("moment", _by_methods(MOMENT_BASIS, moment_of), standard_names())
 RESISTANCE = Quantity(
-    "resistance", "the mean resistance of a body with this wall", _by_methods(RESISTANCE_BASIS, _resistance),
-    ("triangular-teeth", "focusing-arc", "mixed"),
-)  # fmt: skip
+    "resistance", _by_methods(RESISTANCE_BASIS, _resistance), ("triangular-teeth", "focusing-arc", "mixed")
+)

@@ -32,8 +32,6 @@ class MatrixMethod:
     name : str
     matrix : callable
         ``matrix(wall, basis, budget)`` or ``matrix(wall, basis, budget, rng)``.
-    budget : str
-        Meaning of the budget.
     quick, full : tuple of float
         Budgets of the quick and the full set.
     is_random : bool
@@ -43,7 +41,6 @@ class MatrixMethod:
 
     name: str
     matrix: MakeMatrix
-    budget: str
     quick: tuple[float, ...]
     full: tuple[float, ...]
     is_random: bool = False
@@ -116,10 +113,11 @@ def auto_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generato
     return discretise(WallLaw(wall), basis, tolerance=1.0 / budget, rng=rng)
 
 
-AUTO = MatrixMethod("auto", auto_matrix, "1/tolerance", (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8), True)
-CLOSED_FORM = MatrixMethod("closed form", closed_form_matrix, "-", (1.0,), (1.0,))
-BEAMS = MatrixMethod("beams", beam_matrix, "beams a hollow", (1e3, 1e4), (1e2, 1e3, 1e4, 1e5))
-ROWS = MatrixMethod("adaptive angles", adaptive_matrix, "1/tolerance", (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8))
-QMC = MatrixMethod("randomised QMC", qmc_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
-STRATIFIED = MatrixMethod("stratified", stratified_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
-MONTE_CARLO = MatrixMethod("Monte Carlo", monte_carlo_matrix, "rays", QUICK_RAYS, RAYS, True, RANDOM_ORDER)
+# The budget of AUTO and ROWS is 1/tolerance, that of BEAMS the beams a hollow; the others have rays.
+AUTO = MatrixMethod("auto", auto_matrix, (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8), True)
+CLOSED_FORM = MatrixMethod("closed form", closed_form_matrix, (1.0,), (1.0,))
+BEAMS = MatrixMethod("beams", beam_matrix, (1e3, 1e4), (1e2, 1e3, 1e4, 1e5))
+ROWS = MatrixMethod("adaptive angles", adaptive_matrix, (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8))
+QMC = MatrixMethod("randomised QMC", qmc_matrix, QUICK_RAYS, RAYS, True, JUMPING_ORDER)
+STRATIFIED = MatrixMethod("stratified", stratified_matrix, QUICK_RAYS, RAYS, True, JUMPING_ORDER)
+MONTE_CARLO = MatrixMethod("Monte Carlo", monte_carlo_matrix, QUICK_RAYS, RAYS, True, RANDOM_ORDER)

@@ -20,8 +20,7 @@ class Quantity:
 
     Attributes
     ----------
-    name, summary : str
-    name, summary : str
+    name : str
     methods : callable
         ``methods(wall)`` returns triples of a `WorkMethod` and its budgets (quick, full).
     scenes : tuple of str
@@ -29,6 +28,5 @@ class Quantity:
     """
 
     name: str
-    summary: str
     methods: Callable[[Wall], Methods]
     scenes: tuple[str, ...]

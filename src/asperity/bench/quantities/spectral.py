@@ -63,10 +63,7 @@ def eta_at(wall: Wall, angle: float) -> float:
     return (1.0 + 0.5 * total) / (1.0 - 0.5 * total)
 
 
-EIGENVALUE = Quantity("lambda2", "the largest spectral value off the constants", _eigenvalue_methods, standard_names())
-DIFFUSIVITY = Quantity(
-    "eta",
-    "the slope of L^2/tau against ln L in a long channel, over that between diffuse walls",
-    _diffusivity_methods,
-    ETA_SCENES,
-)
+# The largest spectral value off the constants.
+EIGENVALUE = Quantity("lambda2", _eigenvalue_methods, standard_names())
+# The slope of L^2/tau against ln L in a long channel, over that between diffuse walls.
+DIFFUSIVITY = Quantity("eta", _diffusivity_methods, ETA_SCENES)

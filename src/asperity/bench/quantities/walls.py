@@ -1,13 +1,11 @@
-"""The walls of the standard set, and random walls outside it."""
+"""The walls of the standard set, random walls outside it, and walls of the user."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from itertools import pairwise
 from math import pi
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,15 +23,6 @@ TRANSECT_ROW, EXAGGERATION = 170, 3.0
 RANDOM_WALLS = 20
 # Limit on attempts to generate a valid wall; a few always suffice.
 ATTEMPTS = 1000
-
-
-@dataclass(frozen=True)
-class BenchScene:
-    """A wall with its name; ``build`` makes the wall."""
-
-    name: str
-    summary: str
-    build: Callable[[], Wall]
 
 
 def terrain_profile() -> tuple[Floats, Floats]:
@@ -67,30 +56,11 @@ def _mixed() -> Wall:
     return Wall([*teeth, *curves], period=1.0)
 
 
-def _named(name: str, *parameters: float) -> Callable[[], Wall]:
-    def build() -> Wall:
-        from ... import geometry
+def _named(name: str, *parameters: float) -> Wall:
+    from ... import geometry
 
-        wall: Wall = getattr(geometry, name)(*parameters)
-        return wall
-
-    return build
-
-
-_STANDARD = (
-    BenchScene("triangular-teeth", "isosceles teeth of apex angle 0.7", _named("triangular_teeth", 0.7)),
-    BenchScene("rectangular-teeth", "crevices twice as deep as wide", _named("rectangular_teeth", 2.0)),
-    BenchScene("focusing-arc", "circular arcs of half angle 1.2", _named("focusing_arcs", 1.2)),
-    BenchScene("cusps", "dispersing bumps that meet in a cusp", _named("dispersing_arcs", 2.0)),
-    BenchScene("mushroom", "mushrooms with a stem of 0.3 of the cap", _named("mushrooms", 0.3, 0.5)),
-    BenchScene("koch", "the Koch curve after four steps, 256 lines", _named("koch", 4)),
-    BenchScene("profile", "a terrain transect of 403 heights, mirrored, heights times 3", _measured),
-    BenchScene("mixed", "a tooth, a flat top, a semicircle and a cubic in one period", _mixed),
-)
-
-
-def _random(number: int) -> Callable[[], Wall]:
-    return lambda: random_wall(number)
+    wall: Wall = getattr(geometry, name)(*parameters)
+    return wall
 
 
 def random_wall(number: int) -> Wall:
@@ -142,21 +112,33 @@ def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> 
     return Bezier([start, *control, end])
 
 
-@cache
-def scenes() -> Mapping[str, BenchScene]:
-    """The standard set and the random walls, by name."""
-    random = (BenchScene(f"random-{k}", "a random wall", _random(k)) for k in range(RANDOM_WALLS))
-    return MappingProxyType({scene.name: scene for scene in (*_STANDARD, *random)})
+_STANDARD: dict[str, Callable[[], Wall]] = {
+    "triangular-teeth": partial(_named, "triangular_teeth", 0.7),
+    "rectangular-teeth": partial(_named, "rectangular_teeth", 2.0),
+    "focusing-arc": partial(_named, "focusing_arcs", 1.2),
+    "cusps": partial(_named, "dispersing_arcs", 2.0),
+    "mushroom": partial(_named, "mushrooms", 0.3, 0.5),
+    "koch": partial(_named, "koch", 4),
+    "profile": _measured,
+    "mixed": _mixed,
+}
+_RANDOM = {f"random-{number}": partial(random_wall, number) for number in range(RANDOM_WALLS)}
+
+
+def scenes() -> tuple[str, ...]:
+    """Names of the walls with stored references: the standard set and the random walls."""
+    return (*_STANDARD, *_RANDOM)
 
 
 def standard_names() -> tuple[str, ...]:
     """Names of the scenes of the standard set."""
-    return tuple(scene.name for scene in _STANDARD)
+    return tuple(_STANDARD)
 
 
 @cache
-def wall_of(name: str) -> Wall:
-    """The wall of a scene, constructed once in each process."""
-    if name not in scenes():
-        raise InputError(f"scene: expected one of {', '.join(scenes())}, got {name!r}")
-    return scenes()[name].build()
+def wall_of(scene: str) -> Wall:
+    """The wall of a scene, or of a text as `wall_from_text` reads it, constructed once in each process."""
+    from ...geometry import wall_from_text
+
+    build = (_STANDARD | _RANDOM).get(scene)
+    return wall_from_text(scene) if build is None else build()

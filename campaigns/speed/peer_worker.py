@@ -1,7 +1,8 @@
 """Runs one peer, in the peers' own environment: ``python peer_worker.py PEER DATA.npz`` prints one line of JSON.
 
 It imports nothing of asperity. Every peer is run as its expert users run it. Data of rays: x, incoming theta, outgoing
-theta of the reference, and the ``corners`` of the tooth. Data of spectra: a row-stochastic matrix and its exact gap.
+theta of the reference, and the ``corners`` of the wall. Data of chains: a row-stochastic ``matrix``, or its sparse
+parts, and the number ``wanted`` of eigenvalues.
 """
 
 from __future__ import annotations
@@ -126,41 +127,29 @@ def judged(out, right, seconds, version):
 
 
 def deeptime(data):
-    from deeptime.markov.msm import MarkovStateModel
-
-    start = time.perf_counter()
-    # three eigenvalues of largest modulus, because one may be near -1
-    values = np.sort(np.real(MarkovStateModel(data["matrix"]).eigenvalues(3)))
-    return spectral(1.0 - values[-2], data, time.perf_counter() - start, "deeptime")
-
-
-def deeptime_wells(data):
-    """The leading eigenvalues of a sparse chain."""
+    """The leading eigenvalues of a dense or a sparse chain."""
     from deeptime.markov.tools.analysis import eigenvalues
     from scipy.sparse import csr_matrix
 
-    matrix = csr_matrix((data["entries"], data["columns"], data["starts"]))
+    dense = "matrix" in data
+    matrix = data["matrix"] if dense else csr_matrix((data["entries"], data["columns"], data["starts"]))
     # with reversibility and the stationary law given, deeptime uses its symmetric solver
     uniform = np.full(matrix.shape[0], 1.0 / matrix.shape[0])
     start = time.perf_counter()
     values = eigenvalues(matrix, k=int(data["wanted"]), reversible=True, mu=uniform)
-    seconds = time.perf_counter() - start
-    return {"version": version("deeptime"), "seconds": seconds, "values": np.real(values).tolist()}
+    return solved(1.0 - np.real(values), time.perf_counter() - start, "deeptime")
 
 
 def pydtmc(data):
     from pydtmc import MarkovChain
 
     start = time.perf_counter()
-    chain = MarkovChain(data["matrix"])
-    slem = chain.spectral_gap
-    return spectral(float("nan") if slem is None else float(slem), data, time.perf_counter() - start, "PyDTMC")
+    gap = MarkovChain(data["matrix"]).spectral_gap
+    return solved([0.0, np.nan if gap is None else gap], time.perf_counter() - start, "PyDTMC")
 
 
-def spectral(gap, data, seconds, package):
-    # JSON has no NaN
-    found = gap if np.isfinite(gap) else None
-    return {"version": version(package), "seconds": seconds, "gap": found, "right": float(data["gap"])}
+def solved(gaps, seconds, package):
+    return {"version": version(package), "seconds": seconds, "gaps": [float(gap) for gap in gaps]}
 
 
 if __name__ == "__main__":

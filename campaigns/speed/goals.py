@@ -1,0 +1,356 @@
+"""The goals of goals.toml beside what is reached: ``python -m campaigns.speed.goals [PATTERN...]``.
+
+A pattern, with wildcards, is a kind or a name. Times are least times of repeats after a run that compiles. Where no
+independent value is known the error is the reported one, which other campaigns test.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+import tomllib
+import tracemalloc
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from functools import cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigvalsh
+from threadpoolctl import threadpool_limits
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.bench.quantities.walls import wall_of
+from asperity.geometry.polygons.beams import beams_of
+from asperity.kernels.discretisation.isometry_tables import table_matrix
+from asperity.kernels.walls.polygon import table_of_beams
+from campaigns.judges import precise_triangular
+
+from ..pages import print_table
+from .throughput import bounces_a_second, first_rays
+
+FILE = Path(__file__).with_name("goals.toml")
+# Repeats of a computation, and seconds after which no further repeat starts.
+REPEATS, SECONDS = 4, 10.0
+# Tolerance of the run that compiles.
+ROUGH = 1e-2
+Reached = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is to be reached: numbers that must be at least, or at most, the limits; ``unit`` prints them."""
+
+    kind: str
+    name: str
+    unit: str
+    limits: Reached
+    at_least: bool
+
+    def is_met(self, reached: Reached) -> bool:
+        """Whether all numbers are within their limits; NaN is not."""
+        pairs = list(zip(reached, self.limits, strict=True))
+        return all(value >= limit for value, limit in pairs) if self.at_least else all(a <= b for a, b in pairs)
+
+    def row(self, reached: Reached) -> tuple[str, ...]:
+        """A row of the table."""
+        met = "yes" if self.is_met(reached) else "**no**"
+        return f"{self.kind}: {self.name}", self.unit.format(*self.limits), self.unit.format(*reached), met
+
+
+def all_goals() -> list[Goal]:
+    """The goals in the order of the file."""
+    found = []
+    for kind, entry in tomllib.loads(FILE.read_text(encoding="utf-8")).items():
+        at_least = "least" in entry
+        for name, limits in entry["least" if at_least else "most"].items():
+            numbers = tuple(map(float, limits if isinstance(limits, list) else [limits]))
+            found.append(Goal(kind, name, entry["unit"], numbers, at_least))
+    return found
+
+
+def timed(job: Callable[[], Any], repeats: int = REPEATS) -> tuple[Any, float]:
+    """The result, and the least time of the repeats in seconds."""
+    begun, least = time.perf_counter(), float("inf")
+    for _ in range(repeats):
+        start = time.perf_counter()
+        result = job()
+        end = time.perf_counter()
+        least = min(least, end - start)
+        if end - begun > SECONDS:
+            break
+    return result, least
+
+
+# errors
+
+EXACT_TEETH, TEETH, ARCS = ker.TriangularTeethLaw(0.7), geo.triangular_teeth(0.7), geo.focusing_arcs(1.2)
+# <u, P u> / <u, u> for u = cos(theta), and 1 - lambda_2: see docs/theory/closed-forms.md
+TEETH_MOMENT, ARC_MOMENT, ARC_GAP = 0.134541971359171, 0.327558333378, 1.0 - 0.3670253152
+# Limit on the beams of a hollow that is only limited by its tolerance.
+MANY_BEAMS = 10**7
+
+
+def _moment(wall: geo.Wall) -> float:
+    """By the method that the library chooses."""
+    return float(ker.discretise(ker.WallLaw(wall), ker.Legendre(2)).symmetric[1, 1])
+
+
+def _unresolved(law: ker.PolygonLaw) -> float:
+    law.branches(1.0)
+    return float(law.unresolved)
+
+
+def random_polygon() -> geo.Wall:
+    """A polygonal wall with sixteen random vertices below the opening."""
+    rng = np.random.default_rng(16)
+    x = np.concatenate([[0.0], np.sort(rng.random(14)), [1.0]])
+    y = np.concatenate([[0.0], -0.1 - 0.8 * rng.random(14), [0.0]])
+    return geo.Wall.from_vertices(np.column_stack([x, y]))
+
+
+def _gap(wall: geo.Wall, tolerance: float, right: float | None = None) -> float:
+    """The reported error, or infinity if the true one is larger."""
+    found = spec.spectral_gap(ker.WallLaw(wall), tolerance)
+    return found.error if right is None or abs(found.value - right) <= found.error else float("inf")
+
+
+def _law_in_bins(wall: geo.Wall, tolerance: float) -> float:
+    return float(ker.discretise(ker.WallLaw(wall), ker.Bins(64), method="quadrature", tolerance=tolerance).error)
+
+
+def _resistance(wall: geo.Wall, tolerance: float) -> float:
+    return ker.resistance(ker.WallLaw(wall), tolerance).error
+
+
+def _distance(kind: Any, tolerance: float) -> float:
+    return ker.distance(ker.WallLaw(ARCS), ker.WallLaw(TEETH), kind=kind, tolerance=tolerance).error
+
+
+# The right value and how ours is computed. The error is their distance, of matrices in the Frobenius norm unless the
+# name says otherwise.
+EXACT: Mapping[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
+    "triangular teeth, first moment": (lambda: TEETH_MOMENT, partial(_moment, TEETH)),
+    "triangular teeth, bins as an operator": (
+        precise_triangular.reference,
+        lambda: (
+            ker.discretise(
+                ker.TriangularTeethLaw(precise_triangular.ANGLE), ker.Bins(precise_triangular.BINS)
+            ).symmetric
+        ),
+    ),
+    "triangular teeth, Legendre(64)": (
+        lambda: table_matrix(table_of_beams(beams_of(TEETH.vertices)), ker.Legendre(64))[0],
+        lambda: ker.discretise(EXACT_TEETH, ker.Legendre(64)).symmetric,
+    ),
+    # the error bound from its beams
+    "polygon of 16 vertices, whole law": (lambda: 0.0, lambda: _unresolved(ker.PolygonLaw(random_polygon()))),
+    "focusing arc, first moment": (lambda: ARC_MOMENT, partial(_moment, ARCS)),
+}
+WALLS: Mapping[str, geo.Wall] = {
+    "cusps": wall_of("cusps"),
+    "mushroom": wall_of("mushroom"),
+    "tooth, arc and Bezier": wall_of("mixed"),
+    "skew Bezier": geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0)])]),
+}
+# The reported error by the tolerance.
+REPORTED: Mapping[str, Callable[[float], float]] = {
+    "gap of focusing arcs, roughly": partial(_gap, ARCS, right=ARC_GAP),
+    "gap of focusing arcs": partial(_gap, ARCS, right=ARC_GAP),
+    **{f"law in Bins(64) by quadrature, {name}": partial(_law_in_bins, wall) for name, wall in WALLS.items()},
+    **{f"resistance, {name}": partial(_resistance, wall) for name, wall in WALLS.items()},
+    "resistance, Koch 8": lambda tolerance: _resistance(geo.koch(8), tolerance),
+    **{f"gap of dispersing arcs of {k}": partial(_gap, geo.dispersing_arcs(curvature))
+       for k, curvature in (("1/3", 1.0 / 3.0), ("2/3", 2.0 / 3.0), ("1", 1.0))},
+    "Koch 5 as an exact law": lambda tolerance: _unresolved(
+        ker.PolygonLaw(geo.koch(5), tolerance, max_beams=MANY_BEAMS)
+    ),
+    "distance of arc and teeth, rows": partial(_distance, "rows"),
+    "distance of arc and teeth, joint": partial(_distance, "joint"),
+}  # fmt: skip
+
+
+def _error_in_a_time(name: str, limits: Reached) -> Reached:
+    right, solve = EXACT[name]
+    found, seconds = timed(solve)
+    return float(np.linalg.norm(found - right(), 2 if name.endswith("as an operator") else None)), seconds
+
+
+def _reported_in_a_time(name: str, limits: Reached) -> Reached:
+    REPORTED[name](ROUGH)
+    return timed(partial(REPORTED[name], limits[0]))
+
+
+# large matrices
+
+
+@cache
+def _large_matrix(name: str, bins: int) -> ker.KernelMatrix:
+    """A smooth law, a sampled law of a curved wall, or pairs without a known mirror symmetry."""
+    basis, arc, rng = ker.Bins(bins), ker.CircularArcLaw(1.2), np.random.default_rng(0)
+    if name == "Henyey-Greenstein 0.9":
+        return ker.discretise(ker.henyey_greenstein(0.9), basis)
+    if name == "focusing arc":
+        return ker.discretise(arc, basis, method="qmc", samples=2**22, rng=rng)
+    incoming = np.arccos(1.0 - 2.0 * rng.random(2**22))
+    return ker.estimate(incoming, arc.sample(incoming, rng), basis, symmetrise=True)
+
+
+def _part_of_eigvalsh(name: str, limits: Reached) -> Reached:
+    matrix = _large_matrix(name, 4096)
+    with threadpool_limits(1):
+        return (timed(lambda: spec.spectrum(matrix, k=2))[1] / timed(lambda: eigvalsh(matrix.symmetric), 1)[1],)
+
+
+def _seconds_of_gap(name: str, limits: Reached) -> Reached:
+    matrix = _large_matrix(name, 10_000)
+    return (timed(lambda: spec.spectrum(matrix, k=2), 1)[1],)
+
+
+# rays and disks
+
+# Walls, entry points and angles with very long runs of hits. On an arc, 10^9 hits would need a ray within 1e-18 of a
+# tip, which is a corner; double precision allows about 10^6 hits.
+RUNS = {
+    "arc": (geo.focusing_arcs(np.pi / 2), (1e-12, 2e-12), (np.pi / 2 - 1e-6, np.pi / 2 - 0.5e-6)),
+    "channel": (geo.rectangular_teeth(1e6), (0.5, 1.0), (1.9e-3, 2.1e-3)),
+    "wedge": (geo.triangular_teeth(3e-9), (0.0, 1.0), (1.5, 1.6)),
+}
+RUN_RAYS, RUN_LIMIT = 2**14, 2**62
+AIMED_RAYS = 10**6
+
+_rates = cache(bounces_a_second)
+
+
+def _bounces(name: str, limits: Reached) -> Reached:
+    return (_rates()[name][0] / 1e6,)
+
+
+def _two_threads(name: str, limits: Reached) -> Reached:
+    one, two = _rates()[name]
+    return (two / one,)
+
+
+def _run_of_hits(name: str, limits: Reached) -> Reached:
+    rng, (wall, place, angle) = np.random.default_rng(0), RUNS[name]
+    x, theta = rng.uniform(*place, RUN_RAYS), rng.uniform(*angle, RUN_RAYS)
+    job = partial(geo.trace, wall, x, theta, max_collisions=RUN_LIMIT, threads=1)
+    job()
+    return (1e6 * timed(job)[1] / RUN_RAYS,)
+
+
+@cache
+def _verdicts() -> Mapping[str, Any]:
+    from ..robustness import measure_robustness
+
+    return measure_robustness(AIMED_RAYS)
+
+
+def _lost_or_wrong(name: str, limits: Reached) -> Reached:
+    return (float(_verdicts()[name].lost + _verdicts()[name].wrong),)
+
+
+def _disks(name: str, limits: Reached) -> Reached:
+    from ..rigid import measure_rigid
+
+    return (min(row.one_thread for row in measure_rigid()) / 1e6,)
+
+
+# memory and processes
+
+# Rays of two estimates; 10^10 rays would be more chunks, each added to the same counts.
+FEW, MANY = 2**20, 2**23
+TRACE = "from asperity import geometry as geo; geo.trace(geo.{wall}, [0.3, 0.4], [1.0, 2.0])"
+GAP = (
+    "from asperity import geometry as geo, kernels as ker, spectral as spec; spec.spectral_gap(ker.WallLaw(geo.{wall}))"
+)
+PROGRAMS = {
+    "import asperity": "import asperity",
+    "first trace": TRACE.format(wall="focusing_arcs(1.2)"),
+    "first trace of a mushroom": TRACE.format(wall="mushrooms(0.3)"),
+    "first gap of focusing arcs": GAP.format(wall="focusing_arcs(1.2)"),
+    "first gap of triangular teeth": GAP.format(wall="triangular_teeth(0.7)"),
+    "first gap of dispersing arcs": GAP.format(wall="dispersing_arcs(1.0)"),
+    "asperity study focusing-arcs": (
+        "from tempfile import mkdtemp; from asperity.cli import main; "
+        "main(['study', 'focusing-arcs', '--out', mkdtemp()])"
+    ),
+}
+
+
+def growth_of_memory(few: int = FEW, many: int = MANY) -> float:
+    """How much larger the peak of allocated bytes is, as a fraction, if an estimate has more rays."""
+    peaks = []
+    for rays in (few // 4, few, many):
+        tracemalloc.start()
+        law = ker.WallLaw(geo.dispersing_arcs(1.0))
+        ker.discretise(law, ker.Bins(512), "monte-carlo", samples=rays, rng=np.random.default_rng(0))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    # the first loads and compiles
+    return peaks[2] / peaks[1] - 1.0
+
+
+def _memory(name: str, limits: Reached) -> Reached:
+    return (max(growth_of_memory(), 0.0),)
+
+
+def _start(name: str, limits: Reached) -> Reached:
+    """Seconds of a fresh process; the first of the repeats reads the libraries from the disk."""
+    if name.startswith("profile"):
+        return (timed(first_rays, 1)[1],)
+    program, _, cache_is = name.partition(", ")
+    # a warm command has its bytecode, too
+    keeping = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+
+    def run() -> None:
+        with TemporaryDirectory() as empty:
+            environment = {**keeping, "TMPDIR": empty}
+            if cache_is == "empty cache":
+                environment["NUMBA_CACHE_DIR"] = empty
+            subprocess.run([sys.executable, "-c", PROGRAMS[program]], check=True, env=environment, capture_output=True)
+
+    run()
+    return (timed(run)[1],)
+
+
+MEASURES: Mapping[str, Callable[[str, Reached], Reached]] = {
+    "bounces": _bounces,
+    "two threads against one": _two_threads,
+    "error in a time": _error_in_a_time,
+    "reported error in a time": _reported_in_a_time,
+    "gap of 4,096 bins, checked to be complete": _part_of_eigvalsh,
+    "gap of 10,000 bins, checked to be complete": _seconds_of_gap,
+    "run of hits in one step": _run_of_hits,
+    "lost or wrong rays": _lost_or_wrong,
+    "collisions of the true disk": _disks,
+    "memory": _memory,
+    "start": _start,
+}
+
+
+def main(patterns: Sequence[str]) -> int:
+    """Print the table row by row; the exit code tells whether all goals are met."""
+    asked = patterns or ["*"]
+    chosen = [goal for goal in all_goals() if any(fnmatch(word, p) for word in (goal.kind, goal.name) for p in asked)]
+    missed = []
+
+    def row(goal: Goal) -> tuple[str, ...]:
+        reached = MEASURES[goal.kind](goal.name, goal.limits)
+        missed.extend([] if goal.is_met(reached) else [goal])
+        return goal.row(reached)
+
+    print_table("what | goal | reached | met", map(row, chosen))
+    print(f"\n{len(missed)} of {len(chosen)} goals are missed. Machine: {spec.Machine.here()}.")
+    return 1 if missed or not chosen else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

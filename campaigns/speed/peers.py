@@ -1,0 +1,241 @@
+"""Other programs beside asperity in the same run: ``python -m campaigns.speed.peers [FOLDER]``.
+
+Every peer is run as its best users run it, in one thread: Embree from C, one call a ray segment; Mitsuba with the whole
+loop over reflections compiled by Dr.Jit, which needs a recent LLVM; deeptime told that the chain is reversible; scipy
+with shift and inversion. Direct simulation codes such as SPARTA are not measured: their time goes into moving particles
+between cells. The peers are installed in an environment of their own in the folder; each runs in a process with a time
+limit, and one that cannot be had is a row that says so.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import eigsh
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+
+from ..pages import print_table
+from ..timing import least_time
+
+WORKER = Path(__file__).with_name("peer_worker.py")
+# Name in `peer_worker` and requirement. Embree is a system package, such as libembree-dev in Debian; its program needs
+# numpy only. Mitsuba finds LLVM by itself or by DRJIT_LIBLLVM_PATH; on AMD Zen 4 19 works, 16 fails.
+TRACERS = {"embree": "numpy", "mitsuba": "mitsuba"}
+SOLVERS = {"deeptime": "deeptime", "pydtmc": "PyDTMC"}
+# Limits of single commands, and of all commands together.
+MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 40.0, 190.0
+# Short timeouts, so that pip fails soon without an index.
+PIP = ("--quiet", "--disable-pip-version-check", "--prefer-binary", "--timeout", "10", "--retries", "1")
+REPEATS = 3
+
+
+class PeerEnvironment:
+    """The peers' own Python, created in a folder at the first use; each package is installed once.
+
+    Parameters
+    ----------
+    folder : Path
+        An environment left there by an earlier run is reused.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+        self._folder, self._end = folder, time.monotonic() + ALL_SECONDS
+        self._refusals: dict[str, str] = {}
+
+    def run(self, peer: str, package: str, data: Path) -> dict[str, Any] | str:
+        """The result of the peer's function in `peer_worker`, or the reason of its failure in words."""
+        if package not in self._refusals:
+            self._refusals[package] = self._make() or self._install(package)
+        if self._refusals[package]:
+            return self._refusals[package]
+        output, refusal = self._output([str(self.python), str(WORKER), peer, str(data)], RUN_SECONDS)
+        if refusal:
+            return f"fails: {refusal}"
+        answer: dict[str, Any] = json.loads(output.splitlines()[-1])
+        return answer
+
+    def _make(self) -> str:
+        if self.python.exists() and not self._output([str(self.python), "-m", "pip", "--version"], RUN_SECONDS)[1]:
+            return ""
+        _, refusal = self._output([sys.executable, "-m", "venv", "--clear", str(self._folder)], MAKE_SECONDS)
+        return f"no environment: {refusal}" if refusal else ""
+
+    def _install(self, package: str) -> str:
+        command = [str(self.python), "-m", "pip", "install", *PIP, "numpy", package]
+        _, refusal = self._output(command, INSTALL_SECONDS)
+        return f"cannot be installed: {refusal}" if refusal else ""
+
+    def _output(self, command: list[str], seconds: float) -> tuple[str, str]:
+        """The output of a command, and the reason of its failure in words, or an empty string."""
+        limit = min(seconds, self._end - time.monotonic())
+        if limit <= 0.0:
+            return "", "the peers' time was up"
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
+        except subprocess.TimeoutExpired:
+            return "", f"ended after {limit:.0f} s"
+        except OSError as reason:
+            return "", str(reason)
+        return done.stdout, _last_line(done.stderr or done.stdout) if done.returncode else ""
+
+
+def _last_line(text: str) -> str:
+    lines = [line for line in text.splitlines() if line.strip()]
+    return lines[-1].strip().replace("|", "/") if lines else "no message"
+
+
+# rays through polygons
+
+RAYS = 2**15
+# Depth of the corners as a multiple of the width of a side: slopes of order 1 at every number of sides.
+SHALLOWEST, DEEPEST = 0.3, 1.5
+SIDES = (10, 100, 1_000, 10_000, 100_000)
+RAY_HEADS = "sides | tracer | version | million rays/s | wrong | median error | lost"
+PICTURE = "rays-per-second.png"
+# Sides, tracer, rays a second, and the fraction of rays wrong or lost.
+Speed = tuple[int, str, float, float]
+
+
+def random_polygon(sides: int) -> geo.Wall:
+    """A hollow of the given number of sides, of equal width, with corners at random depths."""
+    depth = np.random.default_rng(sides).uniform(SHALLOWEST, DEEPEST, sides - 1) / sides
+    return geo.Wall.from_vertices(np.column_stack([np.linspace(0.0, 1.0, sides + 1), -np.pad(depth, 1)]))
+
+
+def trace_with_all(folder: Path, peers: PeerEnvironment, measured: list[Speed]) -> Iterator[tuple[object, ...]]:
+    """Rows for the same rays through teeth and polygons, by every tracer in one thread; asperity's angles are right."""
+    rng = np.random.default_rng(0)
+    x, theta = rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
+    for wall in (geo.triangular_teeth(0.7), *map(random_polygon, SIDES)):
+        sides = len(wall.pieces)
+        traced, seconds = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=1), REPEATS)
+        lost, rate = float(np.mean(~traced.escaped)), RAYS / seconds
+        measured.append((sides, "asperity", rate, lost))
+        yield sides, "asperity, double precision", "-", f"{rate / 1e6:.3g}", "reference", "-", f"{lost:.1e}"
+        data = folder / "rays.npz"
+        np.savez(data, corners=wall.vertices, x=x, theta=theta, out=traced.theta)
+        for peer, package in TRACERS.items():
+            found = peers.run(peer, package, data)
+            if isinstance(found, str):
+                yield sides, peer, "-", found, "-", "-", "-"
+                continue
+            measured.append((sides, peer, found["rate"], found["wrong"] + found["lost"]))
+            errors = (f"{found[name]:.1e}" for name in ("wrong", "error", "lost"))
+            yield sides, f"{peer}, single precision", found["version"], f"{found['rate'] / 1e6:.3g}", *errors
+
+
+def draw_speeds(measured: list[Speed], file: Path) -> None:
+    """Rays a second against the number of sides, and against the fraction of rays that are wrong or lost."""
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    by_sides, by_error = figure.subplots(1, 2, sharey=True)
+    for tracer in dict.fromkeys(tracer for _, tracer, _, _ in measured):
+        sides, rates, failed = zip(*((n, rate, bad) for n, one, rate, bad in measured if one == tracer), strict=True)
+        by_sides.loglog(sides, rates, "o-", label=tracer)
+        by_error.loglog(np.maximum(failed, 1.0 / RAYS), rates, "o", label=tracer)
+    by_sides.set(xlabel="sides of the polygon", ylabel="rays a second, one thread")
+    by_error.set(xlabel=f"fraction of rays wrong or lost, at least 1/{RAYS}")
+    for axes in (by_sides, by_error):
+        axes.grid(alpha=0.3)
+        axes.legend()
+    figure.savefig(file, dpi=120)
+
+
+# gaps of chains
+
+# Maxwell's law in bins: an easy gap, and a gap that only an accurate solver distinguishes from 0.
+BINS, MAXWELL_GAPS = 256, (0.5, 1e-9)
+# Chains of wells whose rates give three clusters of ten eigenvalues; states of a well.
+WELLS, STATES = 30, (10, 333)
+RATES = np.repeat([1e-6, 1e-9, 1e-12], [10, 10, 9])
+# A gap is wrong if its error exceeds this fraction of it, and rounding.
+WRONG, ROUNDING = 0.1, 1e-13
+CHAIN_HEADS = "chain | solver | version | gaps wrong | largest relative error | seconds | what it says"
+
+
+def wells(states: int) -> tuple[csr_array[Any], np.ndarray[Any, Any]]:
+    """Hopping at rate 1/4 within wells and at ``RATES`` between; the gaps 1 - lambda to first order in the rates."""
+    hop = np.full(WELLS * states - 1, 0.25)
+    hop[states - 1 :: states] = RATES
+    diagonal = 1.0 - np.append(hop, 0.0) - np.append(0.0, hop)
+    coarse = np.diag(np.append(RATES, 0.0) + np.append(0.0, RATES)) - np.diag(RATES, 1) - np.diag(RATES, -1)
+    gaps = np.sort(np.linalg.eigvalsh(coarse)) / states
+    return csr_array(diags_array([hop, diagonal, hop], offsets=[-1, 0, 1])), gaps
+
+
+def solve_with_all(folder: Path, peers: PeerEnvironment) -> Iterator[tuple[object, ...]]:
+    """Rows for the same chains, by every solver."""
+    for gap in MAXWELL_GAPS:
+        matrix = ker.discretise(ker.maxwell(gap), ker.Bins(BINS))
+        found, seconds = least_time(lambda matrix=matrix: spec.spectrum(matrix, k=2), REPEATS)
+        name, right = f"Maxwell's law of {gap:g}, {BINS} bins", np.array([0.0, gap])
+        yield _row(name, "asperity.spectrum", right, np.array([0.0, found.gap]), seconds, str(found.completeness))
+        data = {"matrix": matrix.array, "wanted": 2}
+        for peer in SOLVERS:
+            yield _peer_row(name, peer, right, peers, folder, data)
+    ours: Mapping[str, Callable[[csr_array[Any]], tuple[Any, str]]] = {
+        "asperity.leading_eigenvalues": _leading_eigenvalues,
+        "scipy eigsh, shifted": lambda matrix: (eigsh(matrix.tocsc(), WELLS, sigma=1.0 + 1e-9)[0], "-"),
+    }
+    for states in STATES:
+        chain, right = wells(states)
+        name = f"{WELLS} wells, {chain.shape[0]} states"
+        for solver, solve in ours.items():
+            (values, words), seconds = least_time(lambda solve=solve, chain=chain: solve(chain), 1)
+            yield _row(name, solver, right, 1.0 - values, seconds, words)
+        data = {"entries": chain.data, "columns": chain.indices, "starts": chain.indptr, "wanted": WELLS}
+        yield _peer_row(name, "deeptime", right, peers, folder, data)
+
+
+def _leading_eigenvalues(matrix: csr_array[Any]) -> tuple[Any, str]:
+    found = spec.leading_eigenvalues(matrix, WELLS)
+    return found.values, f"{'complete' if found.complete else 'not complete'}, error below {found.error:.1e}"
+
+
+def _peer_row(
+    name: str, peer: str, right: np.ndarray[Any, Any], peers: PeerEnvironment, folder: Path, data: dict[str, Any]
+) -> tuple[object, ...]:
+    np.savez(folder / "chain.npz", **data)
+    found = peers.run(peer, SOLVERS[peer], folder / "chain.npz")
+    if isinstance(found, str):
+        return name, peer, "-", "-", "-", "-", found
+    return _row(name, peer, right, np.array(found["gaps"]), found["seconds"], "-", found["version"])
+
+
+def _row(
+    name: str, solver: str, right: np.ndarray[Any, Any], gaps: np.ndarray[Any, Any], seconds: float, words: str,
+    version: str = "-",
+) -> tuple[object, ...]:  # fmt: skip
+    """The gaps beside the right ones, the constants' 0 included, both in increasing order."""
+    found = np.full(len(right), np.nan)
+    found[: len(gaps)] = np.sort(gaps)[: len(right)]
+    error = np.abs(found - right)
+    wrong = int(np.sum(~(error <= np.maximum(WRONG * right, ROUNDING))))
+    relative = np.max(error[right > ROUNDING] / right[right > ROUNDING])
+    return name, solver, version, wrong, f"{relative:.1e}", f"{seconds:.2g}", words
+
+
+def main(folder: Path) -> None:
+    """Print the tables and draw the picture."""
+    folder.mkdir(parents=True, exist_ok=True)
+    peers, measured = PeerEnvironment(folder / "environment"), list[Speed]()
+    print_table(RAY_HEADS, trace_with_all(folder, peers, measured))
+    draw_speeds(measured, folder / PICTURE)
+    print()
+    print_table(CHAIN_HEADS, solve_with_all(folder, peers))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "bench-results/peers"))
