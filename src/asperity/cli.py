@@ -44,15 +44,12 @@ class OneLineErrors(click.Group):
             sys.exit(1)
 
 
-def with_disk(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of the disk."""
-    command = click.option("--mass", default=1.0, show_default=True, help="Mass m of the disk.")(command)
-    return click.option(
-        "--inertia", default=0.5, show_default=True, help="Moment of inertia J; 0.5 is a uniform disk of mass 1."
-    )(command)
+# Options of several commands.
+JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of the random generator.")
 
 
-@click.group(cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
 @click.version_option(__version__, prog_name="asperity")
 def main() -> None:
     """Reflection and collision laws of rough walls: kernels, spectra and gaps, each with its error.
@@ -77,14 +74,13 @@ def main() -> None:
 
 @main.command(epilog=WALL_HELP)
 @click.argument("wall")
-@with_disk
+@click.option("--mass", default=1.0, help="Mass m of the disk.")
+@click.option("--inertia", default=0.5, help="Moment of inertia J; 0.5 is a uniform disk of mass 1.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for pictures, matrix and JSON; made if missing.")
-@click.option(
-    "--tolerance", default=1e-3, show_default=True, help="Error asked of gaps, and of matrices for every bin."
-)
-@click.option("--bins", default=128, show_default=True, help="Number of equal-measure bins of the matrix.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random generator.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the summary.")
+@click.option("--tolerance", default=1e-3, help="Error asked of gaps, and of matrices for every bin.")
+@click.option("--bins", default=128, help="Number of equal-measure bins of the matrix.")
+@SEED
+@JSON
 @click.option("--force", is_flag=True, help="Replace the files of an earlier study in the folder.")
 @click.option("-v", "--verbose", is_flag=True, help="Print methods, spectrum, enclosures and evidence too.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
@@ -93,19 +89,12 @@ def main() -> None:
     "picture_format",
     type=click.Choice(["png", "svg", "pdf"]),
     default="png",
-    show_default=True,
     help="Format of the pictures.",
 )
-@click.option(
-    "--dpi",
-    type=click.FloatRange(min=10, max=2400),
-    default=100,
-    show_default=True,
-    help="Dots per inch of the pictures.",
-)
+@click.option("--dpi", type=click.FloatRange(10, 2400), default=100, help="Dots per inch of the pictures.")
 def study(
-    wall: str, mass: float, inertia: float, tolerance: float, bins: int, seed: int, out: Path | None, force: bool,
-    picture_format: str, dpi: float, **printing: bool,
+    wall: str, mass: float, inertia: float, seed: int, out: Path | None, force: bool, picture_format: str, dpi: float,
+    as_json: bool, verbose: bool, quiet: bool, **asked: Any,
 ) -> None:  # fmt: skip
     """Study WALL: law, symmetry, spectrum, gap, and the collision law of a disk.
 
@@ -120,7 +109,6 @@ def study(
     from .geometry import Disk, wall_from_text
     from .study import prepare_folder, study_wall
 
-    as_json, verbose, quiet = (printing[name] for name in ("as_json", "verbose", "quiet"))
     if quiet and (as_json or verbose):
         raise click.UsageError("--quiet prints nothing; leave --json and --verbose out")
     disk = Disk(mass, inertia)
@@ -130,9 +118,7 @@ def study(
             # refuse before the work, not after it
             prepare_folder(out, overwrite=force, picture_format=picture_format)
         rng = np.random.default_rng(seed)
-        report = study_wall(
-            found_wall, Path(wall).name, disk, tolerance=tolerance, bins=bins, rng=rng, progress=not quiet
-        )
+        report = study_wall(found_wall, Path(wall).name, disk, rng=rng, progress=not quiet, **asked)
         if not quiet:
             click.echo(report.to_json() if as_json else report.summary(verbose=verbose))
         if out is not None:
@@ -144,9 +130,9 @@ def study(
 @main.command(epilog=WALL_HELP)
 @click.argument("wall")
 @click.option("--specular", is_flag=True, help="In Feres' convention, where specular reflection is the identity.")
-@click.option("--tolerance", default=1e-6, show_default=True, help="Error asked for.")
+@click.option("--tolerance", default=1e-6, help="Error asked for.")
 @click.option("--enclose", default=0, type=click.IntRange(min=0), help="Also enclose this many eigenvalues.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@JSON
 def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool) -> None:
     """The spectral gap of WALL's reflection law, with its error, its verdict and the evidence.
 
@@ -203,22 +189,21 @@ def walls(out: Path | None, force: bool) -> None:
 
 def with_engine(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of commands that compute many walls into a folder."""
-    for option in (
+    for add in (
         click.option("--force", is_flag=True, help="Replace other results in the folder; by default a run goes on."),
         click.option("--scheduler", help="Address of a dask scheduler, whose workers are used."),
         click.option("--workers", type=click.IntRange(min=1), help="So many processes on this machine."),
         click.option(
             "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder for the tables."
         ),
-        click.option("--tolerance", default=1e-6, show_default=True, help="Error asked of each quantity."),
+        click.option("--tolerance", default=1e-6, help="Error asked of each quantity."),
         click.option(
             "--quantity",
             default="gap",
-            show_default=True,
             help="Of gap, gap_specular, slem, relaxation_time, resistance, eta, accommodation, joined by commas.",
         ),
     ):
-        command = option(command)
+        command = add(command)
     return command
 
 
@@ -293,13 +278,13 @@ def sweep_walls(
 
 @main.command()
 @click.argument("spectrum")
-@click.option("--points", default=64, show_default=True, help="Heights of each wall, at equal distances.")
+@click.option("--points", default=64, help="Heights of each wall, at equal distances.")
 @click.option("--rms-slope", type=float, help="Root mean squared slope; this or --rms-height.")
 @click.option("--rms-height", type=float, help="Root mean squared height about the mean.")
-@click.option("--period", default=1.0, show_default=True, help="Period of the walls, in the unit of all lengths.")
+@click.option("--period", default=1.0, help="Period of the walls, in the unit of all lengths.")
 @click.option("--smooth", is_flag=True, help="Join the heights by cubics: polygons have no spectral gap.")
-@click.option("--walls", default=100, show_default=True, type=click.IntRange(min=4), help="Number of walls.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random generator.")
+@click.option("--walls", default=100, type=click.IntRange(min=4), help="Number of walls.")
+@SEED
 @click.option("--bins", type=click.IntRange(min=1), help="Also write the mean law on so many bins, as mean-law.npz.")
 @with_engine
 def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, **given: Any) -> None:
@@ -344,7 +329,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
 
 @main.command(epilog=WALL_HELP)
 @click.argument("wall", default="triangular-teeth")
-@click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any that is free.")
+@click.option("--port", type=click.IntRange(0, 65535), default=5006, help="0 for any that is free.")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Write what is saved into this folder.")
 def explore(wall: str, port: int, no_browser: bool, out: Path | None) -> None:
@@ -367,12 +352,12 @@ def explore(wall: str, port: int, no_browser: bool, out: Path | None) -> None:
 
 @main.command()
 @click.argument("law")
-@click.option("--moments", default=10, show_default=True, help="Meet <e_l, P e_m> for all l, m below this number.")
-@click.option("--tolerance", default=1e-10, show_default=True, help="Defect asked for.")
+@click.option("--moments", default=10, help="Meet <e_l, P e_m> for all l, m below this number.")
+@click.option("--tolerance", default=1e-10, help="Defect asked for.")
 @click.option("--hollows", type=click.IntRange(min=1), help="At most this many hollows, with a larger defect.")
 @click.option("--mass", type=float, help="Unforeshorten the wall for a disk of this mass ...")
 @click.option("--inertia", type=float, help="... and this moment of inertia.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the search.")
+@SEED
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the wall into this TOML file.")
 @click.option("--force", is_flag=True, help="Replace the file if it exists.")
 def realise(
@@ -418,7 +403,7 @@ def realise(
 
 @main.command()
 @click.argument("ids", nargs=-1, metavar="[ID]...")
-@click.option("--json", "as_json", is_flag=True, help="Print a JSON list of rows.")
+@JSON
 @click.option("--latex", "as_latex", is_flag=True, help="Print the formulas in LaTeX; no check is run.")
 def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
     """Check the ledger: every formula of the paper, each against the status that it has here.
@@ -472,9 +457,7 @@ def warm_up() -> None:
 @main.command(epilog=WALL_HELP)
 @click.argument("problems", nargs=-1, metavar="[PROBLEM|WALL]...")
 @click.option("--quick", is_flag=True, help="Short ladders and cheap references: under three minutes.")
-@click.option(
-    "--out", default="bench-results", show_default=True, type=click.Path(path_type=Path), help="Folder for results."
-)
+@click.option("--out", default="bench-results", type=click.Path(path_type=Path), help="Folder for results.")
 @click.option(
     "--force", is_flag=True, help="Measure again and replace reports in the folder; by default a run goes on."
 )
