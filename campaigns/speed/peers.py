@@ -218,12 +218,13 @@ def _row(
     name: str, solver: str, right: np.ndarray[Any, Any], gaps: np.ndarray[Any, Any], seconds: float, words: str,
     version: str = "-",
 ) -> tuple[object, ...]:  # fmt: skip
-    """The gaps beside the right ones, the constants' included, both in increasing order."""
+    """The gaps beside the right ones, the constants' 0 included, both in increasing order."""
     found = np.full(len(right), np.nan)
     found[: len(gaps)] = np.sort(gaps)[: len(right)]
     error = np.abs(found - right)
     wrong = int(np.sum(~(error <= np.maximum(WRONG * right, ROUNDING))))
-    return name, solver, version, wrong, f"{np.max(error[1:] / right[1:]):.1e}", f"{seconds:.2g}", words
+    relative = np.max(error[right > ROUNDING] / right[right > ROUNDING])
+    return name, solver, version, wrong, f"{relative:.1e}", f"{seconds:.2g}", words
 
 
 def main(folder: Path) -> None:

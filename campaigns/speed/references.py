@@ -8,11 +8,10 @@ core. Problems are patterns as for ``asperity bench``; other problems in the fil
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from itertools import pairwise
 
@@ -23,7 +22,7 @@ from asperity import kernels as ker
 from asperity.bench.problems import problem_names
 from asperity.bench.quantities.collision import DISK, correlation_of
 from asperity.bench.quantities.matrix import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
-from asperity.bench.quantities.walls import RANDOM_WALLS, wall_of
+from asperity.bench.quantities.walls import wall_of
 from asperity.bench.references import FILE
 from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget
@@ -217,14 +216,9 @@ MAKERS = {
 }
 
 
-def main() -> None:
-    """Make the requested references."""
-    parser = argparse.ArgumentParser(prog="python -m campaigns.speed.references", description=__doc__)
-    parser.add_argument("problems", nargs="*", help="SCENE, QUANTITY or SCENE/QUANTITY; all by default")
-    options = parser.parse_args()
-    names = problem_names(options.problems)
-    if not options.problems:
-        names += [f"random-{k}/moment" for k in range(RANDOM_WALLS)]
+def main(patterns: Sequence[str]) -> None:
+    """Make the requested references, or all."""
+    names = problem_names(patterns or ["*"])
     table = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
     for name in names:
         scene, quantity = name.split("/")
@@ -248,4 +242,4 @@ def _rounded(found: Found) -> float | list[float]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main(sys.argv[1:])

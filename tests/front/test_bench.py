@@ -15,6 +15,7 @@ from campaigns.extremes.row import ExtremeRow
 from campaigns.judges.ablations import ablations
 from campaigns.speed.exact_rows import ArcRow
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 from scipy.stats import norm, t
 
 from asperity import geometry as geo
@@ -238,6 +239,16 @@ def test_a_run_is_written_and_read_again(tmp_path):
     assert "on 1 of the 1 where" in run.summary() and "| 1.3 |" in run.summary()
     assert "| teeth/law | by hand | 1.0e-09 |" in run.summary()
     json.loads(run.to_json(), parse_constant=lambda word: pytest.fail(word))
+
+
+def test_a_picture_has_all_problems_of_a_scene_whatever_their_order(tmp_path, monkeypatch):
+    reports = [run_report([("auto", 1e-3, [0.2])], f"{scene}/{what}").reports[0] for what in "ab" for scene in "xy"]
+    drawn = []
+    monkeypatch.setattr(
+        "asperity.bench.run._draw", lambda shown: drawn.append([one.problem for one in shown]) or Figure()
+    )
+    BenchRun(tuple(reports)).save(tmp_path)
+    assert drawn == [["x/a", "x/b"], ["y/a", "y/b"]]
 
 
 # a wall of the user

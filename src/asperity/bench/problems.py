@@ -16,6 +16,7 @@ from ..spectral.work_diagrams.runs import measure, parts_of, solve_once
 from .quantities.collision import COLLISION, DISK, TRUE_DISK, by_true_disks
 from .quantities.distance import DISTANCE
 from .quantities.matrix import LAW, MOMENT, RESISTANCE
+from .quantities.quantity import Methods
 from .quantities.spectral import DIFFUSIVITY, EIGENVALUE
 from .quantities.walls import scenes, standard_names, wall_of
 
@@ -83,10 +84,14 @@ def prepare(scene: str) -> None:
 
 
 @cache
-def methods_of(name: str) -> dict[str, WorkMethod]:
-    """The methods of a problem by their names, made once in each process."""
+def methods_of(name: str) -> Methods:
+    """The methods of a problem with their budgets, made once in each process."""
     scene, _, quantity = name.rpartition("/")
-    return {method.name: method for method, _, _ in QUANTITIES[quantity].methods(wall_of(scene))}
+    return QUANTITIES[quantity].methods(wall_of(scene))
+
+
+def _method(problem: str, name: str) -> WorkMethod:
+    return next(method for method, _, _ in methods_of(problem) if method.name == name)
 
 
 def measured(
@@ -94,9 +99,9 @@ def measured(
 ) -> dict[str, object]:
     """One row, measured in this process on one core, as a dictionary."""
     with on_few_cores(1), np.errstate(all="ignore"):
-        return measure(WorkProblem(name, references), methods_of(name)[method], budget, repeats, seconds).as_dict()
+        return measure(WorkProblem(name, references), _method(name, method), budget, repeats, seconds).as_dict()
 
 
 def value_of(name: str, method: str, budget: float) -> tuple[Floats, float | None, str]:
     """Value, reported error and description of a problem by a method, with rays that no row has."""
-    return parts_of(solve_once(methods_of(name)[method], budget, REFERENCE_REPEAT))
+    return parts_of(solve_once(_method(name, method), budget, REFERENCE_REPEAT))

@@ -59,7 +59,8 @@ def made_references(name: str, child: ChildProcess, seconds: float) -> tuple[Ref
     None is for its own method, nor for the library's choice if this may use that method; rays are for all, because no
     row has the same. Every other reference is checked by that of rays.
     """
-    found = {method: _finest(name, method, child, seconds) for method in FINEST if method in methods_of(name)}
+    applicable = {method.name for method, _, _ in methods_of(name)}
+    found = {method: _finest(name, method, child, seconds) for method in FINEST if method in applicable}
     rays = found.pop(QMC.name)
     checked = [one if rays is None else _beside(one, rays) for one in found.values() if one is not None]
     return tuple(sorted([*checked, *([] if rays is None else [rays])], key=lambda one: one.error))

@@ -27,7 +27,7 @@ COLUMNS, WIDTH, HEIGHT = 3, 4.6, 3.8
 
 @dataclass(frozen=True)
 class BenchRun:
-    """Reports on problems, in the order in which they were run, those on a scene one after the other.
+    """Reports on problems, in the order in which they were run.
 
     Attributes
     ----------
@@ -94,6 +94,7 @@ class BenchRun:
         """Write summary, tables, data and a figure for each scene; return the written paths."""
         texts = {SUMMARY: self.summary(), TABLES: self.tables(), DATA: self.to_json()}
         drawn = [report for report in self.reports if any(row.is_done for row in report.rows)]
+        drawn.sort(key=lambda report: scene_of(report.problem))
         with moved_when_complete(folder) as beside:
             for name, text in texts.items():
                 (beside / name).write_text(text + "\n", encoding="utf-8")

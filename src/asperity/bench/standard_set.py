@@ -11,8 +11,8 @@ from pathlib import Path
 
 from ..core.child import ChildCrashed, ChildProcess, OutOfTime
 from ..spectral import WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
-from .problems import QUANTITIES, measured, prepare
-from .quantities.walls import scenes, wall_of
+from .problems import measured, methods_of, prepare
+from .quantities.walls import scenes
 from .references import FINEST, known_reference, made_references
 from .run import file_stem, scene_of
 
@@ -100,23 +100,22 @@ def run_problems(
         with ChildProcess(partial(prepare, scene)) as child:
             for name in group:
                 report = _run(name, effort, folder, child, plan)
-                say(
-                    f"{name}: {f'{len(report.rows)} rows' if report else 'left out, no independent reference is known'}"
-                )
-                if report:
+                if report is None:
+                    say(f"{name}: left out, no independent reference is known")
+                else:
+                    say(f"{name}: {len(report.rows)} rows")
                     yield report
 
 
 def _run(name: str, effort: Effort, folder: Path | None, child: ChildProcess, whole: TimePlan) -> WorkReport | None:
     """The report of one problem within its part of the time, or None without a reference."""
-    scene, _, quantity = name.rpartition("/")
     stored = known_reference(name)
-    if stored is None and scene in scenes():
+    if stored is None and scene_of(name) in scenes():
         return None
     if whole.remaining >= LEAST_SECONDS:
         # before the time is divided: the first process on a machine compiles for minutes
         child.start()
-    entries = QUANTITIES[quantity].methods(wall_of(scene))
+    entries = methods_of(name)
     plan = TimePlan(whole.next_fraction(), len(entries))
     # half of the time at most
     seconds = min(effort.reference_seconds, 0.5 * plan.seconds / len(FINEST))
