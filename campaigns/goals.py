@@ -20,9 +20,8 @@ from asperity.kernels.walls.polygon import table_of_beams
 from asperity.spectral.work_diagrams.runs import measure
 from campaigns.judges import precise_triangular
 
+from .bounces import MORE, Throughput
 from .memory import MemoryUse
-from .rays import MORE, Throughput
-from .robustness import Verdict
 from .timing import least_time
 from .wall_goals import Goal, wall_goals
 
@@ -53,14 +52,13 @@ def all_goals(
     throughput: Sequence[Throughput],
     runs: Sequence[tuple[str, float, float]],
     start: Mapping[str, float],
-    robustness: Mapping[str, Verdict],
     memory: MemoryUse,
     disks: float,
 ) -> list[Goal]:
     """The goals, from the given measurements and further ones.
 
     The arguments are: bounces a second on walls; runs with hits and seconds for each ray;
-    seconds of fresh processes; verdicts on aimed rays; the memory of estimates; true disks a second.
+    seconds of fresh processes; the memory of estimates; true disks a second.
     """
     goals = [
         Goal(
@@ -82,7 +80,6 @@ def all_goals(
         Goal(f"run of hits: {what}", "below 1 us", f"{1e6 * seconds:.2f} us for {hits:.1e} hits", seconds < 1e-6)
         for what, hits, seconds in runs
     ]
-    goals += [_robust(kind, verdict) for kind, verdict in robustness.items()]
     goals += _large_matrices()
     goals += [Goal("true disk", "2 M collisions/s", f"{disks / 1e6:.2f} M collisions/s", disks >= 2e6)]
     goals += [_memory(memory)]
@@ -156,12 +153,6 @@ def _unresolved(wall: geo.Wall) -> float:
     law = ker.PolygonLaw(wall)
     law.branches(1.0)
     return float(law.unresolved)
-
-
-def _robust(kind: str, verdict: Verdict) -> Goal:
-    what = {"corners": "rays aimed at corners and tangencies", "grazing": "rays at grazing angles"}[kind]
-    reached = f"{verdict.lost} lost, {verdict.wrong} wrong, {verdict.flagged} flagged of {verdict.rays:.1g}"
-    return Goal(what, "0 lost, 0 wrong of 1e+06", reached, verdict.lost == 0 and verdict.wrong == 0)
 
 
 def _memory(memory: MemoryUse) -> Goal:

@@ -12,12 +12,10 @@ from asperity import geometry as geo
 from asperity.core.tables import table
 from asperity.spectral import Machine
 
+from .bounces import RAYS, measure_throughput, throughput_table
 from .goals import all_goals, goal_table
 from .memory import measure_memory
-from .rays import RAYS, measure_throughput, throughput_table
 from .rigid import measure_rigid, speed_table
-from .robustness import RAYS as AIMED_RAYS
-from .robustness import measure_robustness
 from .timing import least_time
 from .transport import PAGE_CELLS, PAGE_JOINT, transport_table
 
@@ -54,11 +52,10 @@ def speed_and_goals(quick: bool) -> str:
     """The machine, the goals, and the tables."""
     throughput = measure_throughput(RAYS // 16 if quick else RAYS)
     runs, start, disks = measure_runs(), measure_start(), measure_rigid()
-    robustness = measure_robustness(AIMED_RAYS // 50 if quick else AIMED_RAYS)
     goals = all_goals(
         throughput,
         [(row.what, row.hits, row.seconds) for row in runs],
-        start, robustness, measure_memory(), min(row.one_thread for row in disks),
+        start, measure_memory(), min(row.one_thread for row in disks),
     )  # fmt: skip
     tables = (
         throughput_table(throughput), _runs_table(runs), speed_table(disks), transport_table(PAGE_JOINT, PAGE_CELLS),

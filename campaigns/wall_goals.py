@@ -21,7 +21,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench.quantities.walls import wall_of
 
-from .rays import FIRST_RAYS, LARGE_PROFILE, first_rays, timed
+from .bounces import FIRST_RAYS, LARGE_PROFILE, first_rays, timed
 
 # Tolerance of the rough runs that compile.
 ROUGH = 1e-2

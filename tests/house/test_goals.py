@@ -1,11 +1,9 @@
-"""The table of goals and what it rests on: errors in a time, memory, robustness."""
+"""The table of goals and what it rests on: errors in a time, memory."""
 
 from __future__ import annotations
 
-import numpy as np
-from campaigns import goals, memory, rays, robustness, wall_goals
+from campaigns import bounces, goals, memory, wall_goals
 
-from asperity import geometry as geo
 from asperity.estimates import Estimate
 
 
@@ -15,29 +13,6 @@ def test_the_memory_of_an_estimate_does_not_grow_with_its_rays():
     assert not used.grows and min(used.peaks) > used.matrix
     assert memory.MemoryUse((1, 2, 4), (100, 100, 103), 1).grows
     assert not memory.MemoryUse((1, 2, 4), (100, 101, 90), 1).grows
-
-
-def test_a_lost_or_wrong_ray_misses_the_goal():
-    right = robustness.Verdict(100, 0, 7, 3, 0, 1.0, (), ())
-    assert goals._robust("corners", right).is_met
-    assert not goals._robust("corners", robustness.Verdict(100, 1, 7, 3, 0, 1.0, (), ())).is_met
-    assert not goals._robust("grazing", robustness.Verdict(100, 0, 7, 3, 1, 1.0, (), ())).is_met
-
-
-def test_rays_of_all_walls_are_counted_together(monkeypatch):
-    monkeypatch.setattr(robustness, "WALLS", {"teeth": geo.triangular_teeth(0.7), "notch": geo.triangular_teeth(1.5)})
-    found = robustness.measure_robustness(20)
-    assert set(found) == {"corners", "grazing"}
-    for verdict in found.values():
-        assert verdict.rays == 20 and verdict.lost == verdict.wrong == 0
-
-
-def test_a_ray_that_was_moved_is_wrong_and_no_conditioning_explains_it():
-    wall, rng = geo.triangular_teeth(0.7), np.random.default_rng(1)
-    x, theta = rng.random(50), np.arccos(1.0 - 2.0 * rng.random(50))
-    traced = geo.trace(wall, x, theta)
-    assert robustness._explained(wall, traced, x, theta, robustness.twin_trace).all()
-    assert not robustness._explained(wall, traced, x, theta + 1e-9, robustness.twin_trace).any()
 
 
 def test_a_goal_of_error_and_time_needs_both_and_an_error_that_holds():
@@ -55,4 +30,4 @@ def test_a_goal_of_a_tolerance_needs_the_error_and_the_seconds():
 
 
 def test_every_wall_whose_bounces_are_counted_has_a_goal():
-    assert set(goals.BOUNCE_GOALS) == set(rays.WALLS)
+    assert set(goals.BOUNCE_GOALS) == set(bounces.WALLS)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaigns.engine import campaigns
 
 import asperity
 from asperity import kernels as ker
@@ -121,9 +122,10 @@ def test_the_commands_on_the_pages_exist():
     root = DOCS.parent
     pages = [root / "README.md", root / "CONTRIBUTING.md", root / "campaigns" / "README.md", *DOCS.rglob("*.md")]
     text = "\n".join(page.read_text(encoding="utf-8") for page in pages if "generated" not in page.parts)
-    campaigns = set(re.findall(r"python -m\s+campaigns\.([a-z][\w.]*\w)", text))
-    assert len(campaigns) > 18
-    paths = [root / "campaigns" / name.replace(".", "/") for name in sorted(campaigns)]
+    scripts = set(re.findall(r"python -m\s+campaigns\.([a-z][\w.]*\w)", text))
+    named = set(re.findall(r"python -m\s+campaigns\s([a-z][\w-]*)", text))
+    assert named <= set(campaigns()) and len(scripts | named) > 18
+    paths = [root / "campaigns" / name.replace(".", "/") for name in sorted(scripts)]
     assert [str(p) for p in paths if not (p.with_suffix(".py").exists() or (p / "__main__.py").exists())] == []
 
 

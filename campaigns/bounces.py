@@ -1,4 +1,4 @@
-"""Bounces a second on walls of all kinds, and the first rays of a large profile (python -m campaigns.rays).
+"""Bounces a second on walls of all kinds, and the first rays of a large profile (python -m campaigns.bounces).
 
 The repeats take one thread and two in turn, so that both meet the same state of the machine. The least times count: on
 one thread also in processor seconds, which other processes disturb less. Two threads are measured with eight times as
@@ -159,7 +159,7 @@ def first_rays() -> str:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(prog="python -m campaigns.rays", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m campaigns.bounces", description=__doc__)
     parser.add_argument("--profile", action="store_true", help="only the profile of 200,000 points")
     if not parser.parse_args().profile:
         from asperity.geometry.tracing.compiled.closed_forms import SIMPLE

@@ -1,0 +1,1 @@
+"""Campaigns of rays, polygons and disks."""
