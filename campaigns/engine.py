@@ -119,6 +119,8 @@ class Campaign:
                 return [Judged("time limit", fault=f"not judged within {self.seconds:g} s")]
             except ChildCrashed as reason:
                 return [Judged("crash", fault=str(reason))]
+            except Exception as reason:
+                return [Judged("exception", fault=f"{type(reason).__name__}: {reason}")]
             return found
 
         with ThreadPoolExecutor(jobs) as pool:

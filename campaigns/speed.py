@@ -15,7 +15,7 @@ from asperity.spectral import Machine
 from .bounces import RAYS, measure_throughput, throughput_table
 from .goals import all_goals, goal_table
 from .memory import measure_memory
-from .rigid import measure_rigid, speed_table
+from .rays.true_disks import collisions_a_second
 from .timing import least_time
 from .transport import PAGE_CELLS, PAGE_JOINT, transport_table
 
@@ -51,14 +51,14 @@ class RunTime:
 def speed_and_goals(quick: bool) -> str:
     """The machine, the goals, and the tables."""
     throughput = measure_throughput(RAYS // 16 if quick else RAYS)
-    runs, start, disks = measure_runs(), measure_start(), measure_rigid()
+    runs, start = measure_runs(), measure_start()
     goals = all_goals(
         throughput,
         [(row.what, row.hits, row.seconds) for row in runs],
-        start, measure_memory(), min(row.one_thread for row in disks),
+        start, measure_memory(), collisions_a_second(),
     )  # fmt: skip
     tables = (
-        throughput_table(throughput), _runs_table(runs), speed_table(disks), transport_table(PAGE_JOINT, PAGE_CELLS),
+        throughput_table(throughput), _runs_table(runs), transport_table(PAGE_JOINT, PAGE_CELLS),
         table("start | seconds", (f"{what} | {least:.2f}" for what, least in start.items())),
     )  # fmt: skip
     return "\n\n".join([f"Machine: {Machine.here()}.", "## Goals", goal_table(goals), "## Speed", *tables])
