@@ -13,9 +13,7 @@ from pathlib import Path
 from asperity.bench.quantities.walls import RANDOM_WALLS
 from asperity.bench.run import BenchRun
 from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
-from asperity.spectral import Machine
 
-from .extremes.report import run_extremes
 from .peers import peer_tables
 from .savings import savings_table
 from .speed import speed_and_goals
@@ -67,17 +65,12 @@ def _random(quick: bool, folder: Path) -> str:
     return _run(names, RANDOM_EFFORT, folder / "random").summary()
 
 
-def _stability(quick: bool, folder: Path) -> str:
-    return f"{run_extremes(quick).table()}\n\nMachine: {Machine.here()}."
-
-
 SECTIONS = (
     Section("speed", "", 590.0, lambda quick, folder: speed_and_goals(quick)),
     Section("standard", "The standard set", FULL.total_seconds + MARGIN, _standard),
     Section("random", "Twenty random walls", RANDOM_EFFORT.total_seconds + MARGIN, _random),
     Section("savings", "What the scenes leave out", 100.0, lambda quick, folder: savings_table(quick)),
     Section("peers", "Peers", 200.0, lambda quick, folder: peer_tables(folder / "peers")),
-    Section("stability", "", 250.0, _stability),
 )
 
 

@@ -1,4 +1,4 @@
-"""The benchmark itself, in small: its scenes, its references, its processes, its report, and the extreme cases."""
+"""The benchmark itself, in small: its scenes, its references, its processes, its report."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from campaigns.__main__ import begin_or_go_on
 from campaigns.__main__ import main as measure_everything
 from campaigns.comparison import compare_runs
 from campaigns.exact_rows import ArcRow
-from campaigns.extremes.report import run_extremes
-from campaigns.extremes.row import ExtremeRow
 from campaigns.sections import SECTIONS, section_text
 from campaigns.timing import side_by_side
 from click.testing import CliRunner
@@ -262,8 +260,7 @@ def test_all_sections_are_joined_in_the_folder_of_the_run(tmp_path, monkeypatch)
     measure_everything()
     page = (tmp_path / "benchmarks.md").read_text()
     assert page.startswith("Measured by `python -m campaigns --quick`.\n\ntable of speed\n")
-    assert "(standard/koch.png)" in page and "table of peers" not in page and "table of stability" not in page
-    assert "table of stability" in (tmp_path / "extremes.md").read_text()
+    assert "(standard/koch.png)" in page and "table of peers" not in page
     # the next run begins anew
     begin_or_go_on(tmp_path, quick=True)
     assert not (tmp_path / "standard" / "koch.png").exists()
@@ -308,27 +305,6 @@ def test_a_row_that_is_less_exact_or_gone_is_worse():
     assert compare_runs(before, BenchRun((gone,))).is_worse
     with pytest.raises(InputError, match="same problems"):
         compare_runs(before, run_report([("auto", 1e-6, [1.0])], "another"))
-
-
-# extreme cases
-
-
-def test_verdicts_tell_apart_what_is_said_and_what_is_not():
-    assert ExtremeRow("a", "b", 1.0, 2.0).verdict == "met"
-    assert ExtremeRow("a", "b", 3.0, 2.0, reported=4.0).verdict == "degraded as reported"
-    assert ExtremeRow("a", "b", 1.0, 2.0, counts={"escaped": 9, "corner": 1}).verdict == "degraded as reported"
-    # a flag that is the exact answer is as good as an escape
-    aimed = ExtremeRow("a", "b", 1.0, 2.0, counts={"escaped": 9, "corner": 1}, flagged_rightly=1)
-    assert aimed.verdict == "met"
-    assert ExtremeRow("a", "b", 3.0, 2.0).verdict == "not met"
-    assert ExtremeRow("a", "b", float("nan"), 2.0).verdict == "not met"
-    assert ExtremeRow("a", "b", ended="refused").verdict == "refused"
-
-
-def test_a_case_that_would_hang_is_a_row():
-    report = run_extremes(True, ["matrix of 2000 bins"], seconds=0.05)
-    assert report.rows[0].verdict == "timed out"
-    assert "1 cases: 1 timed out." in report.table()
 
 
 # what scenes leave out
