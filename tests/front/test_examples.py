@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaigns.judges import precise_bump_gap
+from campaigns.judges import precise_gaps
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -106,14 +106,14 @@ def test_the_gap_of_bumps_agrees_with_rays_and_a_form_that_share_nothing_with_th
     ours = spec.spectral_gap(law, 1e-6)
     for seed in (0, 1):
         # by more degrees the least value falls by less than a ten-thousandth; more rays would be needed for them
-        value, error = precise_bump_gap.gaps(curvature, 15, seed, degrees=(32,))[32]
+        value, error = precise_gaps.gaps(curvature, 15, seed, degrees=(32,))[32]
         assert abs(value - ours.value) <= 1.7 * error + ours.error + 1e-4 * ours.value
 
 
 def test_the_gap_of_bumps_has_the_digits_of_an_independent_computation():
     law = ker.WallLaw(geo.dispersing_arcs(1 / 3)).in_specular_frame()
     ours = spec.spectral_gap(law, 1e-6)
-    value, error = precise_bump_gap.GAP_AT_ONE_THIRD
+    value, error = precise_gaps.GAP_AT_ONE_THIRD
     assert error < 6e-7 and abs(ours.value - value) <= error + ours.error
     # a basis of 16 polynomials is not enough: its value is known to be too large
     assert 0.0373305 - ours.value > 3 * (error + ours.error)

@@ -75,7 +75,7 @@ def test_sums_and_the_other_frame_have_the_rows_of_their_parts():
     assert np.allclose(images @ smooth, law.in_specular_frame().apply(lambda theta: theta**2, ANGLES), atol=1e-10)
 
 
-# campaigns/judges/precise_arc_eigenvalues.py: second and third eigenvalue by modulus, and the error
+# campaigns/judges/precise_gaps.py: second and third eigenvalue by modulus, and the error
 PRECISE = {
     0.6: (0.286691174546, -0.537859309982, 1e-8),
     0.9: (0.235175619486, -0.314437701261, 1e-8),

@@ -16,7 +16,7 @@ from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.spectral.bounds.curvature import least_density, lowest_seen
 
-# 0.03732825 and its error are those of `precise_bump_gap.py`, rays of its own and 96 polynomials; the gaps of the other
+# 0.03732825 and its error are those of `precise_gaps.py`, rays of its own and 96 polynomials; the gaps of the other
 # curvatures are those of `spec.spectral_gap` in the specular frame
 GAP, GAP_ERROR = 0.03732825, 2.4e-7
 

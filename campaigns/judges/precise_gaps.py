@@ -1,10 +1,16 @@
-"""The gap of dispersing bumps by a second method: a Dirichlet form over rays that a tracer of its own follows.
+"""Gaps of dispersing bumps and eigenvalues of focusing arcs, each by a second method.
 
-``python -m campaigns.judges.precise_bump_gap [log2 of the rays of a replicate]`` prints gaps in the specular
-convention. With z the cosine of the incoming angle and z' that of the outgoing one, <f, (1 - P) f> is half the mean of
-(f(z) - f(z'))^2 over z uniform in (-1, 1) and entry points uniform in (0, 1). Its least value over Legendre
-polynomials of degree 1 to L is the gap, from above, up to what the degrees beyond L add. Nothing is shared with the
-library: disks in rows, a quadratic equation for each, rays from scrambled Sobol points.
+``python -m campaigns.judges.precise_gaps [log2 of the rays of a replicate]`` prints gaps in the specular convention,
+from a Dirichlet form over rays that a tracer of its own follows. With z the cosine of the incoming angle and z' that of
+the outgoing one, <f, (1 - P) f> is half the mean of (f(z) - f(z'))^2 over z uniform in (-1, 1) and entry points uniform
+in (0, 1). Its least value over Legendre polynomials of degree 1 to L is the gap, from above, up to what the degrees
+beyond L add. Nothing is shared with the library: disks in rows, a quadratic equation for each, rays from scrambled
+Sobol points.
+
+It also prints the eigenvalues that tests/spectral/test_adapted_panels.py holds the enclosures against: those of the
+complete Galerkin matrix on graded panels, whose entries are integrals over the polygons of each number of hits
+(kernels/discretisation/arcs.py). It shares nothing with expectations, residuals and adapted panels but the law; moduli
+converge from below.
 """
 
 from __future__ import annotations
@@ -16,6 +22,10 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.stats import t as student
 from scipy.stats.qmc import Sobol
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
 
 REPLICATES = 8
 DEGREES = (1, 8, 16, 32, 64, 96)
@@ -103,7 +113,15 @@ def gaps(curvature, rays_log2=16, seed=0, degrees=DEGREES):
     return {degree: (np.mean(each), width * np.std(each, ddof=1)) for degree, each in found.items()}
 
 
+def arc_eigenvalues(half_angle, degree=4, smallest=1e-3):
+    """The second and third by modulus."""
+    basis = ker.Panels.for_wall(geo.focusing_arcs(half_angle), degree, smallest)
+    return spec.spectrum(ker.discretise(ker.CircularArcLaw(half_angle), basis), k=3).values[1:]
+
+
 if __name__ == "__main__":
     for curvature in (1 / 3, 1.0):
         for degree, (value, error) in gaps(curvature, int(sys.argv[1]) if len(sys.argv) > 1 else 20).items():
             print(f"curvature {curvature:.6f}, degrees to {degree}: {value:.9f} +- {error:.1e}", flush=True)
+    for half_angle in (0.6, 0.9, 1.2):
+        print(half_angle, *(f"{value:.12f}" for value in arc_eigenvalues(half_angle)), flush=True)
