@@ -176,7 +176,7 @@ def _misjudged(one: Rolled, rng: np.random.Generator) -> Floats:
 
 
 def _other_disks(one: Rolled, rng: np.random.Generator) -> Floats:
-    """Which disks end otherwise; none over Bezier pieces."""
+    """Which disks end otherwise and do not say that they may; none over Bezier pieces."""
     if any(isinstance(piece, Bezier) for piece in one.wall.pieces):
         return np.zeros(0, dtype=bool)
     scale = SCALE / max(one.rolled.depth, one.rolled.period)
@@ -193,7 +193,9 @@ def _other_disks(one: Rolled, rng: np.random.Generator) -> Floats:
     place = here.position + [scale * one.shift[0], 0.0] + climb[:, None] * here.velocity[:, [0, 2]]
     apart = np.abs(here.velocity - there.velocity).max(axis=1) > SAME_ANGLE
     apart |= np.abs(place - there.position).max(axis=1) > SAME_ANGLE * (1.0 + climb / here.velocity[:, 1])
-    return np.where(out, apart | (here.contacts != there.contacts), here.escaped != there.escaped)
+    # the status says on both walls that rounding decides the disk
+    amplified = (here.status == geo.DiskStatus.AMPLIFIED) & (there.status == geo.DiskStatus.AMPLIFIED)
+    return ~amplified & np.where(out, apart | (here.contacts != there.contacts), here.escaped != there.escaped)
 
 
 def _same_properties(one: Rolled) -> bool:
