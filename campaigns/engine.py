@@ -44,6 +44,8 @@ class Judged:
         What is wrong, if anything.
     outcome : str
         A word that is counted, such as "refused".
+    number : int
+        How many alike statements this one stands for, such as all rays of a case that agree.
     """
 
     kind: str
@@ -52,6 +54,7 @@ class Judged:
     judge_error: float = 0.0
     fault: str = ""
     outcome: str = ""
+    number: int = 1
 
     @property
     def verdict(self) -> Verdict:
@@ -161,22 +164,25 @@ def rows(found: Sequence[Judged]) -> Iterator[tuple[object, ...]]:
     """A row of HEADS for each kind; ``held`` is the fraction that holds, with its 95 % interval by Wilson."""
     for kind in dict.fromkeys(each.kind for each in found):
         some = [each for each in found if each.kind == kind]
-        verdicts = Counter(each.verdict for each in some)
+        verdicts, outcomes = Counter[str](), Counter[str]()
+        for each in some:
+            verdicts[each.verdict] += each.number
+            outcomes[each.outcome] += each.number if each.outcome else 0
         ratios = sorted(each.ratio for each in some if each.ratio is not None)
         worst = max((each.true / each.claimed for each in some if each.claimed > 0.0), default=None)
-        outcomes = Counter(each.outcome for each in some if each.outcome)
         yield (
-            kind, len(some), verdicts["fails"], verdicts["open"], "{:.3f} ({:.3f} to {:.3f})".format(*held(some)),
+            kind, verdicts.total(), verdicts["fails"], verdicts["open"],
+            "{:.3f} ({:.3f} to {:.3f})".format(*held(some)),
             f"{ratios[len(ratios) // 2]:.2g}" if ratios else "-", "-" if worst is None else f"{worst:.2g}",
-            ", ".join(f"{count} {word}" for word, count in outcomes.most_common()),
+            ", ".join(f"{count} {word}" for word, count in outcomes.most_common() if count),
         )  # fmt: skip
 
 
 def held(some: Sequence[Judged]) -> tuple[float, float, float]:
     """The fraction that does not fail, with the ends of its 95 % interval."""
-    number = sum(each.verdict != "fails" for each in some)
-    interval = binomtest(number, len(some)).proportion_ci(method="wilson")
-    return number / len(some), float(interval.low), float(interval.high)
+    number, total = (sum(each.number for each in some if each.verdict != "fails"), sum(each.number for each in some))
+    interval = binomtest(number, total).proportion_ci(method="wilson")
+    return number / total, float(interval.low), float(interval.high)
 
 
 def refuted(campaign: Campaign, found: Sequence[Judged]) -> list[str]:

@@ -1,1 +1,1 @@
-"""The extreme cases of the stability report."""
+"""Stiff and extreme cases: each is right, or says that it is not."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +11,9 @@ import numpy as np
 from asperity import geometry as geo
 from asperity.bench.quantities.collision import DISK, sampled_velocities
 from asperity.core.rounding import EPS
+from campaigns.engine import Campaign, Judged
 
-from .row import ExtremeRow, stored
-
-# Written by campaigns/judges/precise_collision.py
+# Written by campaigns/extremes/references.py
 DATA = Path(__file__).with_name("extreme_disks.json")
 # Measured errors are below 0.4; the limit is the limit for single rays.
 UNITS = 32.0
@@ -22,42 +21,34 @@ UNITS = 32.0
 ROUNDED = 2.0**14 * EPS
 SCALES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 WALL = geo.triangular_teeth(0.7)
+DISKS = 1000
 
 
-def disk_cases(disks: int) -> dict[str, Callable[[], ExtremeRow]]:
-    """The cases by name."""
-    return {f"true disk, scale {scale:g}": partial(_case, scale, disks) for scale in SCALES}
-
-
-def _case(scale: float, disks: int) -> ExtremeRow:
-    """Compare the stored disks with 50 digits, and reverse ``disks`` random disks."""
-    rows = stored(DATA)[f"{scale:g}"]
-    start = np.array([[float.fromhex(number) for number in row[0]] for row in rows])
-    exact = np.array([[float.fromhex(number) for number in row[1]] for row in rows])
+def judge(scale: float) -> Iterator[Judged]:
+    """The stored disks against 50 digits, in units of EPS times the condition, and random ones reversed."""
+    kind, rows = f"true disk, scale {scale:g}", json.loads(DATA.read_text(encoding="utf-8"))[f"{scale:g}"]
+    start, exact = (np.array([[float.fromhex(number) for number in row[k]] for row in rows]) for k in (0, 1))
     contacts, condition = (np.array([row[k] for row in rows]) for k in (2, 3))
     found = geo.collide(DISK, WALL, scale, start[:, :2], start[:, 2:])
     error = np.abs(found.velocity - exact).max(axis=1) / (EPS * (1.0 + contacts) * condition)
     error[found.contacts != contacts] = np.inf
-    back, energy, others, counts = _there_and_back(scale, disks)
-    worst = max(float(error[found.escaped].max(initial=0.0)), UNITS * max(back, energy) / ROUNDED)
-    note = f"{disks} more come back to {back:.1g}, energy to {energy:.1g}; {others} came back by other contacts"
-    for status, number in found.counts().items():
-        counts[status] += number
-    return ExtremeRow(
-        f"true disk, scale {scale:g}", "50 digits, and its own way back", worst, UNITS, "eps x condition",
-        counts=counts, note=note,
-    )  # fmt: skip
-
-
-def _there_and_back(scale: float, disks: int) -> tuple[float, float, int, dict[str, int]]:
-    """Errors of the involution and of the energy, number of disks with another reversed path, and status counts."""
+    for one, gone in zip(error, found.escaped, strict=True):
+        yield Judged(kind, UNITS, float(one)) if gone else Judged(kind, outcome="degraded as reported")
     rng = np.random.default_rng(6)
-    velocity = -sampled_velocities(disks, rng)
-    position = np.column_stack([scale * rng.random(disks), 2.0 * np.pi * rng.random(disks)])
+    velocity = -sampled_velocities(DISKS, rng)
+    position = np.column_stack([scale * rng.random(DISKS), 2.0 * np.pi * rng.random(DISKS)])
     there = geo.collide(DISK, WALL, scale, position, velocity)
     gone = there.escaped
     back = geo.collide(DISK, WALL, scale, there.position[gone], -there.velocity[gone])
     same = back.escaped & (back.contacts == there.contacts[gone])
     involution = np.abs(back.velocity + velocity[gone])[same].max(initial=0.0)
+    yield Judged(f"{kind}, reversed", ROUNDED, float(involution), number=int(same.sum()))
+    if not same.all():
+        yield Judged(f"{kind}, reversed", outcome="by other contacts", number=int((~same).sum()))
     energy = np.abs(DISK.inner(there.velocity, there.velocity) - 1.0)[gone].max(initial=0.0)
-    return float(involution), float(energy), int((~same).sum()), there.counts()
+    yield Judged(f"{kind}, energy", ROUNDED, float(energy))
+
+
+CAMPAIGNS = (
+    Campaign("extreme-disks", "Is the true disk right at all scales?", SCALES.__getitem__, judge, 6, range(6)),
+)

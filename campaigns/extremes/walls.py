@@ -1,4 +1,4 @@
-"""The extreme walls of the stability report, by name."""
+"""The walls of the extreme cases, by name."""
 
 from __future__ import annotations
 

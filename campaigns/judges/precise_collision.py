@@ -1,26 +1,17 @@
 """The collision of the disk with satellites in 50 digits, one disk at a time.
 
-``python -m campaigns.judges.precise_collision`` writes ``campaigns/extremes/extreme_disks.json``, which the
-stability report reads. As in `plain_collision`, nothing is known of a flight but that no satellite moves faster than
-some speed: it advances by the least time in which one could reach the wall, until one is near; then a secant finds the
-contact. The wall is polygonal, its corners are doubles.
+As in `plain_collision`, nothing is known of a flight but that no satellite moves faster than some speed: it advances by
+the least time in which one could reach the wall, until one is near; then a secant finds the contact. The wall is
+polygonal, its corners are doubles.
 """
 
 from __future__ import annotations
 
-import json
-
 import mpmath as mp
-import numpy as np
-from campaigns.extremes.disks import DATA, DISK, SCALES, WALL
-
-from asperity.geometry.disk.satellites import Satellites
 
 DIGITS, GUARD = 50, 15
-DISKS = 12
 # A satellite so near the wall, in units of the wall, is brought to it by secants; it is there at the second distance.
 NEAR, THERE = mp.mpf(10) ** -9, mp.mpf(10) ** -45
-STEP = mp.mpf(10) ** -28
 MOST_STEPS, MOST_CONTACTS = 5_000, 40
 
 
@@ -123,42 +114,3 @@ class Flight:
             push = 2 * mp.fdot(covector, self.v) / mp.fdot(covector, vector)
             self.v = [v - push * w for v, w in zip(self.v, vector, strict=True)]
         raise ArithmeticError("too many contacts")
-
-
-def judged(scale, position, velocity):
-    """One disk, as a row of the file: state in, velocity out rounded once, contacts, condition."""
-    spacing = Satellites.around(scale, scale * WALL.depth).spacing
-    with mp.workdps(DIGITS + GUARD):
-        place, speed = [mp.mpf(float(p)) for p in position], [mp.mpf(float(v)) for v in velocity]
-        _, out, contacts = Flight(WALL, DISK, scale, spacing, place, speed).collide()
-        condition = mp.mpf(1)
-        # positions matter on the scale of the wall's cell and of the satellites' distance
-        for k, size in ((0, scale), (1, spacing), (2, 1), (3, 1), (4, 1)):
-            moved = [*place, *speed]
-            moved[k] += STEP * size
-            _, other, _ = Flight(WALL, DISK, scale, spacing, moved[:2], moved[2:]).collide()
-            condition += max(abs(a - b) for a, b in zip(out, other, strict=True)) / STEP
-        start = [float(number).hex() for number in (*position, *velocity)]
-        return [start, [float(v).hex() for v in out], contacts, float(f"{float(condition):.4g}")]
-
-
-def disks_of(scale):
-    """Random disks over one cell and one spacing."""
-    rng = np.random.default_rng(11)
-    spacing = Satellites.around(scale, scale * WALL.depth).spacing
-    position = np.stack([rng.random(DISKS) * scale, (rng.random(DISKS) - 0.5) * spacing], axis=1)
-    return position, -DISK.from_angles(np.arccos(1 - 2 * rng.random(DISKS)), np.arccos(1 - 2 * rng.random(DISKS)))
-
-
-def main():
-    """Write the data, one disk a line."""
-    blocks = []
-    for scale in SCALES:
-        rows = [judged(scale, *state) for state in zip(*disks_of(scale), strict=True)]
-        blocks.append(f'"{scale:g}": [\n' + ",\n".join(json.dumps(row) for row in rows) + "\n]")
-        DATA.write_text("{" + ",\n".join(blocks) + "}\n", encoding="utf-8")
-        print(f"{scale:g}: {len(rows)} disks", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -246,21 +246,10 @@ def _run_of_hits(name: str, limits: Reached) -> Reached:
     return (1e6 * timed(job)[1] / RUN_RAYS,)
 
 
-@cache
-def _verdicts() -> Mapping[str, Any]:
-    from ..robustness import measure_robustness
-
-    return measure_robustness(AIMED_RAYS)
-
-
-def _lost_or_wrong(name: str, limits: Reached) -> Reached:
-    return (float(_verdicts()[name].lost + _verdicts()[name].wrong),)
-
-
 def _disks(name: str, limits: Reached) -> Reached:
-    from ..rigid import measure_rigid
+    from campaigns.rays.true_disks import collisions_a_second
 
-    return (min(row.one_thread for row in measure_rigid()) / 1e6,)
+    return (collisions_a_second() / 1e6,)
 
 
 # memory and processes
@@ -329,7 +318,6 @@ MEASURES: Mapping[str, Callable[[str, Reached], Reached]] = {
     "gap of 4,096 bins, checked to be complete": _part_of_eigvalsh,
     "gap of 10,000 bins, checked to be complete": _seconds_of_gap,
     "run of hits in one step": _run_of_hits,
-    "lost or wrong rays": _lost_or_wrong,
     "collisions of the true disk": _disks,
     "memory": _memory,
     "start": _start,

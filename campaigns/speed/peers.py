@@ -27,7 +27,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 
 from ..pages import print_table
-from ..timing import least_time
+from .timing import least_time
 
 WORKER = Path(__file__).with_name("peer_worker.py")
 # Name in `peer_worker` and requirement. Embree is a system package, such as libembree-dev in Debian; its program needs

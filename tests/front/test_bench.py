@@ -1,4 +1,4 @@
-"""The benchmark itself, in small: its scenes, its references, its processes, its report, and the extreme cases."""
+"""The benchmark itself, in small: its scenes, its references, its processes, its report."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from copy import copy
 
 import numpy as np
 import pytest
-from campaigns.extremes.report import run_extremes
-from campaigns.extremes.row import ExtremeRow
 from campaigns.judges.ablations import ablations
 from campaigns.speed.exact_rows import ArcRow
 from click.testing import CliRunner
@@ -340,27 +338,6 @@ def test_a_wall_of_a_file_is_measured_and_goes_on_until_it_is_another(notches, t
     geo.Wall.from_vertices([(x, 0.9 * y) for x, y in NOTCHES]).save(notches, overwrite=True)
     (other,) = run_problems([name], SHORT, tmp_path, lambda line: None)
     assert not {row.seconds for row in other.rows if row.is_done} & {row.seconds for row in report.rows}
-
-
-# extreme cases
-
-
-def test_verdicts_tell_apart_what_is_said_and_what_is_not():
-    assert ExtremeRow("a", "b", 1.0, 2.0).verdict == "met"
-    assert ExtremeRow("a", "b", 3.0, 2.0, reported=4.0).verdict == "degraded as reported"
-    assert ExtremeRow("a", "b", 1.0, 2.0, counts={"escaped": 9, "corner": 1}).verdict == "degraded as reported"
-    # a flag that is the exact answer is as good as an escape
-    aimed = ExtremeRow("a", "b", 1.0, 2.0, counts={"escaped": 9, "corner": 1}, flagged_rightly=1)
-    assert aimed.verdict == "met"
-    assert ExtremeRow("a", "b", 3.0, 2.0).verdict == "not met"
-    assert ExtremeRow("a", "b", float("nan"), 2.0).verdict == "not met"
-    assert ExtremeRow("a", "b", ended="refused").verdict == "refused"
-
-
-def test_a_case_that_would_hang_is_a_row():
-    report = run_extremes(True, ["matrix of 2000 bins"], seconds=0.05)
-    assert report.rows[0].verdict == "timed out"
-    assert "1 cases: 1 timed out." in report.table()
 
 
 # what the tracer leaves out

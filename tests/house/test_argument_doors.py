@@ -6,7 +6,6 @@ import inspect
 import operator
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from asperity.errors import InputError
 
 # numpy warns of its class of matrices whenever one is made
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
-ROOT = Path(__file__).parents[2]
 DISK = geo.Disk()
 LAWS = [ker.lambertian(), ker.henyey_greenstein(0.5), ker.specular(), ker.CircularArcLaw(1.2)]
 WITH_SOURCE = {
@@ -173,15 +171,3 @@ def test_operators_refuse_what_is_no_operand_in_words():
     for law in (ker.lambertian(), collision):
         with pytest.raises(InputError, match="weight"):
             10**400 * law
-
-
-@pytest.mark.slow
-def test_a_sample_of_the_campaign_finds_nothing():
-    made = subprocess.run(
-        [sys.executable, "-m", "campaigns.argument_fuzz", "600", "1"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert made.returncode == 0, made.stdout + made.stderr

@@ -1,13 +1,10 @@
-"""The table of goals and what it rests on: limits, errors in a time, memory, robustness."""
+"""The table of goals and what it rests on: limits, errors in a time, memory."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaigns import robustness
 from campaigns.speed import goals, throughput
-
-from asperity import geometry as geo
 
 
 def test_every_goal_can_be_measured_by_its_name():
@@ -15,7 +12,7 @@ def test_every_goal_can_be_measured_by_its_name():
     assert sum(map(len, names.values())) == len(goals.all_goals()) > 60
     assert names["bounces"] == names["two threads against one"] == set(throughput.WALLS)
     assert names["error in a time"] == set(goals.EXACT) and names["reported error in a time"] == set(goals.REPORTED)
-    assert names["run of hits in one step"] == set(goals.RUNS) and names["lost or wrong rays"] == set(robustness.KINDS)
+    assert names["run of hits in one step"] == set(goals.RUNS)
     assert {name.partition(", ")[0] for name in names["start"]} >= set(goals.PROGRAMS)
 
 
@@ -44,19 +41,3 @@ def test_the_table_says_what_is_missed_and_the_exit_code_too(monkeypatch, capsys
 def test_the_memory_of_an_estimate_does_not_grow_with_its_rays():
     # several chunks of 65,536 rays each
     assert goals.growth_of_memory(2**20, 2**21) <= 0.02
-
-
-def test_rays_of_all_walls_are_counted_together(monkeypatch):
-    monkeypatch.setattr(robustness, "WALLS", {"teeth": geo.triangular_teeth(0.7), "notch": geo.triangular_teeth(1.5)})
-    found = robustness.measure_robustness(20)
-    assert set(found) == {"corners", "grazing"}
-    for verdict in found.values():
-        assert verdict.rays == 20 and verdict.lost == verdict.wrong == 0
-
-
-def test_a_ray_that_was_moved_is_wrong_and_no_conditioning_explains_it():
-    wall, rng = geo.triangular_teeth(0.7), np.random.default_rng(1)
-    x, theta = rng.random(50), np.arccos(1.0 - 2.0 * rng.random(50))
-    traced = geo.trace(wall, x, theta)
-    assert robustness._explained(wall, traced, x, theta, robustness.twin_trace).all()
-    assert not robustness._explained(wall, traced, x, theta + 1e-9, robustness.twin_trace).any()

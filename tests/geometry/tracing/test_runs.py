@@ -8,8 +8,8 @@ from itertools import pairwise
 import mpmath as mp
 import numpy as np
 import pytest
+from campaigns.judges.precise_rays import unfold
 from campaigns.judges.precise_tracer import trace_precisely
-from campaigns.judges.precise_wedge import unfold
 
 from asperity import geometry as geo
 from asperity import kernels as ker

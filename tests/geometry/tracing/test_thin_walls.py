@@ -1,4 +1,4 @@
-"""Sharp peaks, plates thinner than rounding or without thickness, islands: rays go where brute force sends them."""
+"""Sharp peaks, plates thinner than rounding, islands: rays go where the plain tracer sends them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ import mpmath as mp
 import numpy as np
 import pytest
 from campaigns.judges.precise_tracer import trace_precisely
-from campaigns.robustness import COLLISIONS, POLYGONS, brute_force, judge, random_polygon, rays_beside_corners
+from campaigns.rays.aimed_rays import COLLISIONS, AimedRays
+from campaigns.rays.thin_polygons import (
+    POLYGONS,
+    follow_plainly,
+    judge_plainly,
+    random_polygon,
+    rays_beside_corners,
+)
 
 from asperity import geometry as geo
 from asperity.geometry.polygons.predicates import ExactPoints
@@ -19,17 +26,13 @@ from asperity.geometry.tracing.compiled.lines import line_time
 from asperity.geometry.tracing.double_double.sides import orientation
 from asperity.geometry.tracing.refinement import refined_trace
 
-WALLS, RAYS, PRECISE_RAYS = 12, 1_000, 6
+PRECISE_RAYS = 6
 FLOOR = [geo.Segment((0.0, -0.9), (1.0, -0.9))]
 
 
-@pytest.mark.parametrize("kind", POLYGONS)
-def test_no_ray_beside_a_corner_is_lost_or_wrong(kind):
-    for seed in range(WALLS):
-        rng = np.random.default_rng([2, seed])
-        wall = random_polygon(kind, rng)
-        verdict = judge(wall, *rays_beside_corners(wall, RAYS, rng), brute_force)
-        assert verdict.lost == 0 and verdict.wrong == 0
+def judged(wall, x, theta):
+    """The judgements of rays by the plain tracer."""
+    return list(judge_plainly(AimedRays("", wall, np.asarray(x), np.asarray(theta))))
 
 
 @pytest.mark.parametrize(
@@ -47,15 +50,14 @@ def test_no_ray_beside_a_corner_is_lost_or_wrong(kind):
 )
 def test_rays_that_were_lost_or_wrong(kind, number, x, theta):
     wall = random_polygon(kind, np.random.default_rng([1, number]))
-    verdict = judge(wall, np.array([x]), np.array([theta]), brute_force)
-    assert verdict.lost == verdict.wrong == verdict.flagged == 0
+    assert not any(each.fault or each.outcome for each in judged(wall, [x], [theta]))
 
 
 def test_the_segment_before_a_run_does_not_count_as_the_one_that_ends_it():
     """Next to the apex of a wedge, after fourteen hits in one step, with the gap within rounding."""
     wall = random_polygon("sharp peaks", np.random.default_rng([77, 7]))
-    verdict = judge(wall, np.array([0.9634121487192336]), np.array([1.4675613245704422]), brute_force)
-    assert verdict.lost == verdict.wrong == verdict.flagged == 0
+    found = judged(wall, [0.9634121487192336], [1.4675613245704422])
+    assert not any(each.fault or each.outcome for each in found)
 
 
 def test_a_line_that_is_met_at_its_end_is_not_met_at_its_start():
@@ -78,12 +80,12 @@ def test_double_doubles_count_the_cells_that_a_ray_passes_without_a_hit(theta):
 
 
 @pytest.mark.parametrize("kind", POLYGONS)
-def test_brute_force_agrees_with_fifty_digits_and_with_fractions(kind):
+def test_the_plain_tracer_agrees_with_fifty_digits_and_with_fractions(kind):
     for seed in range(2):
         rng = np.random.default_rng([3, seed])
         wall = random_polygon(kind, rng)
         x, theta = rays_beside_corners(wall, PRECISE_RAYS, rng)
-        brute = brute_force(wall, x, theta)
+        brute = follow_plainly(wall, x, theta, np.ones(PRECISE_RAYS, bool))
         for i in np.flatnonzero(brute.status == geo.Status.ESCAPED):
             ray = trace_precisely(wall.scene, x[i], theta[i], COLLISIONS)
             assert ray.bounces == brute.collisions[i]
@@ -216,8 +218,7 @@ def test_rays_next_to_the_tip_of_a_peak_are_reflected_at_it():
         x, below = rng.random(500), 10.0 ** rng.uniform(-15.0, -13.0, 500)
         side = np.where(x < 0.5, -1.0, 1.0)
         theta = np.arctan2(0.4 + below, x - 0.5 - side * below * math.tan(0.5 * angle))
-        verdict = judge(wall, x, theta, brute_force)
-        assert verdict.lost == 0 and verdict.wrong == 0
+        assert not any(each.fault for each in judged(wall, x, theta))
 
 
 def test_orientation_has_the_exact_sign():

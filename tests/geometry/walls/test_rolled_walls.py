@@ -7,8 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from campaigns.judges.random_rolled_walls import rolled_wall
-from campaigns.rolled_walls import compare, is_taken_rightly
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -18,18 +16,6 @@ from asperity.geometry.cells.origin import first_top, joined
 from asperity.geometry.tracing.tracing import entries
 
 LOW = geo.Wall.from_vertices([(0, -1.3), (0.2, -0.9), (0.7, -0.3), (0.8, -1.5), (1, -1.3)])
-
-
-@pytest.mark.parametrize("number", range(28))
-def test_a_rolled_and_lowered_wall_has_the_rays_disks_and_facts_of_its_cell(number):
-    found = compare(rolled_wall(number), number, 1_000, 6, 100, matrices=False)
-    assert found.other_rays == found.other_disks == found.misjudged == 0
-    assert found.judged > 0 and found.facts
-
-
-@pytest.mark.parametrize("number", [0, 3, 6, 15, 16])
-def test_a_rolled_and_lowered_wall_has_the_matrix_of_its_cell(number):
-    assert compare(rolled_wall(number), number, 0, 0, 0, matrices=True).matrix <= 1.0
 
 
 def test_half_a_period_of_shift_keeps_the_closed_form():
@@ -120,10 +106,6 @@ def test_a_wall_whose_pieces_would_vanish_by_the_shift_stays_open():
     near = float(np.nextafter(0.1, 0.0))
     wall = geo.Wall.from_vertices([(0, -0.5), (0.1, -0.4), (near, -0.4), (0.3, -0.2), (0.7, 0), (1, -0.5)])
     assert not wall.closes and wall.cell is wall and wall.hollows == () and wall.scene.is_open
-
-
-def test_slits_of_no_width_are_refused_and_plates_accepted():
-    assert all(is_taken_rightly(number) for number in range(120))
 
 
 def _bezier_up_and_down():

@@ -5,17 +5,11 @@ perturbation, down to 1e-25 or at one point only. The domain is drawn independen
 both sides in 50 digits by mpmath, with its own evaluator. Its points are random points, ends and special points of the
 domain, and neighbours of these. A proof is false if the values differ at a point. A refutation is false if its
 counterexample is not in the domain, or if there the values agree or one is not real.
-
-    python -m campaigns.identity_fuzz [claims] [first seed] [processes]
 """
 
 from __future__ import annotations
 
-import sys
-import time
-from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +18,7 @@ import numpy as np
 import sympy as sp
 
 from asperity import InputError, verify
-from asperity.core.tables import table
+from campaigns.engine import Campaign, Judged
 
 DIGITS = 50
 # Values that differ only in the last quarter of the digits count as equal.
@@ -449,78 +443,38 @@ def _bounds(claim: Claim, symbol: Any, *kinds: Any) -> list[float]:
     return [float(r.rhs) for r in claim.domain if r.func in kinds and r.lhs == symbol and r.rhs.is_number]
 
 
-def judged(claim: Claim, seed: int) -> tuple[str, str, str, float]:
-    """The kind, the verdict from values, the answer of `verify`, and its seconds."""
-    rng = np.random.default_rng(seed)
-    outcomes = [compared(claim, point) for point in places(claim, rng)]
+def draw(number: int) -> tuple[int, Claim]:
+    """The seed of the points, and a claim."""
+    return number, Maker(number).claim()
+
+
+def judge(case: tuple[int, Claim]) -> Iterator[Judged]:
+    """The answer of `verify` beside the verdict from values."""
+    number, claim = case
+    outcomes = [compared(claim, point) for point in places(claim, np.random.default_rng(number))]
     broken, seen = outcomes.count(False), outcomes.count(True)
-    label = "false" if broken else "true" if seen else "nowhere"
-    start = time.perf_counter()
+    sides = (claim.left, claim.right) if claim.relation == "==" else (sp.Le(claim.left, claim.right),)
+    fault = ""
     try:
-        if claim.relation == "==":
-            verdict = verify(claim.left, claim.right, claim.domain, time_limit=SECONDS)
-        else:
-            verdict = verify(sp.Le(claim.left, claim.right), claim.domain, time_limit=SECONDS)
+        verdict = verify(*sides, claim.domain, time_limit=SECONDS)
     except InputError:
-        answer = "error"
+        answer, fault = "error", "FALSE error" if broken + seen > 0 else ""
     else:
-        answer = verdict.answer
-        if "time limit" in verdict.evidence:
-            answer = "out of time"
+        answer = "out of time" if "time limit" in verdict.evidence else verdict.answer
+        if answer == "proved" and broken:
+            fault = "FALSE proof"
         if answer == "refuted" and verdict.counterexample:
             point = {s: sp.sympify(verdict.counterexample.get(str(s), 0)) for s in claim.symbols}
-            if (
-                not all(has_its_properties(s, v) for s, v in point.items())
-                or compared_in_more_digits(claim, point) is not False
-            ):
-                answer = "FALSE refutation"
-        if answer == "proved" and broken:
-            answer = "FALSE proof"
-    if answer == "error" and broken + seen > 0:
-        answer = "FALSE error"
-    return claim.kind, label, answer, time.perf_counter() - start
+            is_allowed = all(has_its_properties(s, v) for s, v in point.items())
+            fault = "" if is_allowed and compared_in_more_digits(claim, point) is False else "FALSE refutation"
+    label = "false" if broken else "true" if seen else "nowhere"
+    yield Judged(claim.kind, fault=f"{fault}: {claim}" if fault else "", outcome=f"{answer}, {label} by values")
 
 
 def has_its_properties(symbol: Any, number: Any) -> bool:
     return (not symbol.is_integer or number.is_integer is True) and (not symbol.is_even or number.is_even is True)
 
 
-def run(seed: int) -> tuple[int, str, str, str, float]:
-    return seed, *judged(Maker(seed).claim(), seed)
-
-
-def main(claims: int = 5000, first: int = 0, processes: int = 1) -> list[tuple[int, str, str, str, float]]:
-    """Run the campaign, print its table, and return every outcome."""
-    seeds = range(first, first + claims)
-    if processes > 1:
-        with ProcessPoolExecutor(processes) as pool:
-            found = list(pool.map(run, seeds, chunksize=20))
-    else:
-        found = [run(seed) for seed in seeds]
-    print(table_of(found))
-    for seed, kind, label, answer, _ in found:
-        if "FALSE" in answer:
-            print(seed, kind, label, answer, Maker(seed).claim())
-    return found
-
-
-COLUMNS = ("proved", "refuted", "error", "undecided", "out of time", "FALSE proof", "FALSE refutation", "FALSE error")
-
-
-def table_of(found: list[tuple[int, str, str, str, float]]) -> str:
-    """Counts by kind and by the verdict from values."""
-    rows = [(kind, [one for one in found if one[1] == kind]) for kind in sorted({one[1] for one in found})]
-    rows += [
-        (f"values say: {label}", [one for one in found if one[2] == label]) for label in ("true", "false", "nowhere")
-    ]
-    rows.append(("all", found))
-    lines: list[tuple[object, ...]] = []
-    for name, ones in rows:
-        counts = Counter(one[3] for one in ones)
-        decided = sum(counts[answer] for answer in ("proved", "refuted", "error")) / max(len(ones), 1)
-        lines.append((name, len(ones), *(counts[column] for column in COLUMNS), f"{100 * decided:.1f} %"))
-    return table(" | ".join(("claims about", "number", *COLUMNS, "decided")), lines)
-
-
-if __name__ == "__main__":
-    main(*(int(argument) for argument in sys.argv[1:]))
+# The last five are about constants.
+SMALL = (*range(16, 28), 43, 56, 67, 72, 79)
+CAMPAIGNS = (Campaign("false-formulas", "Is any verdict of verify false?", draw, judge, 5000, SMALL),)

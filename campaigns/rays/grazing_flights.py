@@ -5,8 +5,8 @@ The first collision of every flight is judged in 50 digits by the distances of l
 
 from __future__ import annotations
 
-import argparse
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +14,11 @@ from mpmath import mp, mpf
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from campaigns.engine import Campaign, Judged
 
 DISK = geo.Disk(1.0, 1.0)
+LAWS = {"smooth": ker.smooth(DISK), "no-slip": ker.no_slip(DISK)}
+FLIGHTS, DIGITS = 12, 50
 # Distance from a tangent or a corner up to which the nearest double of a position may decide otherwise.
 NEAR = 1e-11
 # Angle to a wall that bends towards the path up to which a flight may end with a status.
@@ -63,19 +66,18 @@ def time_to_sides(start: np.ndarray, plane: np.ndarray) -> mpf:
     return min(times)
 
 
-def judged(start: np.ndarray, plane: np.ndarray, radius: float) -> tuple[list[mpf], mpf]:
-    """The permitted times to the first collision in the room with a pillar, and the gap between path and pillar."""
+@mp.workdps(DIGITS)
+def first_times(start: np.ndarray, plane: np.ndarray, radius: float) -> list[mpf]:
+    """The permitted times to the first collision in the room with a pillar."""
     x, y, u, v = (mpf(float(a)) for a in (*start, *plane[:2]))
     speed = mp.sqrt(u * u + v * v)
     foot = -(x * u + y * v) / speed
     aside = abs(x * v - y * u) / speed
-    gap = aside - mpf(radius)
     past = time_to_sides(start, plane)
-    if foot <= 0 or gap > NEAR:
-        return [past], gap
-    half = mp.sqrt(max(mpf(radius) ** 2 - aside**2, mpf(0)))
-    met = (foot - half) / speed
-    return ([met] if gap < -NEAR else [met, past]), gap
+    if foot <= 0 or aside - radius > NEAR:
+        return [past]
+    met = (foot - mp.sqrt(max(mpf(radius) ** 2 - aside**2, mpf(0)))) / speed
+    return [met] if aside - radius < -NEAR else [met, past]
 
 
 def tangents(n: int, rng: np.random.Generator, exact: bool) -> Family:
@@ -157,20 +159,18 @@ def outside(family: Family, position: np.ndarray) -> float:
     return float((np.hypot(np.maximum(np.abs(x) - straight, 0.0), y) - 1.0).max())
 
 
-def row_of(family: Family, law: object) -> dict[str, int | str]:
-    """Count the flights, those that stop with a status, and the wrong, the lost and the raised ones."""
-    row: dict[str, int | str] = {"flights": family.name, "cases": len(family.start)}
-    try:
-        record = ker.play(family.table, law, family.start, family.velocity, LONG, 0)
-    except Exception as reason:
-        return {**row, "stopped": 0, "wrong": 0, "lost": 0, "raised": 1, "message": str(reason)[:60]}
+def judge(case: tuple[str, Family]) -> Iterator[Judged]:
+    """Which flights are wrong, which are lost, and which stop with a status."""
+    name, family = case
+    law = LAWS[name]
+    record = ker.play(family.table, law, family.start, family.velocity, LONG, 0)
     stopped = record.status != 0
     # of flights that may stop only their first collision is excused; later ones may meet a corner by chance
     lost = (stopped & (record.collisions == 0) & ~family.may_stop) | (record.counts()["free"] > 0)
     time, wrong = record.time[1], np.zeros(len(stopped), dtype=bool)
     for k in range(len(stopped)):
         if "tangents" in family.name:
-            times, _ = judged(family.start[k], family.velocity[k, :2], family.table.curves[-1].semi_axes[0])
+            times = first_times(family.start[k], family.velocity[k, :2], family.table.curves[-1].semi_axes[0])
             wrong[k] = min(abs(float(t) - time[k]) for t in times) > family.room[k]
         elif math.isfinite(family.first[k]):
             wrong[k] = abs(family.first[k] - time[k]) > family.room[k]
@@ -178,40 +178,30 @@ def row_of(family: Family, law: object) -> dict[str, int | str]:
     wrong |= ~(energy < DRIFT) | ~np.isfinite(record.position).all(axis=(0, 2))
     wrong |= np.array([outside(family, record.position[:, k]) > DEPTH for k in range(len(stopped))])
     # the same bits without the flights that stopped
-    if np.any(~stopped) and "no_slip" not in repr(law):
+    if np.any(~stopped) and name == "smooth":
         rest = ker.play(family.table, law, family.start[~stopped], family.velocity[~stopped], LONG, 0)
         wrong[~stopped] |= (rest.position != record.position[:, ~stopped]).any(axis=(0, 2))
-    return {**row, "stopped": int(stopped.sum()), "wrong": int(wrong.sum()), "lost": int(lost.sum()), "raised": 0}
+    for k in range(len(stopped)):
+        at = f"{family.start[k].tolist()}, {family.velocity[k].tolist()}"
+        fault = f"wrong from {at}" if wrong[k] else f"lost from {at}" if lost[k] else ""
+        yield Judged(f"{family.name}, {name}", fault=fault, outcome="stopped" if stopped[k] else "")
 
 
 def families(n: int, seed: int) -> list[Family]:
-    """All families, of about n flights each."""
+    """All families, of n flights each."""
     rng = np.random.default_rng(seed)
-    return [
-        tangents(n, rng, True), tangents(n, rng, False), along_sides(n, rng), whispers(n, rng, False),
-        whispers(n, rng, True), aims(n, rng, False), aims(n, rng, True),
-    ]  # fmt: skip
-
-
-def rows(n: int, seed: int) -> list[dict[str, int | str]]:
-    """The table of the campaign: smooth and no-slip walls."""
-    with mp.workdps(50):
+    with mp.workdps(DIGITS):
         return [
-            {"law": name, **row_of(family, law)}
-            for name, law in (("smooth", ker.smooth(DISK)), ("no-slip", ker.no_slip(DISK)))
-            for family in families(n, seed)
-        ]
+            tangents(n, rng, True), tangents(n, rng, False), along_sides(n, rng), whispers(n, rng, False),
+            whispers(n, rng, True), aims(n, rng, False), aims(n, rng, True),
+        ]  # fmt: skip
 
 
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    for row in rows(options.flights, options.seed):
-        print("  ".join(f"{value}" for value in row.values()))
+def draw(number: int) -> tuple[str, Family]:
+    """Smooth and no-slip walls in turn, and the families in turn."""
+    return list(LAWS)[number % 2], families(FLIGHTS, number // 14)[number // 2 % 7]
 
 
-if __name__ == "__main__":
-    main()
+CAMPAIGNS = (
+    Campaign("grazing-flights", "Are flights decided rightly that rounding can decide?", draw, judge, 350, range(14)),
+)

@@ -3,46 +3,32 @@
 Each call is a good one with one argument replaced: by the same numbers in another kind of array (the answer must be the
 same one, or an error), by what has no meaning as numbers (an error), or by other numbers (an answer without NaN, or an
 error). An error is an InputError, elsewhere than in constructors and the functions of the first pages also a TypeError,
-ValueError, AttributeError or IndexError. The calls are made in a child process: where it ends by a signal, or does not
-come back, the next child goes on with the next call.
-
-    python -m campaigns.argument_fuzz [calls] [seed]
+ValueError, AttributeError or IndexError. A call that ends the process, or does not come back, fails.
 """
 
 from __future__ import annotations
 
-import argparse
+import contextlib
 import inspect
 import math
-import multiprocessing
 import operator
-import os
 import re
-import signal
-import sys
-import tempfile
 import warnings
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
-from functools import partial
+from functools import cache, partial
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from asperity import kernels as ker
 from asperity.errors import AsperityError
+from campaigns.engine import Campaign, Judged
 from campaigns.judges import public_calls
 
-from .pages import print_table
-
-# Seconds of the processor for one call, and of the clock, after which the child is ended.
-LONGEST, LONGEST_WAIT = 10.0, 60.0
+SECONDS = 60.0
 SAME, REFUSED, OTHER = "same numbers", "no numbers", "other numbers"
-OUTCOMES = (
-    "answer", "InputError", "plain error", "signal", "hang", "raw exception", "another answer", "accepted", "NaN",
-)  # fmt: skip
-GOOD = OUTCOMES[:3]
 # Arguments that the object at hand does not need, a text, and heights, of which masked ones count as undefined.
 UNUSED = re.compile(
     r"breakpoints\(limit|turning_(points|values)\(axis|Segment.flattened|made_by|\.__\w+__\(|check_wall|\(height"
@@ -145,23 +131,31 @@ def scalars(_: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Case:
-    """A call with one odd argument."""
+    """A call with one odd argument, and the good call; operators have none."""
 
     name: str
-    kind: str
     rule: str
     call: Callable[[], Any]
     good: Callable[[], Any] | None = None
     strict: bool = False
 
 
-def cases(seed: int = 0) -> list[Case]:
+@cache
+def cases(seed: int = 7) -> list[Case]:
     """All calls, in a random order."""
     rng = np.random.default_rng(seed)
     calls = {**public_calls.CALLS, **public_calls.method_calls()}
-    every = [case for name, (function, good) in calls.items() for case in _of_call(name, function, good, rng)]
-    every += _operators()
+    with warnings.catch_warnings():
+        # numpy's of its class of matrices
+        warnings.simplefilter("ignore")
+        every = [case for name, (function, good) in calls.items() for case in _of_call(name, function, good, rng)]
+        every += _operators()
     return [every[k] for k in rng.permutation(len(every))]
+
+
+def draw(number: int) -> Case:
+    """One of all calls."""
+    return cases()[number]
 
 
 def _of_call(name: str, function: Callable[..., Any], good: dict[str, Any], rng: np.random.Generator) -> Iterator[Case]:
@@ -184,7 +178,7 @@ def _of_call(name: str, function: Callable[..., Any], good: dict[str, Any], rng:
         usual, strict = partial(function, **arrays), public_calls.is_strict(name, function)
         for rule, odd in kinds:
             for kind, other in odd.items():
-                yield Case(f"{name}({one})", kind, rule, partial(function, **{**arrays, one: other}), usual, strict)
+                yield Case(f"{name}({one} = {kind})", rule, partial(function, **{**arrays, one: other}), usual, strict)
 
 
 def _is_number(value: Any) -> bool:
@@ -227,10 +221,10 @@ def _operators() -> Iterator[Case]:
     for thing in holders:
         for kind, other in operands().items():
             for what in BINARY:
-                label = f"{type(thing).__name__} {what.__name__}"
-                yield Case(label, kind, OTHER, partial(what, thing, other))
-                yield Case(f"{label}, reflected", kind, OTHER, partial(what, other, thing))
-            yield Case(f"{type(thing).__name__} getitem", kind, OTHER, partial(operator.getitem, thing, other))
+                label = f"{type(thing).__name__} {what.__name__} {kind}"
+                yield Case(label, OTHER, partial(what, thing, other))
+                yield Case(f"{label}, reflected", OTHER, partial(what, other, thing))
+            yield Case(f"{type(thing).__name__} getitem {kind}", OTHER, partial(operator.getitem, thing, other))
 
 
 def leaves(value: Any, depth: int = 4) -> list[Any]:
@@ -255,113 +249,39 @@ def agree(first: list[Any], second: list[Any]) -> bool:
     )
 
 
-class TooLong(BaseException):
-    """A call goes on and on."""
-
-
-def outcome(case: Case) -> tuple[str, str]:
-    """What the call ends in, and what it says."""
-    try:
-        answer = leaves(case.call())
-    except AsperityError as reason:
-        return "InputError", str(reason)
-    except TooLong:
-        return "hang", ""
-    except Exception as reason:
-        plain = isinstance(reason, public_calls.PLAIN) and not case.strict
-        return ("plain error" if plain else "raw exception"), f"{type(reason).__name__}: {reason}"
-    if case.rule == REFUSED:
-        return "accepted", str(answer)[:80]
-    if case.good is None:
-        return ("NaN" if has_nan(answer) else "answer"), str(answer)[:80]
-    if case.rule == OTHER and not has_nan(answer):
-        return "answer", str(answer)[:80]
-    try:
-        usual = leaves(case.good())
-    except AsperityError as reason:
-        return "answer", f"the usual call is refused: {reason}"
-    if case.rule == SAME and not agree(answer, usual) and agree(usual, leaves(case.good())):
-        return "another answer", f"{answer} instead of {usual}"[:160]
-    return ("NaN" if has_nan(answer) and not has_nan(usual) else "answer"), str(answer)[:80]
-
-
-def _stop(*_: object) -> None:
-    raise TooLong
-
-
-def _work(todo: list[Case], first: int, pipe: Any) -> None:
-    """The child: outcomes of the calls, one message each."""
+def judge(case: Case) -> Iterator[Judged]:
+    """What the call ends in, in an empty folder."""
     import matplotlib
 
     matplotlib.use("Agg")
-    warnings.simplefilter("ignore")
-    signal.signal(signal.SIGVTALRM, _stop)
-    for k in range(first, len(todo)):
-        signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
-        try:
-            found = outcome(todo[k])
-        except TooLong:
-            found = "hang", ""
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
-        pipe.send((k, *found))
-    pipe.close()
-    os._exit(0)
+    with TemporaryDirectory() as folder, contextlib.chdir(folder), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        outcome, fault = _ended(case)
+    kind = case.rule if case.good else "operands"
+    yield Judged(kind, fault=f"{case.name}: {fault}"[:300] if fault else "", outcome=outcome)
 
 
-def run(todo: list[Case]) -> list[tuple[Case, str, str]]:
-    """The outcome of every call."""
-    context, found = multiprocessing.get_context("fork"), []
-    while len(found) < len(todo):
-        mine, theirs = context.Pipe(duplex=False)
-        child = context.Process(target=_work, args=(todo, len(found), theirs), daemon=True)
-        child.start()
-        theirs.close()
-        try:
-            while mine.poll(LONGEST_WAIT):
-                k, what, text = mine.recv()
-                found.append((todo[k], what, text))
-            found.append((todo[len(found)], "hang", ""))
-        except EOFError:
-            child.join()
-            if len(found) < len(todo):
-                found.append((todo[len(found)], "signal", str(child.exitcode)))
-        child.kill()
-        child.join()
-    return found
+def _ended(case: Case) -> tuple[str, str]:
+    """The outcome, and what is wrong with it."""
+    try:
+        answer = leaves(case.call())
+    except AsperityError:
+        return "InputError", ""
+    except Exception as reason:
+        plain = isinstance(reason, public_calls.PLAIN) and not case.strict
+        return ("plain error", "") if plain else ("exception", f"{type(reason).__name__}: {reason}")
+    if case.rule == REFUSED:
+        return "answer", f"accepted, {answer}"
+    wrong = f"NaN, {answer}" if has_nan(answer) else ""
+    if case.good is None or (case.rule == OTHER and not wrong):
+        return "answer", wrong
+    try:
+        usual = leaves(case.good())
+    except AsperityError:
+        return "answer", ""
+    if case.rule == SAME and not agree(answer, usual) and agree(usual, leaves(case.good())):
+        return "answer", f"{answer} instead of {usual}"
+    return "answer", "" if has_nan(usual) else wrong
 
 
-def bad(found: list[tuple[Case, str, str]]) -> list[str]:
-    """The calls that end otherwise than they should, in words."""
-    return [
-        f"{case.name} = {case.kind} ({case.rule}): {what}: {text}"[:300]
-        for case, what, text in found
-        if what not in GOOD
-    ]
-
-
-def main() -> None:
-    """Print the table, and every call that ends otherwise than it should."""
-    parser = argparse.ArgumentParser(prog="python -m campaigns.argument_fuzz", description=__doc__)
-    parser.add_argument("calls", nargs="?", type=int, help="how many of the calls, taken at random; all by default")
-    parser.add_argument("seed", nargs="?", type=int, default=0)
-    arguments = parser.parse_args()
-    home = os.getcwd()
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        found = run(cases(arguments.seed)[: arguments.calls])
-        os.chdir(home)
-    rows = []
-    for label, here in (
-        (SAME, lambda case: case.rule == SAME), (REFUSED, lambda case: case.rule == REFUSED),
-        (OTHER, lambda case: case.rule == OTHER and case.good), ("operands", lambda case: case.good is None),
-        ("all", lambda case: True),
-    ):  # fmt: skip
-        counts = Counter(what for case, what, _ in found if here(case))
-        rows.append((label, sum(counts.values()), *(counts[what] for what in OUTCOMES)))
-    print_table(" | ".join(("argument", "calls", *OUTCOMES)), rows)
-    print("\n".join(["", *bad(found)]))
-    sys.exit(1 if bad(found) else 0)
-
-
-if __name__ == "__main__":
-    main()
+CAMPAIGNS = (Campaign("odd-arguments", "Is bad input refused?", draw, judge, 2400, range(200), seconds=SECONDS),)

@@ -6,16 +6,16 @@ a satellite could reach the wall, until one is near; a secant in 50 digits then 
 
 from __future__ import annotations
 
-import argparse
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from mpmath import mp, mpf
 
 from asperity import geometry as geo
 from asperity.geometry.disk.satellites import Satellites
-
-from .pages import print_table
+from campaigns.engine import Campaign, Judged
 
 WALLS = {
     "triangular teeth": geo.triangular_teeth(0.7),
@@ -27,12 +27,15 @@ WALLS = {
 }
 # Bound on the errors of a disk that is not amplified.
 ACCURACY = 1e-6
+DIGITS = 50
 # Mass over inertia and scales, log-uniform between these.
 RATIOS, SCALES = (1e-4, 1e6), (1e-4, 1e-1)
 # Distance, in units of the wall, from which on digits decide; disks so near a corner are not judged.
 NEAR, CORNER = 1e-9, 1e-8
 # Steps and contacts after which a disk is not judged.
 MOST_STEPS, MOST_CONTACTS = 100_000, 2000
+# Disks over islands whose masses are 10^3 to 2 10^4 times their inertias; rounding decides the last.
+SMALL = (89, 185, 203, 221, 449, 509)
 
 
 class Judge:
@@ -180,70 +183,54 @@ class Judge:
         raise ArithmeticError("contacts")
 
 
-def drawn(n: int, seed: int) -> list[tuple[str, float, float, np.ndarray, np.ndarray]]:
-    """Wall, scale, mass over inertia, position and incoming velocity of n disks."""
-    rng, cases = np.random.default_rng(seed), []
-    for k in range(n):
-        name = list(WALLS)[k % len(WALLS)]
-        ratio, scale = (math.exp(rng.uniform(*np.log(bounds))) for bounds in (RATIOS, SCALES))
-        wall, disk = WALLS[name], geo.Disk(1.0, 1.0 / ratio)
-        spacing = Satellites.around(scale, scale * wall.depth).spacing
-        position = np.array([rng.random() * scale * wall.period, (rng.random() - 0.5) * spacing])
-        cases.append((name, scale, ratio, position, -disk.from_angles(*np.arccos(1.0 - 2.0 * rng.random(2)))))
-    return cases
+@dataclass(frozen=True)
+class FallingDisk:
+    """A disk of mass 1 on its way to a wall; ``ratio`` is its mass over its inertia."""
+
+    name: str
+    scale: float
+    ratio: float
+    position: np.ndarray
+    velocity: np.ndarray
 
 
-def judged(name: str, scale: float, ratio: float, position: np.ndarray, velocity: np.ndarray) -> dict[str, object]:
-    """Status, contacts and error of one disk; the error is None where the judge gives up."""
-    wall, disk = WALLS[name], geo.Disk(1.0, 1.0 / ratio)
-    hit = geo.collide(disk, wall, scale, position[None], velocity[None])
-    row = {"wall": name, "ratio": ratio, "status": int(hit.status[0]), "contacts": int(hit.contacts[0]), "error": None}
+def draw(number: int) -> FallingDisk:
+    """The walls in turn."""
+    rng, name = np.random.default_rng([1, number]), list(WALLS)[number % len(WALLS)]
+    ratio, scale = (math.exp(rng.uniform(*np.log(bounds))) for bounds in (RATIOS, SCALES))
+    spacing = Satellites.around(scale, scale * WALLS[name].depth).spacing
+    position = np.array([rng.random() * scale * WALLS[name].period, (rng.random() - 0.5) * spacing])
+    angles = np.arccos(1.0 - 2.0 * rng.random(2))
+    return FallingDisk(name, scale, ratio, position, -geo.Disk(1.0, 1.0 / ratio).from_angles(*angles))
+
+
+def judge(case: FallingDisk) -> Iterator[Judged]:
+    """Whether the outgoing state is right or has the status."""
+    wall, disk, scale = WALLS[case.name], geo.Disk(1.0, 1.0 / case.ratio), case.scale
+    decade = 2 * math.floor(0.5 * math.log10(case.ratio))
+    kind = f"m/J 1e{decade} to 1e{decade + 2}"
+    hit = geo.collide(disk, wall, scale, case.position[None], case.velocity[None])
     spacing = Satellites.around(scale, scale * wall.depth).spacing
-    try:
-        end = Judge(wall, disk, scale, spacing, position, velocity).collide()
-    except ArithmeticError:
-        return row
-    found = [mpf(float(a)) - mpf(float(b)) for a, b in zip(hit.position[0], position, strict=True)]
-    apart = np.array([float(a - b) for a, b in zip([*found, *map(mpf, map(float, hit.velocity[0]))], end, strict=True)])
-    speeds = math.sqrt(float(disk.inner(velocity, velocity))) / np.sqrt([disk.mass, disk.mass, disk.inertia])
-    return {**row, "error": float(np.abs(np.concatenate([apart[:2], apart[2:] / speeds])).max())}
+    with mp.workdps(DIGITS):
+        try:
+            end = Judge(wall, disk, scale, spacing, case.position, case.velocity).collide()
+        except ArithmeticError as reason:
+            yield Judged(kind, outcome=f"not judged: {reason}")
+            return
+        found = [mpf(float(a)) - mpf(float(b)) for a, b in zip(hit.position[0], case.position, strict=True)]
+        found += map(mpf, map(float, hit.velocity[0]))
+        apart = np.array([float(a - b) for a, b in zip(found, end, strict=True)])
+    speeds = math.sqrt(float(disk.inner(case.velocity, case.velocity))) / np.sqrt([disk.mass, disk.mass, disk.inertia])
+    error = float(np.abs(np.concatenate([apart[:2], apart[2:] / speeds])).max())
+    if hit.status[0] == geo.DiskStatus.AMPLIFIED:
+        yield Judged(kind, outcome="amplified" if error > ACCURACY else "amplified needlessly")
+    elif hit.escaped[0]:
+        yield Judged(kind, ACCURACY, error)
+    else:
+        yield Judged(kind, outcome="not escaped")
 
 
-def rows(n: int, seed: int) -> list[dict[str, object]]:
-    """One row for each disk."""
-    with mp.workdps(50):
-        return [judged(*case) for case in drawn(n, seed)]
-
-
-def table(found: list[dict[str, object]]) -> list[dict[str, object]]:
-    """Numbers of disks for each two decades of the mass over the inertia."""
-    lines = []
-    for low in range(-4, 6, 2):
-        own = [row for row in found if 10.0**low <= row["ratio"] < 10.0 ** (low + 2)]
-        escaped = [row for row in own if row["status"] in (geo.DiskStatus.ESCAPED, geo.DiskStatus.AMPLIFIED)]
-        told = [row for row in escaped if row["error"] is not None]
-        flagged = [row for row in told if row["status"] == geo.DiskStatus.AMPLIFIED]
-        wrong = [row for row in told if row["error"] > ACCURACY]
-        missed = [row for row in wrong if row["status"] != geo.DiskStatus.AMPLIFIED]
-        needless = [row for row in flagged if row["error"] <= ACCURACY]
-        worst = max((row["error"] for row in told if row["status"] == geo.DiskStatus.ESCAPED), default=0.0)
-        lines.append({
-            "m/J": f"1e{low} to 1e{low + 2}", "disks": len(own), "judged": len(told), "wrong": len(wrong),
-            "amplified": len(flagged), "missed": len(missed), "needless": len(needless), "worst": f"{worst:.1e}",
-            "contacts": max((row["contacts"] for row in own), default=0),
-        })  # fmt: skip
-    return lines
-
-
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--disks", type=int, default=800)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    lines = table(rows(options.disks, options.seed))
-    print_table(" | ".join(lines[0]), (tuple(line.values()) for line in lines))
-
-
-if __name__ == "__main__":
-    main()
+CAMPAIGNS = (
+    Campaign("amplified-collisions", "Does the status show which disks rounding has changed?", draw, judge, 800,
+             SMALL),
+)  # fmt: skip

@@ -1,12 +1,13 @@
-"""Rays on the extreme walls, and where they go in 50 digits.
+"""Rays on the extreme walls, and disks at all scales, and where they go in 50 digits.
 
-``python -m campaigns.judges.precise_extremes [CASE]`` writes the data. The stability report reads
-``campaigns/extremes/extreme_rays.json``. Walls with a closed form are judged by it (`precise_rays`), the
-others by the tracer in 50 digits (`precise_tracer`); neither shares code with the library.
+``python -m campaigns.extremes.references [CASE]`` writes ``extreme_rays.json`` and ``extreme_disks.json`` beside it.
+Walls with a closed form are judged by it (`precise_rays`), the others by the tracer in 50 digits (`precise_tracer`);
+neither shares code with the library.
 
 Of each ray the file has the position, the angle, the outgoing angle rounded once, the number of hits, the condition (1
 + the moduli of the derivatives of the outgoing state by the incoming one, positions in cells), whether it is known to
-pass a corner too closely, and what becomes of it when it is moved by up to 32 ulps, where that is something else.
+pass a corner too closely, and what becomes of it when it is moved by up to 32 ulps, where that is something else. Of
+each disk it has the state before, the velocity after, rounded once, contacts, and condition.
 """
 
 from __future__ import annotations
@@ -17,12 +18,16 @@ from math import pi
 
 import mpmath as mp
 import numpy as np
-from campaigns.extremes import walls as walls
-from campaigns.extremes.rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
+
+from asperity.geometry.disk.satellites import Satellites
+from campaigns.judges import precise_collision
 from campaigns.judges.precise_rays import arc, cap, cap_clearance, crevice, tooth
 from campaigns.judges.precise_tracer import DIGITS, trace_precisely
 
-RAYS, FEW, FEWEST = 64, 24, 4
+from . import disks, walls
+from .rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
+
+RAYS, FEW, FEWEST, DISKS = 64, 24, 4, 12
 # Stems so narrow that none of the rays misses them after its first hit, the one that the closed form is about.
 SMALL_STEMS = walls.STEMS[:2]
 LOWEST_ANGLE, ISLAND_ANGLE = 1e-12, 1e-3
@@ -35,7 +40,7 @@ FEW_MOVES = tuple(
 # An error of this size is enough to look at the ray's neighbours, where that takes the tracer.
 SEEN = 1e-6
 AIM_ULPS = 2
-STEP = mp.mpf(10) ** -30
+STEP, DISK_STEP = mp.mpf(10) ** -30, mp.mpf(10) ** -28
 # The wall's own rounding errors, a few in each coordinate of its joints, in units of the cell.
 WALL_ERROR = 4 * EPS
 # A ray that makes more than these one by one would take hours.
@@ -131,7 +136,7 @@ def rays_of(name, wall):
     return wall.period * place, theta
 
 
-def judged(name, judge, x, theta):
+def judged_ray(name, judge, x, theta):
     """One ray, as a row of the file."""
     with mp.workdps(DIGITS):
         place, angle = mp.mpf(x), mp.mpf(theta)
@@ -173,26 +178,58 @@ def _nearest(figure, values):
     return min(values, key=lambda value: abs(value - float(figure)))
 
 
+def judged_disk(scale, position, velocity):
+    """One disk, as a row of the file: state in, velocity out rounded once, contacts, condition."""
+    spacing = Satellites.around(scale, scale * disks.WALL.depth).spacing
+    with mp.workdps(precise_collision.DIGITS + precise_collision.GUARD):
+        place, speed = [mp.mpf(float(p)) for p in position], [mp.mpf(float(v)) for v in velocity]
+        _, out, contacts = precise_collision.Flight(disks.WALL, disks.DISK, scale, spacing, place, speed).collide()
+        condition = mp.mpf(1)
+        # positions matter on the scale of the wall's cell and of the satellites' distance
+        for k, size in ((0, scale), (1, spacing), (2, 1), (3, 1), (4, 1)):
+            moved = [*place, *speed]
+            moved[k] += DISK_STEP * size
+            _, other, _ = precise_collision.Flight(
+                disks.WALL, disks.DISK, scale, spacing, moved[:2], moved[2:]
+            ).collide()
+            condition += max(abs(a - b) for a, b in zip(out, other, strict=True)) / DISK_STEP
+        start = [float(number).hex() for number in (*position, *velocity)]
+        return [start, [float(v).hex() for v in out], contacts, float(f"{float(condition):.4g}")]
+
+
+def disks_of(scale):
+    """Random disks over one cell and one spacing."""
+    rng = np.random.default_rng(11)
+    spacing = Satellites.around(scale, scale * disks.WALL.depth).spacing
+    position = np.stack([rng.random(DISKS) * scale, (rng.random(DISKS) - 0.5) * spacing], axis=1)
+    return position, -disks.DISK.from_angles(np.arccos(1 - 2 * rng.random(DISKS)), np.arccos(1 - 2 * rng.random(DISKS)))
+
+
 def main(chosen):
-    """Judge the chosen cases, or all; a case takes seconds, the mushrooms some minutes."""
+    """Judge the chosen cases, or all and the disks; a case takes seconds, the mushrooms some minutes."""
     data = json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else {}
     builders = walls.extreme_walls()
     for name in chosen or builders:
         wall = builders[name]()
         judge = judge_of(name, wall)
-        rows = [judged(name, judge, float(x), float(theta)) for x, theta in zip(*rays_of(name, wall), strict=True)]
+        rows = [judged_ray(name, judge, float(x), float(theta)) for x, theta in zip(*rays_of(name, wall), strict=True)]
         data[name] = {"reference": judge.reference, "rays": rows}
-        write({name: data[name] for name in builders if name in data})
+        heads = {case: f'{{"reference": "{data[case]["reference"]}", "rays": ' for case in builders if case in data}
+        _write(DATA, {case: (head, data[case]["rays"], "}") for case, head in heads.items()})
         print(f"{name}: {len(rows)} rays", flush=True)
+    if not chosen:
+        found = {f"{scale:g}": [judged_disk(scale, *state) for state in zip(*disks_of(scale), strict=True)]
+                 for scale in disks.SCALES}  # fmt: skip
+        _write(disks.DATA, {scale: ("", rows, "") for scale, rows in found.items()})
 
 
-def write(data):
-    """One ray a line."""
-    blocks = []
-    for name, case in data.items():
-        rows = ",\n".join(json.dumps(row) for row in case["rays"])
-        blocks.append(f'"{name}": {{"reference": "{case["reference"]}", "rays": [\n{rows}\n]}}')
-    DATA.write_text("{" + ",\n".join(blocks) + "}\n", encoding="utf-8")
+def _write(file, blocks):
+    """One ray or disk a line."""
+    lines = (
+        f'"{name}": {head}[\n' + ",\n".join(map(json.dumps, rows)) + f"\n]{end}"
+        for name, (head, rows, end) in blocks.items()
+    )
+    file.write_text("{" + ",\n".join(lines) + "}\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

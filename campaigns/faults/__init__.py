@@ -1,0 +1,1 @@
+"""Campaigns of faults: odd arguments, damaged files, false formulas."""
