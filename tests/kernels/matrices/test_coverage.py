@@ -31,7 +31,8 @@ def test_errors_hold_in_95_of_100_cases_and_not_much_more_often(name: str) -> No
     true, reported = np.array(found, dtype=float).T
     held = int(np.count_nonzero(true <= reported))
     assert binomtest(held, REPEATS, LEVEL).pvalue > RARE or (name in CAUTIOUS and held > LEVEL * REPEATS)
-    assert np.mean(reported) < 3.0 * np.sqrt(np.mean(true**2))
+    # a normal scalar has 1.96; with few replicates, Student's quantile is larger
+    assert np.mean(reported) < (1.6 if name.startswith("distance") else 3.0) * np.sqrt(np.mean(true**2))
 
 
 def test_squared_errors_vary_as_multinomial_counts_do_also_where_most_are_none() -> None:
