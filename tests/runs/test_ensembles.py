@@ -203,13 +203,6 @@ def test_the_frame_has_a_line_for_each_quantity():
         spec.ensemble(half_diffuse, 6, ["gap", "eta"]).of("slem")
 
 
-def test_too_few_realisations_are_refused():
-    with pytest.raises(InputError, match="realisations"):
-        spec.ensemble(half_diffuse, 3)
-    with pytest.raises(InputError, match="basis"):
-        spec.mean_law(half_diffuse, 5, 8)
-
-
 # ---- the command line -------------------------------------------------------------------------------------------
 GENTLE = ["ensemble", "gaussian:length=0.3", "--points", 8, "--rms-slope", 0.1, "--walls", 6, "--tolerance", 1e-3]
 

@@ -8,7 +8,6 @@ from campaigns import modified_law
 from test_rigid import WALLS, states
 
 from asperity import geometry as geo
-from asperity.errors import InputError
 from asperity.geometry.disk.satellites import Satellites
 
 RATIOS = (0.1, 1.0, 2.0, 10.0)
@@ -116,10 +115,3 @@ def test_the_modified_law_tends_to_the_cylinders_and_undoes_itself_inside(wall):
     assert all(m.defect < 1e-13 and m.mismatches == 0.0 for m in found)
     # and outside it does not: that is what the mask is for
     assert found[0].mismatches_outside > 0.0
-
-
-def test_bad_input_is_refused():
-    with pytest.raises(InputError, match="v2 < 0"):
-        geo.collide_cylinder(geo.Disk(), WALLS["triangular"], 0.1, [[0, 0]], [[0, 1, 0]])
-    with pytest.raises(InputError, match="whole number"):
-        geo.collide_modified(geo.Disk(), WALLS["triangular"], 0.1, [[0, 0]], [[0, -1, 0]], 1.0)

@@ -9,7 +9,6 @@ import pytest
 from campaigns.judges.plain_collision import collide_plainly
 
 from asperity import geometry as geo
-from asperity.errors import InputError
 from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, Path, Span, flight, next_root
 from asperity.geometry.disk.satellites import Satellites
 
@@ -253,35 +252,6 @@ def test_the_default_spacing_is_the_least_divisor_that_is_allowed(scale):
     finer = Satellites.deepest_for(ring.count + 1)
     assert ring.spacing >= scale**0.4 and ring.depth < 1 - math.cos(ring.spacing)
     assert 2 * math.pi / (ring.count + 1) < scale**0.4 or ring.depth >= finer
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"spacing": 0.3}, "whole number"),
-        ({"spacing": 2 * math.pi / 500}, "at most two satellites"),
-        ({"scale": 3.0}, "make the scale smaller"),
-        ({"scale": 0.0}, "greater than 0"),
-        ({"velocity": [[0.0, 1.0, 0.0]]}, "v2 < 0"),
-        ({"velocity": [[0.0, -1.0]]}, r"shape \(n, 3\)"),
-        ({"position": [0.0, 0.0]}, r"shape \(n, 2\)"),
-        ({"position": np.zeros((3, 2)), "velocity": [[0, -1, 0]] * 2}, "equally many rows"),
-        ({"wall": "teeth"}, "expected a Wall"),
-        ({"disk": 1.0}, "expected a Disk"),
-    ],
-)
-def test_bad_input_is_refused_with_what_to_do(change, words):
-    arguments = {
-        "disk": DISK, "wall": WALLS["triangular"], "scale": 0.01, "position": [[0.0, 0.0]],
-        "velocity": [[0.0, -1.0, 0.0]],
-    }  # fmt: skip
-    with pytest.raises(InputError, match=words):
-        geo.collide(**(arguments | change))
-
-
-def test_a_disk_without_mass_is_refused():
-    with pytest.raises(InputError, match="mass"):
-        geo.Disk(mass=0.0)
 
 
 def test_a_disk_that_hardly_rises_still_meets_the_teeth_that_its_satellites_pass():

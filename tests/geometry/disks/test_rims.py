@@ -12,7 +12,6 @@ from scipy.stats import ks_2samp
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 from asperity.geometry.walls.interior import in_solid
 
 DISK = geo.Disk(1.0, 0.5)
@@ -204,26 +203,6 @@ def test_unequal_spacing_has_the_same_limit_law():
     assert ks_2samp(angles[0][0], math.pi - angles[0][0]).pvalue < 1e-6
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"size": [0.1, 0.2]}, "size: expected 4"), ({"size": [-0.1, 0, 0, 0]}, "size"),
-        ({"radius": [1, 1, 1, 0]}, "radius"), ({"angles": [0, 1, 1, 3]}, "angles: expected 4 increasing"),
-        ({"angles": [0.0, 0.1, 0.2, 0.3]}, "half a turn"), ({"size": [0, 0, 0, 0.1], "joined": True}, "equal sizes"),
-        ({"joined": 1}, "joined"),
-    ],
-)  # fmt: skip
-def test_rims_that_are_none_are_refused(arguments, words):
-    with pytest.raises(InputError, match=words):
-        geo.SatelliteDisk(DISK, 4, **({"size": 0.0} | arguments))
-
-
-def test_walls_that_are_not_straight_are_refused():
-    state = [[0.0, 0.0]], [[0.0, -1.0, 0.0]]
-    with pytest.raises(InputError, match="straight pieces"):
-        geo.collide_rim(gear(), geo.focusing_arcs(1.0), 0.1, *state)
-    with pytest.raises(InputError, match="edges shorter"):
-        square = geo.SatelliteDisk(DISK, 4, 0.0, joined=True)
-        geo.collide_rim(square, geo.flat(), 0.1, *state)
+def test_the_limit_of_contacts_of_teeth_is_reported():
     limited = geo.collide_rim(gear(), WALLS["triangular"], 0.1, *states(0.1, 0.1, 10, 7), max_contacts=1)
     assert limited.counts()["bounce_limit"] > 0

@@ -15,7 +15,6 @@ import pytest
 from campaigns.judges.plain_tracer import trace_plainly
 
 from asperity import geometry as geo
-from asperity.errors import InputError
 from asperity.geometry.tracing.threads import in_blocks, interruptibly
 
 EPS = np.finfo(float).eps
@@ -299,31 +298,6 @@ def test_shapes_broadcast_and_results_are_read_only():
     assert traced.x.shape == traced.status.shape == (5, 3)
     with pytest.raises(ValueError, match="read-only"):
         traced.x[0, 0] = 1.0
-
-
-@pytest.mark.parametrize("theta", [0.0, np.pi, -1.0, 4.0, np.nan])
-def test_angles_outside_the_half_circle_are_refused(theta):
-    with pytest.raises(InputError, match="theta"):
-        geo.trace(geo.flat(), 0.5, [1.0, theta])
-
-
-@pytest.mark.parametrize("name", ["triangular teeth", "mushroom", "ellipse", "low polygon"])
-@pytest.mark.parametrize(
-    ("what", "bad"),
-    [("x", np.nan), ("x", -np.inf), ("theta", np.nan), ("theta", 0.0), ("theta", np.pi), ("theta", -0.1)],
-)
-def test_one_bad_ray_among_many_is_named(name, what, bad):
-    vertices = [(0.0, -0.2), (0.1, -0.1), (0.4, -0.9), (0.7, -0.9), (1.0, -0.2)]
-    walls = {
-        "triangular teeth": geo.triangular_teeth(0.7),
-        "mushroom": geo.mushrooms(0.3, 0.5),
-        "ellipse": geo.elliptical_arcs(1.0, geo.Disk()),
-        "low polygon": geo.Wall.from_vertices(vertices),
-    }
-    given = dict(zip(("x", "theta"), rays(14, 40_000), strict=True))
-    given[what][39_998] = bad
-    with pytest.raises(InputError, match=f"{what}: expected .*39998"):
-        geo.trace(walls[name], given["x"], given["theta"], threads=2)
 
 
 def test_foreshortened_ellipses_are_circles():

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asperity import geometry as geo
-from asperity.errors import InputError, WallError
 from asperity.geometry import Arc, Bezier, Segment, Wall
 
 pi = math.pi
@@ -242,111 +241,6 @@ def test_outline_is_the_path_within_tolerance():
     assert np.array_equal(geo.triangular_teeth(1.0).outline(0.1), geo.triangular_teeth(1.0).vertices)
 
 
-CROSSING = {
-    "a loop": ([(0, 0), (0.7, -0.5), (0.3, -0.5), (1, 0)], r"piece 0 and piece 2 .*\(0.5, -0.357143\)"),
-    "a wide cavity": (
-        [
-            (0, 0),
-            (0.4, 0),
-            (0.4, -0.1),
-            (-0.2, -0.1),
-            (-0.2, -1),
-            (1.2, -1),
-            (1.2, -0.1),
-            (0.6, -0.1),
-            (0.6, 0),
-            (1, 0),
-        ],
-        "piece",
-    ),
-    "a far overhang": ([(0, 0), (5, -1), (6.5, -1), (1, 0)], "piece"),
-    "through a corner": (
-        [
-            (0, 0),
-            (0, -1),
-            (0.5, -0.5),
-            (0.5, -0.2),
-            (0.8, -0.2),
-            (0.8, -0.5),
-            (0.5, -0.5),
-            (0.2, -0.4),
-            (0.3, -0.9),
-            (1, -0.9),
-            (1, 0),
-        ],
-        r"\(0.5, -0.5\)",
-    ),
-    "through an edge": (
-        [
-            (0, 0),
-            (0, -1),
-            (0.6, -1),
-            (0.6, -0.2),
-            (0.8, -0.2),
-            (0.8, -0.5),
-            (0.4, -0.5),
-            (0.4, -0.8),
-            (0.8, -0.8),
-            (0.8, -1),
-            (1, -1),
-            (1, 0),
-        ],
-        "piece 2",
-    ),
-    "a tiny loop": ([(0, 0), (0.5 + 1e-7, -0.5), (0.5 - 1e-7, -0.5), (1, 0)], "piece 0 and piece 2"),
-}
-
-
-@pytest.mark.parametrize("name", CROSSING)
-@pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
-def test_crossing_pieces_are_refused_with_their_place(name, factor):
-    corners, words = CROSSING[name]
-    with pytest.raises(WallError, match=words if factor == 1.0 else "cross"):
-        Wall.from_vertices(np.array(corners) * factor)
-
-
-@pytest.mark.parametrize(
-    ("build", "words"),
-    [
-        (lambda: Wall(flask(0.51)), "piece 1 crosses itself or the neighbouring period"),
-        (lambda: Wall([Bezier([(0, 0), (1.6, -1.5), (-0.6, -1.5), (1, 0)])]), "piece 0 crosses itself"),
-        (lambda: Wall(FLOOR, islands=[square(0.2, -0.5, 0.2), square(0.3, -0.45, 0.2)]), "island 0 .* island 1"),
-        (lambda: Wall(FLOOR, islands=[square(0.2, -1.1, 0.2)]), "piece 0 .* of island 0"),
-        (lambda: Wall(FLOOR, islands=[square(0.2, -1.5, 0.2)]), "wrong side"),
-        (lambda: Wall(FLOOR, islands=[square(0.9, -0.5, 0.2)]), "piece 1 of island 0 leaves the cell .* roll"),
-        (lambda: Wall(FLOOR, islands=[square(0.2, -0.1, 0.2)]), "of island 0 rises to y = 0.1"),
-        (lambda: Wall(FLOOR, islands=[square(0.2, -0.5, 0.2)[:3]]), "pieces 2 and 0 of island 0 do not join"),
-        (lambda: Wall.from_vertices([(0, 0), (0.2, float("nan")), (1, 0)]), r"nan\) at vertex 1"),
-        (lambda: Wall.from_vertices([(0, 0), (0.2, -1), (0.2, -1), (1, 0)]), "vertices 1 and 2 coincide"),
-        (lambda: Wall.from_vertices([(0, 0), (0.5, 0.1), (1, 0)]), r"piece 0 rises to y = 0.1 at x = 0.5"),
-        (lambda: Wall.from_vertices([(0, 0), (0.5, -0.1), (1, -0.1)]), "same height"),
-        (lambda: Wall(polygon((0.1, 0), (0.5, -0.1), (1, 0))), r"start at x = 0, got \(0.1, 0\)"),
-        (lambda: Wall.from_vertices([(0, 0), (0.5, -0.1), (0, 0)]), "period"),
-        (lambda: Wall.from_vertices([0, 1, 2]), "shape"),
-        (lambda: Wall.from_vertices("teeth"), "points"),
-        (lambda: Wall(polygon((1, 0), (0.5, -1), (0, 0))), "right to left"),
-        (lambda: Wall(polygon((0, 0), (0.5, -1), (0.9, 0))), "end at x = period = 1"),
-        (lambda: Wall([Segment((0, 0), (0.5, -1)), Segment((0.5, -1.1), (1, 0))]), "pieces 0 and 1 do not join"),
-        (lambda: Wall([Segment((0, 0), (0.5, -1)), Segment((0.5, -1 + 1e-7), (1, 0))]), "do not join"),
-        (lambda: Wall([Arc((0.5, 0), 0.5, pi, 0)]), "piece 0 rises to y = 0.[45]"),
-        (lambda: Wall([Bezier([(0, 0), (0.5, 0), (1, 0)])]), "piece 0: expected a Segment"),
-        (lambda: Wall([]), "at least one piece"),
-        (lambda: Wall([1]), r"pieces\[0\]"),
-        (lambda: Wall(None), "sequence of curves"),
-        (lambda: Wall(FLOOR, period=-1), "period"),
-        (
-            lambda: Wall(polygon((0, -0.5), (1.2, -0.7), (1, -0.5)), islands=[square(0.4, -0.3, 0.2)]),
-            "piece 0 leaves the cell .* roll the cell",
-        ),
-        (lambda: Wall(polygon((0, 0), (0.5, -1), (0.5 + 1e-10, -1), (1, 0)), 1.0).scaled(-1), "factor"),
-        (lambda: Wall([Segment((0, 0), (1e-16, 0)), Segment((0, 0), (1, 0))]), "piece 0 has no length"),
-    ],
-)
-def test_broken_conditions_are_refused_in_words(build, words):
-    with pytest.raises(InputError, match=words):
-        build()
-
-
 def test_tangential_contacts_raise_no_alarm():
     for radius in np.random.default_rng(3).uniform(0.2, 0.5, 20):
         # a round cavity and, beside it, a bump of the neighbouring wall that touches it in one point
@@ -367,21 +261,6 @@ def test_tangential_contacts_raise_no_alarm():
         assert len(Wall(pieces).hollows) == 2
 
 
-def test_from_profile_rolls_to_the_highest_point_and_keeps_units():
-    wall = Wall.from_profile([10.0, 11.0, 13.0], [2.0, 5.0, 4.0], seam="mirror")
-    assert wall.vertices.tolist() == [[0, 0], [2, -1], [4, 0], [5, -3], [6, 0]]
-    step = Wall.from_profile([10.0, 11.0, 13.0], [2.0, 5.0, 4.0], seam="step")
-    assert step.vertices.tolist() == [[0, 0], [2, -1], [2, -3], [3, 0]]
-    assert Wall.from_profile([0, 1, 2], [1, 0, 1], seam="step").vertices.tolist() == [[0, 0], [1, -1], [2, 0]]
-
-
-def test_a_level_profile_is_a_flat_wall():
-    for seam, period in (("mirror", 6.0), ("step", 3.0)):
-        wall = Wall.from_profile([1, 2, 4], [7, 7, 7], seam)
-        assert wall.vertices.tolist() == [[0.0, 0.0], [period, 0.0]]
-        assert wall.flat_top == period and wall.hollows == ()
-
-
 @given(
     st.lists(st.tuples(st.floats(1e-3, 10.0), st.integers(-3, 3)), min_size=2, max_size=15),
     st.sampled_from(["mirror", "step"]),
@@ -399,27 +278,3 @@ def test_every_profile_makes_a_closed_wall(rows, seam, unit):
     whole = 2 * length if seam == "mirror" else length + abs(height[-1] - height[0])
     assert wall.arc_length == pytest.approx(whole, rel=1e-13)
     assert wall.flat_top + sum(h.width for h in wall.hollows) == pytest.approx(wall.period, rel=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("x", "height", "seam", "words"),
-    [
-        ([0, 1, 1], [0, 1, 2], "mirror", "strictly increasing .* row 1"),
-        ([0, 2, 1], [0, 1, 2], "step", "strictly increasing"),
-        ([0], [0], "mirror", "at least 2"),
-        ([0, 1], [0, 1, 2], "mirror", "same length"),
-        ([0, 1], [0, float("nan")], "mirror", r"height: .* index \(1,\)"),
-        ([0, float("inf")], [0, 1], "mirror", "x: "),
-        ([0, 1], [0, 1], "glue", "seam"),
-    ],
-)
-def test_unsuitable_profiles_are_refused_in_words(x, height, seam, words):
-    with pytest.raises(InputError, match=words):
-        Wall.from_profile(x, height, seam)
-
-
-def test_a_tiny_loop_of_segments_is_found_beside_curves():
-    cave = Arc((0.25, 0), 0.25, pi, 2 * pi)
-    loop = polygon((0.5, 0), (0.75 + 1e-6, -0.2), (0.75 - 1e-6, -0.2), (1, 0))
-    with pytest.raises(WallError, match=r"piece 1 and piece 3 cross .*\(0.75, -0.199999\)"):
-        Wall([cave, *loop])
