@@ -194,38 +194,3 @@ def test_a_collision_with_the_flat_wall_is_a_reflection_at_the_normal():
     np.testing.assert_allclose(found.velocity[same], reflected[same], rtol=0, atol=1e-12)
     back = geo.plane_crossing(place[same], reflected[same])
     np.testing.assert_allclose(found.position[same], back, rtol=0, atol=1e-12)
-
-
-def angle_beyond_the_cylinder(space: geo.ConfigurationSpace, position, velocity, sign: float) -> np.ndarray:
-    """Return the outgoing angle of the cylinder's billiard that the disk's trajectory straightens to.
-
-    The entry is eta^-1 of the disk's with ``sign`` 1, the disk's own with 0, and by the printed formula with -1.
-    """
-    entry = position
-    for _ in range(30):  # a contraction by about the spacing
-        entry = position - sign * (space.charts.transfer(entry, velocity) - entry)
-    theta, _ = space.disk.to_angles(velocity)
-    return geo.trace(space.wall.foreshorten(space.disk), entry.sum(axis=-1) / space.scale, theta).theta
-
-
-def test_the_true_disk_follows_the_cylinder_if_the_entry_is_transferred():
-    disk, wall, count = geo.Disk(1.0, 0.5), geo.triangular_teeth(1.6), 2000
-    spacings, medians = [], []
-    for scale in (1e-4, 1e-6, 1e-8):
-        space = geo.ConfigurationSpace(wall, disk, scale)
-        rng = np.random.default_rng(12)
-        w = disk.from_angles(*rng.uniform(0.5, np.pi - 0.5, (2, count)))
-        position = np.stack([rng.uniform(0, 1, count) * scale, rng.uniform(-0.4, 0.4, count) * space.spacing], axis=-1)
-        hit = geo.collide(disk, wall, scale, position, -w)
-        assert hit.escaped.all() and hit.two_satellites.mean() < 0.01
-        angle, _ = disk.to_angles(hit.velocity)
-
-        def errors(sign, space=space, position=position, w=w, angle=angle):
-            return np.abs(angle - angle_beyond_the_cylinder(space, position, w, sign))
-
-        # of the order of rho, and hardly a trajectory takes other sides: next to corners only
-        other = [np.mean(errors(sign) > 20 * space.spacing) for sign in (1, 0, -1)]
-        assert other[0] < 0.01 and min(other[1:]) > 0.1, other
-        spacings.append(space.spacing)
-        medians.append(np.median(errors(1)))
-    assert np.polyfit(np.log(spacings), np.log(medians), 1)[0] == pytest.approx(1.0, abs=0.1)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaigns import modified_law
-from test_rigid import WALLS, states
 
 from asperity import geometry as geo
 from asperity.geometry.disk.satellites import Satellites
+from disk_shapes import WALLS, states
 
 RATIOS = (0.1, 1.0, 2.0, 10.0)
 
