@@ -1,180 +1,24 @@
-"""What tests share: a test that takes ``wall`` runs on every wall here, or on those that ``indirect`` names."""
+"""What tests share: a test that takes ``wall`` runs on all of them, or on those whose names it gives indirectly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
-from itertools import pairwise
 
-import numpy as np
 import pytest
-from campaigns.judges.bezier_pieces import parabola_as_a_cubic, wall_with_inflections
 
-from asperity import geometry as geo
-from asperity.geometry import Arc, Bezier, Segment
+from wall_shapes import CLOSED, OPEN
 
-# ---- walls and disks ---------------------------------------------------------------------------------------------
-pi = np.pi
-FLOOR = [(0.0, -0.9), (1.0, -0.9)]
+# ---- walls -------------------------------------------------------------------------------------------------------
+built = cache(lambda name: (CLOSED | OPEN)[name]())
 
 
-def segments(*points):
-    """The sides of a polygon with these vertices."""
-    return [Segment(p, q) for p, q in pairwise(points)]
-
-
-def over_floor(*islands):
-    """An open wall: islands above a flat floor."""
-    return geo.Wall(segments(*FLOOR), period=1.0, islands=list(islands))
-
-
-def plate(face):
-    """A plate without thickness: an island of a curve there and back."""
-    return over_floor([face, face.reversed()])
-
-
-def bumpy_floor():
-    """A floor whose corners are below y = 0 under a disk."""
-    floor = segments((0.0, -0.8), (0.5, -1.0), (1.0, -0.8))
-    return geo.Wall(floor, period=1.0, islands=[[Arc((0.4, -0.4), 0.2, 0.0, -2.0 * pi)]])
-
-
-def several_hollows():
-    """A notch, a flat top, a half circle, a trough and a flat top."""
-    arc = Arc((0.5, 0.0), 0.1, pi, 2.0 * pi)
-    left, right = [(0, 0), (0.1, -0.3), (0.3, 0), (0.4, 0)], [(0.6, 0), (0.65, -0.2), (0.85, -0.2), (0.9, 0), (1, 0)]
-    return geo.Wall([*segments(*left), arc, *segments(*right)])
-
-
-def valley_of_arcs():
-    """One hollow of five arcs, focusing and dispersing in turn, and a line."""
-    points = [(0, 0), (0.15, -0.25), (0.35, -0.4), (0.5, -0.5), (0.7, -0.35), (0.85, -0.3), (1, 0)]
-    pieces = segments(*points[:2])
-    for k, (start, end) in enumerate(pairwise(points[1:])):
-        (x0, y0), (x1, y1), side = start, end, 1.0 if k % 2 else -1.0
-        chord, bearing, half = np.hypot(x1 - x0, y1 - y0), np.arctan2(y1 - y0, x1 - x0), 0.5
-        rise = side * 0.5 * chord / np.tan(half)
-        centre = 0.5 * (x0 + x1) - rise * np.sin(bearing), 0.5 * (y0 + y1) + rise * np.cos(bearing)
-        middle = bearing - side * pi / 2
-        pieces.append(Arc(centre, 0.5 * chord / np.sin(half), middle - side * half, middle + side * half))
-    return geo.Wall(pieces)
-
-
-def funnel(top, bottom, depth):
-    """An isosceles trapezoid that narrows downwards, or upwards where bottom > top."""
-    left, right = [(0.5 - top / 2, 0), (0.5 - bottom / 2, -depth)], [(0.5 + bottom / 2, -depth), (0.5 + top / 2, 0)]
-    return geo.Wall.from_vertices([(0, 0), *left, *right, (1, 0)])
-
-
-def tilted_channel(angle):
-    """A channel with a flat end, tilted about its upper left joint, below an opening as wide as its mouth."""
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    inner = np.array([(0, 0), (0, -2.0), (0.05, -2.0), (0.05, 0)]) @ turn + np.array([0.4, -0.1])
-    return geo.Wall.from_vertices([(0, 0), (0.35, 0), *inner.tolist(), (max(inner[3, 0], 0.4) + 0.05, 0.0), (1, 0)])
-
-
-def random_teeth(count=400, seed=5):
-    """One hollow with a ragged floor of many long and short lines, overhanging in places."""
-    rng = np.random.default_rng(seed)
-    x = np.linspace(0.0, 1.0, count + 1)[1:-1] + 0.3 / count * (rng.random(count - 1) - 0.5)
-    y = -0.2 - 0.6 * rng.random(count - 1) ** 3
-    return geo.Wall.from_vertices([(0, 0), *zip(x, y, strict=True), (1, 0)])
-
-
-def comb(count=60):
-    """Parallel slots below a common opening: every line is long and runs through many cells of a grid."""
-    points = [(0.0, 0.0), (0.0, -1.0)]
-    for k in range(count):
-        left, right = (k + 0.4) / count, (k + 0.6) / count
-        points += [(left, -1.0), (left, -0.1), (right, -0.1), (right, -1.0)]
-    return geo.Wall.from_vertices([*points, (1.0, -1.0), (1.0, 0.0)])
-
-
-def curved_floor(count=80):
-    """Many lines and two Bezier pieces in one hollow."""
-    flank = [(0.3 * k / count, -0.5 * k / count - 0.01 * (k % 2)) for k in range(count)]
-    x, y = flank[-1]
-    curves = [Bezier([(x, y), (0.4, -0.9), (0.5, -0.4)]), Bezier([(0.5, -0.4), (0.6, -0.9), (1 - x, y)])]
-    return geo.Wall([*segments(*flank), *curves, *segments(*((1 - px, py) for px, py in reversed(flank)))])
-
-
-NOTCH = [(0, -0.9), (0.4, -0.9), (0.5, -0.2), (0.4, -0.9), (1, -0.9)]
-STEM = [(0, 0), (0.45, 0), (0.45, -3)], Bezier([(0.45, -3), (0.5, -2.6), (0.55, -3)]), [(0.55, -3), (0.55, 0), (1, 0)]
-CAVE = [(0, 0), (0.49, 0), (0.1, -0.1), (0.3, -0.9), (0.8, -0.8), (0.93, -0.15), (0.51, 0), (1, 0)]
-MIXED = Bezier([(0.2, -0.5), (0.3, -0.9), (0.5, -0.2), (0.6, -0.5)]), Bezier([(0.6, -0.5), (0.7, -0.5), (0.8, -0.3)])
-WALLS: dict[str, Callable[[], geo.Wall]] = {
-    **{name: entry.build for name, entry in geo.WALLS.items()},
-    # teeth
-    "sharpest teeth": lambda: geo.triangular_teeth(0.02),
-    "sharp teeth": lambda: geo.triangular_teeth(0.301),
-    "obtuse teeth": lambda: geo.triangular_teeth(pi - 1e-4),
-    "right angles": lambda: geo.triangular_teeth(pi / 2),
-    "saw": lambda: geo.Wall.from_vertices([(0, 0), (0, -0.6), (1, 0)]),
-    "leaning teeth": lambda: geo.Wall.from_vertices([(0, 0), (0.3, -0.5), (1, 0)]),
-    "shallowest teeth": lambda: geo.Wall.from_vertices([(0, 0), (0.5, -1e-9), (1, 0)]),
-    "deep teeth": lambda: geo.Wall.from_vertices([(0, 0), (0.5, -20.0), (1, 0)]),
-    "large teeth": lambda: geo.triangular_teeth(1.0).scaled(3e5),
-    "low teeth": lambda: geo.Wall.from_vertices([(0, -0.2), (0.1, -0.1), (0.4, -0.9), (0.7, -0.9), (1, -0.2)]),
-    "profile": lambda: geo.Wall.from_profile(np.arange(300), np.random.default_rng(4).random(300)),
-    "random teeth": random_teeth,
-    "comb": comb,
-    "koch 4": lambda: geo.koch(4),
-    "koch 6": lambda: geo.koch(6),
-    # channels, funnels and caves
-    "deep crevices": lambda: geo.rectangular_teeth(30.0),
-    "tilted channel": lambda: tilted_channel(0.3),
-    "channel tilted back": lambda: tilted_channel(-0.2),
-    "narrowing funnel": lambda: funnel(0.2, 0.05, 2.0),
-    "widening funnel": lambda: funnel(0.05, 0.2, 2.0),
-    "nearly a channel": lambda: funnel(0.1, 0.1 - 1e-9, 3.0),
-    "bulging bottom": lambda: geo.Wall([*segments(*STEM[0]), STEM[1], *segments(*STEM[2])]),
-    "overhang": lambda: geo.Wall.from_vertices([(0, 0), (0.4, 0), (0.2, -0.5), (0.9, -0.6), (0.6, 0), (1, 0)]),
-    "cave": lambda: geo.Wall.from_vertices(CAVE),
-    "mushrooms without stem": lambda: geo.mushrooms(0.3),
-    "narrowest mushrooms": lambda: geo.mushrooms(1e-8),
-    "long stems": lambda: geo.mushrooms(0.1, 4.0),
-    "mushrooms on mushrooms": lambda: geo.mushrooms(0.3, 0.5, 2),
-    "large mushrooms": lambda: geo.mushrooms(0.4, 1.0).scaled(3e5),
-    "small mushrooms": lambda: geo.mushrooms(0.3, 0.5).scaled(1e-6),
-    # arcs and Bezier pieces
-    "semicircles": lambda: geo.focusing_arcs(pi / 2),
-    "shallow arcs": lambda: geo.focusing_arcs(0.06),
-    "flattest arcs": lambda: geo.focusing_arcs(1e-8),
-    "cusps": lambda: geo.dispersing_arcs(2.0),
-    "several hollows": several_hollows,
-    "valley of arcs": valley_of_arcs,
-    "nearly parabolas": lambda: geo.Wall(
-        [
-            parabola_as_a_cubic((0, 0), (0, -0.7), (0.5, -1.4), 1e-13),
-            parabola_as_a_cubic((0.5, -1.4), (1, -0.7), (1, 0), -1e-6),
-        ]
-    ),
-    "inflections": wall_with_inflections,
-    "line and cubic": lambda: geo.Wall(
-        [
-            Bezier([(0, 0), (0.1, -0.5), (0.5, -0.6), (0.6, 0)]),
-            *segments((0.6, 0), (0.7, 0), (0.8, -0.4)),
-            Bezier([(0.8, -0.4), (0.85, -0.1), (1, 0)]),
-        ]
-    ),
-    "mixed": lambda: geo.Wall([*segments((0, 0), (0.2, -0.5)), *MIXED, *segments((0.8, -0.3), (1, 0))]),
-    "curved floor": curved_floor,
-    "many cubics": lambda: geo.random_wall(geo.HeightCorrelation(0.1), 16, rms_slope=0.5, smooth=True, rng=3),
-    # plates without thickness, and islands
-    "plate in a notch": lambda: geo.Wall.from_vertices([(0, 0), *NOTCH, (1, 0)]),
-    "floating plate": lambda: plate(Segment((0.2, -0.5), (0.7, -0.3))),
-    "plate on the floor": lambda: plate(Segment((0.2, -0.9), (0.7, -0.9))),
-    "plate in the opening": lambda: plate(Segment((0.2, 0.0), (0.7, 0.0))),
-    "plate in a side": lambda: plate(Segment((0.0, -0.9), (0.0, -0.3))),
-    "bent plate": lambda: plate(Arc((0.5, -0.6), 0.3, 2.5, 0.6)),
-    "elliptical plate": lambda: plate(Arc((0.5, -0.6), (0.3, 0.2), 2.5, 0.6)),
-    "cubic plate": lambda: plate(Bezier([(0.2, -0.5), (0.4, -0.1), (0.6, -0.8), (0.8, -0.4)])),
-    "island": bumpy_floor,
-}
-built = cache(lambda name: WALLS[name]())
-
-
-@pytest.fixture(params=WALLS)
+@pytest.fixture(params=CLOSED | OPEN)
 def wall(request):
     """Each wall by its name."""
+    return built(request.param)
+
+
+@pytest.fixture(params=CLOSED)
+def closed_wall(request):
+    """Each wall without islands."""
     return built(request.param)

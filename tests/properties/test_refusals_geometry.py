@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,31 +13,17 @@ from asperity import spectral as spec
 from asperity.errors import InputError, WallError
 from asperity.geometry import Arc, Bezier, Segment, Wall
 from asperity.geometry.cells import profile
+from wall_shapes import flask, polygon, square
 
 nan, inf, pi = math.nan, math.inf, math.pi
 DISK, ARC, TEETH = geo.Disk(), Arc((0, 0), 1, 0, 1), geo.triangular_teeth(1.2)
 
 
-def polygon(*corners):
-    return [Segment(p, q) for p, q in pairwise(corners)]
-
-
-def square(x, y, side):
-    return polygon((x, y), (x + side, y), (x + side, y + side), (x, y + side), (x, y))
-
-
 FLOOR, LOOP = polygon((0, -1), (1, -1)), polygon((0.5, 0), (0.75 + 1e-6, -0.2), (0.75 - 1e-6, -0.2), (1, 0))
 
 
-def over_floor(*islands):
-    return Wall(FLOOR, islands=list(islands))
-
-
-def flask(radius, neck=0.1):
-    """A round cavity below an opening of half width ``neck`` in the middle of the cell."""
-    tilt = math.asin(neck / radius)
-    cave = Arc((0.5, -radius * math.cos(tilt)), radius, pi / 2 + tilt, pi / 2 - tilt + 2 * pi)
-    return [Segment((0, 0), (0.5 - neck, 0)), cave, Segment((0.5 + neck, 0), (1, 0))]
+def islands(*loops):
+    return Wall(FLOOR, islands=list(loops))
 
 
 CURVES = [
@@ -59,14 +44,14 @@ CURVES = [
 ]
 
 WALLS = [
-    (lambda: Wall(flask(0.51)), "piece 1 crosses itself or the neighbouring period"),
+    (lambda: flask(0.51), "piece 1 crosses itself or the neighbouring period"),
     (lambda: Wall([Bezier([(0, 0), (1.6, -1.5), (-0.6, -1.5), (1, 0)])]), "piece 0 crosses itself"),
-    (lambda: over_floor(square(0.2, -0.5, 0.2), square(0.3, -0.45, 0.2)), "island 0 .* island 1"),
-    (lambda: over_floor(square(0.2, -1.1, 0.2)), "piece 0 .* of island 0"),
-    (lambda: over_floor(square(0.2, -1.5, 0.2)), "wrong side"),
-    (lambda: over_floor(square(0.9, -0.5, 0.2)), "piece 1 of island 0 leaves the cell .* roll"),
-    (lambda: over_floor(square(0.2, -0.1, 0.2)), "of island 0 rises to y = 0.1"),
-    (lambda: over_floor(square(0.2, -0.5, 0.2)[:3]), "pieces 2 and 0 of island 0 do not join"),
+    (lambda: islands(square(0.2, -0.5, 0.2), square(0.3, -0.45, 0.2)), "island 0 .* island 1"),
+    (lambda: islands(square(0.2, -1.1, 0.2)), "piece 0 .* of island 0"),
+    (lambda: islands(square(0.2, -1.5, 0.2)), "wrong side"),
+    (lambda: islands(square(0.9, -0.5, 0.2)), "piece 1 of island 0 leaves the cell .* roll"),
+    (lambda: islands(square(0.2, -0.1, 0.2)), "of island 0 rises to y = 0.1"),
+    (lambda: islands(square(0.2, -0.5, 0.2)[:3]), "pieces 2 and 0 of island 0 do not join"),
     (lambda: Wall.from_vertices([(0, 0), (0.2, nan), (1, 0)]), r"nan\) at vertex 1"),
     (lambda: Wall.from_vertices([(0, 0), (0.2, -1), (0.2, -1), (1, 0)]), "vertices 1 and 2 coincide"),
     (lambda: Wall.from_vertices([(0, 0), (0.5, 0.1), (1, 0)]), "piece 0 rises to y = 0.1 at x = 0.5"),

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
-import mpmath as mp
 import numpy as np
 import pytest
-from campaigns.judges.precise_tracer import trace_precisely
-from campaigns.robustness import WALLS, aimed_rays, grazing_rays, judge
+from campaigns.robustness import WALLS
 
 from asperity import geometry as geo
 from asperity.geometry.tracing.compiled.rays import SLOTS, trace_rays
@@ -17,26 +15,6 @@ from asperity.geometry.tracing.refinement import refined_trace
 from asperity.geometry.tracing.threads import new_flag
 
 RAYS = 3_000
-PRECISE_RAYS = 4
-
-
-@pytest.mark.parametrize("make", [aimed_rays, grazing_rays])
-@pytest.mark.parametrize("name", WALLS)
-def test_no_ray_is_lost_and_none_is_wrong_but_for_conditioning(name, make):
-    verdict = judge(WALLS[name], *make(WALLS[name], RAYS, np.random.default_rng(5)))
-    assert verdict.rays == RAYS and verdict.lost == 0 and verdict.wrong == 0
-
-
-@pytest.mark.parametrize("name", WALLS)
-def test_the_double_double_twin_agrees_with_fifty_digits(name):
-    scene = WALLS[name].scene
-    rng = np.random.default_rng(6)
-    x, theta = rng.random(PRECISE_RAYS), np.arccos(1.0 - 2.0 * rng.random(PRECISE_RAYS))
-    twin = refined_trace(scene, x, theta)
-    for i in range(PRECISE_RAYS):
-        ray = trace_precisely(scene, x[i], theta[i])
-        assert twin.status[i] == geo.Status.ESCAPED and ray.bounces == twin.collisions[i]
-        assert abs(ray.theta - mp.mpf(twin.theta[i, 0]) - mp.mpf(twin.theta[i, 1])) <= twin.rounding[i]
 
 
 def test_rays_over_many_bezier_pieces_hit_what_the_double_double_twin_hits():

@@ -11,34 +11,6 @@ from asperity import geometry as geo
 from asperity.errors import FileExistsRefusal, InputError
 
 pi = math.pi
-FLOOR = [geo.Segment((0, -1), (1, -1))]
-
-WALLS = {name: entry.build() for name, entry in geo.WALLS.items()}
-WALLS["flat arc"] = geo.focusing_arcs(1e-8)
-WALLS["mixed"] = geo.Wall(
-    [geo.Segment((0, 0), (0.1, -0.7)), geo.Bezier([(0.1, -0.7), (0.3, -2 / 3), (0.4, -1), (0.5, -0.1)]),
-     geo.Arc((0.75, -0.1), 0.25, pi, 2 * pi), geo.Segment((1, -0.1), (1, 0))]
-)  # fmt: skip
-WALLS["islands"] = geo.Wall(
-    FLOOR,
-    islands=[
-        [geo.Arc((0.3, -0.4), (0.1, 0.2), 0, 2 * pi)],
-        [geo.Segment((0.6, -0.5), (0.8, -0.5)), geo.Segment((0.8, -0.5), (0.6, -0.5))],
-    ],
-)
-WALLS["foreshortened"] = geo.dispersing_arcs(1 / 3).foreshorten(geo.Disk(1.0, 0.3)).scaled(1e-6)
-
-
-@pytest.mark.parametrize("name", WALLS)
-def test_a_saved_wall_is_read_back_to_the_bit(name, tmp_path):
-    wall = WALLS[name]
-    wall.save(tmp_path / "wall.toml")
-    again = geo.load_wall(tmp_path / "wall.toml")
-    assert again == wall
-    assert repr(again.vertices.tolist()) == repr(wall.vertices.tolist())
-    assert again.arc_length == wall.arc_length and again.hollows == wall.hollows
-    again.save(str(tmp_path / "again.toml"))
-    assert (tmp_path / "again.toml").read_bytes() == (tmp_path / "wall.toml").read_bytes()
 
 
 @given(st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(1e-12, 2.0)), min_size=1, max_size=6))
