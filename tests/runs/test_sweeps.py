@@ -18,7 +18,6 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.cli import main
-from asperity.core import checkpoints
 
 GRID = {"diffuse_fraction": [0.25, 0.5, 1.0]}
 EVERYTHING = ["gap", "gap_specular", "slem", "relaxation_time", "resistance", "eta", "accommodation"]
@@ -182,24 +181,6 @@ def test_the_picture_marks_verdicts_and_shades_where_there_is_no_gap():
 
 
 # ---- checkpoints ------------------------------------------------------------------------------------------------
-def test_a_sweep_goes_on_where_it_was(tmp_path):
-    calls = []
-
-    def gap(law):
-        calls.append(law)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return spec.spectral_gap(law)
-
-    path = tmp_path / "arcs.sweep"
-    with pytest.raises(KeyboardInterrupt, match=r"stopped after 1 of 3 points, which are in .*arcs\.sweep"):
-        spec.sweep(ker.maxwell, GRID, gap, checkpoint=path, key="counted gaps")
-    # the list of calls has grown, so that the function is told by its name alone
-    table = spec.sweep(ker.maxwell, GRID, gap, checkpoint=path, key="counted gaps")
-    assert len(calls) == 4
-    assert without_seconds(table) == without_seconds(spec.sweep(ker.maxwell, GRID, gap))
-    # nothing is left to do
-    assert spec.sweep(ker.maxwell, GRID, gap, checkpoint=path, key="counted gaps") == table and len(calls) == 7
 
 
 def test_checkpoints_hold_text_and_no_pickle(tmp_path):
@@ -211,26 +192,6 @@ def test_checkpoints_hold_text_and_no_pickle(tmp_path):
     assert len(parts) == 3
     assert all(kind == "text" and json.loads(value) and json.loads(key) for key, value, kind in parts)
     assert [path.name for path in tmp_path.iterdir()] == ["arcs.sweep"]
-
-
-@pytest.mark.parametrize(
-    "changed, words",
-    [
-        ({"tolerance": 1e-3}, "tolerance: 1e-06 there, 0.001 here"),
-        ({"quantities": ["eta"]}, "quantities: ['gap'] there, ['eta'] here"),
-        ({"grid": {"diffuse_fraction": [0.25, 0.5]}}, "grid.diffuse_fraction: '3 from 0.25 to 1.0"),
-        ({"family": lambda diffuse_fraction: ker.maxwell(diffuse_fraction / 2.0)}, "last wall"),
-    ],
-)
-def test_the_checkpoint_of_something_else_is_refused_with_the_difference(tmp_path, changed, words):
-    path = tmp_path / "arcs.sweep"
-    asked = {"family": ker.maxwell, "grid": GRID, "quantities": ["gap"], "tolerance": 1e-6}
-    spec.sweep(**asked, checkpoint=path)
-    before = path.read_bytes()
-    with pytest.raises(InputError) as refusal:
-        spec.sweep(**{**asked, **changed}, checkpoint=path)
-    assert words in str(refusal.value) and "is the checkpoint of something else" in str(refusal.value)
-    assert path.read_bytes() == before
 
 
 def test_a_wall_in_the_middle_that_has_changed_is_noticed(tmp_path):
@@ -267,30 +228,6 @@ def test_another_database_is_refused_and_unharmed(tmp_path):
     with pytest.raises(InputError, match="a database of something else"):
         spec.sweep(ker.maxwell, GRID, checkpoint=tmp_path / "a")
     assert (tmp_path / "a").read_bytes() == before
-
-
-def test_a_second_process_is_refused(tmp_path):
-    def second(law):
-        with pytest.raises(FileExistsRefusal, match="in use by another process"):
-            checkpoints.Checkpoint(tmp_path / "a", {})
-        return Estimate(0.0, 0.0, "bound", "refused")
-
-    table = spec.sweep(ker.maxwell, GRID, second, checkpoint=tmp_path / "a")
-    assert [row.message for row in table.rows] == [""] * 3
-
-
-def test_a_full_disk_stops_with_a_message_and_loses_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpoints, "MOMENT", 0.0)
-    path = tmp_path / "a"
-    with checkpoints.Checkpoint(path, {"seed": 1}) as store:
-        # pages beyond these are as good as a full disk for SQLite
-        store._file.execute("PRAGMA max_page_count = 20")
-        with pytest.raises(InputError, match=r"database or disk is full.*what was written before is safe"):
-            for number in range(1000):
-                store.put(f"{number:04d}", "x" * 1000)
-    with checkpoints.Checkpoint(path, {"seed": 1}) as store:
-        stored = dict(store.parts())
-    assert 10 < len(stored) == number and set(stored.values()) == {"x" * 1000}
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
