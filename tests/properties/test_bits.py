@@ -236,7 +236,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_bits_and_computes_no_part_tw
     assert parts > 4 and RUNS[name]().tobytes() == whole.tobytes()
     keys.clear()
     stop.append(3)
-    with pytest.raises(KeyboardInterrupt, match="stopped.*the same call"):
+    with pytest.raises(KeyboardInterrupt, match=r"stopped.*the same call"):
         RUNS[name](checkpoint=tmp_path / "a")
     stop.clear()
     assert RUNS[name](checkpoint=tmp_path / "a").tobytes() == whole.tobytes() and len(keys) == parts

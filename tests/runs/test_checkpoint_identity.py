@@ -290,7 +290,6 @@ def test_every_function_that_takes_a_checkpoint_is_here_and_takes_a_key():
 
 
 @pytest.mark.parametrize("name", CALLS)
-@pytest.mark.parametrize("name", CALLS)
 def test_the_checkpoint_of_one_computation_is_its_own_and_never_taken_for_another(name, tmp_path):
     one, other = CALLS[name]
     first, again = (one(checkpoint=tmp_path / "a") for _ in range(2))

@@ -270,28 +270,18 @@ def test_each_value_of_the_other_parameters_has_its_own_curve():
 
 
 # ---- extremes ---------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("evaluations", [0, 4, 12])
+@pytest.mark.parametrize("evaluations", [0, 4, 12, 60])
 @pytest.mark.parametrize("error", [1e-12, 1e-3])
-@pytest.mark.parametrize("top", [0.3, 0.5123, 0.77])
-def test_few_evaluations_leave_a_larger_error_that_holds_too(top, error, evaluations):
+@pytest.mark.parametrize("top", [0.3, 0.5123])
+def test_an_extremum_has_errors_that_hold_and_that_evaluations_make_smaller(top, error, evaluations):
     family, quantity = parabola(top, error)
     table = spec.sweep(family, {"diffuse_fraction": np.linspace(0.1, 0.9, 7)}, quantity)
     found = table.extremum(evaluations=evaluations)
     assert abs(found.parameter.value - top) <= found.parameter.error
     assert abs(found.value.value - 1.0) <= found.value.error < 0.02
-    assert found.evaluations <= evaluations
-
-
-@pytest.mark.parametrize("error", [1e-12, 1e-6, 1e-3])
-@pytest.mark.parametrize("top", [0.3, 0.5123, 0.77])
-def test_the_extremum_is_refined_with_errors_that_hold(top, error):
-    family, quantity = parabola(top, error)
-    table = spec.sweep(family, {"diffuse_fraction": np.linspace(0.1, 0.9, 7)}, quantity)
-    found = table.extremum(evaluations=60)
-    assert abs(found.parameter.value - top) <= found.parameter.error
-    assert abs(found.value.value - 1.0) <= found.value.error
-    assert found.value.error < 10.0 * error + 1e-9 and found.parameter.error < 5.0 * np.sqrt(error) + 1e-4
-    assert not found.at_end and found.largest and found.evaluations <= 60
+    assert not found.at_end and found.largest and found.evaluations <= evaluations
+    if evaluations == 60:
+        assert found.value.error < 10.0 * error + 1e-9 and found.parameter.error < 5.0 * np.sqrt(error) + 1e-4
 
 
 def test_the_smallest_value_and_the_end_of_a_sweep():

@@ -6,45 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 from scipy.stats import ks_2samp
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from disk_shapes import PAIR, RADII, VELOCITY, bodies, starts
-
-
-def plain_first_contact(first, second, position, velocity):
-    """The first time at which two satellites touch, from values on a dense grid; for few satellites."""
-    turns = [2.0 * np.pi * np.arange(body.count) / body.count for body in (first, second)]
-
-    def gap(time):
-        points = []
-        for k, body in enumerate((first, second)):
-            x, y, turn = position[k] + velocity[k] * time
-            points.append((x + 1j * y) + body.radius * np.exp(1j * (turn + turns[k])))
-        return float(np.min(np.abs(points[0][:, None] - points[1][None, :]))) - first.size - second.size
-
-    times = np.linspace(0.0, 3.0, 6001)
-    values = np.array([gap(time) for time in times])
-    crossing = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))
-    return brentq(gap, times[crossing[0]], times[crossing[0] + 1], xtol=1e-14) if len(crossing) else None
-
-
-@pytest.mark.slow
-def test_the_first_contact_is_that_of_a_dense_search():
-    first, second = geo.SatelliteDisk(PAIR[0], 5, 0.15), geo.SatelliteDisk(PAIR[1], 7, 0.1, 1.5)
-    rng = np.random.default_rng(1)
-    for _ in range(15):
-        position = np.array([[0.0, 3.0, rng.uniform(0, 7)], [0.0, 0.0, rng.uniform(0, 7)]])
-        velocity = np.array([[rng.uniform(-1, 1), -1.0, rng.uniform(-3, 3)], [0.0, 0.0, rng.uniform(-3, 3)]])
-        expected = plain_first_contact(first, second, position, velocity)
-        hit = geo.collide_pair(first, second, [position], [velocity], max_contacts=1)
-        if expected is None:
-            assert hit.contacts[0] == 0 and hit.status[0] == geo.Status.ESCAPED
-        else:
-            assert hit.contacts[0] == 1
-            assert math.isclose(hit.time[0], expected, abs_tol=1e-11)
 
 
 @pytest.mark.slow
