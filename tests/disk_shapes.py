@@ -73,6 +73,6 @@ def bodies(count):
 def starts(first, second, n, seed=0):
     """The first disk just above the second at random angles."""
     position = np.zeros((n, 2, 3))
-    position[:, 0, 1] = first.largest + second.largest + 0.01
+    position[:, 0, 1] = first.largest + second.largest + 2e-3 * np.pi / first.count
     position[:, :, 2] = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, (n, 2))
     return position, np.tile(VELOCITY, (n, 1, 1))

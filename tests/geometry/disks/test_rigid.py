@@ -20,12 +20,12 @@ SCALES = (1e-1, 1e-2, 1e-4, 1e-6, 1e-8)
 @pytest.mark.parametrize(
     ("name", "scale", "n"),
     [
-        ("triangular", 1e-1, 2500),
-        ("triangular", 1e-2, 2500),
-        ("rectangular", 1e-1, 750),
-        ("rectangular", 1e-3, 750),
-        ("focusing", 1e-2, 2000),
-        ("dispersing", 1e-1, 1500),
+        ("triangular", 1e-1, 600),
+        ("triangular", 1e-2, 600),
+        ("rectangular", 1e-1, 300),
+        ("rectangular", 1e-3, 300),
+        ("focusing", 1e-2, 600),
+        ("dispersing", 1e-1, 500),
     ],
 )
 def test_no_contact_is_missed_by_comparison_with_steps_of_the_distance(name, scale, n):
@@ -36,13 +36,13 @@ def test_no_contact_is_missed_by_comparison_with_steps_of_the_distance(name, sca
     place, outgoing, contacts = collide_plainly(DISK, wall, scale, spacing, position, velocity)
     # the twin gives up where a satellite creeps along a piece, farther from it than its limit, for 20,000 steps
     done = ~np.isnan(outgoing[:, 0])
-    assert done.mean() > 0.998
+    assert done.mean() > 0.99
     assert np.array_equal(contacts[done], out.contacts[done])
     # the twin stops at 1e-11 from the wall, and a few contacts on curved pieces magnify that
     np.testing.assert_allclose(outgoing[done], out.velocity[done], atol=1e-7)
     np.testing.assert_allclose(place[done], out.position[done], atol=1e-7)
     if name == "triangular":
-        assert np.count_nonzero(out.two_satellites) > 100
+        assert np.count_nonzero(out.two_satellites) > 20
 
 
 def test_an_overhang_keeps_the_satellites_that_are_below_it():

@@ -118,7 +118,7 @@ def test_a_no_slip_disk_in_a_circle_keeps_its_angle_of_incidence_every_second_ti
 @pytest.mark.parametrize("spinning", [False, True])
 @pytest.mark.parametrize("name", TABLES)
 def test_the_starts_are_in_equilibrium_and_fly_as_far_as_santalo_says(name, spinning):
-    table, rng, n = TABLES[name], np.random.default_rng(6), 20_000
+    table, rng, n = TABLES[name], np.random.default_rng(6), 6_000
     position, velocity, wall = equilibrium_starts(table, DISK, n, spinning, rng)
     flight, _, _ = table.next_wall(position, velocity, wall)
     # volume over flux of the phase space: directions 2 pi over 2 on the circle, 4 pi over pi on the sphere

@@ -69,8 +69,6 @@ def test_flags_in_deep_channels_are_settled_where_half_an_ulp_of_the_angle_meets
     assert 0 < np.sum(~traced.escaped) < 100
 
 
-
-
 @pytest.mark.parametrize("angle", [3e-9, 1e-7, 1e-5, 1e-3, 0.02, 0.29])
 @pytest.mark.parametrize("middle", [0.5, 0.83])
 def test_rays_that_pass_an_apex_at_any_distance_are_those_of_the_unfolded_wedge(angle, middle):
