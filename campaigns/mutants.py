@@ -52,8 +52,8 @@ TESTS = {
     "kernels/bases/panels.py": ("kernels/matrices/test_weights_and_bases.py",),
     "kernels/collisions/collision_law.py": ("kernels/collisions/test_collision_maps.py",),
     "kernels/bases/measure.py": ("kernels/matrices/test_weights_and_bases.py",),
-    "geometry/disk/disk.py": ("geometry/disks/test_disk.py",),
-    "geometry/cells/profile.py": ("geometry/walls/test_profiles.py",),
+    "geometry/disk/disk.py": ("geometry/disks/test_disk.py", "properties/test_refusals_geometry.py"),
+    "geometry/cells/profile.py": ("geometry/walls/test_profiles.py", "properties/test_refusals_geometry.py"),
 }
 # Kinds of mutants: plausible human errors, not every operator exchanged with every other.
 KINDS = (

@@ -10,7 +10,6 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import InputError
 
 
 @pytest.mark.parametrize("g", [-0.5, 0.0, 0.3, 0.8, 0.95, 0.99])
@@ -68,10 +67,3 @@ def test_where_no_theorem_decides_the_value_is_a_lower_bound():
     assert norm.error == math.inf and norm.compact is None
     larger = np.linalg.norm(ker.discretise(ker.CircularArcLaw(1.2), ker.Legendre(64)).symmetric)
     assert float(norm) <= larger
-
-
-def test_wrong_arguments_are_refused():
-    with pytest.raises(InputError, match="law"):
-        spec.hilbert_schmidt_norm(0.5)
-    with pytest.raises(InputError, match="tolerance"):
-        spec.hilbert_schmidt_norm(ker.lambertian(), 0.0)

@@ -144,25 +144,6 @@ def test_the_error_of_a_mean_law_covers_the_law():
     np.testing.assert_allclose(np.mean(found.replicates, axis=0), found.symmetric, atol=1e-15)
 
 
-def test_a_stopped_mean_law_goes_on_to_the_same_bits(tmp_path):
-    whole = spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1)
-    calls = []
-
-    def stops(rng):
-        calls.append(rng)
-        if len(calls) == 6:
-            raise KeyboardInterrupt
-        return half_diffuse(rng)
-
-    stops.__module__, stops.__qualname__ = half_diffuse.__module__, half_diffuse.__qualname__
-    with pytest.raises(KeyboardInterrupt, match="the same call goes on"):
-        spec.mean_law(stops, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a", key="half diffuse")
-    again = spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a", key="half diffuse")
-    assert again.symmetric.tobytes() == whole.symmetric.tobytes() and again.error == whole.error
-    with pytest.raises(InputError, match="seed"):
-        spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=2, checkpoint=tmp_path / "a", key="half diffuse")
-
-
 @pytest.mark.slow
 def test_the_deficit_of_gentle_gaussian_walls_is_four_times_their_mean_squared_slope():
     pytest.importorskip("SurfaceTopography")
@@ -201,13 +182,6 @@ def test_the_frame_has_a_line_for_each_quantity():
     assert list(frame["quantity"]) == ["gap", "eta"] and (frame["mean_error"] > 0.0).all()
     with pytest.raises(InputError, match="gap, eta"):
         spec.ensemble(half_diffuse, 6, ["gap", "eta"]).of("slem")
-
-
-def test_too_few_realisations_are_refused():
-    with pytest.raises(InputError, match="realisations"):
-        spec.ensemble(half_diffuse, 3)
-    with pytest.raises(InputError, match="basis"):
-        spec.mean_law(half_diffuse, 5, 8)
 
 
 # ---- the command line -------------------------------------------------------------------------------------------

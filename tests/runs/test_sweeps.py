@@ -18,7 +18,6 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.cli import main
-from asperity.core import checkpoints
 
 GRID = {"diffuse_fraction": [0.25, 0.5, 1.0]}
 EVERYTHING = ["gap", "gap_specular", "slem", "relaxation_time", "resistance", "eta", "accommodation"]
@@ -107,27 +106,6 @@ def test_refusals_are_rows_and_stop_no_other_point():
     assert found[0.5, "eta"].value == pytest.approx(3.0) and found[0.5, "eta"].message == ""
 
 
-@pytest.mark.parametrize(
-    "arguments, words",
-    [
-        ((ker.maxwell, {}), "expected values by parameter"),
-        ((ker.maxwell, {"angle": [1.0]}), "cannot be called with angle"),
-        ((ker.maxwell, {"diffuse_fraction": []}), "at least one"),
-        ((ker.maxwell, {"diffuse_fraction": [float("nan")]}), "numbers or texts"),
-        ((ker.maxwell, {"diffuse_fraction": [0.5, 0.5]}), "different values"),
-        ((ker.maxwell, GRID, "lambda"), "expected one of gap"),
-        ((ker.maxwell, GRID, []), "got none"),
-        ((ker.maxwell, GRID, ["gap", "gap"]), "'gap' twice"),
-        ((ker.maxwell, GRID, "gap", 0.0), "greater than 0"),
-        ((0.5, GRID), "expected a function that returns a wall"),
-    ],
-)
-def test_a_sweep_of_nonsense_is_refused_before_the_work(arguments, words):
-    with pytest.raises(InputError, match=None) as refusal:
-        spec.sweep(*arguments)
-    assert words in str(refusal.value)
-
-
 # ---- the forms of a table ---------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def table():
@@ -137,8 +115,6 @@ def table():
 def test_json_gives_the_table_back_to_the_bit(table):
     again = spec.SweepTable.of_json(table.to_json())
     assert again == table
-    with pytest.raises(InputError, match="expected what"):
-        spec.SweepTable.of_json("[]")
 
 
 def test_infinite_errors_survive_json():
@@ -205,24 +181,6 @@ def test_the_picture_marks_verdicts_and_shades_where_there_is_no_gap():
 
 
 # ---- checkpoints ------------------------------------------------------------------------------------------------
-def test_a_sweep_goes_on_where_it_was(tmp_path):
-    calls = []
-
-    def gap(law):
-        calls.append(law)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return spec.spectral_gap(law)
-
-    path = tmp_path / "arcs.sweep"
-    with pytest.raises(KeyboardInterrupt, match=r"stopped after 1 of 3 points, which are in .*arcs\.sweep"):
-        spec.sweep(ker.maxwell, GRID, gap, checkpoint=path, key="counted gaps")
-    # the list of calls has grown, so that the function is told by its name alone
-    table = spec.sweep(ker.maxwell, GRID, gap, checkpoint=path, key="counted gaps")
-    assert len(calls) == 4
-    assert without_seconds(table) == without_seconds(spec.sweep(ker.maxwell, GRID, gap))
-    # nothing is left to do
-    assert spec.sweep(ker.maxwell, GRID, gap, checkpoint=path, key="counted gaps") == table and len(calls) == 7
 
 
 def test_checkpoints_hold_text_and_no_pickle(tmp_path):
@@ -234,26 +192,6 @@ def test_checkpoints_hold_text_and_no_pickle(tmp_path):
     assert len(parts) == 3
     assert all(kind == "text" and json.loads(value) and json.loads(key) for key, value, kind in parts)
     assert [path.name for path in tmp_path.iterdir()] == ["arcs.sweep"]
-
-
-@pytest.mark.parametrize(
-    "changed, words",
-    [
-        ({"tolerance": 1e-3}, "tolerance: 1e-06 there, 0.001 here"),
-        ({"quantities": ["eta"]}, "quantities: ['gap'] there, ['eta'] here"),
-        ({"grid": {"diffuse_fraction": [0.25, 0.5]}}, "grid.diffuse_fraction: '3 from 0.25 to 1.0"),
-        ({"family": lambda diffuse_fraction: ker.maxwell(diffuse_fraction / 2.0)}, "last wall"),
-    ],
-)
-def test_the_checkpoint_of_something_else_is_refused_with_the_difference(tmp_path, changed, words):
-    path = tmp_path / "arcs.sweep"
-    asked = {"family": ker.maxwell, "grid": GRID, "quantities": ["gap"], "tolerance": 1e-6}
-    spec.sweep(**asked, checkpoint=path)
-    before = path.read_bytes()
-    with pytest.raises(InputError) as refusal:
-        spec.sweep(**{**asked, **changed}, checkpoint=path)
-    assert words in str(refusal.value) and "is the checkpoint of something else" in str(refusal.value)
-    assert path.read_bytes() == before
 
 
 def test_a_wall_in_the_middle_that_has_changed_is_noticed(tmp_path):
@@ -290,30 +228,6 @@ def test_another_database_is_refused_and_unharmed(tmp_path):
     with pytest.raises(InputError, match="a database of something else"):
         spec.sweep(ker.maxwell, GRID, checkpoint=tmp_path / "a")
     assert (tmp_path / "a").read_bytes() == before
-
-
-def test_a_second_process_is_refused(tmp_path):
-    def second(law):
-        with pytest.raises(FileExistsRefusal, match="in use by another process"):
-            checkpoints.Checkpoint(tmp_path / "a", {})
-        return Estimate(0.0, 0.0, "bound", "refused")
-
-    table = spec.sweep(ker.maxwell, GRID, second, checkpoint=tmp_path / "a")
-    assert [row.message for row in table.rows] == [""] * 3
-
-
-def test_a_full_disk_stops_with_a_message_and_loses_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpoints, "MOMENT", 0.0)
-    path = tmp_path / "a"
-    with checkpoints.Checkpoint(path, {"seed": 1}) as store:
-        # pages beyond these are as good as a full disk for SQLite
-        store._file.execute("PRAGMA max_page_count = 20")
-        with pytest.raises(InputError, match=r"database or disk is full.*what was written before is safe"):
-            for number in range(1000):
-                store.put(f"{number:04d}", "x" * 1000)
-    with checkpoints.Checkpoint(path, {"seed": 1}) as store:
-        stored = dict(store.parts())
-    assert 10 < len(stored) == number and set(stored.values()) == {"x" * 1000}
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
@@ -353,33 +267,21 @@ def test_each_value_of_the_other_parameters_has_its_own_curve():
     table = spec.sweep(lambda a, b: ker.maxwell(a * b), grid, "gap")
     assert [row.point["b"] for row in table.rows] == [0.5] * 6 + [1.0] * 6
     assert not table.zipped or table.to_xarray().sizes == {"point": 12}
-    with pytest.raises(InputError, match="greater than low"):
-        spec.Between(1.0, 0.0)
 
 
 # ---- extremes ---------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("evaluations", [0, 4, 12])
+@pytest.mark.parametrize("evaluations", [0, 4, 12, 60])
 @pytest.mark.parametrize("error", [1e-12, 1e-3])
-@pytest.mark.parametrize("top", [0.3, 0.5123, 0.77])
-def test_few_evaluations_leave_a_larger_error_that_holds_too(top, error, evaluations):
+@pytest.mark.parametrize("top", [0.3, 0.5123])
+def test_an_extremum_has_errors_that_hold_and_that_evaluations_make_smaller(top, error, evaluations):
     family, quantity = parabola(top, error)
     table = spec.sweep(family, {"diffuse_fraction": np.linspace(0.1, 0.9, 7)}, quantity)
     found = table.extremum(evaluations=evaluations)
     assert abs(found.parameter.value - top) <= found.parameter.error
     assert abs(found.value.value - 1.0) <= found.value.error < 0.02
-    assert found.evaluations <= evaluations
-
-
-@pytest.mark.parametrize("error", [1e-12, 1e-6, 1e-3])
-@pytest.mark.parametrize("top", [0.3, 0.5123, 0.77])
-def test_the_extremum_is_refined_with_errors_that_hold(top, error):
-    family, quantity = parabola(top, error)
-    table = spec.sweep(family, {"diffuse_fraction": np.linspace(0.1, 0.9, 7)}, quantity)
-    found = table.extremum(evaluations=60)
-    assert abs(found.parameter.value - top) <= found.parameter.error
-    assert abs(found.value.value - 1.0) <= found.value.error
-    assert found.value.error < 10.0 * error + 1e-9 and found.parameter.error < 5.0 * np.sqrt(error) + 1e-4
-    assert not found.at_end and found.largest and found.evaluations <= 60
+    assert not found.at_end and found.largest and found.evaluations <= evaluations
+    if evaluations == 60:
+        assert found.value.error < 10.0 * error + 1e-9 and found.parameter.error < 5.0 * np.sqrt(error) + 1e-4
 
 
 def test_the_smallest_value_and_the_end_of_a_sweep():
@@ -389,20 +291,6 @@ def test_the_smallest_value_and_the_end_of_a_sweep():
     assert abs(least.value.value - 0.01) <= least.value.error
     most = table.extremum("gap")
     assert most.at_end and most.value.value == 0.9 and abs(most.parameter.value - 0.9) <= most.parameter.error
-
-
-def test_an_extremum_needs_one_numeric_parameter_and_a_family():
-    table = spec.sweep(ker.maxwell, GRID)
-    with pytest.raises(InputError, match="was read"):
-        spec.SweepTable.of_json(table.to_json()).extremum()
-    with pytest.raises(InputError, match="expected one of gap"):
-        table.extremum("eta")
-    two = spec.sweep(lambda a, b: ker.maxwell(a * b), {"a": [0.1, 0.2], "b": [1.0]})
-    with pytest.raises(InputError, match="expected one parameter"):
-        two.extremum()
-    refused = spec.sweep(ker.maxwell, {"diffuse_fraction": [3.0]})
-    with pytest.raises(InputError, match="no point of the sweep has a value"):
-        refused.extremum()
 
 
 # ---- the command line -------------------------------------------------------------------------------------------

@@ -8,41 +8,13 @@ import mpmath as mp
 import numpy as np
 import pytest
 from campaigns.judges.precise_collision import Flight
-from campaigns.judges.random_curved_walls import COUNT, random_curved_wall
-from test_rigid import DISK, states
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.collisions.compiled import graph_table as graphs
 from asperity.geometry.collisions.records import ground_of
 from asperity.geometry.disk.satellites import Satellites
-
-PARABOLAS = geo.double_parabola()
-# an overhang, an inflection, a bump, and a corner
-WAVES = geo.Wall(
-    [
-        geo.Bezier([(0, 0), (0.25, -0.1), (-0.05, -0.5), (0.4, -0.5)]),
-        geo.Bezier([(0.4, -0.5), (0.55, -0.1), (0.75, -0.6), (0.8, -0.2)]),
-        geo.Bezier([(0.8, -0.2), (0.85, 0), (1, 0)]),
-    ]
-)
-# b' = 0 at the start: the piece begins with control points that coincide
-STILL = geo.Wall(
-    [geo.Bezier([(0, 0), (0, 0), (0.4, -0.7), (0.5, -0.7)]), geo.Bezier([(0.5, -0.7), (0.8, -0.7), (1, 0)])]
-)
-WALLS = {"parabolas": PARABOLAS, "waves": WAVES, "still": STILL}
-
-
-@pytest.mark.parametrize("name", WALLS)
-@pytest.mark.parametrize("scale", [1e-1, 1e-4, 1e-8])
-def test_a_collision_with_bezier_pieces_is_an_involution_that_keeps_the_energy(name, scale):
-    position, velocity = states(WALLS[name], scale, 1000)
-    out = geo.collide(DISK, WALLS[name], scale, position, velocity)
-    assert out.escaped.all()
-    np.testing.assert_allclose(DISK.inner(out.velocity, out.velocity), 1.0, rtol=1e-13)
-    back = geo.collide(DISK, WALLS[name], scale, out.position, -out.velocity)
-    assert np.median(np.abs(back.velocity + velocity)) < 1e-11
-    assert np.mean(back.contacts == out.contacts) >= 0.999
+from disk_shapes import BEZIERS, DISK, PARABOLAS, WAVES, states
 
 
 class ParabolaFlight(Flight):
@@ -135,7 +107,7 @@ def test_straight_bezier_pieces_collide_like_segments():
 
 
 def test_the_parts_of_a_piece_are_graphs_within_their_bounds():
-    for wall in WALLS.values():
+    for wall in BEZIERS.values():
         table, beziers = ground_of(wall.scene).graphs, wall.scene.beziers
         for row in table:
             sigma = np.linspace(row[graphs.LEAST_SIGMA], row[graphs.MOST_SIGMA], 41)
@@ -181,19 +153,6 @@ def test_double_parabolas_of_shrinking_scale_approach_no_slip():
     assert reached[0] > reached[1] > reached[2]
     assert reached[2] == pytest.approx(0.054, abs=0.003)
     assert math.isclose(float(ker.distance(ker.WallLaw(PARABOLAS), ker.retroreflection())), 0.0581, abs_tol=3e-4)
-
-
-@pytest.mark.parametrize("number", range(0, COUNT, 3))
-def test_disks_return_from_random_curved_walls_and_retrace_their_way(number):
-    wall = random_curved_wall(number)
-    for scale in (1e-1, 1e-3):
-        position, velocity = states(wall, scale, 500, seed=number)
-        out = geo.collide(DISK, wall, scale, position, velocity)
-        assert out.escaped.all()
-        back = geo.collide(DISK, wall, scale, out.position, -out.velocity)
-        # a few states amplify rounding by ten orders
-        assert np.mean(np.abs(back.velocity + velocity).max(axis=1) < 1e-4) >= 0.996
-        assert np.mean(back.contacts == out.contacts) >= 0.996
 
 
 def test_the_double_parabola_is_near_no_slip_in_the_papers_pseudometric():

@@ -7,7 +7,6 @@ import sympy
 from campaigns.judges.differentiation import complex_steps
 
 from asperity import geometry as geo
-from asperity.errors import InputError
 from asperity.geometry.disk import rolling
 from asperity.geometry.disk.rolling import SERIES_ANGLE
 from asperity.ledger import index as ledger
@@ -214,21 +213,6 @@ def test_the_transfer_is_the_identity_up_to_the_spacing(disk):
     assert fitted_order(defect) == pytest.approx(1.0, abs=0.02)
     rho = 2 * np.pi / 6400
     assert defect(geo.RollingCharts(rho)) == pytest.approx(0.25 * rho * np.sqrt(disk.inertia), rel=5e-3)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: geo.RollingCharts(1.0), "2 pi divided by a whole number"),
-        (lambda: geo.RollingCharts(2 * np.pi / 3), "at least 4"),
-        (lambda: geo.RollingCharts(np.pi / 4, scale=0.0), "scale: expected a number greater than 0"),
-        (lambda: geo.plane_crossing([0, 1, 0], [1, 0, 1]), "v2 other than 0"),
-        (lambda: geo.RollingCharts(np.pi / 4).transfer([0, 0, 0], [1, 1, 1]), r"shape \(..., 2\)"),
-    ],
-)
-def test_bad_input_is_refused_with_advice(make, message):
-    with pytest.raises(InputError, match=message):
-        make()
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import shapely
 from campaigns.judges.differentiation import complex_steps
 
 from asperity import geometry as geo
-from asperity.errors import InputError
 from asperity.geometry.disk import rolling
 
 WALLS = [
@@ -230,19 +229,3 @@ def test_the_true_disk_follows_the_cylinder_if_the_entry_is_transferred():
         spacings.append(space.spacing)
         medians.append(np.median(errors(1)))
     assert np.polyfit(np.log(spacings), np.log(medians), 1)[0] == pytest.approx(1.0, abs=0.1)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: geo.ConfigurationSpace(geo.koch(2), geo.Disk(), 5.0), "at most two satellites"),
-        (lambda: geo.ConfigurationSpace(geo.flat(), None, 0.1), "disk: expected a Disk such as"),
-        (lambda: geo.ConfigurationSpace(geo.koch(2), geo.Disk(), 0.1, np.pi / 50), "at most two satellites"),
-        (lambda: geo.ConfigurationSpace(geo.flat(), geo.Disk(), 0.1).contains([0.0, 1.0]), r"shape \(..., 3\)"),
-        (lambda: geo.ConfigurationSpace(geo.flat(), geo.Disk(), 0.1).cylinder_contains([0.0]), r"shape \(..., 3\)"),
-        (lambda: geo.ConfigurationSpace(geo.flat(), geo.Disk(), 0.1).normal(0, 0, [1.0]), r"shape \(..., 2\)"),
-    ],
-)
-def test_bad_input_is_refused_with_advice(make, message):
-    with pytest.raises(InputError, match=message):
-        make()

@@ -68,14 +68,7 @@ def test_an_alternating_sequence_of_cells_has_no_limit():
     assert constant[-1] < 0.02 and other[-1] > 0.3
 
 
-def test_bad_input_is_refused(study):
-    rng = np.random.default_rng(0)
-    with pytest.raises(InputError, match="psi"):
-        ker.limit_study(geo.Disk(), TEETH, [0.01], rng, psi=4.0)
-    with pytest.raises(InputError, match="repetitions"):
-        ker.limit_study(geo.Disk(), TEETH, [0.01], rng, repetitions=1)
-    with pytest.raises(InputError, match="spacing"):
-        ker.limit_study(geo.Disk(), TEETH, [0.01], rng, spacing=lambda eps: 2 * np.pi / 500)
+def test_orders_of_columns_that_are_none_are_refused(study):
     with pytest.raises(InputError, match="column"):
         study.order("speed")
     with pytest.raises(InputError, match="against"):
@@ -99,8 +92,3 @@ def test_the_path_of_a_collision_has_its_contacts_on_the_wall():
         depth = (low[..., 1] + across / np.tan(0.6)) * np.sin(0.6)
         np.testing.assert_allclose(np.abs(depth).min(axis=0), 0.0, atol=1e-10)
     assert max(lengths) > 4
-
-
-def test_a_picture_of_more_scales_than_it_has_colours_is_refused():
-    with pytest.raises(InputError, match="scales: expected at most 4 numbers"):
-        ker.draw_limit(geo.Disk(), TEETH, [0.1, 0.05, 0.02, 0.01, 0.005], (1.0, 1.2), np.random.default_rng(0), 4)

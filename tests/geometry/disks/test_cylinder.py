@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaigns.rays import modified_law
-from test_rigid import WALLS, states
 
 from asperity import geometry as geo
-from asperity.errors import InputError
 from asperity.geometry.disk.satellites import Satellites
+from disk_shapes import WALLS, states
 
 RATIOS = (0.1, 1.0, 2.0, 10.0)
 
@@ -116,10 +115,3 @@ def test_most_states_are_inside_the_domain_of_the_modified_law_and_some_outside_
         back = geo.collide_modified(disk, wall, scale, out.position[outside], -out.velocity[outside], spacing)
         moved = np.abs(back.position - position[outside]).max(axis=1)
         assert np.any(moved > modified_law.MISMATCH * scale) if scale == 1e-2 else out.inside.mean() > 0.85
-
-
-def test_bad_input_is_refused():
-    with pytest.raises(InputError, match="v2 < 0"):
-        geo.collide_cylinder(geo.Disk(), WALLS["triangular"], 0.1, [[0, 0]], [[0, 1, 0]])
-    with pytest.raises(InputError, match="whole number"):
-        geo.collide_modified(geo.Disk(), WALLS["triangular"], 0.1, [[0, 0]], [[0, -1, 0]], 1.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_rigid import DISK, states
 
 from asperity import geometry as geo
 from asperity.geometry.collisions import rigid
@@ -13,6 +12,7 @@ from asperity.geometry.collisions.compiled.waves import UNDECIDED, collide_in_wa
 from asperity.geometry.collisions.records import ground_of, is_convex, mass_fractions, results_for, ring_of
 from asperity.geometry.disk.satellites import Satellites
 from asperity.geometry.tracing.tracing import MAX_COLLISIONS
+from disk_shapes import DISK, states
 
 CONVEX = {
     "shallow teeth": geo.triangular_teeth(0.2),
@@ -33,7 +33,6 @@ OTHERS = {
     "mushrooms": geo.mushrooms(0.3),
 }
 EPS = np.finfo(float).eps
-ARRAYS = "position", "velocity", "time", "contacts", "two_satellites", "status"
 
 
 def constants_for(wall, scale, limit=MAX_COLLISIONS):
@@ -73,22 +72,6 @@ def test_disks_in_lanes_collide_as_one_by_one(name, scale):
     assert np.median(error[done]) < 1e-12
     np.testing.assert_allclose(found.position[done], expected.position[done], rtol=0, atol=1e-13)
     np.testing.assert_allclose(found.time[done], expected.time[done], rtol=1e-12, atol=1e-13)
-
-
-@pytest.mark.parametrize("name", ["teeth", "circles"])
-def test_a_result_in_lanes_does_not_depend_on_the_other_disks(name):
-    wall, scale = CONVEX[name], 0.03
-    position, velocity = states(wall, scale, 400, seed=9)
-    whole = geo.collide(DISK, wall, scale, position, velocity)
-    for chosen in (np.arange(400)[::-1], np.arange(0, 400, 7), np.array([5])):
-        part = geo.collide(DISK, wall, scale, position[chosen], velocity[chosen])
-        for array in ARRAYS:
-            assert getattr(part, array).tobytes() == getattr(whole, array)[chosen].tobytes()
-
-
-def test_no_disks_have_no_results():
-    out = geo.collide(DISK, CONVEX["teeth"], 0.01, np.empty((0, 2)), np.empty((0, 3)))
-    assert out.velocity.shape == (0, 3) and out.status.shape == (0,)
 
 
 @pytest.mark.parametrize("name", CONVEX)

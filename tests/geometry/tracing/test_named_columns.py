@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 
 import asperity
-from asperity.geometry.polygons.compiled import columns as beam_columns
-from asperity.geometry.scene import columns
 
 PACKAGE = Path(asperity.__file__).parent
 NUMBA = {"njit", "jit", "vectorize", "guvectorize"}
@@ -81,15 +79,3 @@ def test_the_page_on_primitives_names_files_that_exist():
     assert [name for name in named if not (root / name).exists()] == []
     assert "theory/add-a-primitive" in (root / "docs" / "index.md").read_text(encoding="utf-8")
     assert "docs/theory/add-a-primitive.md" in (root / "CONTRIBUTING.md").read_text(encoding="utf-8")
-
-
-def test_every_column_has_a_comment():
-    for module in (columns, beam_columns):
-        lines = Path(module.__file__).read_text().splitlines()
-        named = [line for line in lines if line[:1].isupper() and " = " in line]
-        assert len(named) > 20
-        # the second of a pair, a low part and a number of columns are explained by the line above them
-        bare = [line for line in named if "#" not in line and not line.split(" = ")[0].endswith(("_COLUMNS", "_LOW"))]
-        for line in bare:
-            above = lines[lines.index(line) - 1]
-            assert above.startswith("#") or " = " in above, line

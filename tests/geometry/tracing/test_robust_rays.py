@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-import mpmath as mp
 import numpy as np
 import pytest
-from campaigns.judges.precise_tracer import trace_precisely
 from campaigns.rays.aimed_rays import WALLS, explained, follow_twin
 
 from asperity import geometry as geo
@@ -17,7 +15,6 @@ from asperity.geometry.tracing.refinement import refined_trace
 from asperity.geometry.tracing.threads import new_flag
 
 RAYS = 3_000
-PRECISE_RAYS = 4
 
 
 def test_a_ray_that_was_moved_is_wrong_and_no_conditioning_explains_it():
@@ -26,18 +23,6 @@ def test_a_ray_that_was_moved_is_wrong_and_no_conditioning_explains_it():
     traced = geo.trace(wall, x, theta)
     assert explained(wall, traced, x, theta, follow_twin).all()
     assert not explained(wall, traced, x, theta + 1e-9, follow_twin).any()
-
-
-@pytest.mark.parametrize("name", WALLS)
-def test_the_double_double_twin_agrees_with_fifty_digits(name):
-    scene = WALLS[name].scene
-    rng = np.random.default_rng(6)
-    x, theta = rng.random(PRECISE_RAYS), np.arccos(1.0 - 2.0 * rng.random(PRECISE_RAYS))
-    twin = refined_trace(scene, x, theta)
-    for i in range(PRECISE_RAYS):
-        ray = trace_precisely(scene, x[i], theta[i])
-        assert twin.status[i] == geo.Status.ESCAPED and ray.bounces == twin.collisions[i]
-        assert abs(ray.theta - mp.mpf(twin.theta[i, 0]) - mp.mpf(twin.theta[i, 1])) <= twin.rounding[i]
 
 
 def test_rays_over_many_bezier_pieces_hit_what_the_double_double_twin_hits():

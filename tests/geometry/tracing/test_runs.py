@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import mpmath as mp
 import numpy as np
@@ -13,7 +12,7 @@ from campaigns.judges.precise_tracer import trace_precisely
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry.scene.columns import PARTNER, RUN_SINE, TREE_LEVELS
+from asperity.geometry.scene.columns import PARTNER, TREE_LEVELS
 from asperity.geometry.scene.scene import NO_TABLES
 from asperity.geometry.tracing.compiled.lines import is_ahead
 from asperity.geometry.tracing.refinement import REFINED_SEGMENTS, refined_trace
@@ -26,64 +25,6 @@ NO_LIMIT = 2**62
 def rays(seed, n):
     rng = np.random.default_rng(seed)
     return rng.random(n), np.arccos(1.0 - 2.0 * rng.random(n))
-
-
-def step_by_step(wall):
-    """The same wall, with the marks that allow runs taken off its tables."""
-    plain = geo.Wall(wall.pieces, wall.period, wall.islands)
-    circles = plain.scene.circles
-    if circles is not None:
-        circles = circles.copy()
-        circles[:, RUN_SINE] = 0.0
-    plain.__dict__["scene"] = replace(plain.scene, pairs=None, circles=circles, closed=None)
-    return plain
-
-
-def turned(points, angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(points) @ np.array([[c, s], [-s, c]])
-
-
-def tilted_channel(width, length, angle):
-    """A channel with a flat end, tilted about its upper left joint, below an opening as wide as its mouth."""
-    inner = turned([(0, 0), (0, -length), (width, -length), (width, 0)], angle) + np.array([0.4, -0.1])
-    right = inner[3, 0]
-    return geo.Wall.from_vertices([(0, 0), (0.35, 0), *inner.tolist(), (max(right, 0.4) + 0.05, 0.0), (1, 0)])
-
-
-def funnel(top, bottom, depth):
-    """An isosceles trapezoid that narrows downwards, or upwards where bottom > top."""
-    m = 0.5
-    return geo.Wall.from_vertices(
-        [(0, 0), (m - top / 2, 0), (m - bottom / 2, -depth), (m + bottom / 2, -depth), (m + top / 2, 0), (1, 0)]
-    )
-
-
-def bent_channel():
-    """A mushroom's stem with a curved bottom that bulges into it, and a long tail beside it."""
-    return geo.Wall(
-        [
-            geo.Segment((0, 0), (0.45, 0)),
-            geo.Segment((0.45, 0), (0.45, -3)),
-            geo.Bezier([(0.45, -3), (0.5, -2.6), (0.55, -3)]),
-            geo.Segment((0.55, -3), (0.55, 0)),
-            geo.Segment((0.55, 0), (1, 0)),
-        ]
-    )
-
-
-WALLS = {
-    "tilted channel": tilted_channel(0.05, 2.0, 0.3),
-    "channel tilted the other way": tilted_channel(0.05, 2.0, -0.2),
-    "narrowing funnel": funnel(0.2, 0.05, 2.0),
-    "widening funnel": funnel(0.05, 0.2, 2.0),
-    "nearly a channel": funnel(0.1, 0.1 - 1e-9, 3.0),
-    "sharp tooth": geo.triangular_teeth(0.02),
-    "curved bottom": bent_channel(),
-    "stem of a mushroom": geo.mushrooms(0.1, 4.0),
-    "two generations": geo.mushrooms(0.3, 0.5, 2),
-    "semicircle": geo.focusing_arcs(np.pi / 2),
-}
 
 
 @pytest.mark.parametrize(
@@ -106,39 +47,26 @@ def test_channels_of_rectangular_teeth_count_every_hit(ratio, theta):
     assert np.max(np.abs(traced.theta - law.reflect(x, theta))[clear]) <= 8 * EPS
 
 
-@pytest.mark.parametrize("angle", [1e-8, 1e-6, 1e-4, 1e-2, 0.25])
-def test_wedges_of_triangular_teeth_count_every_hit(angle):
-    x, theta = rays(2, 100_000)
-    law = ker.TriangularTeethLaw(angle)
-    traced = geo.trace(geo.triangular_teeth(angle), x, theta, max_collisions=NO_LIMIT)
-    hits, outgoing = law.hits(x, theta), law.reflect(x, theta)
-    # the number of hits changes where the angle at the last hit is 0, the outgoing angle is near 0 or pi there
-    clear = np.minimum(outgoing, np.pi - outgoing) > 1e-12
-    assert clear.mean() > 0.999
-    same = traced.collisions == hits
-    # rays within rounding of one hit more or less: the fraction of starts that lie within 64 ulp of such a position
-    assert np.mean(~same) <= 1e-4
-    assert traced.counts()["escaped"] >= len(x) - np.sum(~clear)
-    assert np.max(np.abs(traced.theta - outgoing)[same & traced.escaped]) <= 64 * EPS
-
-
-@pytest.mark.parametrize("name", WALLS)
-def test_runs_change_nothing_but_the_time(name):
-    wall = WALLS[name]
-    x, theta = rays(3, 20_000)
-    fast, slow = geo.trace(wall, x, theta), geo.trace(step_by_step(wall), x, theta)
-    # conditioning by a finite difference: rays that another start nearby sends elsewhere are left out
-    h = 1e-9
-    near = [geo.trace(wall, x + h, theta), geo.trace(wall, x, theta + h * np.sign(np.pi / 2 - theta))]
-    stable = np.all([n.collisions == fast.collisions for n in near], axis=0) & fast.escaped
-    assert stable.mean() > 0.95
-    stretch = sum(np.abs(n.theta - fast.theta) + np.abs(n.x - fast.x) for n in near) / h
-    # hit by hit each hit adds a rounding error; a channel multiplies it by the hits to come
-    allowed = 64 * EPS * (1 + slow.collisions) * (1 + stretch)
-    assert np.array_equal(fast.collisions[stable], slow.collisions[stable])
-    assert np.array_equal(fast.status[stable], slow.status[stable])
-    miss = np.abs(fast.theta - slow.theta) + np.abs(fast.x - slow.x)
-    assert np.all(miss[stable] <= allowed[stable])
+def test_flags_in_deep_channels_are_settled_where_half_an_ulp_of_the_angle_meets_no_corner():
+    # some 10^13 crossings down to the bottom; the position there is known to a hundredth of the width
+    depth, width = 5e3, 0.5
+    rng = np.random.default_rng(7)
+    theta, place = 10.0 ** rng.uniform(-9.4, -8.8, 1_000), rng.random(1_000)
+    traced = geo.trace(geo.rectangular_teeth(1e4), 0.5 + width * place, theta)
+    ends = []
+    with mp.workdps(50):
+        for x, angle in zip(place.tolist(), theta.tolist(), strict=True):
+            half_ulp = mp.mpf(float(np.spacing(angle))) / 2
+            ways = [x - depth / width * mp.cot(mp.mpf(angle) + sign * half_ulp) for sign in (-1, 1)]
+            ends.append([{int(mp.floor(way)) for way in ways}, {int(mp.floor(2 * way - x)) for way in ways}])
+    for ray, (bottom, out) in enumerate(ends):
+        meets_corner = len(bottom) > 1 or len(out) > 1
+        if traced.escaped[ray]:
+            exact = theta[ray] if min(out) % 2 else np.pi - theta[ray]
+            assert abs(traced.theta[ray] - exact) <= 2.0 * np.spacing(exact) or meets_corner
+        else:
+            assert traced.status[ray] == geo.Status.CORNER and meets_corner
+    assert 0 < np.sum(~traced.escaped) < 100
 
 
 @pytest.mark.parametrize("angle", [3e-9, 1e-7, 1e-5, 1e-3, 0.02, 0.29])
@@ -225,93 +153,11 @@ def test_the_cost_of_a_run_does_not_grow_with_its_hits():
     assert least[1e9] < 1.5 * least[1e8]
 
 
-def random_teeth(count, seed):
-    """One hollow with a ragged floor of many long and short lines, overhanging in places."""
-    rng = np.random.default_rng(seed)
-    x = np.linspace(0.0, 1.0, count + 1)[1:-1] + 0.3 / count * (rng.random(count - 1) - 0.5)
-    y = -0.2 - 0.6 * rng.random(count - 1) ** 3
-    return geo.Wall.from_vertices([(0, 0), *zip(x, y, strict=True), (1, 0)])
-
-
-def comb(count):
-    """Parallel slots below a common opening: every line is long and runs through many cells."""
-    points = [(0.0, 0.0), (0.0, -1.0)]
-    for k in range(count):
-        left, right = (k + 0.4) / count, (k + 0.6) / count
-        points += [(left, -1.0), (left, -0.1), (right, -0.1), (right, -1.0)]
-    return geo.Wall.from_vertices([*points, (1.0, -1.0), (1.0, 0.0)])
-
-
-def curved_floor(count):
-    """Many lines and a few Bezier pieces and arcs in one hollow."""
-    flanks = [(0.3 * k / count, -0.5 * k / count - 0.01 * (k % 2)) for k in range(count)]
-    left = [geo.Segment(p, q) for p, q in pairwise(flanks)]
-    x, y = flanks[-1]
-    middle = [
-        geo.Bezier([(x, y), (0.4, -0.9), (0.5, -0.4)]),
-        geo.Bezier([(0.5, -0.4), (0.6, -0.9), (1 - x, y)]),
-    ]
-    mirrored = [(1 - px, py) for px, py in reversed(flanks)]
-    right = [geo.Segment(p, q) for p, q in pairwise(mirrored)]
-    return geo.Wall([*left, *middle, *right])
-
-
-MANY = {
-    "koch 4": geo.koch(4),
-    "koch 6": geo.koch(6),
-    "random teeth": random_teeth(400, 5),
-    "comb": comb(60),
-    "lines and curves": curved_floor(80),
-}
-
-
-def without_boxes(wall):
-    plain = geo.Wall(wall.pieces, wall.period, wall.islands)
-    hollows = plain.scene.hollows.copy()
-    hollows[:, TREE_LEVELS] = 0.0
-    plain.__dict__["scene"] = replace(plain.scene, hollows=hollows, boxes=None)
-    return plain
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", MANY)
-def test_a_tree_of_boxes_changes_no_bit(name):
-    wall = MANY[name]
-    assert wall.plan().hollows_with_grid >= 1
-    count = 3_000 if len(wall.pieces) < 1_000 else 500  # without boxes a ray asks every piece
-    x, theta = rays(6, count)
-    # and rays along the axes, and aimed at joints: they pass along edges and through corners of boxes
-    below = wall.vertices[wall.vertices[:, 1] < -1e-3]
-    targets = below[np.random.default_rng(7).integers(0, len(below), count)]
-    aimed = np.mod(np.arctan2(targets[:, 1], targets[:, 0] - x), np.pi)
-    x = np.concatenate([x, x, targets[:, 0] % 1.0, wall.vertices[::7, 0] % 1.0])
-    theta = np.concatenate([theta, aimed, np.full(count, np.pi / 2), np.full(len(wall.vertices[::7]), np.pi / 4)])
-    found, plain = geo.trace(wall, x, theta), geo.trace(without_boxes(wall), x, theta)
-    for field in ("x", "theta", "collisions", "status"):
-        assert np.array_equal(getattr(found, field), getattr(plain, field))
-
-
-def test_a_wall_of_sixty_thousand_lines_is_traced_in_microseconds_a_bounce():
-    import time
-
-    wall = geo.koch(8)
-    x, theta = rays(8, 2_000)
-    geo.trace(wall, x[:1], theta[:1])
-    start = time.process_time()
-    traced = geo.trace(wall, x, theta, threads=1)
-    spent = time.process_time() - start
-    assert sum(traced.counts().values()) == len(x)
-    # brute force takes 50 us a bounce
-    assert spent / traced.collisions.sum() < 10e-6
-
-
 def test_the_plan_tells_channels_wedges_and_trees():
     assert geo.rectangular_teeth(2.0).plan().channels == 1
     assert geo.triangular_teeth(0.1).plan().wedges == 1
     assert geo.triangular_teeth(0.7).plan().wedges == 0
     assert geo.koch(3).plan().hollows_with_grid == 0 and geo.koch(4).plan().hollows_with_grid == 1
-    tilted = tilted_channel(0.05, 2.0, 0.3).plan()
-    assert tilted.channels + tilted.wedges == 1 and not tilted.mirror_symmetric
     two = geo.Wall.from_vertices([(0, 0), (0.25, -0.5), (0.5, 0), (0.75, -0.5), (1, 0)]).plan()
     assert two.hollows == 2 and two.distinct_hollows == 1
 
@@ -322,9 +168,13 @@ def test_of_two_lines_at_a_joint_a_tree_of_boxes_finds_the_same_as_the_plain_lis
     right = np.column_stack([1.0 - 0.5 * along, -0.37 * along])[::-1]
     wall = geo.Wall.from_vertices([(0, 0), *left.tolist(), (0.5, -0.37), *right.tolist(), (1, 0)])
     assert wall.plan().hollows_with_grid == 1
+    plain = geo.Wall(wall.pieces, wall.period)
+    hollows = plain.scene.hollows.copy()
+    hollows[:, TREE_LEVELS] = 0.0
+    plain.__dict__["scene"] = replace(plain.scene, hollows=hollows, boxes=None)
     rng = np.random.default_rng(1)
     joint, x = wall.vertices[1:-1][rng.integers(199, size=3_000)], rng.random(3_000)
     theta = np.arctan2(-joint[:, 1], x - joint[:, 0])
-    found, plain = geo.trace(wall, x, theta), geo.trace(without_boxes(wall), x, theta)
+    found, plain = geo.trace(wall, x, theta), geo.trace(plain, x, theta)
     for field in ("x", "theta", "collisions", "status"):
         assert np.array_equal(getattr(found, field), getattr(plain, field))

@@ -2,6 +2,7 @@
 
 import re
 import sys
+import warnings
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -69,66 +70,7 @@ def test_a_period_has_the_heights_of_the_profile_and_of_its_mirror_image(rows):
     )
 
 
-@pytest.mark.parametrize(
-    ("x", "height", "seam", "words"),
-    [
-        ([0, 3, 5, 2, 4], [0] * 5, "step", "got 5 at row 2 and 2 at row 3"),
-        ([0, 1, 1, 2], [0] * 4, "step", "got 1 at row 1 and 1 at row 2"),
-        ([[0, 1], [2, 3]], [[0, 1], [2, 3]], "step", r"got shapes \(2, 2\) and \(2, 2\)"),
-        ([0, 1, 2], [0, 1], "mirror", r"got shapes \(3,\) and \(2,\)"),
-        ([0], [0], "mirror", "at least 2"),
-        ([0, 1], [0, 1], "glue", "seam: expected 'mirror', 'step' or 'wrap', got 'glue'"),
-    ],
-)
-def test_unsuitable_profiles_are_refused_with_the_worst_rows(x, height, seam, words):
-    with pytest.raises(InputError, match=words):
-        vertices_of_profile(x, height, seam)
-
-
 # ---- columns of text ---------------------------------------------------------------------------------------------
-def test_two_rows_are_a_profile(tmp_path):
-    (tmp_path / "scan.txt").write_text("0 1\n2 5")
-    assert [part.tolist() for part in geo.read_profile(tmp_path / "scan.txt")] == [[0, 2], [1, 5]]
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "0 1\n1 2\n3 0\n",
-        "x, height\n0, 1\n1, 2\n3, 0\n",
-        "# a scan\n\n0\t1 # first\n1\t2\n3\t0",
-        "\ufeff0;1\r\n1;2\r\n3;0\r\n",
-        "\n# 5 5\nposition height # of a scan\n\n0 1\n# between # two\n\n1 2\n3 0\n\n",
-    ],
-)
-def test_two_column_profiles_are_read(text, tmp_path):
-    file = tmp_path / "scan.txt"
-    file.write_text(text, encoding="utf-8")
-    x, height = geo.read_profile(file)
-    assert x.tolist() == [0, 1, 3] and height.tolist() == [1, 2, 0]
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("0 1\n1 2 3\n", "line 2: expected two numbers"),
-        ("x y\nfoo bar\n0 1\n1 2\n", "line 2"),
-        ("0 1\nx y\n", "line 2"),
-        ("0 1\n", "at least two rows"),
-        ("", "cannot read a file of 0 bytes"),
-        ("\n", "at least two rows of x and height, got 0"),
-        ("x y\n0 1\n", "at least two rows of x and height, got 1"),
-        ("# a\n0 1\n1 2\nx y\n3 4", "line 4: expected two numbers, x and height, got 'x y'"),
-        ("x y\nz w\n0 1\n1 2", "line 2"),
-        ("x 1\n0 1\n1 2", "line 1"),
-    ],
-)
-def test_unsuitable_profile_files_are_refused_with_file_and_line(text, words, tmp_path):
-    file = tmp_path / "scan.csv"
-    file.write_text(text)
-    with pytest.raises(InputError, match=words) as caught:
-        geo.read_profile(file)
-    assert "scan.csv" in str(caught.value)
 
 
 # ---- files of instruments ----------------------------------------------------------------------------------------
@@ -141,14 +83,23 @@ def test_instrument_files_ask_for_the_extra(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def instrument(monkeypatch):
-    """A stand-in for SurfaceTopography, whose one file is what the test puts there."""
-    package = ModuleType("SurfaceTopography")
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", package)
+def reads(monkeypatch):
+    """Put a stand-in in the place of SurfaceTopography: it opens files by this function."""
+
+    def put(read_topography):
+        package = ModuleType("SurfaceTopography")
+        package.read_topography = read_topography
+        monkeypatch.setitem(sys.modules, "SurfaceTopography", package)
+
+    return put
+
+
+@pytest.fixture
+def instrument(reads):
+    """A stand-in whose one file is what the test puts there."""
 
     def gives(heights, positions):
-        scan = SimpleNamespace(heights=lambda: heights, positions=lambda: positions, unit=None)
-        package.read_topography = lambda path: scan
+        reads(lambda path: SimpleNamespace(heights=lambda: heights, positions=lambda: positions, unit=None))
 
     return gives
 
@@ -198,30 +149,22 @@ def test_undefined_heights_are_counted_refused_and_interpolated(instrument, tmp_
 @pytest.mark.parametrize(
     ("failure", "words"), [(ValueError("first\nsecond"), r"\(first\)"), (ValueError(), r"\(ValueError\)")]
 )
-def test_what_a_reader_of_instruments_says_is_told_in_one_line(failure, words, monkeypatch, tmp_path):
-    package = ModuleType("SurfaceTopography")
-
-    def read_topography(path):
+def test_what_a_reader_of_instruments_says_is_told_in_one_line(failure, words, reads, tmp_path):
+    def fails(path):
         raise failure
 
-    package.read_topography = read_topography
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", package)
+    reads(fails)
     (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match=rf"scan\.opd: SurfaceTopography cannot read it {words}"):
         geo.read_profile(tmp_path / "scan.opd")
 
 
-def test_warnings_of_an_instruments_package_are_not_passed_on(monkeypatch, tmp_path):
-    import warnings
-
-    package = ModuleType("SurfaceTopography")
-
-    def read_topography(path):
+def test_warnings_of_an_instruments_package_are_not_passed_on(reads, tmp_path):
+    def warns(path):
         warnings.warn("old format", DeprecationWarning, stacklevel=1)
         return SimpleNamespace(heights=lambda: np.arange(3.0), positions=lambda: np.arange(3.0), unit=None)
 
-    package.read_topography = read_topography
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", package)
+    reads(warns)
     (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
     assert geo.read_profile(tmp_path / "scan.opd")[1].tolist() == [0.0, 1.0, 2.0]
 
@@ -255,22 +198,12 @@ def test_units_in_the_header_are_honoured(head, tmp_path):
     assert profile.unit in ("um", "µm")
 
 
-@pytest.mark.parametrize("head", ["x [um], height", "x [um], height [V]", "x, height [nm]"])
-def test_a_header_with_one_length_is_not_guessed_at(head, tmp_path):
-    (tmp_path / "scan.txt").write_text(f"{head}\n0 1\n1 2\n")
-    with pytest.raises(InputError, match=r"scan\.txt, header: expected two units"):
-        geo.read_profile(tmp_path / "scan.txt")
-
-
 def test_units_that_are_given_count_more_than_the_header(tmp_path):
     (tmp_path / "scan.txt").write_text("x [um], height [nm]\n0 1\n1 2\n")
     profile = geo.read_profile(tmp_path / "scan.txt", units=("mm", "um"))
     assert profile.unit == "mm" and profile.height == pytest.approx([1e-3, 2e-3], rel=1e-12)
     assert geo.read_profile(tmp_path / "scan.txt", units="um").height.tolist() == [1.0, 2.0]
     assert profile.in_unit("um").x.tolist() == [0.0, 1000.0]
-    for units in (("um", "V"), ("um",), 3):
-        with pytest.raises(InputError, match="units: expected"):
-            geo.read_profile(tmp_path / "scan.txt", units=units)
 
 
 def test_the_unit_reaches_the_axes_and_the_file_of_the_wall(tmp_path):
@@ -297,6 +230,11 @@ def test_a_slope_of_a_thousand_is_taken_for_mixed_units():
 @pytest.mark.parametrize(
     ("text", "options"),
     [
+        ("0 1.5\n1 2.5\n", {}),
+        ("x, height\n0, 1.5\n1, 2.5\n", {}),
+        ("# a scan\n\n0\t1.5 # first\n1\t2.5", {}),
+        ("\ufeff0;1.5\r\n1;2.5\r\n", {}),
+        ("\n# 5 5\nposition height # of a scan\n\n0 1.5\n# between # two\n\n1 2.5\n\n", {}),
         ("0,0;1,5\n1,0;2,5\n", {"decimal": ","}),
         ("0,0 1,5\n1,0 2,5\n", {"decimal": ","}),
         ("0|1.5\n1|2.5\n", {"delimiter": "|"}),
@@ -304,40 +242,18 @@ def test_a_slope_of_a_thousand_is_taken_for_mixed_units():
         ("7 1.5 9 0\n7 2.5 9 1\n", {"usecols": (3, 1)}),
         ("12 words\nof 3 metadata\n0 1.5\n1 2.5\n", {"skiprows": 2}),
         ("0\t1.5\n1\t2.5\n", {"delimiter": "\t"}),
+        ("0,1.5\n1,2.5\n", {"delimiter": ","}),
     ],
 )
 def test_columns_are_read_as_the_options_say(text, options, tmp_path):
-    (tmp_path / "scan.txt").write_text(text)
+    (tmp_path / "scan.txt").write_text(text, encoding="utf-8")
     x, height = geo.read_profile(tmp_path / "scan.txt", **options)
     assert x.tolist() == [0, 1] and height.tolist() == [1.5, 2.5]
-
-
-def test_a_text_in_another_encoding_is_read_as_told(tmp_path):
-    (tmp_path / "scan.txt").write_bytes("# Höhe\nx [µm], z [µm]\n0 1\n1 2\n".encode("latin-1"))
-    assert geo.read_profile(tmp_path / "scan.txt", encoding="latin-1").unit == "µm"
 
 
 def test_an_empty_field_is_an_undefined_height(tmp_path):
     (tmp_path / "scan.csv").write_text("0;1\n1;\n2;nan\n3;4\n")
     assert geo.read_profile(tmp_path / "scan.csv", delimiter=";").undefined == 2
-
-
-@pytest.mark.parametrize(
-    ("options", "name"),
-    [
-        ({"decimal": ";"}, "decimal"), ({"delimiter": ""}, "delimiter"), ({"delimiter": ","}, None),
-        ({"delimiter": ",", "decimal": ","}, "delimiter"), ({"usecols": 3}, "usecols"),
-        ({"usecols": (0, -1)}, "usecols"), ({"skiprows": -1}, "skiprows"), ({"encoding": "klingon"}, "encoding"),
-        ({"encoding": 3}, "encoding"),
-    ],
-)  # fmt: skip
-def test_unsuitable_options_are_refused_by_name(options, name, tmp_path):
-    (tmp_path / "scan.txt").write_text("0,1\n1,2\n")
-    if name is None:
-        assert len(geo.read_profile(tmp_path / "scan.txt", **options).x) == 2
-        return
-    with pytest.raises(InputError, match=f"^{name}: expected"):
-        geo.read_profile(tmp_path / "scan.txt", **options)
 
 
 def test_every_option_has_its_word_in_the_text_of_a_wall(tmp_path):
@@ -347,9 +263,6 @@ def test_every_option_has_its_word_in_the_text_of_a_wall(tmp_path):
     wall = geo.wall_from_text(f"{file}:{words},interpolate=yes,seam=step")
     assert wall.vertices.tolist() == [[0, 0], [0, -2], [1, -1], [2, 0]] and wall.unit == "um"
     assert geo.wall_from_text(f"{file}:{words},interpolate=yes,detrend=1").depth == 0.0
-    for bad, message in (("sort=maybe", "parameter sort: cannot read 'maybe'"), ("glue=1", "unknown parameter 'glue'")):
-        with pytest.raises(InputError, match=message):
-            geo.wall_from_text(f"{file}:{bad}")
 
 
 # ---- before it is a wall -----------------------------------------------------------------------------------------
@@ -368,8 +281,6 @@ def test_what_is_left_of_a_fit_is_orthogonal_to_all_polynomials_of_the_degree(de
 
 def test_masked_points_of_an_array_are_undefined():
     assert geo.Profile([0, 1, 2], np.ma.array([1.0, 7.0, 2.0], mask=[False, True, False])).undefined == 1
-    with pytest.raises(InputError, match="1 of 3 heights are undefined"):
-        geo.Wall.from_profile([0, 1, 2], np.ma.array([1.0, 7.0, 2.0], mask=[False, True, False]))
 
 
 def test_a_map_in_a_text_is_given_to_the_package_that_reads_it(tmp_path):
@@ -381,12 +292,6 @@ def test_a_map_in_a_text_is_given_to_the_package_that_reads_it(tmp_path):
     # heights in nm, so that the positions become nm
     assert profile.unit == "nm" and profile.x == pytest.approx([0.0, 500.0, 1000.0, 1500.0])
     assert profile.height.tolist() == heights[1].tolist()
-
-
-def test_a_profile_refuses_what_is_none():
-    for x, height in (([0], [1]), ([0, np.nan], [1, 2]), ([0, 1], [1]), ([0, 1], ["a", "b"])):
-        with pytest.raises(InputError):
-            geo.Profile(x, height)
 
 
 # ---- what the columns are ----------------------------------------------------------------------------------------
@@ -458,7 +363,7 @@ def test_contradictions_of_quantity_and_unit_are_refused_with_the_call_that_deci
     assert profile_of(tmp_path, text, **{**options, **call}).unit in ("mm", "um")
 
 
-@pytest.mark.parametrize("rows", [3, 20, 51, 300])
+@pytest.mark.parametrize("rows", [3, 51, 300])
 @pytest.mark.parametrize(
     ("line", "head", "expected"),
     [
@@ -500,8 +405,6 @@ def test_a_computed_periodic_profile_wraps_round():
     x = np.arange(4) / 4.0
     wall = geo.Wall.from_profile(x, [0.0, -1.0, -2.0, -1.0], seam="wrap")
     assert wall.vertices.tolist() == [[0, 0], [0.25, -1], [0.5, -2], [0.75, -1], [1, 0]]
-    with pytest.raises(InputError, match="'wrap' expects equal steps"):
-        geo.Wall.from_profile([0.0, 1.0, 3.0], [0.0, -1.0, -2.0], seam="wrap")
 
 
 @pytest.mark.parametrize(
@@ -512,8 +415,6 @@ def test_a_computed_periodic_profile_wraps_round():
     ],
 )  # fmt: skip
 def test_a_width_of_160_metres_for_micrometres_is_taken_for_mixed_units(unit, width, height, warns):
-    import warnings
-
     profile = geo.Profile(np.linspace(0.0, width, 5), height * np.array([0, 1, 0, 1, 0]), unit)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")

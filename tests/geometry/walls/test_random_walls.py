@@ -149,24 +149,6 @@ def test_generators_and_seeds_are_numpys():
     assert wall(None) != wall(None) and np.random.get_state()[1].tolist() == state  # noqa: NPY002
 
 
-@pytest.mark.parametrize(
-    ("asked", "message"),
-    [
-        ({}, "expected one of rms_slope and rms_height"),
-        ({"rms_slope": 0.1, "rms_height": 0.1}, "expected one of rms_slope and rms_height"),
-        ({"rms_slope": -1.0}, "rms_slope: expected"),
-        ({"spectrum": geo.SelfAffine(0.5, shortest=2.0), "rms_slope": 0.1}, "expected power at one frequency"),
-        ({"spectrum": lambda q: -q, "rms_slope": 0.1}, "powers of at least 0"),
-        ({"spectrum": geo.HeightCorrelation(0.1, lambda s: np.where(s < 1, 1.0, 0.0)), "rms_slope": 0.1}, "negative"),
-        ({"spectrum": 0.1, "rms_slope": 0.1}, "expected HeightCorrelation"),
-        ({"points": 3, "rms_slope": 0.1}, "points"),
-    ],
-)
-def test_bad_input_is_refused(asked, message):
-    with pytest.raises(InputError, match=message):
-        geo.random_wall(**{"spectrum": geo.HeightCorrelation(0.1), "points": 16, **asked})
-
-
 def test_what_makes_the_heights_is_named_where_it_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "SurfaceTopography.Generation", None)
     with pytest.raises(InputError, match=r"asperity\[profiles\]"):
