@@ -278,23 +278,6 @@ def test_angles_and_entry_points_outside_their_range_are_refused(law: Law) -> No
         law.sample(1.0, np.random)
 
 
-@pytest.mark.parametrize("law", [TriangularTeethLaw(0.9), RectangularTeethLaw(0.8), CircularArcLaw(1.1)], ids=repr)
-def test_samples_have_the_mean_that_the_operator_gives(law: Law) -> None:
-    rng = np.random.default_rng(11)
-    for theta in (0.2, 0.9, 1.7, 2.7):
-        value = np.cos(law.sample(np.full(40_000, theta), rng))
-        spread = value.std() / math.sqrt(value.size)
-        assert abs(value.mean() - float(law.apply(np.cos, theta))) < 4.0 * spread + 1e-12
-
-
-def test_respond_and_sample_broadcast() -> None:
-    law = CircularArcLaw(0.5)
-    assert law.reflect(np.full((3, 1), 0.3), np.full(4, 1.0)).shape == (3, 4)
-    assert law.sample(1.0, np.random.default_rng(0)).shape == ()
-    assert law.apply(lambda angle: np.stack([angle, angle**2], axis=-1), np.full((2, 3), 1.0)).shape == (2, 3, 2)
-    assert law.apply(np.cos, np.empty(0)).shape == (0,)
-
-
 def test_the_law_of_a_crevice_is_that_of_every_float64_angle_however_many_its_crossings():
     rng = np.random.default_rng(11)
     for ratio in (0.3, 2.7, 1e3, 1e6, 1e8, 1e15):

@@ -101,15 +101,6 @@ def test_one_generation_has_the_law_of_its_wall_and_more_generations_a_mixture()
     np.testing.assert_allclose(mass[:, -1], 1.0, atol=1e-9)
 
 
-def test_the_law_is_reversible():
-    law = ker.MushroomLaw(geo.MushroomGenerations(0.2, 0.3, 20))
-    x, theta = rays(60_000, seed=7)
-    out = law.reflect(np.clip(x, 1e-12, None), theta)
-    for f, g in ((np.cos, np.sin), (lambda a: a, lambda a: np.cos(2 * a))):
-        gap = f(theta) * g(out) - g(theta) * f(out)
-        assert abs(gap.mean()) < 4.5 * gap.std() / np.sqrt(len(gap))
-
-
 def test_many_generations_of_narrow_mushrooms_approach_retroreflection():
     x, theta = rays(20_000, seed=8)
     reached = []

@@ -96,16 +96,6 @@ def test_traced_rays_go_where_the_closed_form_says(wall: geo.Wall) -> None:
     assert np.mean(error[escaped] > 1e-9) < 1e-4
 
 
-def test_a_traced_law_applies_and_samples_alike() -> None:
-    law = WallLaw(geo.dispersing_arcs(1.0))
-    assert law.reversible and law.mirror_symmetric
-    drawn = law.sample(np.full(20_000, 1.1), np.random.default_rng(9))
-    spread = np.cos(drawn).std() / math.sqrt(drawn.size)
-    assert abs(np.cos(drawn).mean() - float(law.apply(np.cos, 1.1))) < 5.0 * spread
-    skew = WallLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.5), (1, 0)]))
-    assert skew.mirror_symmetric is None
-
-
 def test_rays_that_do_not_escape_are_sent_back_and_reported() -> None:
     law = WallLaw(geo.triangular_teeth(math.pi / 2))
     # straight into the bottom, and beside it

@@ -60,24 +60,6 @@ def test_a_peak_much_narrower_than_the_bins_is_seen() -> None:
 
 
 @pytest.mark.parametrize(
-    "law",
-    [
-        ker.lambertian(),
-        ker.henyey_greenstein(0.5),
-        ker.MatrixLaw([[0.5, 0.5], [0.5, 0.5]]),
-        ker.DensityLaw(lambda theta, theta_out: 0.5 * np.sin(theta_out) + 0.0 * theta),
-        ker.maxwell(0.5),
-    ],
-    ids=repr,
-)
-def test_no_angles_have_no_images(law: ker.Law) -> None:
-    assert law.apply(np.cos, []).shape == (0,)
-    assert law.apply(np.cos, np.empty((3, 0))).shape == (3, 0)
-    assert law.apply(ker.Legendre(4).evaluate, np.empty((2, 0))).shape == (2, 0, 4)
-    assert law.sample([], np.random.default_rng(1)).shape == (0,)
-
-
-@pytest.mark.parametrize(
     ("make", "sizes", "order"),
     [
         (ker.Bins, (16, 32, 64), ker.Bins.order),
