@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -21,6 +24,18 @@ def halves_exchanged(theta: np.ndarray) -> np.ndarray:
 def tilted(theta: np.ndarray, out: np.ndarray) -> np.ndarray:
     """A density that preserves sin(theta) d theta and is neither reversible nor mirror symmetric."""
     return (1.0 + 0.5 * np.cos(theta) * (1.5 * np.cos(out) ** 2 - 0.5)) * ker.SINE.density(out)
+
+
+@dataclass(frozen=True)
+class Bounce(ker.DrivenLaw):
+    """Triangular teeth, known only by their rays."""
+
+    mirror_symmetric: bool | None = None
+
+    reversible = True
+
+    def reflect(self, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        return ker.TriangularTeethLaw(1.1).reflect(x, theta)
 
 
 # Cycles of three equal bins preserve the measure, but are not reversible; the other matrix is, but has no symmetry.
@@ -54,6 +69,8 @@ LAWS = {
     "polygon": ker.PolygonLaw(SKEW),
     "wall in closed form": ker.WallLaw(geo.triangular_teeth(0.7)),
     "traced wall": ker.WallLaw(geo.dispersing_arcs(1.0)),
+    "rays alone": Bounce(),
+    "rays and their mirror images": Bounce(mirror_symmetric=True),
     "mushrooms": ker.MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 3)),
     "sum": 0.2 * ker.specular() + 0.5 * TEETH + 0.3 * ker.lambertian(),
     "sum of isometries": 0.4 * TEETH + 0.6 * ker.specular() @ TEETH,
@@ -70,6 +87,28 @@ BASES = {
     "polynomials": ker.Legendre(6),
     "panels": ker.Panels([0.0, 0.4, 2.0, np.pi], 2),
 }
+# Laws that Legendre polynomials diagonalise: the eigenvalue that belongs to the polynomial of each degree l > 0.
+DIAGONAL = {
+    "lambertian": (ker.lambertian(), lambda degree: 0.0 * degree),
+    "maxwell": (ker.maxwell(0.3), lambda degree: 0.7 * (-1.0) ** degree),
+    "maxwell in the other frame": (ker.maxwell(0.3).in_specular_frame(), lambda degree: 0.7 + 0.0 * degree),
+    "scattering back": (ker.henyey_greenstein(-0.7), lambda degree: (-0.7) ** degree),
+    "two scatterings": (
+        0.5 * ker.henyey_greenstein(0.9) + 0.5 * ker.henyey_greenstein(-0.5),
+        lambda degree: 0.5 * 0.9**degree + 0.5 * (-0.5) ** degree,
+    ),
+    "three parts": (
+        0.25 * ker.maxwell(0.5) + 0.75 * ker.henyey_greenstein(0.6),
+        lambda degree: 0.125 * (-1.0) ** degree + 0.75 * 0.6**degree,
+    ),
+    "part of the identity": (
+        0.25 * ker.retroreflection() + 0.75 * ker.henyey_greenstein(0.5),
+        lambda degree: 0.25 + 0.75 * 0.5**degree,
+    ),
+    "product": (ker.henyey_greenstein(0.5) @ ker.henyey_greenstein(0.8), lambda degree: 0.4**degree),
+    "mirrored product": (ker.specular() @ ker.henyey_greenstein(0.5), lambda degree: (-0.5) ** degree),
+    "power": (ker.henyey_greenstein(-0.7) ** 3, lambda degree: (-0.343) ** degree),
+}
 
 
 @pytest.fixture(params=LAWS)
@@ -78,7 +117,37 @@ def law(request: pytest.FixtureRequest) -> ker.Law:
     return LAWS[request.param]
 
 
+@pytest.fixture
+def bounce() -> Callable[..., ker.DrivenLaw]:
+    """Makes triangular teeth, known only by their rays; whether the mirror symmetry is known is its argument."""
+    return Bounce
+
+
 @pytest.fixture(params=BASES)
 def basis(request: pytest.FixtureRequest) -> ker.Basis:
     """A basis of every kind, with and without the mirror symmetry."""
     return BASES[request.param]
+
+
+@pytest.fixture(params=DIAGONAL)
+def diagonal(request: pytest.FixtureRequest) -> tuple[ker.Law, np.ndarray]:
+    """A law and its eigenvalues, that of the polynomial of degree l in place l."""
+    law, eigenvalue = DIAGONAL[request.param]
+    return law, np.append(1.0, eigenvalue(np.arange(1.0, 400.0)))
+
+
+@pytest.fixture
+def matrix(law: ker.Law, basis: ker.Basis) -> ker.KernelMatrix:
+    """The matrix of every law in every basis, by the method that is chosen for a rough tolerance."""
+    return rough_matrix(law, basis)
+
+
+def rough_matrix(law: ker.Law, basis: ker.Basis) -> ker.KernelMatrix:
+    """A matrix to a tolerance of 1e-3, computed once."""
+    key = id(law), id(basis)
+    if key not in MATRICES:
+        MATRICES[key] = ker.discretise(law, basis, tolerance=1e-3, samples=2**13, rng=5)
+    return MATRICES[key]
+
+
+MATRICES: dict[tuple[int, int], ker.KernelMatrix] = {}

@@ -18,6 +18,8 @@ JUMPS = {
     "product of matrices": 1e-2,
     "product of isometries": 1e-2,
     "mushrooms": 1e-2,
+    "rays alone": 1e-2,
+    "rays and their mirror images": 1e-2,
     "product": 1e-3,
     "involution": 1e-4,
     "traced wall": 1e-6,

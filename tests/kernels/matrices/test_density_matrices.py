@@ -18,13 +18,6 @@ def test_lambertian_matrices_have_rank_one_to_rounding() -> None:
         assert np.abs(matrix.symmetric - np.outer(basis.constant, basis.constant)).max() < 1e-14
 
 
-@pytest.mark.parametrize("g", [0.5, -0.7, 0.9])
-def test_legendre_has_the_eigenvalues_of_henyey_greenstein_to_rounding(g: float) -> None:
-    matrix = ker.discretise(ker.henyey_greenstein(g), ker.Legendre(64))
-    assert np.abs(matrix.symmetric - np.diag(g ** np.arange(64.0))).max() < 1e-12
-    assert matrix.tolerance_met
-
-
 def henyey_greenstein_on(basis: ker.Bins, g: float) -> np.ndarray:
     """The Galerkin matrix from sum (2 l + 1)/2 g^l P_l P_l, with the integral of P_l (P_{l+1} - P_{l-1})/(2 l + 1)."""
     u = np.cos(basis.edges)
@@ -42,8 +35,17 @@ def henyey_greenstein_on(basis: ker.Bins, g: float) -> np.ndarray:
 UNEVEN = ker.Bins([0.0, 0.01, 0.3, 0.32, 1.0, 1.7, 2.5, 3.0, np.pi])
 
 
-@pytest.mark.parametrize("basis", [ker.Bins(64), ker.Bins(256), ker.Bins(7), UNEVEN], ids=repr)
-@pytest.mark.parametrize("g", [0.5, 0.95, 0.99, -0.9])
+@pytest.mark.parametrize(
+    ("g", "basis"),
+    [
+        (0.5, ker.Bins(64)),
+        (0.95, UNEVEN),
+        (0.99, ker.Bins(256)),
+        (0.99, ker.Bins(7)),
+        (-0.9, ker.Bins(64)),
+        (-0.9, UNEVEN),
+    ],
+)
 def test_peaked_densities_have_their_exact_masses_between_bins(g: float, basis: ker.Bins) -> None:
     matrix = ker.discretise(ker.henyey_greenstein(g), basis)
     assert np.linalg.norm(matrix.symmetric - henyey_greenstein_on(basis, g)) <= float(matrix.error)
