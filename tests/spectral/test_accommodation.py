@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
@@ -113,21 +112,10 @@ def test_laws_without_known_means_are_sampled_with_honest_errors():
     assert np.all(np.abs(found.tangential_at - exact) < 2.3 * found.tangential_errors)
 
 
-@pytest.mark.parametrize("angle", [np.pi / 2, np.arcsin(np.pi / 4), np.pi - np.arcsin(np.pi / 4)])
-def test_angles_at_which_a_coefficient_is_no_number_are_refused(angle):
-    with pytest.raises(InputError, match="take one beside it"):
-        spec.accommodation(ker.lambertian(), theta=[1.0, angle])
-
-
 def test_the_default_angles_are_far_from_the_poles():
     found = spec.accommodation(ker.lambertian())
     assert np.abs(np.cos(found.theta)).min() > 0.03
     assert np.abs(np.sin(found.theta) - np.pi / 4).min() > 0.005
-
-
-def test_what_is_no_law_is_refused():
-    with pytest.raises(InputError, match="expected a Law"):
-        spec.accommodation(geo.flat())
 
 
 def test_shallow_walls_have_the_coefficients_of_the_billiard_laplacian():

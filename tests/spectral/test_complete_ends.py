@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.spectral.eigenvalues.completeness import Deflated, margin_below, norm_beyond
+from asperity.spectral.eigenvalues.completeness import Deflated, margin_below
 from asperity.spectral.eigenvalues.dense import TILE, compressed, end_values, extremal, symmetric_half
 from asperity.spectral.eigenvalues.parity import parity_basis
 
@@ -61,45 +61,9 @@ def test_the_largest_value_is_found_where_all_moduli_are_at_the_lower_end():
     assert np.allclose(found.values[1:], [-0.8, -0.9], rtol=0.0, atol=1e-10)
 
 
-def test_lanczos_alone_would_miss_a_copy_and_the_factorisation_says_so():
-    array = with_spectrum([0.9, 0.9, 0.8])
-    matrix = Deflated.of(array, None)
-    one = BASIS[:, [0]]
-    assert margin_below(matrix, 1.0, one, np.array([0.9]), 0.85) is None
-    both = BASIS[:, :2]
-    margin = margin_below(matrix, 1.0, both, np.array([0.9, 0.9]), 0.8 + 1e-10)
-    assert margin is not None and 0.0 < margin < 1e-10
-
-
-@pytest.mark.parametrize("below", [1e-8, 1e-10])
-def test_a_threshold_below_an_eigenvalue_is_never_proved(below):
-    """The proof is one-sided: it may fail for a threshold above the spectrum by rounding, never pass for one below."""
-    array = with_spectrum([0.9])
-    margin = margin_below(Deflated.of(array, None), 1.0, np.empty((SIZE, 0)), np.empty(0), 0.9 - below)
-    assert margin is None or margin >= below
-    lower = margin_below(Deflated.of(array, None), -1.0, np.empty((SIZE, 0)), np.empty(0), -BULK[1:].min() - below)
-    assert lower is None or lower >= below
-
-
 def test_the_margin_of_rounding_is_below_a_hundred_times_the_dimension_in_roundings():
     margin = margin_below(Deflated.of(with_spectrum([0.9]), None), 1.0, np.empty((SIZE, 0)), np.empty(0), 0.95)
     assert margin is not None and margin < 100 * SIZE * np.finfo(float).eps
-
-
-def test_a_deflated_matrix_is_the_compression_to_the_complement():
-    array, constant = with_spectrum([0.9, -0.8]), BASIS[:, 3] * 0.6 + BASIS[:, 0] * 0.8
-    projector = np.eye(SIZE) - np.outer(constant, constant)
-    exact = projector @ array @ projector
-    matrix = Deflated.of(array, constant)
-    block = RNG.normal(size=(SIZE, 2))
-    assert np.allclose(matrix @ block, exact @ block, rtol=0.0, atol=1e-12)
-    assert np.allclose(matrix @ block[:, 0], exact @ block[:, 0], rtol=0.0, atol=1e-12)
-    assert matrix.frobenius == pytest.approx(np.linalg.norm(exact), rel=1e-12)
-    values = np.linalg.eigvalsh(exact)[::-1]
-    assert norm_beyond(matrix, values[:1]) >= np.abs(values[1:]).max()
-    found = extremal(array, constant, 2)
-    ranks = np.concatenate([np.arange(found.top), SIZE + np.arange(found.top - len(found.values), 0)])
-    assert np.all(np.abs(found.values - values[ranks]) <= found.errors)
 
 
 def test_the_factorisation_proves_what_is_off_the_constants_whatever_the_constants_do():
@@ -132,13 +96,6 @@ def test_large_and_small_matrices_have_the_same_kind_of_spectrum(known):
     assert "no other eigenvalue" in found.completeness
     assert found.gap == pytest.approx(0.5, abs=1e-9) and found.gap_errors.algebraic[0] < 1e-10
     assert set(found.parity) == ({"none"} if known is None else {"even", "odd"})
-
-
-def test_the_leading_eigenvalues_of_mirror_symmetric_laws_are_labelled():
-    matrix = ker.discretise(ker.henyey_greenstein(0.5), ker.Legendre(32))
-    found = spec.leading_eigenvalues(matrix, 4)
-    assert np.allclose(found.values, 0.5 ** np.arange(4.0), rtol=0.0, atol=1e-9)
-    assert found.complete and found.parity == ("even", "odd", "even", "odd")
 
 
 @pytest.mark.parametrize("size", [2, 3, 64, 65, 100])

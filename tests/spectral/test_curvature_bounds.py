@@ -13,7 +13,6 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import InputError
 from asperity.spectral.bounds.curvature import least_density, lowest_seen
 
 # 0.03732818 and its error are those of rays of a textbook tracer and 96 polynomials; the gaps of the other
@@ -99,11 +98,3 @@ def test_the_least_elevation_that_sees_the_sky_is_that_of_rays():
         ray = geo.trace(wall, np.mod(x - y / np.tan(theta), 1.0), theta)
         single = np.abs(ray.theta - (math.pi - theta + 2.0 * slope)) < 1e-6
         assert np.all(single == reaches)
-
-
-def test_wrong_arguments_are_refused():
-    for curvature in (0.0, 1.6, math.nan):
-        with pytest.raises(InputError, match="curvature"):
-            spec.curvature_gap_bounds(curvature)
-    with pytest.raises(InputError, match="bins"):
-        spec.curvature_gap_bounds(1.0, 10)

@@ -8,7 +8,6 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import AccuracyError
 from asperity.kernels.laws.structure import lists_branches, made_of_isometries
 from asperity.spectral.essential.edge import essential_edge, grazing_symbol
 
@@ -44,16 +43,6 @@ def test_one_walk_through_the_algebra_serves_both_questions():
     assert lists_branches(TEETH @ ker.specular())
     assert not lists_branches(TEETH @ ker.lambertian()) and not made_of_isometries(TEETH @ ker.lambertian())
     assert not made_of_isometries(ker.WallLaw(geo.focusing_arcs(1.0)))
-
-
-@pytest.mark.parametrize("a", [0.1, 0.3, 1.0])
-@pytest.mark.parametrize("specular", [False, True])
-def test_maxwell_has_the_gap_a_in_both_conventions(a, specular):
-    law = ker.maxwell(a)
-    gap = spec.spectral_gap(law.in_specular_frame() if specular else law)
-    assert abs(float(gap) - a) <= gap.error + 1e-15 and gap.error < 1e-14
-    assert gap.verdict == "isolated" and gap.kind == "bound"
-    assert gap.convention == ("specular" if specular else "paper")
 
 
 def test_a_polygon_mixed_with_a_lambertian_law_has_the_gap_of_fact_eleven():
@@ -131,29 +120,6 @@ def test_a_curved_wall_without_mirror_symmetry_is_isolated():
     gap = spec.spectral_gap(law, tolerance=1e-2)
     assert gap.verdict == "isolated" and gap.error < 1e-2
     assert any("essential" in line for line in gap.evidence)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("exponent", [2, 3])
-def test_powers_have_the_powers_of_the_spectrum(exponent):
-    """g = -0.7: an even power turns the lower end up."""
-    gap = spec.spectral_gap(ker.henyey_greenstein(-0.7) ** exponent)
-    expected = 1 - (0.49 if exponent == 2 else 0.49**3)
-    assert abs(float(gap) - expected) <= gap.error + 1e-15 and gap.verdict == "isolated"
-    semicircle = spec.spectral_gap(SEMICIRCLE**exponent)
-    assert abs(float(semicircle) - (1 - EDGE_OF_SEMICIRCLE**exponent)) <= semicircle.error < 1e-7
-    assert semicircle.verdict == "essential edge"
-
-
-@pytest.mark.slow
-def test_henyey_greenstein_has_a_gap_with_a_bound():
-    gap = spec.spectral_gap(ker.henyey_greenstein(0.999999), tolerance=1e-12)
-    assert gap.kind == "bound" and gap.verdict == "isolated" and abs(float(gap) - 1e-6) <= gap.error + 1e-16
-
-
-def test_a_law_that_is_not_reversible_has_no_gap_to_quote():
-    with pytest.raises(AccuracyError, match="not symmetric"):
-        spec.spectral_gap(ker.MatrixLaw(np.roll(np.eye(8), 1, axis=1)))
 
 
 @pytest.mark.parametrize(

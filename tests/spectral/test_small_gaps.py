@@ -173,18 +173,6 @@ def test_the_edge_of_an_isometric_law_needs_no_grazing_rays(monkeypatch):
         assert found.low == found.high == 1.0 and found.kind == "bound" and found.reasons
 
 
-def test_a_limit_above_the_norm_is_no_limit(monkeypatch):
-    from asperity.spectral.essential import grazing
-
-    def growing(law, angle, end, parts):
-        return np.array([1.0 + 0.1 * end, 0.2]), 1e-9
-
-    monkeypatch.setattr(grazing, "_at_angle", growing)
-    law = ker.InvolutionLaw(lambda theta: np.pi - theta)
-    limit = grazing.grazing_limit(law)
-    assert not limit.resolved and limit.error == 1.0
-
-
 def test_what_cannot_be_told_is_undecided(monkeypatch):
     from asperity.spectral.essential import grazing
 

@@ -8,7 +8,6 @@ from matplotlib import pyplot
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 from asperity.kernels.billiards.equilibrium import equilibrium_starts
 from asperity.kernels.billiards.pictures import path_between
 
@@ -47,10 +46,6 @@ def test_disks_that_left_have_no_points():
     count = int(strip.collisions[0])
     assert 0 < count < 20
     assert np.isnan(first).sum() == np.isnan(second).sum() == 20 - count
-    with pytest.raises(InputError, match="from curves"):
-        ker.phase_portrait(strip, "boundary")
-    with pytest.raises(InputError, match="'boundary' or 'velocity'"):
-        ker.phase_portrait(strip, "angle")
 
 
 def test_paths_have_the_points_of_the_record():

@@ -12,7 +12,6 @@ from scipy.stats import kstest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import InputError
 
 LEANING = ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.2, -0.5), (1, 0)]))
 
@@ -148,22 +147,3 @@ def test_retroreflected_particles_stay_on_one_chord():
     found = spec.channel_paths(ker.retroreflection(), [5.0, 50.0, 500.0], 500, 0, bend=2.0)
     # the longest chord touches the inner circle
     assert np.all(np.abs(found.positions) <= 2.0 * 2.0 * math.acos(1.0 / 3.0) + 1e-9)
-
-
-def test_wrong_arguments_are_refused():
-    law = ker.lambertian()
-    with pytest.raises(InputError, match="expected a law"):
-        spec.channel_paths("lambertian", [1, 2, 3])
-    with pytest.raises(InputError, match="increasing positive times"):
-        spec.channel_paths(law, [1, 2])
-    with pytest.raises(InputError, match="greater than the radius"):
-        spec.channel_paths(law, [1, 2, 3], bend=1.0)
-    with pytest.raises(InputError, match="arrangement"):
-        spec.channel_paths(law, [1, 2, 3], arrangement="shifted")
-    straight = spec.channel_paths(law, [1, 2, 3], 10, 0)
-    with pytest.raises(InputError, match="at least 320"):
-        straight.limit_variance()
-    with pytest.raises(InputError, match="bent channel"):
-        straight.variance_rate()
-    with pytest.raises(InputError, match="straight channel"):
-        spec.channel_paths(law, [1, 2, 3], 10, 0, bend=3.0).limit_variance()

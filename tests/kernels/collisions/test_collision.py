@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import InputError
 
 RNG = 20_260_301
 positive = st.floats(1e-6, 1e6)
@@ -75,19 +74,6 @@ def test_branches_of_triangular_teeth_are_isometries_that_conserve():
             assert np.allclose(rolling @ matrix, rolling, atol=1e-13)
 
 
-def test_branches_without_probability_are_left_out():
-    """Teeth of apex psi have two outcomes up to theta = (pi - psi)/2 and three or four beyond (ledger S2.06, S2.07)."""
-    psi = 0.7
-    K = ker.CollisionLaw(ker.TriangularTeethLaw(psi), geo.Disk())
-    assert ker.TriangularTeethLaw(psi).branches(0.5)[0].shape == (4,)
-    shallow = [float(p) for p, _ in K.branches(0.5)]
-    assert len(shallow) == 2 and sum(shallow) == pytest.approx(1.0, abs=1e-14)
-    # a branch stays if it has a probability at one of the angles
-    several = K.branches([0.5, 2.0])
-    assert [bool(p[0] > 0.0) for p, _ in several] == [True, True, False]
-    assert all(np.any(p > 0.0) for p, _ in several)
-
-
 def test_branches_give_the_sampled_velocities():
     disk = geo.Disk(1.3, 0.4)
     K = ker.CollisionLaw.from_wall(geo.triangular_teeth(0.9), disk)
@@ -125,35 +111,6 @@ def test_the_law_of_the_foreshortened_wall_is_the_closed_form_with_corrected_par
     assert np.max(np.abs(teeth.theta - law.reflect(x, theta))[same]) < 1e-12
 
 
-def test_from_wall_foreshortens_and_the_constructor_does_not():
-    disk, wall = geo.Disk(), geo.triangular_teeth(1.0)
-    assert ker.CollisionLaw.from_wall(wall, disk).law == ker.WallLaw(wall.foreshorten(disk))
-    assert ker.CollisionLaw(ker.WallLaw(wall), disk).law == ker.WallLaw(wall)
-
-
-def test_apply_maps_psi_to_pi_minus_psi():
-    K = ker.CollisionLaw(ker.lambertian(), geo.Disk())
-    theta, psi = np.linspace(0.3, 2.8, 4)[:, None], np.linspace(0.2, 2.9, 5)
-    value = K.apply(lambda t, p: np.cos(t) ** 2 * p, theta, psi)
-    # Lambert: E cos^2 = 1/3
-    assert value.shape == (4, 5)
-    assert np.allclose(value, np.broadcast_to((np.pi - psi) / 3, (4, 5)), atol=1e-9)
-
-
-@pytest.mark.parametrize("psi_basis", [ker.Legendre(5, weight="sin2"), ker.Bins(6, weight="sin2")], ids=repr)
-def test_the_lazy_operator_is_the_kronecker_product_and_symmetric(psi_basis):
-    K = ker.CollisionLaw(ker.TriangularTeethLaw(0.8), geo.Disk())
-    operator = K.operator(ker.Legendre(7), psi_basis)
-    dense = operator.dense()
-    vectors = np.random.default_rng(RNG).normal(size=(dense.shape[1], 3))
-    assert np.allclose(operator @ vectors, dense @ vectors, atol=1e-13)
-    assert np.allclose(operator.rmatvec(vectors[:, 0]), dense.T @ vectors[:, 0], atol=1e-13)
-    assert np.max(np.abs(dense - dense.T)) < 1e-12
-    assert float(operator.symmetry_defect()) < 1e-12
-    assert float(K.symmetry_defect(ker.Legendre(7), psi_basis)) < 1e-12
-    assert float(K.symmetry_defect()) < 1e-12
-
-
 def test_spectrum_of_k_is_that_of_the_reflection_law_with_both_signs():
     law = ker.henyey_greenstein(0.6)
     K = ker.CollisionLaw(law, geo.Disk())
@@ -163,24 +120,3 @@ def test_spectrum_of_k_is_that_of_the_reflection_law_with_both_signs():
     eigenvalues = np.linalg.eigvalsh(dense)
     assert np.allclose(np.sort(np.abs(eigenvalues))[::-1][:8], np.repeat(0.6 ** np.arange(4), 2), atol=1e-12)
     assert found.gap == pytest.approx(0.4, abs=1e-12)
-
-
-def test_velocities_that_point_away_are_refused():
-    K = ker.CollisionLaw(ker.specular(), geo.Disk())
-    rng = np.random.default_rng(0)
-    with pytest.raises(InputError, match="v2 < 0"):
-        K.sample([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]], rng)
-    with pytest.raises(InputError, match=r"v2 >= 0 at row \[1\]"):
-        K.sample([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]], rng)
-    with pytest.raises(InputError, match="shape"):
-        K.sample([0.0, -1.0], rng)
-    with pytest.raises(InputError, match="Generator"):
-        K.sample([0.0, -1.0, 0.0], "seven")
-    with pytest.raises(InputError, match="disk"):
-        ker.CollisionLaw(ker.specular(), 3)
-    with pytest.raises(InputError, match="wall"):
-        ker.CollisionLaw.from_wall(ker.specular(), geo.Disk())
-    with pytest.raises(InputError, match="sum of 1"):
-        ker.CollisionLaw(0.5 * ker.lambertian(), geo.Disk())
-    with pytest.raises(InputError, match="paper"):
-        ker.CollisionLaw(ker.specular().in_specular_frame(), geo.Disk())

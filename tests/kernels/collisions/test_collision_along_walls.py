@@ -81,20 +81,3 @@ def test_a_run_with_a_law_along_a_wall_goes_on_from_its_checkpoint(tmp_path):
         ker.play(
             circle, ker.CollisionAlongWall(moved, DISK), [0, 0], [1.0, 0.3, 0.0], 5, 2, checkpoint=tmp_path / "run"
         )
-
-
-def test_wrong_arguments_are_refused():
-    law = ker.PositionLaw([0.0, 1.0], [ker.specular()])
-    along = ker.CollisionAlongWall(law, DISK)
-    with pytest.raises(InputError, match="PositionLaw"):
-        ker.CollisionAlongWall(ker.specular(), DISK)
-    with pytest.raises(InputError, match="length of wall 0"):
-        ker.play(geo.Container.circle(1.0), along, [0.0, 0.0], [1.0, 0.0, 0.0], 1)
-    with pytest.raises(InputError, match="shape"):
-        along.sample_at([0.5], [1.0, -1.0, 0.0])
-    with pytest.raises(InputError, match="positions from 0 to 1"):
-        along.sample_at([1.5], [[1.0, -1.0, 0.0]])
-    with pytest.raises(InputError, match="same disk"):
-        ker.play(geo.Container.strip(), [along, ker.smooth(geo.Disk(1.0, 1.0))], [0.0, 0.5], [0.0, 1.0, 0.0], 1)
-    with pytest.raises(InputError, match="collision laws"):
-        ker.lyapunov_exponent(geo.Container.circle(1.0), along, rng=0)

@@ -7,7 +7,6 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 
 DISK = geo.Disk(1.0, 1.0)
 TEETH = geo.triangular_teeth(1.2)
@@ -78,19 +77,6 @@ def test_entries_are_estimates_and_a_frame():
     assert list(found.to_frame()["pair"]) == list(found.names)
 
 
-def test_wrong_arguments_are_refused():
-    with pytest.raises(InputError, match="window"):
-        ker.weak_limit(DISK, TEETH, [1e-2], window=0.0)
-    with pytest.raises(InputError, match="repetitions"):
-        ker.weak_limit(DISK, TEETH, [1e-2], repetitions=1)
-    with pytest.raises(InputError, match="pairs"):
-        ker.weak_limit(DISK, TEETH, [1e-2], {})
-    with pytest.raises(InputError, match="scales"):
-        ker.weak_limit(DISK, TEETH, [[1e-2]])
-    with pytest.raises(InputError, match="of: expected"):
-        ker.weak_limit(DISK, TEETH, 1e-2, rng=0, samples=8).estimate(0, 0, of="disk")
-
-
 def test_a_limit_study_over_several_psi_is_the_mean_of_its_parts():
     psi = [0.4, 1.2, 2.4]
     study = ker.limit_study(DISK, TEETH, [1e-3, 1e-5], rng=4, psi=psi, samples=(8, 12, 12))
@@ -102,5 +88,3 @@ def test_a_limit_study_over_several_psi_is_the_mean_of_its_parts():
     moved = study.state_distance - study.distance
     assert np.all(moved >= study.drift) and np.all(moved <= 2.0 * study.drift * (1.0 + 1e-12))
     assert moved[1] < 0.03 * moved[0]
-    with pytest.raises(InputError, match="psi"):
-        ker.limit_study(DISK, TEETH, [1e-3], rng=0, psi=[[1.0]])

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
@@ -189,23 +188,3 @@ def test_generations_approach_the_exchange():
     copies = 1.0 - 1.002 * first.covered
     second = hollow.generations(2, neck=1e-3)
     assert second.covered == pytest.approx(first.covered * (1.0 + copies))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"exchange": ker.lambertian()}, "exchange: expected"),
-        ({"opening": 0.0}, "opening"),
-        ({"opening": 0.5}, "opening"),
-    ],
-)
-def test_unsuitable_arguments_are_refused(arguments, message):
-    with pytest.raises(InputError, match=message):
-        ker.exchange_hollow(**{"exchange": exchange_of(ker.lambertian(), 2), **arguments})
-
-
-def test_generations_are_whole_and_necks_leave_room():
-    hollow = ker.exchange_hollow(exchange_of(ker.retroreflection(), 1), 1e-2)
-    for arguments in ({"number": 0}, {"number": 2, "neck": 0.0}, {"number": 2, "neck": 1e6}):
-        with pytest.raises(InputError):
-            hollow.generations(**arguments)

@@ -12,7 +12,6 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 
 
 def test_the_error_of_the_distance_holds_in_95_of_100_runs():
@@ -104,18 +103,3 @@ def test_deep_tubes_with_short_plates_are_nearer_to_retroreflection():
         ker.retroreflection_distance(geo.tube(plates, height), 2000, rng=0) for plates, height in ((30, 0.1), (3, 0.4))
     )
     assert float(near) + near.error < float(far) - far.error
-
-
-def test_wrong_arguments_are_refused():
-    with pytest.raises(InputError, match="angle"):
-        geo.notched_angle(math.pi, 3)
-    with pytest.raises(InputError, match="notches"):
-        geo.notched_angle(0.3, 0)
-    with pytest.raises(InputError, match="at most 1000000"):
-        geo.tube(2_000_000, 0.1)
-    with pytest.raises(InputError, match="at least the height"):
-        geo.tube(3, 0.4, 0.1)
-    with pytest.raises(InputError, match="Wall, or a law"):
-        ker.retroreflection_distance(ker.specular().in_specular_frame())
-    with pytest.raises(InputError, match="rays"):
-        ker.retroreflection_distance(geo.flat(), 10)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
@@ -52,24 +51,3 @@ def test_the_smallest_radius_is_that_of_the_hollow_side():
     # an ellipse as the image of a circle: b^2/a at the ends of its long axis, here at the bottom
     deep = geo.Wall([geo.Arc((0.5, 0.0), (0.5, 1.0), np.pi, 2.0 * np.pi)])
     assert hollow_radius(deep) == pytest.approx(0.25, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"wanted": "most"}, "wanted"),
-        ({"bounds": [(1.0, 0.5)]}, "bounds"),
-        ({"most_depth": 1e-9}, "no member"),
-        ({"family": ker.TriangularTeethLaw, "most_depth": 1.0}, "expected walls"),
-    ],
-)
-def test_unsuitable_wishes_are_refused(arguments, message):
-    given = {
-        "objective": ker.resistance,
-        "family": geo.triangular_teeth,
-        "bounds": [(0.5, 2.0)],
-        "grid": 3,
-        **arguments,
-    }
-    with pytest.raises(InputError, match=message):
-        ker.design_wall(**given)

@@ -6,7 +6,6 @@ import pytest
 from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.estimates import Estimate
 from asperity.kernels.inverse import wall_for_law
 from asperity.kernels.inverse.hull import few_weights, nearest_weights, possible_gain
 
@@ -20,11 +19,6 @@ def lambert():
 
 def moments_of(law, number=MOMENTS):
     return ker.discretise(law, ker.Legendre(number), tolerance=1e-12).symmetric
-
-
-def moment_matrix(entries, weight="sin"):
-    array = np.array(entries)
-    return ker.KernelMatrix(array, ker.Legendre(len(array), weight), Estimate(0.0, 0.0, "bound", "given"))
 
 
 def test_the_wall_for_lamberts_law_has_its_moments_to_rounding(lambert):
@@ -146,27 +140,6 @@ def test_the_picture_says_how_many_hollows(lambert):
     assert f"{len(lambert.hollows)} hollows" in lambert.plot().get_title()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"law": "lambert"}, "law: expected a Law"),
-        ({"law": ker.lambertian(), "moments": 1}, "moments"),
-        ({"law": ker.lambertian(), "tolerance": 0.0}, "tolerance"),
-        ({"law": ker.lambertian(), "hollows": []}, "hollows: expected at least one"),
-        ({"law": ker.lambertian(), "hollows": ["flat"]}, r"hollows\[0\]: expected a Wall"),
-        ({"law": ker.lambertian(), "most_hollows": 0}, "most_hollows"),
-        ({"law": ker.TriangularTeethLaw(1.0) @ ker.henyey_greenstein(0.5)}, "symmetric"),
-        ({"law": moment_matrix([[1.0, 0.0, 0.0], [0.0, 0.3, 0.2], [0.0, 0.1, 0.2]])}, "from their transpose by 0.14"),
-        ({"law": moment_matrix([[1.0, 0.1], [0.1, 0.3]])}, "miss those of a law by 0.1"),
-        ({"law": moment_matrix(np.eye(3), "sin2")}, "weight sin"),
-        ({"law": moment_matrix([[1.0]])}, "at least 2 moments"),
-    ],
-)
-def test_unsuitable_arguments_are_refused(arguments, message):
-    with pytest.raises(InputError, match=message):
-        ker.wall_for(**arguments)
-
-
 def test_the_nearest_point_of_a_hull_is_that_of_quadratic_programming():
     rng = np.random.default_rng(4)
     for _ in range(20):
@@ -204,5 +177,3 @@ def test_alternating_cells_do_not_converge_and_flattening_ones_do():
     assert np.all(np.diff(flattening.diameters) < 0.0)
     # a scale that keeps the disk within 1 of its limit law is no small one
     assert flattening.scales[0] == 1e-3
-    with pytest.raises(InputError, match="at least 4 walls"):
-        ker.dichotomy([teeth, flat])

@@ -1,4 +1,4 @@
-"""The algebra of laws: what sums, compositions, powers, adjoints and frames do to functions and to samples."""
+"""The algebra of laws: what sums, compositions, powers and frames do to functions."""
 
 from __future__ import annotations
 
@@ -9,10 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asperity.errors import InputError
 from asperity.kernels import Combination, Composition, mixture
-from asperity.kernels.bases.measure import SINE
-from asperity.kernels.laws.density import DensityLaw
 from asperity.kernels.laws.ideal import lambertian, maxwell
 from asperity.kernels.laws.law import Law, retroreflection, specular
 from asperity.kernels.laws.matrix_law import MatrixLaw
@@ -89,31 +86,6 @@ def test_specular_and_retroreflection_are_involutions() -> None:
     assert (specular() ** 1001).branches(1.0)[1].tolist() == [math.pi - 1.0]
 
 
-@settings(max_examples=20, deadline=None)
-@given(cheap, cheap)
-def test_adjoints_pass_to_the_other_side_of_the_inner_product(first: Law, second: Law) -> None:
-    for law in (first @ second, 0.4 * first + 0.6 * second, first**2, first.in_specular_frame()):
-        if law.evaluations < 2_000:
-            check_adjoint(law)
-
-
-def check_adjoint(law: Law) -> None:
-    """<f, P g> = <P* f, g> for indicators of unions of equal bins, by a rule that the breakpoints divide."""
-    cells = 300
-    angle = SINE.quantile((np.arange(cells) + 0.5) / cells)
-
-    def f(a: np.ndarray) -> np.ndarray:
-        return np.cos(a) ** 2 + 0.3 * np.cos(a)
-
-    def g(a: np.ndarray) -> np.ndarray:
-        return np.cos(3.0 * a)
-
-    there = np.mean(f(angle) * law.apply(g, angle))
-    back = np.mean(g(angle) * law.adjoint().apply(f, angle))
-    # midpoint rule: order 2 for continuous rows, order 1 where rows jump with theta
-    assert abs(there - back) < 4.0 / cells
-
-
 def test_adjoints_of_a_cycle_are_exact() -> None:
     back = CYCLE.adjoint()
     assert isinstance(back, MatrixLaw)
@@ -137,18 +109,6 @@ class LambertianInBins(MatrixLaw):
 def flip() -> Law:
     """J as a law of the specular frame."""
     return retroreflection().in_specular_frame()
-
-
-def test_the_specular_frame_is_an_involution_that_turns_outgoing_angles_over() -> None:
-    for law in PARTS:
-        frame = law.in_specular_frame()
-        assert frame.frame == "specular" and law.frame == "paper"
-        assert frame.in_specular_frame() is law
-        assert np.allclose(
-            frame.apply(smooth, THETA), law.apply(lambda a: smooth(math.pi - a), THETA), rtol=0.0, atol=1e-14
-        )
-    identity = specular().in_specular_frame().sample(THETA, np.random.default_rng(0))
-    assert np.allclose(identity, THETA, rtol=0.0, atol=5e-16)
 
 
 def test_the_specular_frame_of_a_sum_is_the_sum_of_the_frames() -> None:
@@ -183,16 +143,8 @@ def test_promises_of_sums_and_compositions_follow_from_their_parts() -> None:
 
 
 # ---- weights and frames -------------------------------------------------------------------------------------------
-def test_weights_must_sum_to_one_before_a_sum_is_used() -> None:
+def test_a_sum_may_be_completed_before_it_is_used() -> None:
     law = 0.3 * specular() + 0.6 * lambertian()
-    with pytest.raises(InputError, match=r"expected a sum of 1, got 0\.89"):
-        law.apply(np.cos, 1.0)
-    with pytest.raises(InputError, match="expected a sum of 1"):
-        law.sample(1.0, np.random.default_rng(0))
-    with pytest.raises(InputError, match="expected a sum of 1"):
-        (0.3 * specular()).branches(1.0)
-    with pytest.raises(InputError, match="expected a sum of 1"):
-        (law @ specular()).apply(np.cos, 1.0)
     assert (law + 0.1 * retroreflection()).apply(np.ones_like, 1.0) == pytest.approx(1.0, abs=1e-15)
 
 
@@ -202,41 +154,17 @@ def test_ten_tenths_are_one() -> None:
     assert np.count_nonzero(law.branches(1.0)[0]) == 1
 
 
-def test_negative_weights_are_refused_by_name() -> None:
-    with pytest.raises(InputError, match=r"non-negative ones, got -0\.5 for term 1, lambertian\(\)"):
-        (1.5 * specular() + -0.5 * lambertian()).apply(np.cos, 1.0)
-    with pytest.raises(InputError, match="finite weights"):
-        math.nan * specular()
-
-
-def test_mixture_checks_at_construction() -> None:
+def test_a_mixture_is_a_sum() -> None:
     law = mixture([specular(), lambertian()], [0.25, 0.75])
     assert agree(law, 0.25 * specular() + 0.75 * lambertian())
-    with pytest.raises(InputError, match="sum of 1"):
-        mixture([specular(), lambertian()], [0.25, 0.7])
-    with pytest.raises(InputError, match="one for each of 2 laws"):
-        mixture([specular(), lambertian()], [1.0])
 
 
-def test_scalars_of_numpy_scale_and_other_things_do_not() -> None:
+def test_scalars_of_numpy_scale() -> None:
     assert repr(np.float64(0.5) * specular()) == "0.5*specular()"
     assert repr(2 * (0.25 * specular() + 0.25 * lambertian())) == "0.5*specular() + 0.5*lambertian()"
-    for nonsense in ("a", specular(), True, np.ones(2)):
-        with pytest.raises(TypeError):
-            nonsense * specular()
-    with pytest.raises(TypeError):
-        specular() + 1.0
-    with pytest.raises(TypeError):
-        specular() @ 1.0
-    with pytest.raises(InputError, match="exponent"):
-        specular() ** -1
 
 
-def test_laws_in_different_frames_neither_add_nor_compose() -> None:
-    with pytest.raises(InputError, match="cannot compose laws in different frames"):
-        specular() @ lambertian().in_specular_frame()
-    with pytest.raises(InputError, match="cannot add laws in different frames"):
-        0.5 * specular() + 0.5 * lambertian().in_specular_frame()
+def test_compositions_stay_in_the_frame_of_their_laws() -> None:
     both = TriangularTeethLaw(0.9).in_specular_frame() @ RectangularTeethLaw(1.0).in_specular_frame()
     assert both.frame == "specular"
     assert both.in_specular_frame().frame == "paper"
@@ -259,43 +187,6 @@ def test_names_read_like_the_expressions_that_made_them() -> None:
 
 
 # ---- branches of compounds ------------------------------------------------------------------------------------------
-TEETH = TriangularTeethLaw(2.0 * math.pi / 7)
-COMPOUNDS = [
-    TEETH @ RectangularTeethLaw(0.8),
-    TEETH**3,
-    0.4 * TEETH + 0.6 * specular() @ TEETH,
-    (TEETH @ TEETH).in_specular_frame(),
-]
-
-
-@pytest.mark.parametrize("law", COMPOUNDS, ids=repr)
-def test_branches_of_compounds_are_merged_and_act_like_the_law(law: Law) -> None:
-    probability, outgoing = law.branches(THETA)
-    assert probability.shape == outgoing.shape and probability.shape[0] == THETA.size
-    assert np.all(probability >= 0.0)
-    assert np.allclose(probability.sum(axis=-1), 1.0, rtol=0.0, atol=1e-14)
-    assert np.allclose((probability * smooth(outgoing)).sum(axis=-1), law.apply(smooth, THETA), rtol=0.0, atol=1e-13)
-    for row, angle in zip(probability, outgoing, strict=True):
-        assert np.all(np.diff(np.sort(angle[row > 0.0])) > 1e-13)
-
-
-@pytest.mark.parametrize("law", COMPOUNDS[:3], ids=repr)
-def test_compounds_are_smooth_between_their_kinks(law: Law) -> None:
-    breakpoints, left_out = law.breakpoints(300)
-    edges = np.concatenate([[0.0], breakpoints, [math.pi]])
-    sums = []
-    for order in (8, 16):
-        angle, weight = SINE.quadrature(edges, order)
-        sums.append((weight * law.apply(smooth, angle)).reshape(-1, order).sum(axis=1))
-    wrong = np.abs(sums[0] - sums[1])
-    assert wrong.max() < 1e-13 + left_out
-    assert np.sort(wrong)[: -wrong.size // 50 - 2].max() < 1e-13
-
-
-def test_laws_with_a_density_have_no_branches() -> None:
-    for law in (lambertian(), maxwell(0.5), specular() @ lambertian(), CircularArcLaw(1.0)):
-        with pytest.raises(InputError, match="not a finite mixture of isometries"):
-            law.branches(1.0)
 
 
 def test_a_law_says_whether_it_knows_its_breakpoints() -> None:
@@ -308,39 +199,4 @@ def test_a_law_says_whether_it_knows_its_breakpoints() -> None:
     assert tilted.outgoing_breakpoints == pytest.approx(math.pi / 2) and teeth.outgoing_breakpoints.size == 0
 
 
-def test_powers_out_of_reach_say_what_to_do() -> None:
-    with pytest.raises(InputError, match="discretise"):
-        (henyey_greenstein(0.9) ** 5).apply(np.cos, 1.0)
-    with pytest.raises(InputError, match="power of at most 100"):
-        (specular() ** 500).apply(np.cos, 1.0)
-    with pytest.raises(InputError, match="at most 64"):
-        (TriangularTeethLaw(0.123) ** 6).branches(THETA)
-
-
 # ---- samples -------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize(
-    "law",
-    [
-        0.2 * specular() + 0.5 * TriangularTeethLaw(0.9) + 0.3 * lambertian(),
-        TriangularTeethLaw(0.9) @ henyey_greenstein(0.7),
-        RectangularTeethLaw(0.7) ** 4,
-        CircularArcLaw(0.8).in_specular_frame(),
-        CYCLE @ LOPSIDED,
-        DensityLaw(lambda a, b: (1.0 + 0.5 * np.cos(a) * np.cos(b)) * SINE.density(b)),
-    ],
-    ids=repr,
-)
-def test_samples_follow_the_operator(law: Law) -> None:
-    rng = np.random.default_rng(5)
-    for theta in (0.3, 1.4, 2.6):
-        outgoing = law.sample(np.full(20_000, theta), rng)
-        for function in (np.cos, smooth, lambda a: np.cos(5.0 * a)):
-            value = function(outgoing)
-            spread = value.std() / math.sqrt(value.size)
-            assert abs(value.mean() - float(law.apply(function, theta))) < 4.5 * spread + 1e-12
-
-
-def test_samples_depend_on_the_generator_alone() -> None:
-    law = 0.5 * specular() + 0.5 * CircularArcLaw(0.8)
-    first, second = (law.sample(THETA, np.random.default_rng(7)) for _ in range(2))
-    assert np.array_equal(first, second)

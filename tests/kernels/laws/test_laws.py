@@ -15,7 +15,6 @@ from scipy.special import ellipe
 from asperity.errors import AccuracyError, InputError
 from asperity.estimates import Estimate
 from asperity.kernels.bases.bins import Bins
-from asperity.kernels.bases.legendre import Legendre
 from asperity.kernels.bases.measure import SINE
 from asperity.kernels.laws.density import DensityLaw
 from asperity.kernels.laws.ideal import lambertian, maxwell
@@ -65,12 +64,6 @@ def test_maxwell_has_its_three_eigenvalues(fraction: float) -> None:
     assert law.reversible and law.mirror_symmetric
 
 
-def test_maxwell_refuses_fractions_outside_the_unit_interval() -> None:
-    for value in (-0.1, 1.1, math.nan):
-        with pytest.raises(InputError, match="diffuse_fraction"):
-            maxwell(value)
-
-
 # ---- Henyey-Greenstein --------------------------------------------------------------------------------------------
 @settings(max_examples=40, deadline=None)
 @given(g=st.floats(-0.95, 0.95), degree=st.integers(0, 12))
@@ -118,25 +111,13 @@ def test_narrow_henyey_greenstein_laws_stay_resolved(g: float) -> None:
     assert np.median(np.abs(near - target)) < 10.0 * (1.0 - abs(g))
 
 
-def test_henyey_greenstein_samples_have_the_moments_of_its_eigenvalues() -> None:
-    rng = np.random.default_rng(4)
-    for g in (-0.6, 0.0, 0.3, 0.9):
-        for theta in (0.1, 1.2, 2.8):
-            drawn = henyey_greenstein(g).sample(np.full(20_000, theta), rng)
-            for degree in (1, 2, 5):
-                assert_z(polynomial(degree)(drawn), g**degree * float(polynomial(degree)(theta)))
-
-
 def test_henyey_greenstein_keeps_grazing_angles_apart() -> None:
     drawn = henyey_greenstein(1.0 - 1e-12).sample(np.full(1000, 1e-10), np.random.default_rng(5))
     assert np.all(drawn > 0.0)
     assert np.median(np.abs(drawn - 1e-10)) < 1e-11
 
 
-def test_henyey_greenstein_refuses_its_limits() -> None:
-    for g in (1.0, -1.0, 1.5, math.nan):
-        with pytest.raises(InputError, match="g: expected"):
-            henyey_greenstein(g)
+def test_henyey_greenstein_laws_know_their_eigenvalues() -> None:
     assert henyey_greenstein(0.5) == HenyeyGreensteinLaw(0.5)
     assert [henyey_greenstein(-0.5).eigenvalue(degree) for degree in range(3)] == [1.0, -0.5, 0.25]
 
@@ -165,24 +146,7 @@ def test_the_adjoint_of_a_density_law_is_its_reversal() -> None:
     assert np.allclose(law.adjoint().apply(polynomial(2), theta), 0.0, atol=1e-13)
 
 
-def test_a_law_that_does_not_preserve_the_measure_has_no_adjoint() -> None:
-    uniform = DensityLaw(lambda a, b: 1.0 / math.pi)
-    assert uniform.reversible is False
-    with pytest.raises(InputError, match="does not preserve sin"):
-        uniform.adjoint()
-
-
-def test_densities_that_are_no_laws_are_refused_with_the_defect() -> None:
-    with pytest.raises(InputError, match=r"rows that integrate to 1, got 2 at theta"):
-        DensityLaw(lambda a, b: np.sin(b))
-    with pytest.raises(InputError, match="values of at least 0"):
-        DensityLaw(lambda a, b: SINE.density(b) * (1.0 + 3.0 * np.cos(b) + 0.0 * a))
-    with pytest.raises(InputError, match="vectorised"):
-        DensityLaw(lambda a, b: np.ones(5))
-    with pytest.raises(InputError, match="finite"):
-        DensityLaw(lambda a, b: np.full(np.broadcast_shapes(a.shape, b.shape), math.nan))
-    with pytest.raises(InputError, match="function of"):
-        DensityLaw(3.0)  # type: ignore[arg-type]
+def test_densities_that_jump_are_refused_with_the_defect() -> None:
     with pytest.raises(AccuracyError, match="breakpoints") as info:
         DensityLaw(lambda a, b: np.where(b < 1.0, 2.0, 1.0) * SINE.density(b) / (1.5 - 0.5 * math.cos(1.0)) + 0.0 * a)
     assert 1e-7 < info.value.defect < 1e-2
@@ -221,23 +185,6 @@ def test_an_exchange_of_intervals_is_a_law() -> None:
     assert np.allclose((law @ law).apply(np.sin, theta), np.sin(theta), atol=1e-12)
 
 
-def test_maps_that_are_no_reversible_laws_are_refused() -> None:
-    with pytest.raises(InputError, match="expected an involution"):
-        InvolutionLaw(lambda theta: np.arccos(np.clip(np.cos(theta) / 2.0, -1.0, 1.0)))
-    # a rotation of u preserves the measure and is no involution (ledger S1.08)
-    with pytest.raises(InputError, match="expected an involution"):
-        InvolutionLaw(lambda theta: np.arccos(-(np.mod(0.6 - np.cos(theta), 2.0) - 1.0)))
-    # tan(T/2) tan(theta/2) = 1/2 is an involution and stretches the measure
-    with pytest.raises(InputError, match=r"sin\(theta\) d theta to be preserved"):
-        InvolutionLaw(lambda theta: 2.0 * np.arctan(0.5 / np.tan(0.5 * theta)))
-    with pytest.raises(InputError, match=r"angles in \(0, pi\)"):
-        InvolutionLaw(lambda theta: theta + math.pi)
-    with pytest.raises(InputError, match="vectorised"):
-        InvolutionLaw(lambda theta: np.ones(3))
-    with pytest.raises(InputError, match="finite"):
-        InvolutionLaw(lambda theta: np.full(theta.shape, math.nan))
-
-
 # ---- matrices -------------------------------------------------------------------------------------------------------
 @settings(max_examples=25, deadline=None)
 @given(size=st.integers(1, 12), seed=st.integers(0, 10**6))
@@ -254,17 +201,6 @@ def test_a_matrix_law_moves_bins_as_its_matrix_says(size: int, seed: int) -> Non
     assert np.allclose(law.edges, np.arccos(1.0 - 2.0 * np.arange(size + 1) / size), atol=1e-12)
 
 
-def test_matrix_law_samples_follow_rows_and_are_uniform_in_the_cosine() -> None:
-    law = MatrixLaw([[0.2, 0.3, 0.5], [0.6, 0.0, 0.4], [1.0, 0.0, 0.0]])
-    drawn = law.sample(np.full(30_000, 1.5), np.random.default_rng(6))
-    u = -np.cos(drawn)
-    assert_z((u < -1.0 / 3.0).astype(float), 0.6)
-    assert not np.any((u > -1.0 / 3.0) & (u < 1.0 / 3.0))
-    assert_z(u[u > 0.0], 2.0 / 3.0)
-    assert_z((u[u > 0.0] - 2.0 / 3.0) ** 2, 1.0 / 27.0)
-    assert np.all((drawn > 0.0) & (drawn < math.pi))
-
-
 def test_a_matrix_law_measures_reversibility_with_the_masses_of_its_bins() -> None:
     def on_bins(array: list[list[float]], edges: list[float]) -> KernelMatrix:
         basis = Bins(np.array(edges))
@@ -278,17 +214,3 @@ def test_a_matrix_law_measures_reversibility_with_the_masses_of_its_bins() -> No
     assert MatrixLaw(on_bins([[0.4, 0.6], [0.2, 0.8]], edges)).mirror_symmetric is None
     with pytest.raises(InputError, match="does not preserve"):
         MatrixLaw(on_bins([[0.4, 0.6], [0.6, 0.4]], edges)).adjoint()
-
-
-def test_matrices_that_are_no_laws_are_refused_by_row() -> None:
-    with pytest.raises(InputError, match=r"rows that sum to 1, got 0\.9 in row 1"):
-        MatrixLaw([[1.0, 0.0], [0.5, 0.4]])
-    with pytest.raises(InputError, match=r"probabilities, got -0\.1 in row 0, column 1"):
-        MatrixLaw([[1.1, -0.1], [0.0, 1.0]])
-    with pytest.raises(InputError, match="square"):
-        MatrixLaw([[0.5, 0.5]])
-
-    with pytest.raises(InputError, match="on Bins in theta"):
-        MatrixLaw(KernelMatrix(np.eye(3), Legendre(3), EXACT))
-    with pytest.raises(InputError, match="on Bins in theta"):
-        MatrixLaw(KernelMatrix(np.eye(2), Bins(2, weight="sin2"), EXACT))

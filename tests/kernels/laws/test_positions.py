@@ -8,7 +8,6 @@ from scipy.integrate import quad
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 
 RNG = 20_260_322
 FLOOR = geo.Wall.from_vertices([(0, -1), (1, -1)])
@@ -154,8 +153,6 @@ def test_an_asteroid_field_displaces_rays_without_bound_and_closed_walls_do_not(
     closed = ker.displacements(geo.mushrooms(0.4), 20_000, rng=RNG)
     assert np.max(np.abs(closed.values)) <= closed.longest_possible <= 1.0
     assert closed.exceeds(1.0).kind == "bound"
-    with pytest.raises(InputError, match="closes"):
-        closed.tail_exponent()
 
 
 def test_displacements_of_open_walls_vanish_with_the_scale_like_their_tail():
@@ -168,23 +165,3 @@ def test_displacements_of_open_walls_vanish_with_the_scale_like_their_tail():
         noise = (coarse.error / float(coarse) + fine.error / float(fine)) / np.log(5.0)
         assert abs(rate - float(tail)) < noise + tail.error < 0.9
         assert float(fine) + fine.error < 0.2 * float(coarse)
-
-
-def test_wrong_arguments_are_refused():
-    with pytest.raises(InputError, match="begin at height 0"):
-        geo.join_walls([FLOOR])
-    with pytest.raises(InputError, match="repeats"):
-        geo.join_walls([geo.flat()], 0)
-    with pytest.raises(InputError, match="increasing"):
-        ker.PositionLaw([1.0, 0.0], [ker.specular()])
-    with pytest.raises(InputError, match="one for each"):
-        ker.PositionLaw([0.0, 1.0], [])
-    with pytest.raises(InputError, match="convention"):
-        ker.PositionLaw([0.0, 1.0], [ker.specular().in_specular_frame()])
-    law = ker.PositionLaw([0.0, 1.0], [ker.specular()])
-    with pytest.raises(InputError, match="positions from 0 to 1"):
-        law.sample(1.5, 1.0)
-    with pytest.raises(InputError, match="length"):
-        ker.position_distance(law, ker.PositionLaw([0.0, 2.0], [ker.specular()]))
-    with pytest.raises(InputError, match="largest"):
-        ker.displacements(FLOOR, 200, rng=0).tail_exponent(100)

@@ -18,13 +18,6 @@ def test_lambertian_matrices_have_rank_one_to_rounding() -> None:
         assert np.abs(matrix.symmetric - np.outer(basis.constant, basis.constant)).max() < 1e-14
 
 
-@pytest.mark.parametrize("g", [0.5, -0.7, 0.9])
-def test_legendre_has_the_eigenvalues_of_henyey_greenstein_to_rounding(g: float) -> None:
-    matrix = ker.discretise(ker.henyey_greenstein(g), ker.Legendre(64))
-    assert np.abs(matrix.symmetric - np.diag(g ** np.arange(64.0))).max() < 1e-12
-    assert matrix.tolerance_met
-
-
 def henyey_greenstein_on(basis: ker.Bins, g: float) -> np.ndarray:
     """The Galerkin matrix from sum (2 l + 1)/2 g^l P_l P_l, with the integral of P_l (P_{l+1} - P_{l-1})/(2 l + 1)."""
     u = np.cos(basis.edges)
@@ -42,8 +35,17 @@ def henyey_greenstein_on(basis: ker.Bins, g: float) -> np.ndarray:
 UNEVEN = ker.Bins([0.0, 0.01, 0.3, 0.32, 1.0, 1.7, 2.5, 3.0, np.pi])
 
 
-@pytest.mark.parametrize("basis", [ker.Bins(64), ker.Bins(256), ker.Bins(7), UNEVEN], ids=repr)
-@pytest.mark.parametrize("g", [0.5, 0.95, 0.99, -0.9])
+@pytest.mark.parametrize(
+    ("g", "basis"),
+    [
+        (0.5, ker.Bins(64)),
+        (0.95, UNEVEN),
+        (0.99, ker.Bins(256)),
+        (0.99, ker.Bins(7)),
+        (-0.9, ker.Bins(64)),
+        (-0.9, UNEVEN),
+    ],
+)
 def test_peaked_densities_have_their_exact_masses_between_bins(g: float, basis: ker.Bins) -> None:
     matrix = ker.discretise(ker.henyey_greenstein(g), basis)
     assert np.linalg.norm(matrix.symmetric - henyey_greenstein_on(basis, g)) <= float(matrix.error)
@@ -57,24 +59,6 @@ def test_a_peak_much_narrower_than_the_bins_is_seen() -> None:
     assert matrix.stochastic_defect() < 1e-10 and eigenvalues(matrix)[0] == pytest.approx(1.0, abs=1e-10)
     # a Galerkin eigenvalue of a reversible law lies below its own, g
     assert 0.999 < eigenvalues(matrix)[1] < 1.0 - 1e-5
-
-
-@pytest.mark.parametrize(
-    "law",
-    [
-        ker.lambertian(),
-        ker.henyey_greenstein(0.5),
-        ker.MatrixLaw([[0.5, 0.5], [0.5, 0.5]]),
-        ker.DensityLaw(lambda theta, theta_out: 0.5 * np.sin(theta_out) + 0.0 * theta),
-        ker.maxwell(0.5),
-    ],
-    ids=repr,
-)
-def test_no_angles_have_no_images(law: ker.Law) -> None:
-    assert law.apply(np.cos, []).shape == (0,)
-    assert law.apply(np.cos, np.empty((3, 0))).shape == (3, 0)
-    assert law.apply(ker.Legendre(4).evaluate, np.empty((2, 0))).shape == (2, 0, 4)
-    assert law.sample([], np.random.default_rng(1)).shape == (0,)
 
 
 @pytest.mark.parametrize(

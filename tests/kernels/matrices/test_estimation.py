@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from asperity import kernels as ker
-from asperity.errors import AccuracyError, InputError
 
 LAW = ker.TriangularTeethLaw(1.1)
 
@@ -76,29 +75,3 @@ def test_pairs_of_any_shape_are_taken() -> None:
     theta, image = pairs(600, 2)
     flat = ker.estimate(theta, image, ker.Bins(4))
     assert np.array_equal(ker.estimate(theta.reshape(20, 30), image.reshape(20, 30), ker.Bins(4)).array, flat.array)
-
-
-def test_empty_bins_are_named() -> None:
-    with pytest.raises(AccuracyError, match=r"2 of 4 bins have no incoming pair \(bins 2, 3\)") as caught:
-        ker.estimate([0.5, 1.2], [0.5, 3.0], ker.Bins(4))
-    assert caught.value.defect == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize(
-    ("theta_in", "theta_out", "basis", "message"),
-    [
-        ([0.5, 1.0], [0.5], ker.Bins(1), "shape"),
-        ([0.0, 1.0], [0.5, 1.0], ker.Bins(1), "theta_in: expected angles"),
-        ([0.5, 1.0], [0.5, np.nan], ker.Bins(1), "theta_out: expected finite"),
-        ([0.5, 1.0], [0.5, 4.0], ker.Bins(1), "theta_out: expected angles"),
-        ([0.5, 1.0], [0.5, 1.0], 3, "basis"),
-        ([0.5, 1.0], [0.5, 1.0], ker.Bins(2, weight="sin2"), "sin"),
-        ([], [], ker.Bins(1), "at least 1"),
-        ([0.5] * 10, [0.5] * 10, ker.Legendre(2), "at least 16"),
-    ],
-)
-def test_bad_pairs_are_refused_in_one_sentence(
-    theta_in: list[float], theta_out: list[float], basis: ker.Basis, message: str
-) -> None:
-    with pytest.raises(InputError, match=message):
-        ker.estimate(theta_in, theta_out, basis)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import pickle
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ from hypothesis import strategies as st
 from asperity import kernels as ker
 from asperity.errors import FileExistsRefusal, InputError
 from asperity.estimates import Estimate
-from asperity.kernels.matrices.defects import invariance_z_score, replicate_z_score, reversibility_z_score
 from asperity.kernels.matrices.matrix import frobenius_error
 
 NO_ERROR = Estimate(0.0, 0.0, "bound", "given")
@@ -139,16 +137,6 @@ def test_the_specular_frame_makes_specular_the_identity_and_is_undone_by_itself(
         assert np.abs(turned.array - np.eye(basis.size)).max() < 1e-12
         assert np.abs(turned.in_specular_frame().array - matrix.array).max() < 1e-12
         assert turned.in_specular_frame().frame == "paper"
-    with pytest.raises(InputError, match="discretise law"):
-        ker.discretise(ker.specular(), ker.Bins([0.0, 1.0, np.pi])).in_specular_frame()
-
-
-def test_matrices_of_different_bases_or_frames_do_not_mix() -> None:
-    p, q = (ker.discretise(ker.lambertian(), ker.Bins(n)) for n in (2, 3))
-    with pytest.raises(InputError, match="different bases"):
-        p @ q
-    with pytest.raises(InputError, match="conventions"):
-        p + p.in_specular_frame()
 
 
 def test_flux_and_weights_are_those_of_the_bins() -> None:
@@ -157,8 +145,6 @@ def test_flux_and_weights_are_those_of_the_bins() -> None:
         np.abs(matrix.weights - 0.5 * (np.cos(matrix.basis.edges[:-1]) - np.cos(matrix.basis.edges[1:]))).max() < 1e-15
     )
     assert np.abs(matrix.flux - matrix.weights[:, None] * matrix.array).max() < 1e-15
-    with pytest.raises(InputError, match="flux"):
-        _ = ker.discretise(ker.lambertian(), ker.Legendre(3)).flux
 
 
 def test_arrays_are_read_only_and_fields_fixed() -> None:
@@ -167,84 +153,6 @@ def test_arrays_are_read_only_and_fields_fixed() -> None:
         matrix.symmetric[0, 0] = 2.0
     with pytest.raises(dataclasses.FrozenInstanceError):
         matrix.law = "other"  # type: ignore[misc]
-
-
-def test_the_asymmetry_does_not_depend_on_the_size() -> None:
-    # half of the array antisymmetric in each block: the defect of one block is that of a hundred
-    block = np.array([[0.0, 1.0], [0.0, 0.0]])
-    small = ker.KernelMatrix(block, ker.Bins(2), NO_ERROR)
-    large = ker.KernelMatrix(np.kron(np.eye(100), block), ker.Bins(200), NO_ERROR)
-    assert float(small.symmetry_defect()) == pytest.approx(np.sqrt(0.5))
-    assert float(large.symmetry_defect()) == pytest.approx(np.sqrt(0.5))
-    assert small.symmetry_defect().z_score is None
-
-
-def test_defects_are_numbers_that_know_their_norm() -> None:
-    defect = stochastic(4, np.random.default_rng(2)).symmetry_defect()
-    assert defect > 0.01 and "||_F" in defect.norm and defect.value == float(defect)
-    with pytest.raises(AttributeError, match="immutable"):
-        defect.norm = "other"
-    copied = pickle.loads(pickle.dumps(ker.SymmetryDefect(0.5, z_score=2.0)))
-    assert (float(copied), copied.z_score) == (0.5, 2.0)
-
-
-def reversible_flux(n: int, rng: np.random.Generator) -> np.ndarray:
-    flux = rng.random((n, n)) ** 3
-    flux += flux.T
-    return flux / flux.sum()
-
-
-# Sums over 300 samples: the mean is off by 0.06 (one standard deviation), the spread by 0.04.
-@pytest.mark.parametrize(("n", "pairs"), [(3, 60), (8, 200), (8, 5000), (30, 2000), (30, 300)])
-def test_z_scores_of_reversible_counts_are_standard_normal(n: int, pairs: int) -> None:
-    rng = np.random.default_rng(n * pairs)
-    drawn, totals = [], []
-    for _ in range(300):
-        flux = reversible_flux(n, rng)
-        counts = rng.multinomial(pairs, flux.ravel()).reshape(n, n)
-        drawn.append(reversibility_z_score(counts))
-        totals.append(invariance_z_score(counts.sum(axis=1), flux.sum(axis=1)))
-    for scores in (drawn, totals):
-        assert abs(np.mean(scores)) < 0.3
-        assert 0.75 < np.std(scores) < 1.2
-
-
-def test_z_scores_find_a_drift_that_a_fixed_tolerance_misses() -> None:
-    rng = np.random.default_rng(11)
-    n = 20
-    flux = reversible_flux(n, rng)
-    cycle = np.roll(np.eye(n), 1, axis=1) - np.roll(np.eye(n), -1, axis=1)
-    drifting = flux + 0.5 * flux * cycle
-    drifting /= drifting.sum()
-    counts = rng.multinomial(100_000, drifting.ravel()).reshape(n, n)
-    assert reversibility_z_score(counts) > 10.0
-
-
-def test_unequal_rows_are_told_from_the_invariant_measure() -> None:
-    flux = reversible_flux(6, np.random.default_rng(12))
-    assert invariance_z_score(np.array([100, 5000, 300, 20_000, 700, 50]), flux.sum(axis=1)) > 20.0
-
-
-@pytest.mark.parametrize("dimensions", [1, 3, 20])
-def test_z_scores_from_replicates_have_the_tails_of_a_normal(dimensions: int) -> None:
-    """The fraction above 2 is that of a normal, 0.0228, within 4.5 standard errors and the fit's quarter."""
-    rng = np.random.default_rng(5)
-    scores = [replicate_z_score(list(rng.normal(size=(8, dimensions)))) for _ in range(4000)]
-    fraction = np.mean(np.array(scores) > 2.0)
-    assert abs(fraction - 0.0228) < 0.0228 / 4 + 4.5 * np.sqrt(0.0228 / 4000)
-    assert np.max(scores) < 5.0
-
-
-def test_z_scores_from_replicates_are_centred_and_find_a_mean() -> None:
-    rng = np.random.default_rng(4)
-    scores = []
-    for _ in range(200):
-        parts = [rng.normal(size=(12, 12)) for _ in range(8)]
-        scores.append(replicate_z_score([part - part.T for part in parts]))
-    assert abs(np.mean(scores)) < 0.3 and 0.75 < np.std(scores) < 1.3
-    drift = 3.0 * np.triu(np.ones((12, 12)), 1)
-    parts = [part + drift for part in (rng.normal(size=(12, 12)) for _ in range(8))]
-    assert replicate_z_score([part - part.T for part in parts]) > 8.0
 
 
 @pytest.mark.parametrize(
@@ -299,14 +207,10 @@ def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
     for path in (text, archive, array):
         with pytest.raises(InputError, match=f"{path.name} is not a kernel matrix"):
             ker.load_matrix(path)
-    with pytest.raises(InputError, match="No such file"):
-        ker.load_matrix(tmp_path / "missing.npz")
     whole = stochastic(2, np.random.default_rng(0)).save(tmp_path / "whole.npz").read_bytes()
     (tmp_path / "half.npz").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match="is not a kernel matrix"):
         ker.load_matrix(tmp_path / "half.npz")
-    with pytest.raises(InputError, match="cannot write"):
-        stochastic(2, np.random.default_rng(0)).save(tmp_path / "no" / "folder" / "kernel.npz")
 
 
 def test_metadata_that_a_file_cannot_hold_are_refused(tmp_path: Path) -> None:
@@ -329,9 +233,6 @@ def test_the_picture_labels_its_axes_with_units(basis: ker.Basis) -> None:
     labels = [axes.get_ylabel() for axes in ax.get_figure().axes if axes is not ax]
     assert any("invariant measure" in label for label in labels)
     pyplot.close(ax.get_figure())
-    with pytest.raises(InputError, match="one angle"):
-        lambert = ker.discretise(ker.lambertian(), basis)
-        lambert.tensor(lambert).plot()
 
 
 def test_the_repr_is_one_line_and_owns_up_to_a_missed_tolerance() -> None:
@@ -340,19 +241,3 @@ def test_the_repr_is_one_line_and_owns_up_to_a_missed_tolerance() -> None:
     for part in ("Bins(8)", "CircularArcLaw", "qmc", "4096 samples", "tolerance 1e-08 not met"):
         assert part in text
     assert "not met" not in repr(ker.discretise(ker.TriangularTeethLaw(1.0), ker.Bins(8)))
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: ker.KernelMatrix(np.eye(3), ker.Bins(2), NO_ERROR), "expected shape"),
-        (lambda: ker.KernelMatrix(np.full((2, 2), np.nan), ker.Bins(2), NO_ERROR), "finite"),
-        (lambda: ker.KernelMatrix(np.eye(2), "bins", NO_ERROR), "basis"),
-        (lambda: ker.KernelMatrix(np.eye(2), ker.Bins(2), 0.1), "Estimate"),
-        (lambda: ker.KernelMatrix(np.eye(2), ker.Bins(2), NO_ERROR) @ np.ones(3), "expected 2 entries"),
-        (lambda: ker.KernelMatrix(np.eye(2), ker.Bins(2), NO_ERROR) ** -1, "exponent"),
-    ],
-)
-def test_bad_matrices_are_refused_in_one_sentence(make: object, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        make()  # type: ignore[operator]

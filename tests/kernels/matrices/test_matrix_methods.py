@@ -7,7 +7,6 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 from asperity.kernels.discretisation import methods
 from asperity.kernels.discretisation.method import Budget, computed
 
@@ -46,13 +45,6 @@ def test_a_new_method_is_used_for_the_law_and_for_all_that_is_made_of_it():
     assert ker.discretise(ker.maxwell(0.5), BASIS, "exact").method == "exact"
     assert ker.discretise(0.5 * ker.lambertian() + 0.5 * HG(0.5), BASIS).method == "exact + quadrature"
     assert ker.discretise(ker.lambertian().in_specular_frame(), BASIS).method == "quadrature"
-
-
-def test_a_law_without_the_method_is_told_which_it_has():
-    with pytest.raises(InputError, match=r"lambertian.*no method 'exact'; it has quadrature, monte-carlo"):
-        ker.discretise(ker.maxwell(0.5), BASIS, "exact")
-    with pytest.raises(InputError, match="it has qmc, quadrature, monte-carlo"):
-        ker.discretise(ker.WallLaw(geo.mushrooms(0.3, 0.5)), BASIS, "exact")
 
 
 def test_a_prediction_does_not_exceed_the_error_that_is_there():

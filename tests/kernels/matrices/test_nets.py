@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
@@ -17,29 +15,17 @@ TEETH = ker.TriangularTeethLaw(1.1)
 BASES = [ker.Bins(16), ker.Bins(9), ker.Legendre(6), ker.Panels(np.linspace(0.0, np.pi, 5), 2)]
 
 
-@dataclass(frozen=True)
-class Bounce(ker.DrivenLaw):
-    """Triangular teeth, known only by their rays."""
-
-    mirror_symmetric: bool | None = True
-
-    reversible = True
-
-    def reflect(self, x: object, theta: object) -> np.ndarray:
-        return TEETH.reflect(x, theta)  # type: ignore[arg-type]
-
-
 def sampled(law: ker.Law, basis: ker.Basis, seed: int) -> ker.KernelMatrix:
     return ker.discretise(law, basis, "qmc", samples=4096, rng=np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("basis", BASES, ids=repr)
-def test_matrices_from_half_of_the_rays_are_mirror_symmetric_markov_and_right_within_their_errors(basis):
+def test_matrices_from_half_of_the_rays_are_mirror_symmetric_markov_and_right_within_their_errors(basis, bounce):
     exact = ker.discretise(TEETH, basis).symmetric
     flip = reflection_matrix(basis)
     within = []
     for seed in range(24):
-        found = sampled(Bounce(), basis, seed)
+        found = sampled(bounce(mirror_symmetric=True), basis, seed)
         assert np.abs(flip @ found.symmetric @ flip.T - found.symmetric).max() < 1e-14
         assert found.stochastic_defect() < 1e-13 and found.samples == 4096
         within.append(np.linalg.norm(found.symmetric - exact) <= float(found.error))
@@ -48,9 +34,9 @@ def test_matrices_from_half_of_the_rays_are_mirror_symmetric_markov_and_right_wi
 
 
 @pytest.mark.parametrize("looks", [(8, 16), (64, 512), (8, 4096), (128, 1024, 2048)], ids=repr)
-def test_a_net_that_goes_on_is_the_net_that_was_never_looked_at(looks):
+def test_a_net_that_goes_on_is_the_net_that_was_never_looked_at(looks, bounce):
     basis, last = ker.Bins(4), looks[-1]
-    parted, whole = (SobolSampler(Bounce(mirror_symmetric=None), basis, np.random.default_rng(3)) for _ in range(2))
+    parted, whole = (SobolSampler(bounce(), basis, np.random.default_rng(3)) for _ in range(2))
     for look in looks:
         found, rays, _ = parted.sampled(look, symmetrise=False)
         assert rays == look
@@ -61,9 +47,11 @@ def test_a_net_that_goes_on_is_the_net_that_was_never_looked_at(looks):
 
 @pytest.mark.parametrize("chunk", [1, 8, 64, 4096])
 @pytest.mark.parametrize("looks", [(2000,), (1, 100, 1000, 3), (30, 31, 900)], ids=repr)
-def test_parts_of_a_net_are_digital_shifts_of_one_sequence_whatever_is_traced_at_a_time(looks, chunk, monkeypatch):
+def test_parts_of_a_net_are_digital_shifts_of_one_sequence_whatever_is_traced_at_a_time(
+    looks, chunk, monkeypatch, bounce
+):
     monkeypatch.setattr(ray_sums, "SMALLEST_CHUNK", chunk)
-    basis, law = ker.Bins(2), Bounce(mirror_symmetric=None)
+    basis, law = ker.Bins(2), bounce()
     net, twin = (SobolSampler(law, basis, np.random.default_rng(5)) for _ in range(2))
     for look in looks:
         net.sampled(look, symmetrise=False)
@@ -78,9 +66,9 @@ def test_parts_of_a_net_are_digital_shifts_of_one_sequence_whatever_is_traced_at
 
 
 @pytest.mark.parametrize("rays", [8, 64, 1024])
-def test_each_part_is_a_net(rays):
+def test_each_part_is_a_net(rays, bounce):
     # of 2^k points of a (0, k, 2)-net one is in every dyadic rectangle of that area, in any shape
-    net = SobolSampler(Bounce(mirror_symmetric=None), ker.Bins(2), np.random.default_rng(6))
+    net = SobolSampler(bounce(), ker.Bins(2), np.random.default_rng(6))
     digits = net.sequence.block(0, rays)
     for shift in net.shifts:
         x, y = ((digits ^ shift) * 2.0**-SOBOL_BITS).T
@@ -107,31 +95,31 @@ def test_a_block_is_the_same_whatever_block_it_is_in(number):
     assert np.array_equal(np.concatenate(blocks), whole) and len(np.unique(whole, axis=0)) == 2**10
 
 
-def test_more_rays_than_a_net_has_are_refused_before_the_first_is_traced():
-    net = SobolSampler(Bounce(), ker.Bins(2), np.random.default_rng(1))
+def test_more_rays_than_a_net_has_are_refused_before_the_first_is_traced(bounce):
+    net = SobolSampler(bounce(mirror_symmetric=True), ker.Bins(2), np.random.default_rng(1))
     with pytest.raises(InputError, match="at most 34359738368 rays, got 34359738369; use method 'monte-carlo'"):
         net.sampled(PARTS * 2**SOBOL_BITS + 1, symmetrise=False)
     assert net.sums.each == 0 and not net.sums.tables.any()
 
 
-def test_mirror_images_are_worth_as_many_rays_again():
+def test_mirror_images_are_worth_as_many_rays_again(bounce):
     exact, basis = ker.discretise(TEETH, ker.Bins(16)).symmetric, ker.Bins(16)
     halved, whole = (
         np.sqrt(np.mean([np.sum((sampled(law, basis, seed).symmetric - exact) ** 2) for seed in range(16)]))
-        for law in (Bounce(), Bounce(mirror_symmetric=None))
+        for law in (bounce(mirror_symmetric=True), bounce())
     )
     # nets of order 3/4
     assert whole / halved == pytest.approx(2.0**0.75, rel=0.15)
 
 
-def test_counts_hold_every_ray_and_its_mirror_image():
-    counts = sampled(Bounce(), ker.Bins(16), 0).counts
+def test_counts_hold_every_ray_and_its_mirror_image(bounce):
+    counts = sampled(bounce(mirror_symmetric=True), ker.Bins(16), 0).counts
     assert counts.sum() == 2 * 4096 and np.array_equal(counts, counts[::-1, ::-1])
 
 
-def test_a_basis_without_the_symmetry_takes_rays_from_both_sides():
+def test_a_basis_without_the_symmetry_takes_rays_from_both_sides(bounce):
     basis = ker.Bins(np.array([0.0, 0.5, 1.7, np.pi]))
     exact = ker.discretise(TEETH, basis).symmetric
-    found = sampled(Bounce(), basis, 1)
+    found = sampled(bounce(mirror_symmetric=True), basis, 1)
     assert found.counts.sum() == 4096
     assert np.linalg.norm(found.symmetric - exact) < 2.0 * float(found.error)

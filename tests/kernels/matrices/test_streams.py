@@ -217,24 +217,6 @@ def test_memory_does_not_grow_with_the_stream():
     assert min(peak(256) for _ in range(3)) < 1.1 * peak(16)
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ([], "at least 1 pairs"),
-        (np.ones((3, 3)), r"shape \(n, 2\)"),
-        ("text", "iterable of chunks"),
-        (7, "iterable of chunks"),
-        ([([0.5, 1.0], [0.5])], "as many outgoing as incoming"),
-        ([([0.5], [4.0])], "theta_out: expected angles"),
-        ([0.5, 1.0], "expected chunks"),
-        ((np.ones(3), np.ones(4)), "one length"),
-    ],
-)
-def test_bad_streams_are_refused(given, words):
-    with pytest.raises(InputError, match=words):
-        ker.estimate_stream(given, ker.Bins(2))
-
-
 def test_incoming_angles_that_do_not_follow_the_measure_are_refused_by_default():
     with pytest.raises(InputError, match="pass invariant=False"):
         ker.estimate_stream(pairs(invariant=False), ker.Bins(6))

@@ -45,7 +45,7 @@ def test_a_deep_crevice_is_followed_through_thousands_of_reflections_to_the_last
     assert np.abs(row.offset[row.sign < 0] - np.pi).max() < 1e-15
 
 
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize("seed", range(0, 50, 2))
 def test_rows_and_beams_are_one_law_by_two_methods(seed):
     hollow = random_hollow(seed)
     beams = beams_of(hollow, max_beams=20_000)

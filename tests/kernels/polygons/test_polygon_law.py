@@ -11,9 +11,7 @@ from campaigns.judges.traced_pairs import chi_square_p
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import InputError
 from asperity.kernels.discretisation.isometries import branch_matrix
-from asperity.kernels.laws.isometry_table import IsometryTable
 from asperity.kernels.walls.isometry_branches import isometries
 
 EPS = float(np.finfo(np.float64).eps)
@@ -61,11 +59,6 @@ def test_matrices_from_the_table_are_those_of_quadrature_between_kinks(psi: floa
     assert np.linalg.norm(found.symmetric - found.symmetric.T) < 2e-13
 
 
-def test_the_published_number_of_triangular_teeth() -> None:
-    found = ker.discretise(ker.TriangularTeethLaw(0.7), ker.Legendre(2))
-    assert found.symmetric[1, 1] == pytest.approx(0.134541971359171, abs=1e-15)
-
-
 @pytest.mark.parametrize("r", [1e-6, 0.5, 40.0, 1e8])
 def test_polygons_that_are_teeth_have_the_laws_of_teeth(r: float) -> None:
     basis = ker.Bins(32)
@@ -77,22 +70,6 @@ def test_polygons_that_are_teeth_have_the_laws_of_teeth(r: float) -> None:
         wanted = ker.RectangularTeethLaw(r).apply(np.cos, theta)
         assert np.allclose(law.apply(np.cos, theta), wanted, atol=1e-14 * max(1.0, r))
     assert float(ker.PolygonLaw(wall).unresolved) == 0.0
-
-
-def test_beams_of_a_triangle_and_a_rectangle_give_the_closed_forms() -> None:
-    from asperity.geometry.polygons.beams import beams_of
-    from asperity.kernels.discretisation.isometry_tables import table_matrix
-    from asperity.kernels.walls.polygon import table_of_beams
-
-    for basis in BASES:
-        table = table_of_beams(beams_of([(0, 0), (0.5, -0.5 / math.tan(0.35)), (1, 0)]))
-        exact = ker.discretise(ker.TriangularTeethLaw(0.7), basis).symmetric
-        assert np.linalg.norm(table_matrix(table, basis)[0] - exact) < 1e-13 * math.sqrt(basis.size)
-        table = table_of_beams(beams_of([(0, 0), (0, -1.3), (1, -1.3), (1, 0)], max_beams=20_000))
-        half = IsometryTable.joined([IsometryTable.flat(0.5), table.scaled(0.5)])
-        found, bound = table_matrix(half, basis)
-        exact = ker.discretise(ker.RectangularTeethLaw(1.3), basis).symmetric
-        assert 0.0 < np.linalg.norm(found - exact) <= bound + 2e-13
 
 
 # ---- laws of polygons -----------------------------------------------------------------------------------------------
@@ -182,16 +159,6 @@ def test_few_angles_are_answered_as_many() -> None:
     for k, angle in enumerate(theta):
         probability, _ = law.branches(angle)
         assert np.array_equal(probability, at_once[k][: probability.size]) and not at_once[k][probability.size :].any()
-
-
-def test_walls_that_are_curved_or_open_are_refused_with_advice() -> None:
-    with pytest.raises(InputError, match="WallLaw"):
-        ker.PolygonLaw(geo.focusing_arcs(1.0))
-    with pytest.raises(InputError, match="WallLaw"):
-        plate = [geo.Segment((0.2, -0.1), (0.4, -0.1)), geo.Segment((0.4, -0.1), (0.2, -0.1))]
-        ker.PolygonLaw(geo.Wall([geo.Segment((0, -1), (1, -1))], islands=[plate]))
-    with pytest.raises(InputError, match="wall"):
-        ker.PolygonLaw(1.0)
 
 
 def test_polygons_have_no_gap_and_their_walls_are_exact() -> None:
