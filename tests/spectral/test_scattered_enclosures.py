@@ -9,6 +9,7 @@ from scipy.special import eval_legendre
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.errors import InputError
 from asperity.spectral.bounds.enclosure import Enclosure, _with_ties
 from asperity.spectral.bounds.operator_residuals import image_rule
 from asperity.spectral.bounds.separation import rest_of_spectrum
@@ -32,6 +33,15 @@ def test_images_of_fast_functions_are_accurate(degree):
     angle = np.array([0.02, 0.7, 1.5, 2.9])
     image = ker.henyey_greenstein(0.3).apply(lambda theta: eval_legendre(degree, np.cos(theta)), angle)
     assert np.abs(image - 0.3**degree * eval_legendre(degree, np.cos(angle))).max() < 1e-13
+
+
+def test_a_composition_whose_images_have_no_known_error_is_refused():
+    arc, scattering = ker.CircularArcLaw(1.0), ker.henyey_greenstein(0.5)
+    with pytest.raises(InputError, match="no known error"):
+        spec.enclosures(arc @ scattering @ arc, 2)
+    with pytest.raises(InputError, match="has a scattering that leaves"):
+        near = ker.henyey_greenstein(0.96)
+        spec.enclosures(near @ ker.TriangularTeethLaw(0.7) @ near, 2, tolerance=1e-12)
 
 
 def test_errors_of_images_of_arcs_and_of_unresolved_polygons_are_counted():
