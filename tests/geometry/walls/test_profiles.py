@@ -219,11 +219,11 @@ def test_the_unit_reaches_the_axes_and_the_file_of_the_wall(tmp_path):
     assert again.unit == "um" and again == wall == geo.Wall.from_vertices(wall.vertices)
 
 
-def test_a_slope_of_a_thousand_is_taken_for_mixed_units():
-    x, height = np.arange(5.0), 1000.0 * np.array([0, 1, 0, 1, 0])
-    with pytest.warns(UserWarning, match="mean slope is 1e\\+03: are the heights in a smaller unit"):
-        geo.Wall.from_profile(x, height)
-    geo.Wall.from_profile(x, height / 1000.0)
+def test_a_slope_above_a_hundred_is_taken_for_mixed_units():
+    x, height = np.arange(5.0), np.array([0, 1, 0, 1, 0])
+    with pytest.warns(UserWarning, match="mean slope is 100: are the heights in a smaller unit"):
+        geo.Wall.from_profile(x, 100.1 * height)
+    geo.Wall.from_profile(x, 100.0 * height)
 
 
 # ---- how columns are written -------------------------------------------------------------------------------------
@@ -411,7 +411,7 @@ def test_a_computed_periodic_profile_wraps_round():
     ("unit", "width", "height", "warns"),
     [
         ("m", 160.0, 3e-6, True), ("mm", 160.0, 3e-3, False), ("m", 160.0, 3.0, False), ("m", 0.5, 1e-8, False),
-        ("", 1000.0, 1e-8, True), ("m", 160.0, 0.0, False),
+        ("", 1000.0, 1e-8, True), ("m", 160.0, 0.0, False), ("", 1.0, 1e-9, False),
     ],
 )  # fmt: skip
 def test_a_width_of_160_metres_for_micrometres_is_taken_for_mixed_units(unit, width, height, warns):
