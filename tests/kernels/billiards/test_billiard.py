@@ -12,9 +12,8 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 
-IRRATIONAL = (0.1, 0.5, 0.9, 2.0, 10.0)
+IRRATIONAL = (0.1, 2.0)
 # arctan(sqrt(m/J)) = pi p/q
 RATIONAL = ((1, 6), (1, 4), (1, 3), (1, 5), (2, 5))
 
@@ -124,7 +123,7 @@ def test_a_real_rough_wall_sets_the_disk_free_in_the_strip():
 
 
 def test_the_true_disk_in_a_strip_does_what_its_limit_law_does():
-    disk, n = geo.Disk(1.0, 0.5), 400
+    disk, n = geo.Disk(1.0, 0.5), 200
     wall = geo.triangular_teeth(1.2)
     velocity = np.tile(disk.from_angles(1.1, 1.0), (n, 1))
     widths = []
@@ -133,25 +132,6 @@ def test_the_true_disk_in_a_strip_does_what_its_limit_law_does():
         widths.append(np.log(record.extent()))
     difference = widths[0].mean() - widths[1].mean()
     assert abs(difference) < 4.5 * math.sqrt((widths[0].var() + widths[1].var()) / n)
-
-
-def test_bad_input_is_refused():
-    disk, rng = geo.Disk(), np.random.default_rng(0)
-    strip, law = geo.Container.strip(), no_slip(disk)
-    with pytest.raises(InputError, match="centres in the container"):
-        ker.play(strip, law, [[0.0, 2.0]], [[0.0, 1.0, 0.0]], 3, rng)
-    with pytest.raises(InputError, match="one for each of the 2 walls"):
-        ker.play(strip, [law], [[0.0, 0.0]], [[0.0, 1.0, 0.0]], 3, rng)
-    with pytest.raises(InputError, match="same disk"):
-        ker.play(strip, [law, no_slip(geo.Disk(2.0))], [[0.0, 0.0]], [[0.0, 1.0, 0.0]], 3, rng)
-    with pytest.raises(InputError, match=r"shape \(1, 3\)"):
-        ker.play(strip, law, [[0.0, 0.0]], [[0.0, 1.0]], 3, rng)
-    with pytest.raises(InputError, match="convex"):
-        geo.Container.polygon([(0, 0), (1, 0), (0.2, 0.2), (0, 1)])
-    with pytest.raises(InputError, match="counterclockwise"):
-        geo.Container.polygon([(0, 0), (0, 1), (1, 0)])
-    with pytest.raises(InputError, match="unit vectors"):
-        geo.Container([[0, 0]], [[0, 2]])
 
 
 @pytest.mark.slow

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 
 RNG = 20_260_401
 TRIANGLE = ker.PolygonalBody([[(0.0, 0.0), (2.0, 0.0), (0.3, 1.1)]])
@@ -127,20 +125,6 @@ def test_the_lines_that_meet_a_body_do_not_depend_on_the_region_around_it():
         assert abs(met.mean() - fraction) < 4.5 * np.sqrt(fraction * (1 - fraction) / n)
 
 
-@pytest.mark.parametrize(
-    ("region", "words"),
-    [
-        (geo.Container.polygon([(-3, -2), (4, -2), (4, 3)]), "contains the body"),
-        (geo.Container.strip(9.0), "outer loop"),
-        (geo.flat(), "Container"),
-        (geo.Container.sinai(9.0, 0.5), "convex"),
-    ],
-)
-def test_a_region_that_is_not_a_convex_set_around_the_body_is_refused(region, words):
-    with pytest.raises(InputError, match=words):
-        ker.PolygonalBody([[(-2.5, -1.5), (-1.0, -1.5), (-2.5, 0.0)]]).scatter_in(region, 10)
-
-
 def test_the_fraction_of_lines_that_meet_a_convex_body_is_its_perimeter_over_that_of_the_circle():
     """Cauchy and Crofton; and the mean momentum transfer is 8/3 of the perimeter, in any circle around the body."""
     perimeter = np.sum(np.hypot(*(np.roll(TRIANGLE.polygons[0], -1, axis=0) - TRIANGLE.polygons[0]).T))
@@ -158,28 +142,8 @@ def test_the_fraction_of_lines_that_meet_a_convex_body_is_its_perimeter_over_tha
         assert abs(scaled.mean() - 8.0 / 3.0 * perimeter) < 4.5 * scaled.std() / np.sqrt(n)
 
 
-def diffuse_spin_force(spin):
-    """Lambert's law by an independent integral over the rim, in coordinates of the plane."""
-
-    def part(component):
-        def integrand(phi):
-            normal = np.array([np.cos(phi), np.sin(phi)])
-            tangent = np.array([-np.sin(phi), np.cos(phi)])
-            relative = np.array([-1.0, 0.0]) - spin * tangent
-            push = relative - np.hypot(*relative) * np.pi / 4.0 * normal
-            value = {"along": -push[0], "across": -push[1], "torque": tangent @ push}[component]
-            return np.cos(phi) * value
-
-        return quad(integrand, -0.5 * np.pi, 0.5 * np.pi, epsabs=1e-12)[0]
-
-    return [part(name) for name in ("along", "across", "torque")]
-
-
 @pytest.mark.parametrize("spin", [-0.7, 0.0, 0.2, 1.0, 3.0])
-def test_forces_on_a_spinning_disk_agree_with_integrals(spin):
-    found = ker.spin_force(ker.lambertian(), spin)
-    for number, exact in zip((found.along, found.across, found.torque), diffuse_spin_force(spin), strict=True):
-        assert abs(float(number) - exact) <= number.error + 1e-11
+def test_forces_on_a_spinning_disk_of_mirrors_and_retroreflectors_are_known(spin):
     mixed = ker.spin_force(0.25 * ker.retroreflection() + 0.75 * ker.specular(), spin, radius=2.0)
     assert float(mixed.along) == pytest.approx(2.0 * (1.0 + 2.0), abs=1e-9)
     assert float(mixed.across) == pytest.approx(2.0 * 0.25 * np.pi * spin, abs=1e-9)
@@ -199,10 +163,14 @@ def test_the_spin_force_has_the_symmetry_of_the_cell_and_the_limit_without_spin(
     assert float(plus.across) > 0.0 > float(plus.torque)
 
 
-@pytest.mark.parametrize("law", [ker.RectangularTeethLaw(2.0), ker.TriangularTeethLaw(0.3)], ids=repr)
-def test_reported_errors_of_spin_forces_hold(law):
+@pytest.mark.parametrize(
+    ("law", "points"),
+    [(ker.lambertian(), 10_000), (ker.RectangularTeethLaw(2.0), 200_000), (ker.TriangularTeethLaw(0.3), 200_000)],
+    ids=repr,
+)
+def test_reported_errors_of_spin_forces_hold(law, points):
     """Against a midpoint rule in the coordinates of the plane, at spins for which kinks lie anywhere."""
-    phi = np.pi * ((np.arange(200_000) + 0.5) / 200_000 - 0.5)
+    phi = np.pi * ((np.arange(points) + 0.5) / points - 0.5)
     normal, tangent = np.stack([np.cos(phi), np.sin(phi)]), np.stack([-np.sin(phi), np.cos(phi)])
     for spin in np.random.default_rng(RNG).uniform(-1.5, 1.5, 4):
         relative = np.array([[-1.0], [0.0]]) - spin * tangent
@@ -266,22 +234,3 @@ def test_a_direction_measure_weights_the_forces_of_streams():
     angles = 2.0 * np.pi * np.arange(48) / 48
     exact = 2.0 * np.pi * np.mean([chi(angle) * body.force(angle)[0] for angle in angles])
     assert float(found) == pytest.approx(exact, rel=1e-4)
-    with pytest.raises(InputError, match="one for every element"):
-        ker.RoughBody.polygon([ker.specular()], [(0, 0), (1, 0), (0, 1)])
-
-
-def test_wrong_arguments_are_refused():
-    with pytest.raises(InputError, match="three points"):
-        ker.PolygonalBody([[(0, 0), (1, 0)]])
-    with pytest.raises(InputError, match="area"):
-        ker.PolygonalBody([[(0, 0), (1, 0), (2, 0)]])
-    with pytest.raises(InputError, match="polygons"):
-        ker.PolygonalBody([])
-    with pytest.raises(InputError, match="other than 0"):
-        TRIANGLE.scatter([[5.0, 5.0]], [[0.0, 0.0]])
-    with pytest.raises(InputError, match="to contain"):
-        TRIANGLE.scatter_in_circle(10, 0, radius=0.1)
-    with pytest.raises(InputError, match="convention"):
-        ker.spin_force(ker.specular().in_specular_frame(), 0.1)
-    with pytest.raises(InputError, match="rays"):
-        TRIANGLE.force(0.0, 10)
