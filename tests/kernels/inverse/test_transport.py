@@ -359,7 +359,7 @@ def test_the_resistance_of_a_wall_without_closed_form_meets_its_tolerance(kind):
     pieces = [geo.Bezier([a, 0.5 * (a + b), b]) for a, b in itertools.pairwise(ends)]
     exact = ker.resistance(ker.PolygonLaw(geo.Wall.from_vertices(points)))
     law = ker.WallLaw(geo.Wall(pieces))
-    coarse, fine = (ker.resistance(law, tolerance, time_limit=120.0) for tolerance in (1e-3, 3e-6))
+    coarse, fine = (ker.resistance(law, tolerance, time_limit=120.0) for tolerance in (1e-3, 1e-5))
     for found in (coarse, fine):
         assert abs(found.value - exact.value) <= found.error + exact.error
-    assert coarse.error <= 1e-3 and fine.error <= 3e-6
+    assert coarse.error <= 1e-3 and fine.error <= 1e-5
