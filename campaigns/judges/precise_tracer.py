@@ -189,6 +189,8 @@ def trace_precisely(scene, x, theta, limit=2000):
         ]
         own = slice(int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END]))
         curves = [] if scene.beziers is None else [_bezier(row) for row in scene.beziers[own]]
+        # a focusing arc lies beyond its chord; other curves may reach between two sides
+        clear = not scene.is_open and not curves and all(focusing for _, _, focusing, *_ in arcs)
         bounces, itinerary, enters = 0, [], True
         while bounces <= limit:
             while True:
@@ -227,7 +229,7 @@ def trace_precisely(scene, x, theta, limit=2000):
             v = (v[0] - w * n[0], v[1] - w * n[1])
             bounces, before = bounces + 1, itinerary[-1] if itinerary else ("", -1)
             itinerary.append(piece)
-            if not scene.is_open and before[0] == piece[0] == "line" and before != piece:
+            if clear and before[0] == piece[0] == "line" and before != piece:
                 sides = _line(scene, before[1]), _line(scene, piece[1])
                 number, step = _crossings(sides, p, v) if _faces(sides, scene.joints) else (0, 0)
                 if FEW <= number <= limit - bounces:

@@ -27,7 +27,7 @@ WITH_SOURCE = {
     if "rng" in arguments and "Rng" in str(inspect.signature(function).parameters["rng"].annotation)
 }
 NO_SOURCES = {
-    "matrix": np.matrix("1 0; 0 1"), "list": [1, 2], "object": object(), "negative": -1, "huge": 10**5000,
+    "matrix": np.eye(2).view(np.matrix), "list": [1, 2], "object": object(), "negative": -1, "huge": 10**5000,
     "beyond": 2**128, "true": True, "fraction": 1.5, "text": "1", "array": np.array([1]), "masked": np.ma.masked,
     "class": np.random.PCG64, "old": np.random.RandomState(0), "span": np.timedelta64(1, "s"),
 }  # fmt: skip

@@ -158,7 +158,7 @@ DISKS = [
     (lambda: geo.plane_crossing([0, 1, 0], [1, 0, 1]), "v2 other than 0"),
     (lambda: geo.RollingCharts(pi / 4).transfer([0, 0, 0], [1, 1, 1]), r"shape \(..., 2\)"),
     (lambda: geo.ConfigurationSpace(geo.koch(2), DISK, 5.0), "at most two satellites"),
-    (lambda: geo.ConfigurationSpace(geo.flat(), None, 0.1), "a Wall and a Disk"),
+    (lambda: geo.ConfigurationSpace(geo.flat(), None, 0.1), "disk: expected a Disk such as"),
     (lambda: geo.ConfigurationSpace(geo.koch(2), DISK, 0.1, pi / 50), "at most two satellites"),
     (lambda: SPACE.contains([0.0, 1.0]), r"shape \(..., 3\)"),
     (lambda: SPACE.cylinder_contains([0.0]), r"shape \(..., 3\)"),
