@@ -143,7 +143,7 @@ def study(scales=(0.01,), **changed):
 
 DISKS = [
     (lambda: geo.Disk(mass=0.0), "mass"), (lambda: geo.Disk(inertia=-1.0), "inertia"),
-    (lambda: geo.Disk(mass=nan), "mass"),
+    (lambda: geo.Disk(mass=nan), "mass"), (lambda: geo.Disk(2.0, 1.0, 2.0), r"moves as Disk\(mass=2.0, inertia=0.25\)"),
     (lambda: DISK.to_angles([(1.0, 1.0, 0.0), (1.0, 0.0, 0.0)]), r"got v2 = 0\.0 at index \(1,\);"),
     (lambda: DISK.to_angles((1.0, -1.0, 0.0)), r"v2 > 0, got v2 = -1\.0;"),
     (lambda: DISK.to_angles([(1, 1, 0), (1, -0.5, 7), (1, 0, 0)]), r"got v2 = -0\.5 at index \(1,\);"),

@@ -412,6 +412,7 @@ def test_a_computed_periodic_profile_wraps_round():
     [
         ("m", 160.0, 3e-6, True), ("mm", 160.0, 3e-3, False), ("m", 160.0, 3.0, False), ("m", 0.5, 1e-8, False),
         ("", 1000.0, 1e-8, True), ("m", 160.0, 0.0, False), ("", 1.0, 1e-9, False),
+        ("", 160.0, 3e-6, False),
     ],
 )  # fmt: skip
 def test_a_width_of_160_metres_for_micrometres_is_taken_for_mixed_units(unit, width, height, warns):
