@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from threading import local
@@ -24,6 +25,8 @@ from typing import Any, Literal
 from scipy.stats import binomtest
 
 from asperity.core.child import ChildProcess, OutOfTime
+
+from .pages import print_table
 
 Verdict = Literal["holds", "fails", "open"]
 HEADS = "kind | cases | fail | open | held | median of reported/true | largest true/reported | outcomes"
@@ -142,6 +145,7 @@ def judged(name: str, number: int) -> list[Judged]:
     return campaigns()[name].judged(number)
 
 
+@cache
 def campaigns() -> dict[str, Campaign]:
     """All campaigns by name: those in the tuple CAMPAIGNS of the modules beside this one."""
     found: dict[str, Campaign] = {}
@@ -195,8 +199,6 @@ def refuted(campaign: Campaign, found: Sequence[Judged]) -> list[str]:
 
 def print_run(campaign: Campaign, first: int, count: int | None, jobs: int, record: Path | None) -> bool:
     """Run a campaign, print what fails at once and the table at the end; whether the library stands."""
-    from .pages import print_table
-
     begun, found = time.monotonic(), list[Judged]()
     for number, each in campaign.run(range(first, campaign.cases if count is None else first + count), jobs, record):
         found += each

@@ -7,10 +7,7 @@ from collections.abc import Iterable
 from asperity.core.tables import table_lines
 
 
-def print_table(heads: str, rows: Iterable[str | Iterable[object]]) -> str:
-    """Print a table line by line, each line as soon as it is available; return the whole."""
-    lines = []
+def print_table(heads: str, rows: Iterable[str | Iterable[object]]) -> None:
+    """Print a table line by line, each line as soon as it is available."""
     for line in table_lines(heads, rows):
         print(line, flush=True)
-        lines.append(line)
-    return "\n".join(lines)

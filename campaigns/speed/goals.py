@@ -224,7 +224,6 @@ RUNS = {
     "wedge": (geo.triangular_teeth(3e-9), (0.0, 1.0), (1.5, 1.6)),
 }
 RUN_RAYS, RUN_LIMIT = 2**14, 2**62
-AIMED_RAYS = 10**6
 
 _rates = cache(bounces_a_second)
 
