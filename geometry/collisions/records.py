@@ -15,23 +15,7 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..disk.disk import Disk
 from ..disk.satellites import Satellites
-from ..scene.columns import (
-    ARC_COLUMNS,
-    BEZIER_COLUMNS,
-    CURVATURE,
-    ELLIPSES_END,
-    FIRST_ELLIPSE,
-    JOINT_X,
-    JOINT_Y,
-    LEFT,
-    LINE_COLUMNS,
-    LINE_NORMAL_X,
-    LINE_NORMAL_Y,
-    RIGHT,
-    SIZE,
-    STARTS_LINE,
-    STRETCH,
-)
+from ..scene import columns as c
 from ..tracing.threads import new_flag
 from .compiled.graph_table import LEAST_BEND, MOST_BEND, graphs_of
 
@@ -118,15 +102,15 @@ def ground_of(scene: Scene) -> Ground:
     """Return the tables of a wall, with circles and ellipses, which have the same columns, in one table."""
     from ..tracing.double_double.arcs import refined_arcs
 
-    none = np.empty((0, ARC_COLUMNS))
+    none = np.empty((0, c.ARC_COLUMNS))
     circles, ellipses = (none if table is None else table for table in (scene.circles, scene.ellipses))
     hollows = scene.hollows.copy()
-    hollows[:, (FIRST_ELLIPSE, ELLIPSES_END)] += len(circles)
-    lines = np.zeros((len(scene.joints), LINE_COLUMNS)) if scene.lines is None else scene.lines
+    hollows[:, (c.FIRST_ELLIPSE, c.ELLIPSES_END)] += len(circles)
+    lines = np.zeros((len(scene.joints), c.LINE_COLUMNS)) if scene.lines is None else scene.lines
     arcs = [table for table in (circles, ellipses) if len(table)]
     table = np.concatenate(arcs) if arcs else none
     exact_arcs = refined_arcs(table)
-    beziers = np.empty((0, BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
+    beziers = np.empty((0, c.BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
     graphs = graphs_of(beziers, hollows)
     return Ground(
         scene.cell, scene.is_open, hollows, scene.joints, lines, table, exact_arcs, beziers, graphs, new_flag()
@@ -135,7 +119,7 @@ def ground_of(scene: Scene) -> Ground:
 
 def largest_bend(ground: Ground) -> float:
     """Return an upper bound on the curvature of the wall's pieces."""
-    arcs = np.abs(ground.arcs[:, CURVATURE]) * np.maximum(ground.arcs[:, STRETCH], 1.0) ** 2
+    arcs = np.abs(ground.arcs[:, c.CURVATURE]) * np.maximum(ground.arcs[:, c.STRETCH], 1.0) ** 2
     bends = np.abs(ground.graphs[:, [LEAST_BEND, MOST_BEND]])
     return float(max(arcs.max(initial=0.0), bends.max(initial=0.0)))
 
@@ -148,18 +132,18 @@ def is_convex(ground: Ground) -> bool:
     hollows, joints, lines = ground.hollows, ground.joints, ground.lines
     if ground.is_open or len(hollows) != 1 or len(ground.graphs):
         return False
-    hollow, ends = hollows[0], joints[:, [JOINT_X, JOINT_Y]]
-    if hollow[LEFT] != 0.0 or hollow[RIGHT] != ground.cell:
+    hollow, ends = hollows[0], joints[:, [c.JOINT_X, c.JOINT_Y]]
+    if hollow[c.LEFT] != 0.0 or hollow[c.RIGHT] != ground.cell:
         return False
-    starts = np.flatnonzero(joints[:, STARTS_LINE] > 0.0)
+    starts = np.flatnonzero(joints[:, c.STARTS_LINE] > 0.0)
     if len(ground.arcs):
         is_arc = len(joints) == 2 and not len(starts) and not ends[:, 1].any()
-        return bool(is_arc and ground.arcs[0, CURVATURE] > 0.0)
+        return bool(is_arc and ground.arcs[0, c.CURVATURE] > 0.0)
     if len(starts) != len(joints) - 1:
         return False
-    away = (ends - ends[starts, np.newaxis]) @ lines[starts][:, [LINE_NORMAL_X, LINE_NORMAL_Y], np.newaxis]
+    away = (ends - ends[starts, np.newaxis]) @ lines[starts][:, [c.LINE_NORMAL_X, c.LINE_NORMAL_Y], np.newaxis]
     others = np.arange(len(joints)) - starts[:, np.newaxis]
-    return bool(np.all(away[..., 0][(others != 0) & (others != 1)] > ROOM * hollow[SIZE]))
+    return bool(np.all(away[..., 0][(others != 0) & (others != 1)] > ROOM * hollow[c.SIZE]))
 
 
 def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:
@@ -184,5 +168,5 @@ def mass_fractions(disk: Disk) -> tuple[float, float]:
 
 def position_rounding(scene: Scene, farthest: float) -> float:
     """Return a bound on the rounding error of a satellite's position, from the wall's size and ``farthest``."""
-    size = float(scene.hollows[:, SIZE].max()) if len(scene.hollows) else 0.0
+    size = float(scene.hollows[:, c.SIZE].max()) if len(scene.hollows) else 0.0
     return SLACK * (size + scene.cell + farthest)

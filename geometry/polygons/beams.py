@@ -12,31 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, number_between, whole_number
 from ...core.rounding import EPS
 from ..tracing.threads import in_blocks, interruptibly
-from .compiled.columns import (
-    COUNT,
-    CUT_X,
-    EDGE,
-    FIRST,
-    FLUX,
-    LINE_C,
-    LINE_P,
-    LINE_S,
-    PIECE_COLUMNS,
-    PIECE_COSINE,
-    PIECE_HIGH,
-    PIECE_LOW,
-    PIECE_OFFSET,
-    PIECE_SINE,
-    PRIORITY,
-    REAL_COLUMNS,
-    SIGN,
-    TAG_BOUNCES,
-    TAG_COLUMNS,
-    TAG_LEAF,
-    TAG_SIGN,
-    VERTEX_COLUMNS,
-    WHOLE_COLUMNS,
-)
+from .compiled import columns as c
 from .mirror_images import Symmetrised, symmetrised
 from .triangulation import Triangulation, checked_chain, triangulated
 
@@ -276,7 +252,7 @@ class _Beams:
 
         in_blocks(run, parts, threads, block=1)
         for rest, rows, tags, counts, rounding in found:
-            tags[:, TAG_LEAF] += self.leaves
+            tags[:, c.TAG_LEAF] += self.leaves
             self._rows.append(rows)
             self._tags.append(tags)
             self.leaves, self.steps = self.leaves + counts[LEAVES], self.steps + counts[STEPS]
@@ -302,7 +278,7 @@ class _Beams:
         """Remove and return all beams above a threshold of priority."""
         taken = []
         for store, here in self._tables:
-            chosen = np.flatnonzero(here & (store.real[:, PRIORITY] > threshold))
+            chosen = np.flatnonzero(here & (store.real[:, c.PRIORITY] > threshold))
             if chosen.size:
                 here[chosen] = False
                 taken.append(_selected(store, chosen))
@@ -320,20 +296,20 @@ def _divided(
     """
     hollow = _hollow(triangulation)
     beams = _Beams(hollow, _entrance(triangulation.entrance, hollow.width, entrances))
-    wanted = tolerance * float(beams.column(FLUX).sum())
+    wanted = tolerance * float(beams.column(c.FLUX).sum())
     splits = min(FIRST_SPLITS, int(FIRST_FRACTION * max_beams))
     if splits and len(triangulation.vertices) <= FEW_VERTICES:
         beams.divide(wanted / FIRST_SPLITS, splits, STEPS_A_BEAM * splits, 1, 1)
-    if float(beams.column(FLUX).sum()) > wanted:
+    if float(beams.column(c.FLUX).sum()) > wanted:
         interruptibly(lambda: _in_rounds(beams, wanted, max_beams, threads))
-    complete = float(beams.column(FLUX).sum()) <= wanted
+    complete = float(beams.column(c.FLUX).sum()) <= wanted
     return _Division(beams.leaving(), beams.rest(), beams.rounding, complete)
 
 
 def _in_rounds(beams: _Beams, wanted: float, max_beams: int, threads: int | None) -> None:
     """Divide beams in rounds until the flux that is left is as wanted, or a limit is reached."""
     while True:
-        flux, best = beams.column(FLUX), beams.column(PRIORITY).max(initial=0.0)
+        flux, best = beams.column(c.FLUX), beams.column(c.PRIORITY).max(initial=0.0)
         left, used = float(flux.sum()), beams.leaves + flux.size
         room, spare = max_beams - used, STEPS_A_BEAM * max_beams - beams.steps
         if left <= wanted or room <= 0 or spare <= 0 or best <= 0.0:
@@ -386,25 +362,25 @@ def _entrance(edge: int, width: float, halves: int) -> Store:
     from .compiled.store import Store
 
     vertices, real, whole = (
-        np.zeros((6, VERTEX_COLUMNS)),
-        np.zeros((2, REAL_COLUMNS)),
-        np.zeros((2, WHOLE_COLUMNS), int),
+        np.zeros((6, c.VERTEX_COLUMNS)),
+        np.zeros((2, c.REAL_COLUMNS)),
+        np.zeros((2, c.WHOLE_COLUMNS), int),
     )
     # the lines along the opening and, vertical, through its left and its right end; then these and those along it again
-    vertices[[0, 4], LINE_C], vertices[[1, 2, 3, 5], LINE_S] = (1.0, -1.0), 1.0
-    vertices[[2, 5], LINE_P] = vertices[[2, 4], CUT_X] = width
-    real[:, FLUX] = real[:, PRIORITY] = width
-    whole[:, FIRST], whole[:, COUNT], whole[:, EDGE], whole[:, SIGN] = (0, 3), 3, edge, 1
+    vertices[[0, 4], c.LINE_C], vertices[[1, 2, 3, 5], c.LINE_S] = (1.0, -1.0), 1.0
+    vertices[[2, 5], c.LINE_P] = vertices[[2, 4], c.CUT_X] = width
+    real[:, c.FLUX] = real[:, c.PRIORITY] = width
+    whole[:, c.FIRST], whole[:, c.COUNT], whole[:, c.EDGE], whole[:, c.SIGN] = (0, 3), 3, edge, 1
     return Store(vertices[: 3 * halves], real[:halves], whole[:halves])
 
 
 def _selected(store: Store, beams: NDArray[np.int64]) -> Store:
     """Return some beams of a store."""
     whole = store.whole[beams]
-    end = np.cumsum(whole[:, COUNT])
-    begin = end - whole[:, COUNT]
-    vertices = np.arange(end[-1]) + np.repeat(whole[:, FIRST] - begin, whole[:, COUNT])
-    whole[:, FIRST] = begin
+    end = np.cumsum(whole[:, c.COUNT])
+    begin = end - whole[:, c.COUNT]
+    vertices = np.arange(end[-1]) + np.repeat(whole[:, c.FIRST] - begin, whole[:, c.COUNT])
+    whole[:, c.FIRST] = begin
     return type(store)(store.vertices[vertices], store.real[beams], whole)
 
 
@@ -414,7 +390,7 @@ def _together(stores: list[Store]) -> Store:
         return stores[0]
     begin = 0
     for vertices, _, whole in stores:
-        whole[:, FIRST] += begin
+        whole[:, c.FIRST] += begin
         begin += len(vertices)
     return type(stores[0])(*(np.concatenate(table) for table in zip(*stores, strict=True)))
 
@@ -422,17 +398,17 @@ def _together(stores: list[Store]) -> Store:
 def _columns(rows: list[Floats], tags: list[NDArray[np.int64]]) -> _Pieces:
     """Return the pieces of several tables."""
     none = np.empty(0), np.empty(0, np.int64)
-    real = [np.concatenate([none[0], *(table[:, k] for table in rows)]) for k in range(PIECE_COLUMNS)]
-    whole = [np.concatenate([none[1], *(table[:, k] for table in tags)]) for k in range(TAG_COLUMNS)]
+    real = [np.concatenate([none[0], *(table[:, k] for table in rows)]) for k in range(c.PIECE_COLUMNS)]
+    whole = [np.concatenate([none[1], *(table[:, k] for table in tags)]) for k in range(c.TAG_COLUMNS)]
     return _Pieces(
-        real[PIECE_LOW],
-        real[PIECE_HIGH],
-        real[PIECE_SINE],
-        real[PIECE_COSINE],
-        real[PIECE_OFFSET],
-        whole[TAG_LEAF],
-        whole[TAG_SIGN],
-        whole[TAG_BOUNCES],
+        real[c.PIECE_LOW],
+        real[c.PIECE_HIGH],
+        real[c.PIECE_SINE],
+        real[c.PIECE_COSINE],
+        real[c.PIECE_OFFSET],
+        whole[c.TAG_LEAF],
+        whole[c.TAG_SIGN],
+        whole[c.TAG_BOUNCES],
     )
 
 

@@ -17,29 +17,8 @@ import numpy as np
 from ...core.checks import Floats
 from ..curves.arc import Arc
 from ..curves.segment import Segment
-from .columns import (
-    CHAIN,
-    CIRCLE_X,
-    CIRCLE_Y,
-    CIRCULAR,
-    COPIES,
-    DOUBT,
-    FORM,
-    FORM_COLUMNS,
-    FORM_LEFT,
-    FORM_RIGHT,
-    HALF_ANGLE,
-    LINK_COLUMNS,
-    LINK_CONSTANT,
-    LINK_X,
-    LINK_Y,
-    NO_FORM,
-    RADIUS,
-    WEDGE,
-    WEDGE_X,
-    WEDGE_Y,
-    row_of,
-)
+from . import columns as c
+from .columns import row_of
 from .facing import WIDEST_WEDGE
 
 if TYPE_CHECKING:
@@ -65,12 +44,12 @@ def closed_form_of(pieces: Sequence[Curve], points: Sequence[Point], size: float
             return _wedge_form(left, right, points[1], size)
         if len(pieces) == 1 and isinstance(pieces[0], Arc) and pieces[0].is_circular:
             return _arc_form(left, right, pieces[0])
-    return row_of(FORM_COLUMNS, {FORM: NO_FORM})
+    return row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM})
 
 
 def closed_table(rows: Sequence[Floats]) -> Floats | None:
     """Return all rows as one table, or None if no hollow has a closed form."""
-    if all(row[FORM] == NO_FORM for row in rows):
+    if all(row[c.FORM] == c.NO_FORM for row in rows):
         return None
     table = np.zeros((len(rows), max(map(len, rows))))
     for k, row in enumerate(rows):
@@ -85,24 +64,24 @@ def _wedge_form(left: float, right: float, apex: Point, size: float) -> Floats:
     angle = fsum([pi, -west, -east])
     # the chain of the unfolded ends of the opening is convex if the apex lies below the opening
     if not left <= x <= right or angle <= NARROWEST_WEDGE:
-        return row_of(FORM_COLUMNS, {FORM: NO_FORM})
+        return row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM})
     # a straight ray turns by less than pi about the apex
     copies = ceil(pi / angle)
     links = copies + 2
     row = row_of(
-        CHAIN + 2 * links * LINK_COLUMNS,
+        c.CHAIN + 2 * links * c.LINK_COLUMNS,
         {
-            FORM: WEDGE, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_FRACTION * size,
-            WEDGE_X: x, WEDGE_Y: y, COPIES: copies,
+            c.FORM: c.WEDGE, c.FORM_LEFT: left, c.FORM_RIGHT: right, c.DOUBT: DOUBT_FRACTION * size,
+            c.WEDGE_X: x, c.WEDGE_Y: y, c.COPIES: copies,
         },
     )  # fmt: skip
     lengths = hypot(x - left, y), hypot(right - x, y)
     for start, side, first, (far, near) in ((0, 1.0, east, lengths), (links, -1.0, west, lengths[::-1])):
         for k in range(links):
             polar, length = fsum([first, -(k - 1) * angle]), near if k % 2 else far
-            link = CHAIN + (start + k) * LINK_COLUMNS
-            row[link + LINK_X], row[link + LINK_Y] = x + side * length * cos(polar), y + length * sin(polar)
-            row[link + LINK_CONSTANT] = _constant(k, side, first, angle)
+            link = c.CHAIN + (start + k) * c.LINK_COLUMNS
+            row[link + c.LINK_X], row[link + c.LINK_Y] = x + side * length * cos(polar), y + length * sin(polar)
+            row[link + c.LINK_CONSTANT] = _constant(k, side, first, angle)
     return row
 
 
@@ -121,14 +100,14 @@ def _constant(hits: int, side: float, first: float, angle: float) -> float:
 def _arc_form(left: float, right: float, arc: Arc) -> Floats:
     half = 0.5 * (arc.end_angle - arc.start_angle)
     if not FLATTEST_ARC <= half <= 0.5 * pi:
-        return row_of(FORM_COLUMNS, {FORM: NO_FORM})
+        return row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM})
     radius = 0.5 * (right - left) / sin(half)
     # at pi/2 the centre lies on the opening
     height = radius * cos(half) if half < 0.5 * pi else 0.0
     return row_of(
-        FORM_COLUMNS,
+        c.FORM_COLUMNS,
         {
-            FORM: CIRCULAR, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_FRACTION,
-            CIRCLE_X: 0.5 * (left + right), CIRCLE_Y: height, RADIUS: radius, HALF_ANGLE: half,
+            c.FORM: c.CIRCULAR, c.FORM_LEFT: left, c.FORM_RIGHT: right, c.DOUBT: DOUBT_FRACTION,
+            c.CIRCLE_X: 0.5 * (left + right), c.CIRCLE_Y: height, c.RADIUS: radius, c.HALF_ANGLE: half,
         },
     )  # fmt: skip

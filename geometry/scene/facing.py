@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from .columns import APEX_X, APEX_Y, FAR_X, FAR_Y, GAP, NEAR_X, NEAR_Y, PAIR_ANGLE, PAIR_SINE, PARTNER
+from . import columns as c
 
 # Widest wedge with runs, radians. In a wider wedge a ray has at most about ten hits, and a run does not pay.
 WIDEST_WEDGE = 0.3
@@ -66,8 +66,8 @@ def facing_pairs(
     for i, j in zip(first.tolist(), second.tolist(), strict=True):
         found = _facing(starts[i], ends[i], starts[j], ends[j], hulls, TOUCH_ULPS * EPS * size)
         if found is not None:
-            rows.append((int(numbers[i]), {PARTNER: float(numbers[j])} | found[0]))
-            rows.append((int(numbers[j]), {PARTNER: float(numbers[i])} | found[1]))
+            rows.append((int(numbers[i]), {c.PARTNER: float(numbers[j])} | found[0]))
+            rows.append((int(numbers[j]), {c.PARTNER: float(numbers[i])} | found[1]))
     return rows
 
 
@@ -110,15 +110,15 @@ def _facing(a0: Floats, a1: Floats, b0: Floats, b1: Floats, hulls: Floats, slack
         return None
     return [
         {
-            NEAR_X: top[0],
-            NEAR_Y: top[1],
-            FAR_X: bottom[0],
-            FAR_Y: bottom[1],
-            APEX_X: u[0],
-            APEX_Y: u[1],
-            GAP: gap,
-            PAIR_SINE: sin(beta),
-            PAIR_ANGLE: beta,
+            c.NEAR_X: top[0],
+            c.NEAR_Y: top[1],
+            c.FAR_X: bottom[0],
+            c.FAR_Y: bottom[1],
+            c.APEX_X: u[0],
+            c.APEX_Y: u[1],
+            c.GAP: gap,
+            c.PAIR_SINE: sin(beta),
+            c.PAIR_ANGLE: beta,
         }
         for (top, bottom), u, gap in zip(parts, (u_a, u_b), gaps, strict=True)
     ]

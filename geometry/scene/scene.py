@@ -21,76 +21,10 @@ from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.crossings import directions_of, straight_in
 from ..curves.curve import Curve, Point
+from . import columns as c
 from .boxes import TREE_COLUMNS, tree_of
 from .closed_forms import MOST_PIECES, closed_form_of, closed_table
-from .columns import (
-    ARC_COLUMNS,
-    BEZIER_COLUMNS,
-    BEZIERS_END,
-    CHORD_X,
-    CHORD_Y,
-    CIRCLES_END,
-    CORNER_EDGE,
-    CURVATURE,
-    EDGE_X,
-    EDGE_Y,
-    ELLIPSES_END,
-    END_CORNER,
-    END_X,
-    END_Y,
-    FIRST_BEZIER,
-    FIRST_CIRCLE,
-    FIRST_ELLIPSE,
-    FIRST_JOINT,
-    FIRST_PAIR,
-    FORM,
-    FORM_COLUMNS,
-    HOLLOW_COLUMNS,
-    IS_CORNER,
-    JOINT_COLUMNS,
-    JOINT_X,
-    JOINT_Y,
-    JOINTS_END,
-    LEFT,
-    LEFT_EDGE,
-    LENGTH,
-    LINE_COLUMNS,
-    LINE_NORMAL_X,
-    LINE_NORMAL_Y,
-    MIDDLE_X,
-    MIDDLE_Y,
-    NO_EDGE,
-    NO_FORM,
-    NORMAL_X,
-    NORMAL_Y,
-    PAIR_COLUMNS,
-    PAIRS_END,
-    REACH,
-    RIGHT,
-    RIGHT_EDGE,
-    RUN_SINE,
-    SHORT_CHORD,
-    SIZE,
-    SKY_LEFT,
-    SKY_RIGHT,
-    SMOOTH_EDGE,
-    SPAN,
-    START_CORNER,
-    START_X,
-    START_Y,
-    STARTS_LINE,
-    STRETCH,
-    TREE_LEVELS,
-    TREE_ROOT,
-    X1,
-    X2,
-    X3,
-    Y1,
-    Y2,
-    Y3,
-    row_of,
-    table_of,
-)
+from .columns import row_of, table_of
 from .facing import facing_pairs
 from .records import Record
 from .sky import sky_of
@@ -128,12 +62,12 @@ def corners_of(pieces: Sequence[Curve]) -> NDArray[np.bool_]:
 
 def line_rows(starts: Floats, ends: Floats) -> Floats:
     """Return rows of ``lines``; the columns of their pairs are set later."""
-    rows = np.zeros((len(starts), LINE_COLUMNS))
+    rows = np.zeros((len(starts), c.LINE_COLUMNS))
     edges = ends - starts
     length = np.array(list(map(hypot, *edges.T.tolist())))
-    rows[:, [EDGE_X, EDGE_Y]] = edges
-    rows[:, LINE_NORMAL_X], rows[:, LINE_NORMAL_Y] = -edges[:, 1] / length, edges[:, 0] / length
-    rows[:, LENGTH] = length
+    rows[:, [c.EDGE_X, c.EDGE_Y]] = edges
+    rows[:, c.LINE_NORMAL_X], rows[:, c.LINE_NORMAL_Y] = -edges[:, 1] / length, edges[:, 0] / length
+    rows[:, c.LENGTH] = length
     return rows
 
 
@@ -144,7 +78,7 @@ def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
     turn = arc.end_angle - arc.start_angle
     # counterclockwise arcs have their centre on the left, the free side: they are focusing
     sign = 1.0 if turn > 0.0 else -1.0
-    chord = (ends[END_X] - ends[START_X], stretch * (ends[END_Y] - ends[START_Y]))
+    chord = (ends[c.END_X] - ends[c.START_X], stretch * (ends[c.END_Y] - ends[c.START_Y]))
     length = hypot(*chord)
     direction = (chord[0] / length, chord[1] / length)
     half = 0.5 * abs(turn)
@@ -160,16 +94,16 @@ def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
     )
     short = length if half <= 0.25 * pi else 0.0
     columns = {
-        NORMAL_X: normal[0], NORMAL_Y: normal[1], CURVATURE: curvature, CHORD_X: direction[0], CHORD_Y: direction[1],
-        SHORT_CHORD: short, SPAN: 2.0 * half, STRETCH: stretch,
+        c.NORMAL_X: normal[0], c.NORMAL_Y: normal[1], c.CURVATURE: curvature,
+        c.CHORD_X: direction[0], c.CHORD_Y: direction[1], c.SHORT_CHORD: short, c.SPAN: 2.0 * half, c.STRETCH: stretch,
     }  # fmt: skip
-    return row_of(ARC_COLUMNS, {**ends, **columns})
+    return row_of(c.ARC_COLUMNS, {**ends, **columns})
 
 
 def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
     """Return a row of ``beziers`` from its first columns ``ends``."""
     inner = list(curve.control_points[1:-1])
-    start, end = (ends[START_X], ends[START_Y]), (ends[END_X], ends[END_Y])
+    start, end = (ends[c.START_X], ends[c.START_Y]), (ends[c.END_X], ends[c.END_Y])
     points = np.array([start, *inner, end], dtype=np.float64)
     if len(points) == 3:
         a1, a2 = 2.0 * (points[1] - points[0]), points[0] - 2.0 * points[1] + points[2]
@@ -182,10 +116,10 @@ def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
     size = float(np.abs([a1, a2, a3]).sum())
     reach = float(np.hypot(*(points - middle).T).max()) + NEARBY_MARGIN * size
     columns = {
-        X1: a1[0], Y1: a1[1], X2: a2[0], Y2: a2[1], X3: a3[0], Y3: a3[1],
-        MIDDLE_X: middle[0], MIDDLE_Y: middle[1], REACH: reach,
+        c.X1: a1[0], c.Y1: a1[1], c.X2: a2[0], c.Y2: a2[1], c.X3: a3[0], c.Y3: a3[1],
+        c.MIDDLE_X: middle[0], c.MIDDLE_Y: middle[1], c.REACH: reach,
     }  # fmt: skip
-    return row_of(BEZIER_COLUMNS, {**ends, **columns})
+    return row_of(c.BEZIER_COLUMNS, {**ends, **columns})
 
 
 class Tables(NamedTuple):
@@ -206,13 +140,13 @@ class Tables(NamedTuple):
 # Empty tables, with the types of all tables.
 NO_TABLES = Record(
     Tables(
-        np.empty((0, HOLLOW_COLUMNS)),
-        np.empty((0, JOINT_COLUMNS)),
-        np.empty((0, LINE_COLUMNS)),
-        np.empty((0, ARC_COLUMNS)),
-        np.empty((0, ARC_COLUMNS)),
-        np.empty((0, BEZIER_COLUMNS)),
-        np.empty((0, PAIR_COLUMNS)),
+        np.empty((0, c.HOLLOW_COLUMNS)),
+        np.empty((0, c.JOINT_COLUMNS)),
+        np.empty((0, c.LINE_COLUMNS)),
+        np.empty((0, c.ARC_COLUMNS)),
+        np.empty((0, c.ARC_COLUMNS)),
+        np.empty((0, c.BEZIER_COLUMNS)),
+        np.empty((0, c.PAIR_COLUMNS)),
         np.empty((0, TREE_COLUMNS)),
         1.0,
         False,
@@ -241,15 +175,15 @@ class Scene:
         """The tables with types equal for all walls, so that each function is compiled once."""
         return Record(
             Tables(
-                hollows=_filled(self.hollows, HOLLOW_COLUMNS),
-                joints=_filled(self.joints, JOINT_COLUMNS),
-                lines=np.zeros((len(self.joints), LINE_COLUMNS))
+                hollows=_filled(self.hollows, c.HOLLOW_COLUMNS),
+                joints=_filled(self.joints, c.JOINT_COLUMNS),
+                lines=np.zeros((len(self.joints), c.LINE_COLUMNS))
                 if self.lines is None
-                else _filled(self.lines, LINE_COLUMNS),
-                circles=_filled(self.circles, ARC_COLUMNS),
-                ellipses=_filled(self.ellipses, ARC_COLUMNS),
-                beziers=_filled(self.beziers, BEZIER_COLUMNS),
-                pairs=_filled(self.pairs, PAIR_COLUMNS),
+                else _filled(self.lines, c.LINE_COLUMNS),
+                circles=_filled(self.circles, c.ARC_COLUMNS),
+                ellipses=_filled(self.ellipses, c.ARC_COLUMNS),
+                beziers=_filled(self.beziers, c.BEZIER_COLUMNS),
+                pairs=_filled(self.pairs, c.PAIR_COLUMNS),
                 boxes=_filled(self.boxes, TREE_COLUMNS),
                 cell=float(self.cell),
                 is_open=bool(self.is_open),
@@ -278,19 +212,19 @@ def scene_of(wall: Cell) -> Scene:
             tables.add_hollow(hollow.left, hollow.right, [part], edges)
     else:
         chains = [chain, *map(_chain_of, wall.islands, wall.island_vertices)]
-        tables.add_hollow(0.0, wall.period, chains, edges=(NO_EDGE, NO_EDGE))
+        tables.add_hollow(0.0, wall.period, chains, edges=(c.NO_EDGE, c.NO_EDGE))
     return tables.scene(wall.period, not wall.closes)
 
 
 def _edge(is_corner: bool) -> float:
-    return CORNER_EDGE if is_corner else SMOOTH_EDGE
+    return c.CORNER_EDGE if is_corner else c.SMOOTH_EDGE
 
 
 def scene_in_one(wall: Cell) -> Scene:
     """Build the tables of a closed wall with its whole cell, flat tops included, as one hollow."""
     tables = _Tables()
     chain = _chain_of(wall.pieces, wall.vertices)
-    tables.add_hollow(0.0, wall.period, [chain], edges=(CORNER_EDGE, CORNER_EDGE))
+    tables.add_hollow(0.0, wall.period, [chain], edges=(c.CORNER_EDGE, c.CORNER_EDGE))
     return tables.scene(wall.period, False)
 
 
@@ -345,45 +279,45 @@ class _Tables:
 
     def __init__(self) -> None:
         self.hollows: list[Floats] = []
-        self.joints = _Blocks(JOINT_COLUMNS)
-        self.lines = _Blocks(LINE_COLUMNS)
-        self.circles = _Blocks(ARC_COLUMNS)
-        self.ellipses = _Blocks(ARC_COLUMNS)
-        self.beziers = _Blocks(BEZIER_COLUMNS)
-        self.pairs = _Blocks(PAIR_COLUMNS)
+        self.joints = _Blocks(c.JOINT_COLUMNS)
+        self.lines = _Blocks(c.LINE_COLUMNS)
+        self.circles = _Blocks(c.ARC_COLUMNS)
+        self.ellipses = _Blocks(c.ARC_COLUMNS)
+        self.beziers = _Blocks(c.BEZIER_COLUMNS)
+        self.pairs = _Blocks(c.PAIR_COLUMNS)
         self.boxes = _Blocks(TREE_COLUMNS)
         self.closed: list[Floats] = []
 
     def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[float, float]) -> None:
         """Append one hollow, or the whole cell of an open wall."""
-        is_closed = len(chains) == 1 and edges != (NO_EDGE, NO_EDGE)
+        is_closed = len(chains) == 1 and edges != (c.NO_EDGE, c.NO_EDGE)
         chains = [chain.without_long_arcs() for chain in chains]
         vertices = np.concatenate([chain.vertices for chain in chains])
         size = max(float(np.max(np.ptp(vertices, axis=0))), right - left)
-        row = {LEFT: left, RIGHT: right, SIZE: size, LEFT_EDGE: edges[0], RIGHT_EDGE: edges[1]}
-        row |= dict(zip((FIRST_JOINT, FIRST_CIRCLE, FIRST_ELLIPSE, FIRST_BEZIER), self._sizes(), strict=True))
+        row = {c.LEFT: left, c.RIGHT: right, c.SIZE: size, c.LEFT_EDGE: edges[0], c.RIGHT_EDGE: edges[1]}
+        row |= dict(zip((c.FIRST_JOINT, c.FIRST_CIRCLE, c.FIRST_ELLIPSE, c.FIRST_BEZIER), self._sizes(), strict=True))
         joints = np.concatenate([_joint_rows(chain) for chain in chains])
         lines = np.concatenate([_chain_lines(chain) for chain in chains])
         circles = self._curves(chains)
-        self.hollows.append(row_of(HOLLOW_COLUMNS, row))
+        self.hollows.append(row_of(c.HOLLOW_COLUMNS, row))
         if len(circles):
             _mark_runs(circles, chains, size)
         inside = bool(np.all((left <= vertices[:, 0]) & (vertices[:, 0] <= right)))
-        if inside or edges != (NO_EDGE, NO_EDGE):
+        if inside or edges != (c.NO_EDGE, c.NO_EDGE):
             self._mark_pairs(lines, chains, size)
-        if np.count_nonzero(joints[:, STARTS_LINE]) >= TREE_LINES:
+        if np.count_nonzero(joints[:, c.STARTS_LINE]) >= TREE_LINES:
             self._add_tree(joints, size)
             if is_closed and chains[0].is_line.all():
-                lines[:-1, [SKY_RIGHT, SKY_LEFT]] = sky_of(chains[0].vertices, size)
+                lines[:-1, [c.SKY_RIGHT, c.SKY_LEFT]] = sky_of(chains[0].vertices, size)
         self.joints.append(joints)
         self.lines.append(lines)
         self.circles.append(circles)
-        columns = [JOINTS_END, CIRCLES_END, ELLIPSES_END, BEZIERS_END]
+        columns = [c.JOINTS_END, c.CIRCLES_END, c.ELLIPSES_END, c.BEZIERS_END]
         self.hollows[-1][columns] = self._sizes()
         form = None
         if is_closed and len(chains[0].pieces) <= MOST_PIECES:
             form = closed_form_of(chains[0].pieces, list(map(chains[0].joint, range(len(chains[0].vertices)))), size)
-        self.closed.append(row_of(FORM_COLUMNS, {FORM: NO_FORM}) if form is None else form)
+        self.closed.append(row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM}) if form is None else form)
 
     def _sizes(self) -> tuple[int, int, int, int]:
         return self.joints.count, self.circles.count, self.ellipses.count, self.beziers.count
@@ -397,24 +331,24 @@ class _Tables:
             for i in chain.curves():
                 piece, start, end = chain.pieces[i], chain.joint(i), chain.joint(i + 1)
                 ends = {
-                    START_X: start[0], START_Y: start[1], END_X: end[0], END_Y: end[1],
-                    START_CORNER: chain.corners[i], END_CORNER: chain.corners[i + 1],
+                    c.START_X: start[0], c.START_Y: start[1], c.END_X: end[0], c.END_Y: end[1],
+                    c.START_CORNER: chain.corners[i], c.END_CORNER: chain.corners[i + 1],
                 }  # fmt: skip
                 if isinstance(piece, Arc):
                     (circles if piece.is_circular else ellipses).append(arc_row(piece, ends))
                 elif isinstance(piece, Bezier):
                     beziers.append(bezier_row(piece, ends))
-        self.ellipses.append(table_of(ellipses, ARC_COLUMNS))
-        self.beziers.append(table_of(beziers, BEZIER_COLUMNS))
-        return table_of(circles, ARC_COLUMNS)
+        self.ellipses.append(table_of(ellipses, c.ARC_COLUMNS))
+        self.beziers.append(table_of(beziers, c.BEZIER_COLUMNS))
+        return table_of(circles, c.ARC_COLUMNS)
 
     def _add_tree(self, joints: Floats, size: float) -> None:
         """Add a tree over the lines of the last hollow."""
-        starts = joints[:, [JOINT_X, JOINT_Y]]
-        is_line = (joints[:, STARTS_LINE] > 0.0)[:, np.newaxis]
+        starts = joints[:, [c.JOINT_X, c.JOINT_Y]]
+        is_line = (joints[:, c.STARTS_LINE] > 0.0)[:, np.newaxis]
         ends = np.where(is_line, np.roll(starts, -1, axis=0), starts)
         tree, levels = tree_of(starts, ends, self.joints.count, self.boxes.count, size)
-        self.hollows[-1][[TREE_ROOT, TREE_LEVELS]] = self.boxes.count, levels
+        self.hollows[-1][[c.TREE_ROOT, c.TREE_LEVELS]] = self.boxes.count, levels
         self.boxes.append(tree)
 
     def _mark_pairs(self, lines: Floats, chains: list[_Chain], size: float) -> None:
@@ -434,18 +368,18 @@ class _Tables:
         )  # fmt: skip
         table: list[Floats] = []
         for line, row in sorted(rows, key=lambda pair: (pair[0], *pair[1].values())):
-            if lines[line - first, PAIRS_END] == 0.0:
-                lines[line - first, [FIRST_PAIR, PAIRS_END]] = self.pairs.count + len(table)
-            table.append(row_of(PAIR_COLUMNS, row))
-            lines[line - first, PAIRS_END] += 1.0
-        self.pairs.append(table_of(table, PAIR_COLUMNS))
+            if lines[line - first, c.PAIRS_END] == 0.0:
+                lines[line - first, [c.FIRST_PAIR, c.PAIRS_END]] = self.pairs.count + len(table)
+            table.append(row_of(c.PAIR_COLUMNS, row))
+            lines[line - first, c.PAIRS_END] += 1.0
+        self.pairs.append(table_of(table, c.PAIR_COLUMNS))
 
     def scene(self, cell: float, is_open: bool) -> Scene:
         joints, lines = self.joints.whole(), self.lines.whole()
         return Scene(
-            hollows=table_of(self.hollows, HOLLOW_COLUMNS),
+            hollows=table_of(self.hollows, c.HOLLOW_COLUMNS),
             joints=joints,
-            lines=lines if joints[:, STARTS_LINE].any() else None,
+            lines=lines if joints[:, c.STARTS_LINE].any() else None,
             circles=self.circles.table(),
             ellipses=self.ellipses.table(),
             beziers=self.beziers.table(),
@@ -475,15 +409,15 @@ class _Blocks:
 
 
 def _joint_rows(chain: _Chain) -> Floats:
-    rows = np.zeros((len(chain.vertices), JOINT_COLUMNS))
-    rows[:, [JOINT_X, JOINT_Y]] = chain.vertices
-    rows[:, IS_CORNER], rows[:-1, STARTS_LINE] = chain.corners, chain.is_line
+    rows = np.zeros((len(chain.vertices), c.JOINT_COLUMNS))
+    rows[:, [c.JOINT_X, c.JOINT_Y]] = chain.vertices
+    rows[:, c.IS_CORNER], rows[:-1, c.STARTS_LINE] = chain.corners, chain.is_line
     return rows
 
 
 def _chain_lines(chain: _Chain) -> Floats:
     """Return a row of ``lines`` for every joint of a chain, zeros where no segment starts."""
-    rows = np.zeros((len(chain.vertices), LINE_COLUMNS))
+    rows = np.zeros((len(chain.vertices), c.LINE_COLUMNS))
     numbers = np.flatnonzero(chain.is_line)
     rows[numbers] = line_rows(chain.vertices[numbers], chain.vertices[numbers + 1])
     return rows
@@ -500,22 +434,23 @@ def _hulls(chain: _Chain) -> Floats:
 def _mark_runs(circles: Floats, chains: list[_Chain], size: float) -> None:
     """Set RUN_SINE of the focusing circles whose circular segment contains no other piece of the hollow."""
     outlines = [chain.vertices for chain in chains]
-    outlines += [c.pieces[k].point(np.linspace(0.0, 1.0, OUTLINE_POINTS)) for c in chains for k in c.curves()]
+    at = np.linspace(0.0, 1.0, OUTLINE_POINTS)
+    outlines += [chain.pieces[k].point(at) for chain in chains for k in chain.curves()]
     points = np.concatenate(outlines)
     for row in circles:
-        half, radius = 0.5 * row[SPAN], 1.0 / abs(row[CURVATURE])
-        x, y = points[:, 0] - row[START_X], points[:, 1] - row[START_Y]
+        half, radius = 0.5 * row[c.SPAN], 1.0 / abs(row[c.CURVATURE])
+        x, y = points[:, 0] - row[c.START_X], points[:, 1] - row[c.START_Y]
         own = abs(
             np.hypot(
-                points[:, 0] - row[START_X] - row[NORMAL_X] / row[CURVATURE],
-                points[:, 1] - row[START_Y] - row[NORMAL_Y] / row[CURVATURE],
+                points[:, 0] - row[c.START_X] - row[c.NORMAL_X] / row[c.CURVATURE],
+                points[:, 1] - row[c.START_Y] - row[c.NORMAL_Y] / row[c.CURVATURE],
             )
         )
-        height = y * row[CHORD_X] - x * row[CHORD_Y]
+        height = y * row[c.CHORD_X] - x * row[c.CHORD_Y]
         slack = 1e-12 * size
         foreign = (height < -slack) & (np.abs(own - radius) > slack)
-        if row[CURVATURE] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
-            row[RUN_SINE] = sin(half / RUN_CHORDS)
+        if row[c.CURVATURE] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
+            row[c.RUN_SINE] = sin(half / RUN_CHORDS)
 
 
 def _filled(table: Floats | None, columns: int) -> Floats:

@@ -10,23 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..scene.columns import (
-    ARC_COLUMNS,
-    BEZIER_COLUMNS,
-    CURVATURE,
-    END_Y,
-    JOINT_Y,
-    LINE_COLUMNS,
-    PAIR_COLUMNS,
-    SIZE,
-    SPAN,
-    START_Y,
-    STARTS_LINE,
-    STRETCH,
-    Y1,
-    Y2,
-    Y3,
-)
+from ..scene import columns as c
 from ..scene.tolerances import JOINT_ULPS
 from .double_double.records import WideResults, WideTables
 
@@ -71,10 +55,10 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     from .double_double.rays import refined_rays
 
     count = len(x)
-    circles = _rows(scene.circles, ARC_COLUMNS)
-    arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, ARC_COLUMNS)]))
-    lines, pairs = _rows(scene.lines, LINE_COLUMNS), _rows(scene.pairs, PAIR_COLUMNS)
-    beziers = np.zeros((1, BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
+    circles = _rows(scene.circles, c.ARC_COLUMNS)
+    arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, c.ARC_COLUMNS)]))
+    lines, pairs = _rows(scene.lines, c.LINE_COLUMNS), _rows(scene.pairs, c.PAIR_COLUMNS)
+    beziers = np.zeros((1, c.BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
     tables = WideTables(
         scene.hollows, scene.joints, lines, pairs, arcs, len(circles), beziers, _free_bands(scene),
         scene.cell, scene.is_open,
@@ -136,19 +120,22 @@ def _free_bands(scene: Scene) -> Floats:
     """Return the bands of heights (low, high) of an open wall without any piece, shape (n, 2); empty if not open."""
     if not scene.is_open:
         return np.empty((0, 2))
-    lines = np.flatnonzero(scene.joints[:, STARTS_LINE] > 0.0)
-    heights = [np.column_stack([scene.joints[lines, JOINT_Y], scene.joints[lines + 1, JOINT_Y]])]
-    for arcs in (_rows(scene.circles, ARC_COLUMNS), _rows(scene.ellipses, ARC_COLUMNS)):
+    lines = np.flatnonzero(scene.joints[:, c.STARTS_LINE] > 0.0)
+    heights = [np.column_stack([scene.joints[lines, c.JOINT_Y], scene.joints[lines + 1, c.JOINT_Y]])]
+    for arcs in (_rows(scene.circles, c.ARC_COLUMNS), _rows(scene.ellipses, c.ARC_COLUMNS)):
         # every point of an arc is within half of the arc length of one of its ends
-        half = 0.5 * arcs[:, SPAN] / np.abs(arcs[:, CURVATURE]) / arcs[:, STRETCH]
+        half = 0.5 * arcs[:, c.SPAN] / np.abs(arcs[:, c.CURVATURE]) / arcs[:, c.STRETCH]
         heights.append(
             np.column_stack(
-                [np.minimum(*arcs[:, (START_Y, END_Y)].T) - half, np.maximum(*arcs[:, (START_Y, END_Y)].T) + half]
+                [
+                    np.minimum(*arcs[:, (c.START_Y, c.END_Y)].T) - half,
+                    np.maximum(*arcs[:, (c.START_Y, c.END_Y)].T) + half,
+                ]
             )
         )
-    c0, c1, c2, c3 = _rows(scene.beziers, BEZIER_COLUMNS)[:, (START_Y, Y1, Y2, Y3)].T
+    c0, c1, c2, c3 = _rows(scene.beziers, c.BEZIER_COLUMNS)[:, (c.START_Y, c.Y1, c.Y2, c.Y3)].T
     heights.append(np.column_stack([c0, c0 + c1 / 3, c0 + (2 * c1 + c2) / 3, c0 + c1 + c2 + c3]))
-    slack = JOINT_ULPS * EPS * float(scene.hollows[0, SIZE])
+    slack = JOINT_ULPS * EPS * float(scene.hollows[0, c.SIZE])
     extents = sorted((float(row.min()) - slack, float(row.max()) + slack) for part in heights for row in part)
     bands, top = [], extents[0][1]
     for low, high in extents:

@@ -23,7 +23,7 @@ from ...core.checks import (
     numbers,
     whole_number,
 )
-from ..scene.columns import FORM, FORM_COLUMNS, LEFT, NO_FORM, RIGHT
+from ..scene import columns as c
 from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
 
@@ -268,7 +268,7 @@ def _goes_in_waves(scene: Scene, rays: int) -> bool:
     """Whether rays are traced in waves, which needs a function that takes a second to compile once on a machine."""
     if rays < MANY_RAYS or scene.is_open or scene.ellipses is not None:
         return False
-    if scene.closed is not None and np.all(scene.closed[:, FORM] != NO_FORM):
+    if scene.closed is not None and np.all(scene.closed[:, c.FORM] != c.NO_FORM):
         return False
     from .compiled.closed_forms import SIMPLE
 
@@ -299,7 +299,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
         tables = scene.tables.address
         # of an earlier block, if another thread does not use it
         room = rooms.pop() if rooms else room_for(scene.hollows, MANY_RAYS if in_waves else RAYS)
-        closed = np.empty((0, FORM_COLUMNS)) if scene.closed is None else scene.closed
+        closed = np.empty((0, c.FORM_COLUMNS)) if scene.closed is None else scene.closed
         crossings = CROSSINGS if in_waves else (*CROSSINGS[:2], 0)
         first, size = 0, MANY_RAYS if in_waves else len(x)
         while first < len(x) and not stop[0]:
@@ -373,7 +373,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     if wall.origin != (0.0, 0.0):
         entry = float(entries(wall, np.array([position]), np.array([incoming]))[0])
     base = np.floor(entry / scene.cell) * scene.cell
-    left, right = scene.hollows[:, LEFT], scene.hollows[:, RIGHT]
+    left, right = scene.hollows[:, c.LEFT], scene.hollows[:, c.RIGHT]
     inside = np.flatnonzero((left < entry - base) & (entry - base < right) | scene.is_open)
     if len(inside) == 0:
         # a flat top: entry, hit and exit are one point

@@ -31,22 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scene.columns import (
-    CURVATURE,
-    EDGE_X,
-    EDGE_Y,
-    IS_CORNER,
-    JOINT_X,
-    JOINT_Y,
-    LENGTH,
-    LINE_NORMAL_X,
-    LINE_NORMAL_Y,
-    NORMAL_X,
-    NORMAL_Y,
-    START_X,
-    START_Y,
-    STRETCH,
-)
+from ...scene import columns as c
 from ...tracing.compiled.arcs import near_end, on_arc
 from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
@@ -204,12 +189,12 @@ def conic_after(conic, t, rotation, turn, motion):
 
 
 @inlined
-def safe_step(f, f1, c):
-    """Return the first positive root of the parabola f + f1 t + c t^2/2, f >= 0, or inf; 0 only if f = 0 > f1."""
-    disc = f1 * f1 - 2.0 * c * f
+def safe_step(f, f1, f2):
+    """Return the first positive root of the parabola f + f1 t + f2 t^2/2, f >= 0, or inf; 0 only if f = 0 > f1."""
+    disc = f1 * f1 - 2.0 * f2 * f
     if f1 < 0.0:
         return 2.0 * f / (math.sqrt(disc) - f1) if disc >= 0.0 else np.inf
-    return (f1 + math.sqrt(disc)) / -c if c < 0.0 else np.inf
+    return (f1 + math.sqrt(disc)) / -f2 if f2 < 0.0 else np.inf
 
 
 @inlined
@@ -228,7 +213,7 @@ def graph_after(form, t, rotation, path):
 
 @inlined
 def graph_bounds(sign, graph, motion, xi1, ahead):
-    """-> (c, doubt, third): bounds on a graph's sign F up to a time ahead: F'' is at least c and at most c + doubt.
+    """-> (least, doubt, third): bounds on a graph's sign F up to a time ahead: F'' is in [least, least + doubt].
 
     ``third`` bounds |F'''|.
     """
@@ -269,17 +254,17 @@ def next_root(sign, leaving, line, conic, graph, span, path, patience):
             return t, rotation, CLEAR if number > 0 else CORNER
         ahead = min(end - t, patience)
         doubt = (third + growth * ahead) * ahead
-        c = f2 - doubt
+        least = f2 - doubt
         if graph is not None:
-            c, doubt, third = graph_bounds(sign, graph[0], motion, xi1, ahead)
+            least, doubt, third = graph_bounds(sign, graph[0], motion, xi1, ahead)
             if f1 < 0.0 < f2:
                 # near a tangency, where rounding decides between two roots and none
                 until = -f1 / f2
                 if until < ahead and abs(f + 0.5 * f1 * until) <= slack and third * until**3 <= slack:
                     return t + until, turning(motion.spin * (t + until)), GRAZING
-        step = safe_step(f, f1, c)
+        step = safe_step(f, f1, least)
         if step >= ahead:
-            if graph is None and c > 0.0 and -f2 * ahead <= f1 < 0.0 and f - 0.5 * f1 * f1 / f2 <= slack:
+            if graph is None and least > 0.0 and -f2 * ahead <= f1 < 0.0 and f - 0.5 * f1 * f1 / f2 <= slack:
                 # near a tangency, as above
                 t -= f1 / f2
                 return t, turning(motion.spin * t), GRAZING
@@ -300,10 +285,10 @@ def next_root(sign, leaving, line, conic, graph, span, path, patience):
 @inlined
 def where_on_line(joints, lines, j, x, y, slack):
     """-> (inside, corner): whether a point of the line through segment j is on it, and within the slack of a corner."""
-    along = (x - joints[j, JOINT_X]) * lines[j, EDGE_X] + (y - joints[j, JOINT_Y]) * lines[j, EDGE_Y]
-    length = lines[j, LENGTH]
+    along = (x - joints[j, c.JOINT_X]) * lines[j, c.EDGE_X] + (y - joints[j, c.JOINT_Y]) * lines[j, c.EDGE_Y]
+    length = lines[j, c.LENGTH]
     from_start, from_end = along / length, length - along / length
-    at_start, at_end = joints[j, IS_CORNER] > 0.0, joints[j + 1, IS_CORNER] > 0.0
+    at_start, at_end = joints[j, c.IS_CORNER] > 0.0, joints[j + 1, c.IS_CORNER] > 0.0
     corner = (from_start <= slack and at_start) or (from_end <= slack and at_end)
     return from_start >= -slack and from_end >= -slack, corner
 
@@ -315,7 +300,7 @@ def face_at(kind, number, x, y, ground):
     graph = ground.graphs[number if kind == BEZIER else 0]
     if kind != BEZIER:
         return Face(CURVED if kind == ARC else STRAIGHT, number, arc, arc, (0.0, 0.0))
-    along, _ = in_frame(graph, x - graph[START_X], y - graph[START_Y])
+    along, _ = in_frame(graph, x - graph[c.START_X], y - graph[c.START_Y])
     curve = ground.beziers[int(graph[PIECE])]
     return Face(SPLINE, number, arc, curve, (graph[FIRST_S] + parameter_at(graph, along), 0.0))
 
@@ -333,8 +318,8 @@ def is_in_front(kind, number, own, x, y, slack, ground):
 def line_form(number, is_own, path, ground):
     """-> line: F of a line along a path, see `towards_line`."""
     joints, lines = ground.joints, ground.lines
-    g1, g2 = lines[number, LINE_NORMAL_X], lines[number, LINE_NORMAL_Y]
-    level = 0.0 if is_own else g1 * (path.x - joints[number, JOINT_X]) + g2 * (path.y - joints[number, JOINT_Y])
+    g1, g2 = lines[number, c.LINE_NORMAL_X], lines[number, c.LINE_NORMAL_Y]
+    level = 0.0 if is_own else g1 * (path.x - joints[number, c.JOINT_X]) + g2 * (path.y - joints[number, c.JOINT_Y])
     return towards_line(level, g1, g2, path.turn, path.motion)
 
 
@@ -342,10 +327,10 @@ def line_form(number, is_own, path, ground):
 def conic_form(number, is_own, path, ground):
     """-> conic: F of an arc along a path, (f, g1, g2, curvature, stretch)."""
     arcs = ground.arcs
-    curvature, stretch = arcs[number, CURVATURE], arcs[number, STRETCH]
-    rx, ry = path.x - arcs[number, START_X], stretch * (path.y - arcs[number, START_Y])
-    g1, g2 = arcs[number, NORMAL_X] - curvature * rx, arcs[number, NORMAL_Y] - curvature * ry
-    level = 0.0 if is_own else 0.5 * ((arcs[number, NORMAL_X] + g1) * rx + (arcs[number, NORMAL_Y] + g2) * ry)
+    curvature, stretch = arcs[number, c.CURVATURE], arcs[number, c.STRETCH]
+    rx, ry = path.x - arcs[number, c.START_X], stretch * (path.y - arcs[number, c.START_Y])
+    g1, g2 = arcs[number, c.NORMAL_X] - curvature * rx, arcs[number, c.NORMAL_Y] - curvature * ry
+    level = 0.0 if is_own else 0.5 * ((arcs[number, c.NORMAL_X] + g1) * rx + (arcs[number, c.NORMAL_Y] + g2) * ry)
     return level, g1, g2, curvature, stretch
 
 
@@ -370,8 +355,8 @@ def where_on_piece(kind, number, path, state, inward, ground):
     wide = path.slack * max(1.0, min(path.motion.fastest / abs(inward), WIDEST_SLACK))
     if kind == LINE:
         return where_on_line(ground.joints, ground.lines, number, x, y, wide)
-    arc, stretch = ground.arcs[number], ground.arcs[number, STRETCH]
-    inside = on_arc(arc, x - arc[START_X], stretch * (y - arc[START_Y]), wide * max(1.0, stretch))
+    arc, stretch = ground.arcs[number], ground.arcs[number, c.STRETCH]
+    inside = on_arc(arc, x - arc[c.START_X], stretch * (y - arc[c.START_Y]), wide * max(1.0, stretch))
     return inside, near_end(arc, x, y, wide)
 
 
@@ -392,7 +377,7 @@ def first_on_piece(kind, number, own, path, span, size, ground):
     else:
         conic = conic_form(number, is_own, path, ground)
         here, rate, _, _, _ = conic_after(conic, t, rotation, path.turn, motion)
-        reach = slack * max(1.0, ground.arcs[number, STRETCH])
+        reach = slack * max(1.0, ground.arcs[number, c.STRETCH])
         patience = 2.0 * size / motion.fastest
     leaving = is_own and t == 0.0
     if t == 0.0 and own.kind != NO_PIECE and not is_own and abs(here) <= reach:

@@ -14,44 +14,28 @@ import numpy as np
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
-from ...scene.columns import (
-    BEZIERS_END,
-    END_CORNER,
-    END_X,
-    END_Y,
-    FIRST_BEZIER,
-    START_CORNER,
-    START_X,
-    START_Y,
-    X1,
-    X2,
-    X3,
-    Y1,
-    Y2,
-    Y3,
-    row_of,
-    table_of,
-)
+from ...scene import columns as c
+from ...scene.columns import row_of, table_of
 
 # graphs: the first columns are those of every curve; sigma = s - FIRST_S is the parameter of the part.
-ALONG_X = END_CORNER + 1  # unit vector along the chord
-ALONG_Y = END_CORNER + 2
-WIDTH = END_CORNER + 3  # abscissa of the end
-XI1 = END_CORNER + 4  # xi = XI1 sigma + XI2 sigma^2 + XI3 sigma^3
-XI2 = END_CORNER + 5
-XI3 = END_CORNER + 6
-ETA1 = END_CORNER + 7
-ETA2 = END_CORNER + 8
-ETA3 = END_CORNER + 9
-FIRST_S = END_CORNER + 10  # parameter of the piece at the start of the part
-LEAST_SIGMA = END_CORNER + 11  # the formula holds from here
-MOST_SIGMA = END_CORNER + 12  # to here
-PIECE = END_CORNER + 13  # row of the piece in `beziers`
-STEEPNESS = END_CORNER + 14  # sqrt(1 + h'^2) at most
-LEAST_BEND = END_CORNER + 15  # h'' at least, at most 0
-MOST_BEND = END_CORNER + 16  # h'' at most, at least 0
-THIRD = END_CORNER + 17  # |h'''| at most
-GRAPH_COLUMNS = END_CORNER + 18
+ALONG_X = c.END_CORNER + 1  # unit vector along the chord
+ALONG_Y = c.END_CORNER + 2
+WIDTH = c.END_CORNER + 3  # abscissa of the end
+XI1 = c.END_CORNER + 4  # xi = XI1 sigma + XI2 sigma^2 + XI3 sigma^3
+XI2 = c.END_CORNER + 5
+XI3 = c.END_CORNER + 6
+ETA1 = c.END_CORNER + 7
+ETA2 = c.END_CORNER + 8
+ETA3 = c.END_CORNER + 9
+FIRST_S = c.END_CORNER + 10  # parameter of the piece at the start of the part
+LEAST_SIGMA = c.END_CORNER + 11  # the formula holds from here
+MOST_SIGMA = c.END_CORNER + 12  # to here
+PIECE = c.END_CORNER + 13  # row of the piece in `beziers`
+STEEPNESS = c.END_CORNER + 14  # sqrt(1 + h'^2) at most
+LEAST_BEND = c.END_CORNER + 15  # h'' at least, at most 0
+MOST_BEND = c.END_CORNER + 16  # h'' at most, at least 0
+THIRD = c.END_CORNER + 17  # |h'''| at most
+GRAPH_COLUMNS = c.END_CORNER + 18
 
 # Largest slope of a part against its chord, and largest ratio of the speeds d xi/ds on it. Smaller limits make more
 # parts, and the bounds on h'' sharper.
@@ -71,13 +55,13 @@ def graphs_of(beziers: Floats, hollows: Floats) -> Floats:
         rows += _graphs_of_piece(curve, number)
         first.append(len(rows))
     for hollow in hollows:
-        hollow[[FIRST_BEZIER, BEZIERS_END]] = [first[int(k)] for k in hollow[[FIRST_BEZIER, BEZIERS_END]]]
+        hollow[[c.FIRST_BEZIER, c.BEZIERS_END]] = [first[int(k)] for k in hollow[[c.FIRST_BEZIER, c.BEZIERS_END]]]
     return table_of(rows, GRAPH_COLUMNS)
 
 
 def _graphs_of_piece(curve: Floats, number: int) -> list[Floats]:
     """Return the rows of one piece, from halving until every part is a graph."""
-    size = float(np.abs(curve[[X1, Y1, X2, Y2, X3, Y3]]).sum())
+    size = float(np.abs(curve[[c.X1, c.Y1, c.X2, c.Y2, c.X3, c.Y3]]).sum())
     todo, rows = [(0.0, 1.0)], []
     while todo:
         low, high = todo.pop()
@@ -87,25 +71,25 @@ def _graphs_of_piece(curve: Floats, number: int) -> list[Floats]:
             todo += [(middle, high), (low, middle)]
             continue
         row[PIECE] = number
-        row[START_CORNER] = curve[START_CORNER] if low == 0.0 else 0.0
-        row[END_CORNER] = curve[END_CORNER] if high == 1.0 else 0.0
+        row[c.START_CORNER] = curve[c.START_CORNER] if low == 0.0 else 0.0
+        row[c.END_CORNER] = curve[c.END_CORNER] if high == 1.0 else 0.0
         rows.append(row)
     for before, after in pairwise(rows):
-        before[[END_X, END_Y]] = after[[START_X, START_Y]]
-    rows[-1][[END_X, END_Y]] = curve[[END_X, END_Y]]
+        before[[c.END_X, c.END_Y]] = after[[c.START_X, c.START_Y]]
+    rows[-1][[c.END_X, c.END_Y]] = curve[[c.END_X, c.END_Y]]
     return rows
 
 
 def _graph(curve: Floats, low: float, high: float, size: float) -> Floats | None:
     """Return the row of the part on [low, high], or None if the part must be halved."""
-    a1, a2, a3 = curve[[X1, Y1]], curve[[X2, Y2]], curve[[X3, Y3]]
-    start = curve[[START_X, START_Y]] + low * (a1 + low * (a2 + low * a3))
+    a1, a2, a3 = curve[[c.X1, c.Y1]], curve[[c.X2, c.Y2]], curve[[c.X3, c.Y3]]
+    start = curve[[c.START_X, c.START_Y]] + low * (a1 + low * (a2 + low * a3))
     # the coefficients of b(low + sigma) - b(low)
     c1, c2, c3 = a1 + low * (2.0 * a2 + 3.0 * low * a3), a2 + 3.0 * low * a3, a3
     span = high - low
     chord = span * (c1 + span * (c2 + span * c3))
     width = float(np.hypot(*chord))
-    row = row_of(GRAPH_COLUMNS, {START_X: start[0], START_Y: start[1], FIRST_S: low})
+    row = row_of(GRAPH_COLUMNS, {c.START_X: start[0], c.START_Y: start[1], FIRST_S: low})
     if width <= STRAIGHT * size or span <= EPS:
         along = chord / width if width > 0.0 else np.array([1.0, 0.0])
         values = {XI1: width / span or EPS * size, MOST_SIGMA: span, STEEPNESS: 1.0}

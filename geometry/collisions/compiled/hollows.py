@@ -4,20 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...scene.columns import (
-    BEZIERS_END,
-    CIRCLES_END,
-    ELLIPSES_END,
-    FIRST_BEZIER,
-    FIRST_CIRCLE,
-    FIRST_ELLIPSE,
-    FIRST_JOINT,
-    JOINTS_END,
-    LEFT,
-    RIGHT,
-    SIZE,
-    STARTS_LINE,
-)
+from ...scene import columns as c
 from ...tracing.compiled.options import inlined
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
 from .contact import ARC, CLEAR, Span, Touch, first_on_piece, next_root, satellite_after, towards_line
@@ -33,24 +20,24 @@ def first_in_hollow(h, own, came_from, path, span, ground):
     """
     hollows, joints, motion = ground.hollows, ground.joints, path.motion
     t, end, rotation = span
-    kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, SIZE]
+    kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, c.SIZE]
     where = satellite_after(t, rotation, path.turn, motion)
-    ranges = (FIRST_JOINT, JOINTS_END), (FIRST_CIRCLE, CIRCLES_END), (FIRST_ELLIPSE, ELLIPSES_END)
+    ranges = (c.FIRST_JOINT, c.JOINTS_END), (c.FIRST_CIRCLE, c.CIRCLES_END), (c.FIRST_ELLIPSE, c.ELLIPSES_END)
     for first, end_of_range in ranges:
-        tried = LINE if first == FIRST_JOINT else ARC
+        tried = LINE if first == c.FIRST_JOINT else ARC
         for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
-            if tried == ARC or joints[k, STARTS_LINE] > 0.0:
+            if tried == ARC or joints[k, c.STARTS_LINE] > 0.0:
                 rest = Span(t, end, rotation)
                 hit, there, unclear = first_on_piece(tried, k, own, path, rest, size, ground)
                 if hit < end:
                     end, kind, number, code, where = hit, tried, k, unclear, there
-    for k in range(int(hollows[h, FIRST_BEZIER]), int(hollows[h, BEZIERS_END])):
+    for k in range(int(hollows[h, c.FIRST_BEZIER]), int(hollows[h, c.BEZIERS_END])):
         hit, there, unclear = first_on_graph(k, own, path, Span(t, end, rotation), size, ground)
         if hit < end:
             end, kind, number, code, where = hit, BEZIER, k, unclear, there
     if ground.is_open:
         for side in (-1, 1):
-            edge = hollows[h, LEFT] if side < 0 else hollows[h, RIGHT]
+            edge = hollows[h, c.LEFT] if side < 0 else hollows[h, c.RIGHT]
             line = towards_line(side * (edge - path.x), -float(side), 0.0, path.turn, motion)
             rest = Span(t, end, rotation)
             hit, then, unclear = next_root(1.0, came_from == side, line, None, None, rest, path, np.inf)

@@ -10,26 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scene.columns import (
-    CORNER_EDGE,
-    CURVATURE,
-    EDGE_X,
-    EDGE_Y,
-    JOINT_X,
-    JOINT_Y,
-    LEFT,
-    LEFT_EDGE,
-    LENGTH,
-    LINE_NORMAL_X,
-    LINE_NORMAL_Y,
-    NORMAL_X,
-    NORMAL_Y,
-    RIGHT,
-    RIGHT_EDGE,
-    START_X,
-    START_Y,
-    STRETCH,
-)
+from ...scene import columns as c
 from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.pointers import is_raised
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
@@ -86,16 +67,16 @@ class Chosen(NamedTuple):
 def hollow_at(hollows, entry):
     """Return the hollow whose opening contains a position of the cell, or -1 at a flat top."""
     h = last_hollow(entry, hollows)
-    return h if h >= 0 and entry < hollows[h, RIGHT] else -1
+    return h if h >= 0 and entry < hollows[h, c.RIGHT] else -1
 
 
 @inlined
 def near_edge(hollows, entry, slack):
     """Whether a position at height 0 is within the slack of an end of a hollow that is a corner."""
     for h in range(hollows.shape[0]):
-        if abs(entry - hollows[h, LEFT]) <= slack and hollows[h, LEFT_EDGE] == CORNER_EDGE:
+        if abs(entry - hollows[h, c.LEFT]) <= slack and hollows[h, c.LEFT_EDGE] == c.CORNER_EDGE:
             return True
-        if abs(entry - hollows[h, RIGHT]) <= slack and hollows[h, RIGHT_EDGE] == CORNER_EDGE:
+        if abs(entry - hollows[h, c.RIGHT]) <= slack and hollows[h, c.RIGHT_EDGE] == c.CORNER_EDGE:
             return True
     return False
 
@@ -173,22 +154,22 @@ def surface(kind, index, x, y, ground):
     if kind == BEZIER:
         return graph_surface(ground.graphs[index], x, y)
     if kind == LINE:
-        n1, n2 = lines[index, LINE_NORMAL_X], lines[index, LINE_NORMAL_Y]
-        ex, ey, length = lines[index, EDGE_X], lines[index, EDGE_Y], lines[index, LENGTH]
-        fraction = ((x - joints[index, JOINT_X]) * ex + (y - joints[index, JOINT_Y]) * ey) / (length * length)
+        n1, n2 = lines[index, c.LINE_NORMAL_X], lines[index, c.LINE_NORMAL_Y]
+        ex, ey, length = lines[index, c.EDGE_X], lines[index, c.EDGE_Y], lines[index, c.LENGTH]
+        fraction = ((x - joints[index, c.JOINT_X]) * ex + (y - joints[index, c.JOINT_Y]) * ey) / (length * length)
         near = index if fraction <= 0.5 else index + 1
         if near != index:
             fraction -= 1.0
-        return joints[near, JOINT_X] + fraction * ex, joints[near, JOINT_Y] + fraction * ey, n1, n2
-    curvature, stretch = arcs[index, CURVATURE], arcs[index, STRETCH]
-    qx, qy = x - arcs[index, START_X], stretch * (y - arcs[index, START_Y])
-    n1, n2 = arcs[index, NORMAL_X] - curvature * qx, arcs[index, NORMAL_Y] - curvature * qy
-    f = 0.5 * ((arcs[index, NORMAL_X] + n1) * qx + (arcs[index, NORMAL_Y] + n2) * qy)
+        return joints[near, c.JOINT_X] + fraction * ex, joints[near, c.JOINT_Y] + fraction * ey, n1, n2
+    curvature, stretch = arcs[index, c.CURVATURE], arcs[index, c.STRETCH]
+    qx, qy = x - arcs[index, c.START_X], stretch * (y - arcs[index, c.START_Y])
+    n1, n2 = arcs[index, c.NORMAL_X] - curvature * qx, arcs[index, c.NORMAL_Y] - curvature * qy
+    f = 0.5 * ((arcs[index, c.NORMAL_X] + n1) * qx + (arcs[index, c.NORMAL_Y] + n2) * qy)
     qx -= f * n1
     qy -= f * n2
-    n1, n2 = arcs[index, NORMAL_X] - curvature * qx, stretch * (arcs[index, NORMAL_Y] - curvature * qy)
+    n1, n2 = arcs[index, c.NORMAL_X] - curvature * qx, stretch * (arcs[index, c.NORMAL_Y] - curvature * qy)
     norm = 1.0 / math.sqrt(n1 * n1 + n2 * n2)
-    return arcs[index, START_X] + qx, arcs[index, START_Y] + qy / stretch, n1 * norm, n2 * norm
+    return arcs[index, c.START_X] + qx, arcs[index, c.START_Y] + qy / stretch, n1 * norm, n2 * norm
 
 
 @inlined

@@ -7,24 +7,7 @@ from __future__ import annotations
 
 import math
 
-from ...scene.columns import (
-    CURVATURE,
-    EDGE_X,
-    EDGE_Y,
-    FIRST_JOINT,
-    JOINT_X,
-    JOINT_Y,
-    JOINTS_END,
-    LENGTH,
-    LINE_NORMAL_X,
-    LINE_NORMAL_Y,
-    NORMAL_X,
-    NORMAL_Y,
-    START_X,
-    START_Y,
-    STARTS_LINE,
-    STRETCH,
-)
+from ...scene import columns as c
 from ...tracing.compiled.options import compiled, inlined
 from ...tracing.compiled.pointers import is_raised
 from ...tracing.compiled.rays import ESCAPED
@@ -99,11 +82,11 @@ def end_disk(work, lane, position, velocity, disk, scale, results):
 def line_at(joints, lines, k):
     """Return start, end, edge, normal, length and number of a line."""
     return (
-        (joints[k, JOINT_X], joints[k, JOINT_Y]),
-        (joints[k + 1, JOINT_X], joints[k + 1, JOINT_Y]),
-        (lines[k, EDGE_X], lines[k, EDGE_Y]),
-        (lines[k, LINE_NORMAL_X], lines[k, LINE_NORMAL_Y]),
-        lines[k, LENGTH],
+        (joints[k, c.JOINT_X], joints[k, c.JOINT_Y]),
+        (joints[k + 1, c.JOINT_X], joints[k + 1, c.JOINT_Y]),
+        (lines[k, c.EDGE_X], lines[k, c.EDGE_Y]),
+        (lines[k, c.LINE_NORMAL_X], lines[k, c.LINE_NORMAL_Y]),
+        lines[k, c.LENGTH],
         float(k),
     )
 
@@ -112,10 +95,10 @@ def line_at(joints, lines, k):
 def arc_at(arcs):
     """Return start, normal, curvature and stretch of the arc."""
     return (
-        (arcs[0, START_X], arcs[0, START_Y]),
-        (arcs[0, NORMAL_X], arcs[0, NORMAL_Y]),
-        arcs[0, CURVATURE],
-        arcs[0, STRETCH],
+        (arcs[0, c.START_X], arcs[0, c.START_Y]),
+        (arcs[0, c.NORMAL_X], arcs[0, c.NORMAL_Y]),
+        arcs[0, c.CURVATURE],
+        arcs[0, c.STRETCH],
     )
 
 
@@ -123,7 +106,7 @@ def arc_at(arcs):
 def fly(work, disk, ring, limit, ground):
     """-> int: one flight of all lanes; see `finish_flights`."""
     joints, lines, arcs, hollow = ground.joints, ground.lines, ground.arcs, ground.hollows[0]
-    first, last = int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])
+    first, last = int(hollow[c.FIRST_JOINT]), int(hollow[c.JOINTS_END])
     begin_flights(work, ring)
     for place in range(3):
         side = 0.0 if place == 0 else (1.0 if place == 1 else -1.0)
@@ -133,7 +116,7 @@ def fly(work, disk, ring, limit, ground):
                 meet_arc(work, ring, place, start, normal, curvature, stretch)
             else:
                 for k in range(first, last):
-                    if joints[k, STARTS_LINE] > 0.0:
+                    if joints[k, c.STARTS_LINE] > 0.0:
                         start, _, edge, normal, length, number = line_at(joints, lines, k)
                         meet_line(work, ring, place, start, edge, normal, length, number)
             compare(work, ring, place)
@@ -143,7 +126,7 @@ def fly(work, disk, ring, limit, ground):
         reflect_at_arc(work, ring, disk, start, normal, curvature, stretch)
     else:
         for k in range(first, last):
-            if joints[k, STARTS_LINE] > 0.0:
+            if joints[k, c.STARTS_LINE] > 0.0:
                 start, end, edge, normal, length, number = line_at(joints, lines, k)
                 reflect_at_line(work, ring, disk, start, end, edge, normal, length, number)
     return found

@@ -13,26 +13,7 @@ from ....core.compilation import jit
 from ...tracing.compiled.options import inlined, linked_allocating
 from ...tracing.compiled.trigonometry import PI, PI_REST
 from ...tracing.double_double.arithmetic import add
-from .columns import (
-    BOUNCES,
-    COUNT,
-    CUT_X,
-    CUT_Y,
-    FIRST,
-    LINE_C,
-    LINE_S,
-    PIECE_COLUMNS,
-    PIECE_COSINE,
-    PIECE_HIGH,
-    PIECE_LOW,
-    PIECE_OFFSET,
-    PIECE_SINE,
-    SIGN,
-    TAG_BOUNCES,
-    TAG_COLUMNS,
-    TAG_LEAF,
-    TAG_SIGN,
-)
+from . import columns as c
 
 _compile = jit()
 
@@ -64,7 +45,7 @@ def leaving_offset(low, high, unfolding):
 def set_angles(polygon, count, angles, cuts):
     """Compute the angles of the vertices of a polygon, also in ascending order, in ``cuts``."""
     for i in range(count):
-        angle = math.atan2(polygon[i, LINE_S], polygon[i, LINE_C])
+        angle = math.atan2(polygon[i, c.LINE_S], polygon[i, c.LINE_C])
         angles[i] = angle
         k = i
         while k > 0 and cuts[k - 1] > angle:
@@ -93,10 +74,10 @@ def put_pieces(pieces, used, polygon, count, angles, cuts, offset, tag, width):
         if lower < 0 or upper < 0:
             continue
         row, tags = pieces.rows[used], pieces.tags[used]
-        row[PIECE_LOW], row[PIECE_HIGH], row[PIECE_OFFSET] = cuts[k], cuts[k + 1], offset
-        row[PIECE_SINE] = (polygon[upper, CUT_X] - polygon[lower, CUT_X]) / width
-        row[PIECE_COSINE] = (polygon[lower, CUT_Y] - polygon[upper, CUT_Y]) / width
-        tags[TAG_LEAF], tags[TAG_SIGN], tags[TAG_BOUNCES] = tag
+        row[c.PIECE_LOW], row[c.PIECE_HIGH], row[c.PIECE_OFFSET] = cuts[k], cuts[k + 1], offset
+        row[c.PIECE_SINE] = (polygon[upper, c.CUT_X] - polygon[lower, c.CUT_X]) / width
+        row[c.PIECE_COSINE] = (polygon[lower, c.CUT_Y] - polygon[upper, c.CUT_Y]) / width
+        tags[c.TAG_LEAF], tags[c.TAG_SIGN], tags[c.TAG_BOUNCES] = tag
         used += 1
     return used
 
@@ -104,7 +85,7 @@ def put_pieces(pieces, used, polygon, count, angles, cuts, offset, tag, width):
 @linked_allocating
 def new_pieces(size):
     """-> Pieces: tables with room for so many pieces."""
-    return Pieces(np.empty((size, PIECE_COLUMNS)), np.empty((size, TAG_COLUMNS), np.int64))
+    return Pieces(np.empty((size, c.PIECE_COLUMNS)), np.empty((size, c.TAG_COLUMNS), np.int64))
 
 
 @_compile
@@ -114,9 +95,9 @@ def pieces_of(store, width):
     pieces, used = new_pieces(vertices), 0
     angles, cuts = np.empty(vertices), np.empty(vertices)
     for beam in range(beams):
-        first, count = store.whole[beam, FIRST], store.whole[beam, COUNT]
+        first, count = store.whole[beam, c.FIRST], store.whole[beam, c.COUNT]
         polygon = store.vertices[first : first + count]
         set_angles(polygon, count, angles, cuts)
-        tag = beam, store.whole[beam, SIGN], store.whole[beam, BOUNCES]
+        tag = beam, store.whole[beam, c.SIGN], store.whole[beam, c.BOUNCES]
         used = put_pieces(pieces, used, polygon, count, angles, cuts, 0.0, tag, width)
     return pieces.rows[:used], pieces.tags[:used]

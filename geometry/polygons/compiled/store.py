@@ -10,27 +10,7 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ...tracing.compiled.growing import taller
 from ...tracing.compiled.options import inlined, linked_allocating
-from .columns import (
-    BOUNCES,
-    COUNT,
-    CUTS,
-    EDGE,
-    ERROR_X,
-    ERROR_Y,
-    FIRST,
-    FLUX,
-    PRIORITY,
-    REAL_COLUMNS,
-    SIGN,
-    T_X,
-    T_X_LOW,
-    T_Y,
-    T_Y_LOW,
-    TURN,
-    TURN_LOW,
-    VERTEX_COLUMNS,
-    WHOLE_COLUMNS,
-)
+from . import columns as c
 from .unfolding import Course, unfolded
 
 
@@ -53,17 +33,17 @@ class Rank(NamedTuple):
 @inlined
 def end_of(store, used):
     """Return the number of vertices of the first ``used`` beams."""
-    return store.whole[used - 1, FIRST] + store.whole[used - 1, COUNT] if used > 0 else 0
+    return store.whole[used - 1, c.FIRST] + store.whole[used - 1, c.COUNT] if used > 0 else 0
 
 
 @inlined
 def put_course(store, beam, course):
     """Write where a beam is."""
     real, whole, isometry = store.real, store.whole, course.unfolding
-    whole[beam, EDGE], whole[beam, SIGN], whole[beam, BOUNCES] = course.edge, int(isometry.sign), course.bounces
-    real[beam, TURN], real[beam, TURN_LOW] = isometry.turn, isometry.turn_low
-    real[beam, T_X], real[beam, T_X_LOW], real[beam, ERROR_X] = isometry.x, isometry.x_low, isometry.error_x
-    real[beam, T_Y], real[beam, T_Y_LOW], real[beam, ERROR_Y] = isometry.y, isometry.y_low, isometry.error_y
+    whole[beam, c.EDGE], whole[beam, c.SIGN], whole[beam, c.BOUNCES] = course.edge, int(isometry.sign), course.bounces
+    real[beam, c.TURN], real[beam, c.TURN_LOW] = isometry.turn, isometry.turn_low
+    real[beam, c.T_X], real[beam, c.T_X_LOW], real[beam, c.ERROR_X] = isometry.x, isometry.x_low, isometry.error_x
+    real[beam, c.T_Y], real[beam, c.T_Y_LOW], real[beam, c.ERROR_Y] = isometry.y, isometry.y_low, isometry.error_y
 
 
 @inlined
@@ -71,10 +51,10 @@ def put_beam(store, beam, polygon, count, rank, course):
     """Write a beam behind those before it."""
     first = end_of(store, beam)
     for i in range(count):
-        for k in range(VERTEX_COLUMNS):
+        for k in range(c.VERTEX_COLUMNS):
             store.vertices[first + i, k] = polygon[i, k]
-    store.whole[beam, FIRST], store.whole[beam, COUNT], store.whole[beam, CUTS] = first, count, rank.cuts
-    store.real[beam, FLUX], store.real[beam, PRIORITY] = rank.flux, rank.priority
+    store.whole[beam, c.FIRST], store.whole[beam, c.COUNT], store.whole[beam, c.CUTS] = first, count, rank.cuts
+    store.real[beam, c.FLUX], store.real[beam, c.PRIORITY] = rank.flux, rank.priority
     put_course(store, beam, course)
 
 
@@ -83,31 +63,31 @@ def course_of(store, beam):
     """-> Course: where a beam is."""
     real, whole = store.real, store.whole
     isometry = unfolded(
-        float(whole[beam, SIGN]),
-        real[beam, TURN],
-        real[beam, TURN_LOW],
-        real[beam, T_X],
-        real[beam, T_X_LOW],
-        real[beam, T_Y],
-        real[beam, T_Y_LOW],
-        real[beam, ERROR_X],
-        real[beam, ERROR_Y],
+        float(whole[beam, c.SIGN]),
+        real[beam, c.TURN],
+        real[beam, c.TURN_LOW],
+        real[beam, c.T_X],
+        real[beam, c.T_X_LOW],
+        real[beam, c.T_Y],
+        real[beam, c.T_Y_LOW],
+        real[beam, c.ERROR_X],
+        real[beam, c.ERROR_Y],
     )
-    return Course(whole[beam, EDGE], whole[beam, BOUNCES], isometry)
+    return Course(whole[beam, c.EDGE], whole[beam, c.BOUNCES], isometry)
 
 
 @inlined
 def rank_of(store, beam):
     """-> Rank: the flux and the priority of a beam."""
-    return Rank(store.real[beam, FLUX], store.real[beam, PRIORITY], store.whole[beam, CUTS])
+    return Rank(store.real[beam, c.FLUX], store.real[beam, c.PRIORITY], store.whole[beam, c.CUTS])
 
 
 @inlined
 def take_polygon(store, beam, polygon):
     """Write the polygon of a beam to ``polygon``, which has room for it; return its number of vertices."""
-    first, count = store.whole[beam, FIRST], store.whole[beam, COUNT]
+    first, count = store.whole[beam, c.FIRST], store.whole[beam, c.COUNT]
     for i in range(count):
-        for k in range(VERTEX_COLUMNS):
+        for k in range(c.VERTEX_COLUMNS):
             polygon[i, k] = store.vertices[first + i, k]
     return count
 
@@ -116,9 +96,9 @@ def take_polygon(store, beam, polygon):
 def new_store(vertices, beams):
     """-> Store: tables with room for so many vertices and beams."""
     return Store(
-        np.empty((vertices, VERTEX_COLUMNS)),
-        np.empty((beams, REAL_COLUMNS)),
-        np.empty((beams, WHOLE_COLUMNS), np.int64),
+        np.empty((vertices, c.VERTEX_COLUMNS)),
+        np.empty((beams, c.REAL_COLUMNS)),
+        np.empty((beams, c.WHOLE_COLUMNS), np.int64),
     )
 
 

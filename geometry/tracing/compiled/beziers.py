@@ -16,24 +16,8 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from ....core.rounding import EPS
+from ...scene import columns as c
 from ...scene.boxes import BOXES
-from ...scene.columns import (
-    END_CORNER,
-    END_X,
-    END_Y,
-    MIDDLE_X,
-    MIDDLE_Y,
-    REACH,
-    START_CORNER,
-    START_X,
-    START_Y,
-    X1,
-    X2,
-    X3,
-    Y1,
-    Y2,
-    Y3,
-)
 from ...scene.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, SMOOTH_JOINT, TANGENT_ULPS
 from ..double_double.beziers import curve_size
 from .lanes import BEFORE, HIT_S, LANES, NUMBER, RAY, TIME, WORD, Lanes, Ray, Table, constant, cross, dot, repeated
@@ -115,14 +99,16 @@ def halley_error(step, slope, bend, a3):
 @inlined
 def bezier_tangent(curve, s):
     """-> (tx, ty): b'(s)."""
-    return bezier_slope(curve[X1], curve[X2], curve[X3], s), bezier_slope(curve[Y1], curve[Y2], curve[Y3], s)
+    return bezier_slope(curve[c.X1], curve[c.X2], curve[c.X3], s), bezier_slope(
+        curve[c.Y1], curve[c.Y2], curve[c.Y3], s
+    )
 
 
 @inlined
 def bezier_time(curve, s, px, py, vx, vy):
     """-> float: the distance along the ray to the point s of the curve."""
-    dx = bezier_value(curve[START_X], curve[X1], curve[X2], curve[X3], s) - px
-    dy = bezier_value(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s) - py
+    dx = bezier_value(curve[c.START_X], curve[c.X1], curve[c.X2], curve[c.X3], s) - px
+    dy = bezier_value(curve[c.START_Y], curve[c.Y1], curve[c.Y2], curve[c.Y3], s) - py
     return dx * vx + dy * vy
 
 
@@ -150,7 +136,7 @@ def joint_contact_time(curve, g, s, px, py, vx, vy, room):
     _, a1, a2, a3 = g
     tx, ty = bezier_tangent(curve, s)
     is_steep = abs(bezier_slope(a1, a2, a3, s)) > SMOOTH_JOINT * (abs(tx) + abs(ty)) + room
-    if is_steep or curve[START_CORNER if s == 0.0 else END_CORNER] > 0.0:
+    if is_steep or curve[c.START_CORNER if s == 0.0 else c.END_CORNER] > 0.0:
         return np.inf
     return bezier_time(curve, s, px, py, vx, vy)
 
@@ -242,7 +228,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
     """-> (t, s, tangent, near_s): first front hit on a Bezier piece that the ray did not start on; see `bezier_hit`."""
     a0, a1, a2, a3 = g
     # size of the products in the sum g
-    spread = max(abs(vx), abs(vy)) * (abs(curve[START_X] - px) + abs(curve[START_Y] - py) + curve_size(curve))
+    spread = max(abs(vx), abs(vy)) * (abs(curve[c.START_X] - px) + abs(curve[c.START_Y] - py) + curve_size(curve))
     # g lies between its four Bernstein coefficients, so it has no zero if they have one sign
     b1, b2, b3 = a0 + a1 / 3.0, a0 + (2.0 * a1 + a2) / 3.0, a0 + a1 + a2 + a3
     if max(min(a0, b1, b2, b3), -max(a0, b1, b2, b3)) > NO_ZERO_ULPS * EPS * spread:
@@ -267,7 +253,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
         touched, touches = touches, False
         if high == 1.0:
             # computed from the joint, so that the next piece has the same number
-            value_high = (curve[END_X] - px) * vy - (curve[END_Y] - py) * vx
+            value_high = (curve[c.END_X] - px) * vy - (curve[c.END_Y] - py) * vx
             if abs(value_high) <= room:
                 t = joint_contact_time(curve, g, 1.0, px, py, vx, vy, room)
                 touches = t > slack and t < np.inf
@@ -282,7 +268,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
                     best_t, best_s, tangent = t, high, 1
         # a root beside a contact equals the contact within rounding
         if value_low >= 0.0 >= value_high and value_low > value_high and not touched and not touches:
-            if curve[X3] == 0.0 and curve[Y3] == 0.0:
+            if curve[c.X3] == 0.0 and curve[c.Y3] == 0.0:
                 s = quadratic_root(a0, a1, a2)
             else:
                 s = falling_root(a0, a1, a2, a3, low, high, value_low, value_high)
@@ -304,10 +290,10 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
     A hit within the slack of the start is not counted: ``near_s`` is its parameter, -1 if there is none.
     """
     g = (
-        (curve[START_X] - px) * vy - (curve[START_Y] - py) * vx,
-        curve[X1] * vy - curve[Y1] * vx,
-        curve[X2] * vy - curve[Y2] * vx,
-        curve[X3] * vy - curve[Y3] * vx,
+        (curve[c.START_X] - px) * vy - (curve[c.START_Y] - py) * vx,
+        curve[c.X1] * vy - curve[c.Y1] * vx,
+        curve[c.X2] * vy - curve[c.Y2] * vx,
+        curve[c.X3] * vy - curve[c.Y3] * vx,
     )
     if own_s >= 0.0:
         t, s, tangent = hit_from_own(curve, g, own_s, px, py, vx, vy, slack)
@@ -327,8 +313,8 @@ def nearest_bezier(tables, first, end, own_number, own_s, px, py, vx, vy, slack,
     for k in range(first, end):
         curve = tables.beziers[k]
         # whether the ray meets the circle about the piece before ``time``; if not, `hit_from_afar` finds nothing
-        dx, dy = curve[MIDDLE_X] - px, curve[MIDDLE_Y] - py
-        along, room = dx * vx + dy * vy, curve[REACH] + NEARBY_MARGIN * (abs(dx) + abs(dy))
+        dx, dy = curve[c.MIDDLE_X] - px, curve[c.MIDDLE_Y] - py
+        along, room = dx * vx + dy * vy, curve[c.REACH] + NEARBY_MARGIN * (abs(dx) + abs(dy))
         # no short circuit, because the processor guesses its branches wrong
         if (k != own_number) & ((abs(dx * vy - dy * vx) > room) | (along < -room) | (along - room > time)):
             continue
@@ -345,8 +331,8 @@ def nearest_bezier(tables, first, end, own_number, own_s, px, py, vx, vy, slack,
 @inlined
 def bezier_reflect(curve, s, vx, vy):
     """-> (px, py, vx, vy): the point s of the curve and the reflected velocity."""
-    px = bezier_value(curve[START_X], curve[X1], curve[X2], curve[X3], s)
-    py = bezier_value(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s)
+    px = bezier_value(curve[c.START_X], curve[c.X1], curve[c.X2], curve[c.X3], s)
+    py = bezier_value(curve[c.START_Y], curve[c.Y1], curve[c.Y2], curve[c.Y3], s)
     tx, ty = bezier_tangent(curve, s)
     scale = 1.0 / math.sqrt(tx * tx + ty * ty)
     nx, ny = -ty * scale, tx * scale
@@ -362,9 +348,9 @@ def bend_number(curve, s):
     misses a bump may hit the same piece behind the bump.
     """
     # the curvature has the sign of b' x b'', which is a quadratic in s for a cubic b
-    c0 = 2.0 * (curve[X1] * curve[Y2] - curve[Y1] * curve[X2])
-    c1 = 6.0 * (curve[X1] * curve[Y3] - curve[Y1] * curve[X3])
-    c2 = 6.0 * (curve[X2] * curve[Y3] - curve[Y2] * curve[X3])
+    c0 = 2.0 * (curve[c.X1] * curve[c.Y2] - curve[c.Y1] * curve[c.X2])
+    c1 = 6.0 * (curve[c.X1] * curve[c.Y3] - curve[c.Y1] * curve[c.X3])
+    c2 = 6.0 * (curve[c.X2] * curve[c.Y3] - curve[c.Y2] * curve[c.X3])
     disc = c1 * c1 - 4.0 * c2 * c0
     if disc <= 0.0:
         return 0
@@ -444,8 +430,8 @@ def _pick(*choices: Any) -> Any:
 
 def _meets_circle(ray: Ray, curve: _Curve) -> Lanes:
     """Return which rays meet the circle about the piece before their hits, as in `nearest_bezier`."""
-    dx, dy = curve[MIDDLE_X] - ray.px, curve[MIDDLE_Y] - ray.py
-    along, room = dot(dx, dy, ray.vx, ray.vy), curve[REACH] + NEARBY_MARGIN * (abs(dx) + abs(dy))
+    dx, dy = curve[c.MIDDLE_X] - ray.px, curve[c.MIDDLE_Y] - ray.py
+    along, room = dot(dx, dy, ray.vx, ray.vy), curve[c.REACH] + NEARBY_MARGIN * (abs(dx) + abs(dy))
     return (abs(cross(dx, dy, ray.vx, ray.vy)) <= room) & (along >= -room) & (along - room <= ray.at[TIME])
 
 
@@ -488,22 +474,22 @@ class _Meeting:
         """Return those of g, as in `bezier_hit`."""
         ray, curve = self.ray, self.curve
         return (
-            cross(curve[START_X] - ray.px, curve[START_Y] - ray.py, ray.vx, ray.vy),
-            cross(curve[X1], curve[Y1], ray.vx, ray.vy),
-            cross(curve[X2], curve[Y2], ray.vx, ray.vy),
-            cross(curve[X3], curve[Y3], ray.vx, ray.vy),
+            cross(curve[c.START_X] - ray.px, curve[c.START_Y] - ray.py, ray.vx, ray.vy),
+            cross(curve[c.X1], curve[c.Y1], ray.vx, ray.vy),
+            cross(curve[c.X2], curve[c.Y2], ray.vx, ray.vy),
+            cross(curve[c.X3], curve[c.Y3], ray.vx, ray.vy),
         )
 
     def value_at_end(self) -> Lanes:
         ray, curve = self.ray, self.curve
-        return cross(curve[END_X] - ray.px, curve[END_Y] - ray.py, ray.vx, ray.vy)
+        return cross(curve[c.END_X] - ray.px, curve[c.END_Y] - ray.py, ray.vx, ray.vy)
 
     def spread(self) -> Lanes:
         """Return the size of the products in the sum g."""
         ray, curve = self.ray, self.curve
         size: Lanes = curve_size.py_func(curve)
         fast = (abs(ray.vx) > abs(ray.vy)).where(abs(ray.vx), abs(ray.vy))
-        return fast * (abs(curve[START_X] - ray.px) + abs(curve[START_Y] - ray.py) + size)
+        return fast * (abs(curve[c.START_X] - ray.px) + abs(curve[c.START_Y] - ray.py) + size)
 
     def touch(self, ends: Any, extrema: Any) -> None:
         """Doubt rays whose line passes an end of the piece, or touches it at an extremum of g, within rounding.
@@ -519,19 +505,22 @@ class _Meeting:
     def hit(self, s: Lanes, chosen: Lanes) -> None:
         """Take the hits at s that are nearer."""
         ray, curve = self.ray, self.curve
-        x = bezier_value.py_func(curve[START_X], curve[X1], curve[X2], curve[X3], s)
-        y = bezier_value.py_func(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s)
+        x = bezier_value.py_func(curve[c.START_X], curve[c.X1], curve[c.X2], curve[c.X3], s)
+        y = bezier_value.py_func(curve[c.START_Y], curve[c.Y1], curve[c.Y2], curve[c.Y3], s)
         time = dot(x - ray.px, y - ray.py, ray.vx, ray.vy)
         ray.doubt(chosen & self.far & (abs(time) <= NEARBY * self.spread()))
         nearer = chosen & (time > 0.0) & (time < ray.at[TIME])
         with self.builder.if_then(nearer.any()):
             slope_of = bezier_slope.py_func
-            tx, ty = slope_of(curve[X1], curve[X2], curve[X3], s), slope_of(curve[Y1], curve[Y2], curve[Y3], s)
+            tx, ty = (
+                slope_of(curve[c.X1], curve[c.X2], curve[c.X3], s),
+                slope_of(curve[c.Y1], curve[c.Y2], curve[c.Y3], s),
+            )
             scale = self.one / (tx * tx + ty * ty).root()
             start, end = self.corners
-            dx, dy = x - curve[START_X], y - curve[START_Y]
+            dx, dy = x - curve[c.START_X], y - curve[c.START_Y]
             at_corner = (start > 0.0) & (dot(dx, dy, dx, dy) <= start * start)
-            dx, dy = x - curve[END_X], y - curve[END_Y]
+            dx, dy = x - curve[c.END_X], y - curve[c.END_Y]
             at_corner = at_corner | ((end > 0.0) & (dot(dx, dy, dx, dy) <= end * end))
             ray.hit(nearer, self.number, time, (x, y), (-ty * scale, tx * scale), at_corner)
             ray.at[HIT_S] = nearer.where(s, ray.at[HIT_S])
@@ -565,9 +554,9 @@ def meet_parabola(typing, work, first, beziers, k, corners, number):
                 all_.hit_from_own(g, slope / -bend, all_.own)
             with builder.if_then(all_.far.any()):
                 last = all_.value_at_end()
-                c = a1 / (-2.0 * a2)
-                lowest = bezier_value.py_func(a0, a1, a2, a3, c)
-                inside = (c > 0.0) & (c < 1.0)
+                lowest_at = a1 / (-2.0 * a2)
+                lowest = bezier_value.py_func(a0, a1, a2, a3, lowest_at)
+                inside = (lowest_at > 0.0) & (lowest_at < 1.0)
                 all_.touch((a0, last), [(inside, lowest)])
                 early = (a0 >= 0.0) & (lowest <= 0.0) & (a0 > lowest)
                 late = (lowest >= 0.0) & (last <= 0.0) & (lowest > last)
@@ -633,9 +622,9 @@ def _meet_far_cubic(all_: _Meeting, g: Any) -> None:
     first_at, second_at = (c1 < c2).where(c1, c2), (c1 < c2).where(c2, c1)
     values = []
     insides = []
-    for c in (first_at, second_at):
-        inside = (disc > 0.0) & (c > 0.0) & (c < 1.0)
-        value = bezier_value.py_func(*g, c)
+    for turn in (first_at, second_at):
+        inside = (disc > 0.0) & (turn > 0.0) & (turn < 1.0)
+        value = bezier_value.py_func(*g, turn)
         values.append(value)
         insides.append(inside)
     all_.touch((a0, last), zip(insides, values, strict=True))

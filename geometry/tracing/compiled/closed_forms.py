@@ -15,33 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
-from ...scene.columns import (
-    BEZIERS_END,
-    CHAIN,
-    CIRCLE_X,
-    CIRCLE_Y,
-    COPIES,
-    DOUBT,
-    ELLIPSES_END,
-    FIRST_BEZIER,
-    FIRST_ELLIPSE,
-    FORM,
-    FORM_LEFT,
-    FORM_RIGHT,
-    HALF_ANGLE,
-    LEFT,
-    LINK_COLUMNS,
-    LINK_CONSTANT,
-    LINK_X,
-    LINK_Y,
-    NO_FORM,
-    RADIUS,
-    RIGHT,
-    TREE_LEVELS,
-    WEDGE,
-    WEDGE_X,
-    WEDGE_Y,
-)
+from ...scene import columns as c
 from ...scene.scene import NO_TABLES
 from .lanes import WALKS, WAVE, WORK
 from .lines import NATURAL
@@ -95,8 +69,8 @@ def room_for(hollows: Floats, block: int) -> Room:
     """Return the work space of `trace_closed`, for one thread and blocks of rays."""
     rays, others, met = np.empty((3, block), np.int64)
     # rays near one of many Bezier pieces are gathered in a second part
-    parts = 2 if np.any(hollows[:, BEZIERS_END] > hollows[:, FIRST_BEZIER]) else 1
-    walks = np.empty(WALKS if np.any(hollows[:, TREE_LEVELS] > 0.0) else 0, np.int64)
+    parts = 2 if np.any(hollows[:, c.BEZIERS_END] > hollows[:, c.FIRST_BEZIER]) else 1
+    walks = np.empty(WALKS if np.any(hollows[:, c.TREE_LEVELS] > 0.0) else 0, np.int64)
     heads = np.full(len(hollows) + 1, -1)
     return Room(np.empty((7, block)), rays, others, met, heads, _aligned(parts * WORK), walks)
 
@@ -112,8 +86,8 @@ def cross_arc(form, entry, angle, hits, moment, incidence):
     all terms positive, and the same with cosines. A chord advances by 2 d to the left if d is acute, else by
     2 (pi - d) to the right, which gives the number of hits. The angular momentum about the centre gives the exit.
     """
-    left, right, doubt = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT]
-    middle, height, radius, half = form[CIRCLE_X], form[CIRCLE_Y], form[RADIUS], form[HALF_ANGLE]
+    left, right, doubt = form[c.FORM_LEFT], form[c.FORM_RIGHT], form[c.DOUBT]
+    middle, height, radius, half = form[c.CIRCLE_X], form[c.CIRCLE_Y], form[c.RADIUS], form[c.HALF_ANGLE]
     width = right - left
     for i in range(entry.shape[0]):
         theta = angle[i]
@@ -156,9 +130,15 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
     The sign of ``turn``, the moment of the apex about the ray, selects the line that is met first. The number of hits
     is the number of consecutive unfolded ends of the opening on the side of the ray opposite to the apex.
     """
-    left, right, doubt, apex_x, apex_y = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT], form[WEDGE_X], form[WEDGE_Y]
-    copies = int(form[COPIES])
-    mirrored = LINK_COLUMNS * (copies + 2)
+    left, right, doubt, apex_x, apex_y = (
+        form[c.FORM_LEFT],
+        form[c.FORM_RIGHT],
+        form[c.DOUBT],
+        form[c.WEDGE_X],
+        form[c.WEDGE_Y],
+    )
+    copies = int(form[c.COPIES])
+    mirrored = c.LINK_COLUMNS * (copies + 2)
     for i in range(entry.shape[0]):
         sine, cosine = sine_cosine(angle[i])
         vx[i], vy[i] = -cosine, -sine
@@ -167,9 +147,9 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
     for i in range(entry.shape[0]):
         hits[i] = 1.0
     for k in range(2, copies + 1):
-        first = CHAIN + LINK_COLUMNS * k
-        x0, y0 = form[first + LINK_X], form[first + LINK_Y]
-        x1, y1 = form[first + mirrored + LINK_X], form[first + mirrored + LINK_Y]
+        first = c.CHAIN + c.LINK_COLUMNS * k
+        x0, y0 = form[first + c.LINK_X], form[first + c.LINK_Y]
+        x1, y1 = form[first + mirrored + c.LINK_X], form[first + mirrored + c.LINK_Y]
         before, now = k - 1.0, float(k)
         for i in range(entry.shape[0]):
             x, y = (x0, y0) if turn[i] > 0.0 else (x1, y1)
@@ -177,17 +157,17 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
             hits[i] = now if beyond and hits[i] == before else hits[i]
     for i in range(entry.shape[0]):
         count = int(hits[i])
-        last = CHAIN + LINK_COLUMNS * count + (0 if turn[i] > 0.0 else mirrored)
-        following = last + LINK_COLUMNS
-        inside = (form[last + LINK_X] - entry[i]) * vy[i] - form[last + LINK_Y] * vx[i]
-        outside = (form[following + LINK_X] - entry[i]) * vy[i] - form[following + LINK_Y] * vx[i]
+        last = c.CHAIN + c.LINK_COLUMNS * count + (0 if turn[i] > 0.0 else mirrored)
+        following = last + c.LINK_COLUMNS
+        inside = (form[last + c.LINK_X] - entry[i]) * vy[i] - form[last + c.LINK_Y] * vx[i]
+        outside = (form[following + c.LINK_X] - entry[i]) * vy[i] - form[following + c.LINK_Y] * vx[i]
         odd = count % 2 == 1
         goes_right = odd == (turn[i] > 0.0)
         fraction = inside / (inside - outside)
         near, far = (right, left) if goes_right else (left, right)
         exit = near + fraction * (far - near)
         incoming = angle[i]
-        angle[i] = form[last + LINK_CONSTANT] + (-incoming if odd else incoming)
+        angle[i] = form[last + c.LINK_CONSTANT] + (-incoming if odd else incoming)
         # distances of the ray's line from the apex, from the ends of the opening, and from its ends at the exit
         west, east = (left - entry[i]) * vy[i], (entry[i] - right) * vy[i]
         closest = min(min(abs(turn[i]), min(west, east)), min(abs(inside), abs(outside)))
@@ -214,12 +194,12 @@ def cross(form, entry, angle, hits, room, crossings):
     """Reflect rays by one hollow with a closed form; ``room`` is work space."""
     count = entry.shape[0]
     wedge, arc, _ = crossings
-    address = address_at(wedge if form[FORM] == WEDGE else arc)
+    address = address_at(wedge if form[c.FORM] == c.WEDGE else arc)
     first, second = room.numbers[0, :count], room.numbers[1, :count]
     if address == 0:
         for j in range(count):
             hits[j] = 0.0
-    elif form[FORM] == WEDGE:
+    elif form[c.FORM] == c.WEDGE:
         call_at(address, None, (form, entry, angle, hits, first, second, room.numbers[2, :count]))
     else:
         call_at(address, None, (form, entry, angle, hits, first, second))
@@ -228,7 +208,7 @@ def cross(form, entry, angle, hits, room, crossings):
 @inlined
 def cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings):
     """Reflect rays by hollow number h: by its closed form if it has one, else in waves."""
-    if closed.shape[0] > 0 and closed[h, FORM] != NO_FORM:
+    if closed.shape[0] > 0 and closed[h, c.FORM] != c.NO_FORM:
         cross(closed[h], entry, angle, hits, room, crossings)
         return
     _, _, simple = crossings
@@ -243,10 +223,10 @@ def cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings):
 @inlined
 def is_crossed(hollow, closed, h, crossings):
     """-> bool: whether rays in hollow number h are not all left undecided."""
-    if closed.shape[0] > 0 and closed[h, FORM] != NO_FORM:
+    if closed.shape[0] > 0 and closed[h, c.FORM] != c.NO_FORM:
         return True
     _, _, simple = crossings
-    return simple != 0 and hollow[ELLIPSES_END] == hollow[FIRST_ELLIPSE]
+    return simple != 0 and hollow[c.ELLIPSES_END] == hollow[c.FIRST_ELLIPSE]
 
 
 @inlined
@@ -289,12 +269,12 @@ def put_into_hollows(starts, theta, hollows, cell, results, room):
     for k in range(1, 0 if searched else flat):
         for j in range(count):
             found = places[j] if k > 1 else 0.0
-            places[j] = found + 1.0 if starts[j] - bases[j] >= hollows[k, LEFT] else found
+            places[j] = found + 1.0 if starts[j] - bases[j] >= hollows[k, c.LEFT] else found
     for j in range(count if flat > 0 else 0):
         entry, h = starts[j] - bases[j], 0
         if flat > 1:
             h = max(last_hollow(entry, hollows), 0) if searched else int(places[j]) & NATURAL
-        left, right = hollows[h, LEFT], hollows[h, RIGHT]
+        left, right = hollows[h, c.LEFT], hollows[h, c.RIGHT]
         place = h if (left < entry) & (entry < right) else flat
         if (entry == left) | (entry == right):
             h = opening_at(entry, hollows)
@@ -323,8 +303,8 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     whole = (
         is_crossed(hollows[0], closed, FIRST_HOLLOW, crossings)
         and hollows.shape[0] == 1
-        and hollows[0, LEFT] == 0.0
-        and hollows[0, RIGHT] == cell
+        and hollows[0, c.LEFT] == 0.0
+        and hollows[0, c.RIGHT] == cell
     )
     block, flat = numbers.shape[1], hollows.shape[0]
     for first in range(0, x.shape[0], block):

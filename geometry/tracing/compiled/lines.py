@@ -8,20 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...scene import columns as c
 from ...scene.boxes import BOXES, CONTENT, PARENT
-from ...scene.columns import (
-    EDGE_X,
-    EDGE_Y,
-    IS_CORNER,
-    JOINT_X,
-    JOINT_Y,
-    LENGTH,
-    SKY_LEFT,
-    SKY_RIGHT,
-    STARTS_LINE,
-    TREE_LEVELS,
-    TREE_ROOT,
-)
 from ...scene.sky import MOST_LINES, SKY_ROOM
 from ...scene.tolerances import NEARBY_SLACKS
 from .lanes import (
@@ -76,8 +64,8 @@ def line_time(tables, j, sides, px, py, vx, vy):
         # relative to the nearer joint, for accuracy at both ends
         fraction = min(c_after / (c_before - c_after), -LEAST_FRACTION)
         near = j + 1
-    hx = joints[near, JOINT_X] + fraction * lines[j, EDGE_X]
-    hy = joints[near, JOINT_Y] + fraction * lines[j, EDGE_Y]
+    hx = joints[near, c.JOINT_X] + fraction * lines[j, c.EDGE_X]
+    hy = joints[near, c.JOINT_Y] + fraction * lines[j, c.EDGE_Y]
     return (hx - px) * vx + (hy - py) * vy, fraction
 
 
@@ -85,20 +73,20 @@ def line_time(tables, j, sides, px, py, vx, vy):
 def is_ahead(tables, j, sides, t, close, slack):
     """-> bool: whether a line lies ahead of the start for any rounding: at a time above ``close``, or a slack away."""
     c_before, c_after = sides
-    return t > close or t * (c_before - c_after) > slack * tables.lines[j, LENGTH]
+    return t > close or t * (c_before - c_after) > slack * tables.lines[j, c.LENGTH]
 
 
 @inlined
 def joint_side(joints, j, own, px, py, vx, vy, slack):
     """-> (c, t): the number c of joint j, and the time to the joint if it is a corner that the ray meets, else inf."""
-    dx, dy = joints[j, JOINT_X] - px, joints[j, JOINT_Y] - py
-    c = dx * vy - dy * vx
-    if abs(c) <= slack and joints[j, IS_CORNER] > 0.0:
+    dx, dy = joints[j, c.JOINT_X] - px, joints[j, c.JOINT_Y] - py
+    side = dx * vy - dy * vx
+    if abs(side) <= slack and joints[j, c.IS_CORNER] > 0.0:
         ahead = dx * vx + dy * vy
         # at entry the corners of the opening are always behind the ray, at any angle
         if (own.bounces > 0 or dy != 0.0) and ahead > slack:
-            return c, ahead
-    return c, np.inf
+            return side, ahead
+    return side, np.inf
 
 
 @inlined
@@ -116,7 +104,7 @@ def nearest_line(scope, own, px, py, vx, vy, time):
     for j in range(first, end - 1):
         c_after, ahead = joint_side(joints, j + 1, own, px, py, vx, vy, slack)
         corner_time = min(corner_time, ahead)
-        if c_before >= 0.0 >= c_after and c_before > c_after and joints[j, STARTS_LINE] > 0.0:
+        if c_before >= 0.0 >= c_after and c_before > c_after and joints[j, c.STARTS_LINE] > 0.0:
             is_own = own.kind == LINE and own.number == j
             if not is_own:
                 t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
@@ -136,7 +124,7 @@ def first_boxes(scope, px, py, vx, vy, least, most):
     A walk is the row of a node and its level, from 1 above the leaves; the mask of the boxes in the node still to
     visit; and eight bits for each level, those masks of the nodes above.
     """
-    root, levels = int(scope.hollow[TREE_ROOT]), int(scope.hollow[TREE_LEVELS])
+    root, levels = int(scope.hollow[c.TREE_ROOT]), int(scope.hollow[c.TREE_LEVELS])
     return root, levels - 1, boxes_met(scope.tables.boxes, root, px, py, vx, vy, least, most), np.int64(0)
 
 
@@ -146,7 +134,7 @@ def next_leaf(scope, walk, forward, px, py, vx, vy, least, most):
 
     Boxes are visited in the order of the wall, or against it if not ``forward``.
     """
-    boxes, top = scope.tables.boxes, int(scope.hollow[TREE_LEVELS]) - 1
+    boxes, top = scope.tables.boxes, int(scope.hollow[c.TREE_LEVELS]) - 1
     node, level, mask, waiting = walk
     while True:
         if mask == 0:
@@ -195,7 +183,7 @@ def nearest_line_in_boxes(tree, own_line, bounces, px, py, vx, vy, time):
             at_end &= at_end - 1
             _, ahead = joint_side(joints, j, own, px, py, vx, vy, slack)
             corner_time = min(corner_time, ahead)
-            if joints[j, STARTS_LINE] > 0.0:
+            if joints[j, c.STARTS_LINE] > 0.0:
                 _, ahead = joint_side(joints, j + 1, own, px, py, vx, vy, slack)
                 corner_time = min(corner_time, ahead)
         while met != 0:
@@ -203,8 +191,8 @@ def nearest_line_in_boxes(tree, own_line, bounces, px, py, vx, vy, time):
             met &= met - 1
             if j == own_line:
                 continue
-            c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
-            c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
+            c_before = (joints[j, c.JOINT_X] - px) * vy - (joints[j, c.JOINT_Y] - py) * vx
+            c_after = (joints[j + 1, c.JOINT_X] - px) * vy - (joints[j + 1, c.JOINT_Y] - py) * vx
             t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
             # of two lines at equal distance the first along the wall is hit, as without boxes
             if is_ahead(tables, j, (c_before, c_after), t, close, slack):
@@ -222,17 +210,17 @@ def leaves_to_sky(tables, own, room, px, py, vx, vy):
     ``room`` is the distance from the ends of the line from which on this is known.
     """
     joints, lines, j = tables.joints, tables.lines, own
-    x0, y0 = abs(joints[j, JOINT_X] - px), abs(joints[j, JOINT_Y] - py)
-    x1, y1 = abs(joints[j + 1, JOINT_X] - px), abs(joints[j + 1, JOINT_Y] - py)
+    x0, y0 = abs(joints[j, c.JOINT_X] - px), abs(joints[j, c.JOINT_Y] - py)
+    x1, y1 = abs(joints[j + 1, c.JOINT_X] - px), abs(joints[j + 1, c.JOINT_Y] - py)
     is_inside = (max(x0, y0) > room) & (max(x1, y1) > room)
-    is_free = (vx < lines[j, SKY_RIGHT] * vy) & (-vx < lines[j, SKY_LEFT] * vy)
+    is_free = (vx < lines[j, c.SKY_RIGHT] * vy) & (-vx < lines[j, c.SKY_LEFT] * vy)
     return is_inside & is_free
 
 
 @inlined
 def begin_walks(scope, work, walks, count):
     """-> int: the number of rays of a wave that begin at the root of the tree; the other ones meet no line."""
-    root, top, room = int(scope.hollow[TREE_ROOT]), int(scope.hollow[TREE_LEVELS]) - 1, SKY_ROOM * scope.slack
+    root, top, room = int(scope.hollow[c.TREE_ROOT]), int(scope.hollow[c.TREE_LEVELS]) - 1, SKY_ROOM * scope.slack
     first, end = scope.joints
     nodes, has_sky = 0, end - first <= MOST_LINES + 1
     for i in range(count):
@@ -282,7 +270,7 @@ def doubt_at_ends(scope, work, i, first, at_end):
         j = first + first_bit(at_end)
         at_end &= at_end - 1
         _, ahead = joint_side(joints, j, start, px, py, vx, vy, slack)
-        if joints[j, STARTS_LINE] > 0.0:
+        if joints[j, c.STARTS_LINE] > 0.0:
             _, other = joint_side(joints, j + 1, start, px, py, vx, vy, slack)
             ahead = min(ahead, other)
         if ahead < np.inf:

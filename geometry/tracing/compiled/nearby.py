@@ -8,16 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...scene import columns as c
 from ...scene.boxes import BOXES, CONTENT
-from ...scene.columns import (
-    JOINT_X,
-    JOINT_Y,
-    LENGTH,
-    START_X,
-    START_Y,
-    STARTS_LINE,
-    STRETCH,
-)
 from ...scene.compiled.records import array_of
 from ...scene.tolerances import NEARBY_SLACKS
 from ..double_double.arcs import refined_arcs
@@ -76,11 +68,11 @@ def line_starts_in_front(tables, line, own, px, py, vx, vy, slack):
 def line_nearby(tables, j, px, py, vx, vy, slack):
     """-> (t, fraction, is_clear): time to a line close by, or inf; whether the line is certainly ahead."""
     joints = tables.joints
-    c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
-    c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
-    if joints[j, STARTS_LINE] > 0.0 and c_before >= 0.0 >= c_after and c_before > c_after:
+    c_before = (joints[j, c.JOINT_X] - px) * vy - (joints[j, c.JOINT_Y] - py) * vx
+    c_after = (joints[j + 1, c.JOINT_X] - px) * vy - (joints[j + 1, c.JOINT_Y] - py) * vx
+    if joints[j, c.STARTS_LINE] > 0.0 and c_before >= 0.0 >= c_after and c_before > c_after:
         t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
-        height, reach = t * (c_before - c_after), slack * tables.lines[j, LENGTH]
+        height, reach = t * (c_before - c_after), slack * tables.lines[j, c.LENGTH]
         if abs(t) <= NEARBY_SLACKS * slack and height >= -reach:
             return t, fraction, height > reach
     return np.inf, 0.0, False
@@ -89,13 +81,13 @@ def line_nearby(tables, j, px, py, vx, vy, slack):
 @linked
 def arc_nearby(arc, px, py, vx, vy, slack):
     """-> (t, tangent, is_clear): time to a hit on an arc close by, or inf; see `line_nearby`."""
-    stretch = arc[STRETCH]
+    stretch = arc[c.STRETCH]
     wide = slack * max(1.0, stretch)
     t, tangent, height = arc_time(arc, NOT_OWN, px, py, vx, vy, stretch)
     if abs(t) > NEARBY_SLACKS * slack or height < -wide:
         return np.inf, 0, False
     t = max(t, 0.0)
-    if not on_arc(arc, px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y]), wide):
+    if not on_arc(arc, px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y]), wide):
         return np.inf, 0, False
     return t, tangent, height > wide
 

@@ -17,44 +17,7 @@ from functools import cache
 import numpy as np
 
 from ....core.rounding import EPS
-from ...scene.columns import (
-    BEZIERS_END,
-    CIRCLES_END,
-    CORNER_EDGE,
-    CURVATURE,
-    EDGE_X,
-    EDGE_Y,
-    ELLIPSES_END,
-    FIRST_BEZIER,
-    FIRST_CIRCLE,
-    FIRST_ELLIPSE,
-    FIRST_JOINT,
-    FIRST_PAIR,
-    IS_CORNER,
-    JOINT_X,
-    JOINT_Y,
-    JOINTS_END,
-    LEFT,
-    LEFT_EDGE,
-    LENGTH,
-    LINE_NORMAL_X,
-    LINE_NORMAL_Y,
-    NO_EDGE,
-    NORMAL_X,
-    NORMAL_Y,
-    PAIRS_END,
-    PARTNER,
-    POINT_X,
-    POINT_Y,
-    RIGHT,
-    RIGHT_EDGE,
-    RUN_SINE,
-    SIZE,
-    START_X,
-    START_Y,
-    STRETCH,
-    TREE_LEVELS,
-)
+from ...scene import columns as c
 from ...scene.compiled.records import ROW, Typed, place_of
 from ...scene.records import Record
 from ...scene.scene import NO_TABLES
@@ -89,7 +52,7 @@ def last_hollow(entry, hollows):
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
-        if hollows[middle, LEFT] <= entry:
+        if hollows[middle, c.LEFT] <= entry:
             low = middle + 1
         else:
             high = middle
@@ -100,10 +63,10 @@ def last_hollow(entry, hollows):
 def opening_at(entry, hollows):
     """-> int: number of the hollow whose opening contains a position of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
     h = last_hollow(entry, hollows)
-    if h < 0 or entry >= hollows[h, RIGHT] or (entry == hollows[h, LEFT] and hollows[h, LEFT_EDGE] != NO_EDGE):
+    if h < 0 or entry >= hollows[h, c.RIGHT] or (entry == hollows[h, c.LEFT] and hollows[h, c.LEFT_EDGE] != c.NO_EDGE):
         # a flat top or its edge; an edge between two hollows is a corner
-        at_left = h >= 0 and entry == hollows[h, LEFT] and hollows[h, LEFT_EDGE] == CORNER_EDGE
-        at_right = h >= 0 and entry == hollows[h, RIGHT] and hollows[h, RIGHT_EDGE] == CORNER_EDGE
+        at_left = h >= 0 and entry == hollows[h, c.LEFT] and hollows[h, c.LEFT_EDGE] == c.CORNER_EDGE
+        at_right = h >= 0 and entry == hollows[h, c.RIGHT] and hollows[h, c.RIGHT_EDGE] == c.CORNER_EDGE
         return TOP_CORNER if at_left or at_right else FLAT_TOP
     return h
 
@@ -115,14 +78,14 @@ def scope_of(tables, h, slots):
     return Scope(
         tables,
         hollow,
-        hollow[LEFT],
-        hollow[RIGHT],
-        JOINT_ULPS * EPS * hollow[SIZE],
-        (np.int64(hollow[FIRST_JOINT]), np.int64(hollow[JOINTS_END])),
-        (np.int64(hollow[FIRST_CIRCLE]), np.int64(hollow[CIRCLES_END])),
-        (np.int64(hollow[FIRST_ELLIPSE]), np.int64(hollow[ELLIPSES_END])),
-        (np.int64(hollow[FIRST_BEZIER]), np.int64(hollow[BEZIERS_END])),
-        hollow[TREE_LEVELS] > 0.0,
+        hollow[c.LEFT],
+        hollow[c.RIGHT],
+        JOINT_ULPS * EPS * hollow[c.SIZE],
+        (np.int64(hollow[c.FIRST_JOINT]), np.int64(hollow[c.JOINTS_END])),
+        (np.int64(hollow[c.FIRST_CIRCLE]), np.int64(hollow[c.CIRCLES_END])),
+        (np.int64(hollow[c.FIRST_ELLIPSE]), np.int64(hollow[c.ELLIPSES_END])),
+        (np.int64(hollow[c.FIRST_BEZIER]), np.int64(hollow[c.BEZIERS_END])),
+        hollow[c.TREE_LEVELS] > 0.0,
         slots,
     )
 
@@ -149,7 +112,7 @@ def nearest_curve(scope, own, px, py, vx, vy):
     for i in range(circles + ellipses_end - first_ellipse):
         of_kind, k = (CIRCLE, first_circle + i) if i < circles else (ELLIPSE, first_ellipse + i - circles)
         arc = arc_of(tables, of_kind, k)
-        stretch = arc[STRETCH]
+        stretch = arc[c.STRETCH]
         is_own = own.kind == of_kind and own.number == k
         t, tangent, _ = arc_time(arc, is_own, px, py, vx, vy, stretch)
         if abs(t) <= close and not is_own:
@@ -219,10 +182,10 @@ def incidence(scope, hit, px, py, vx, vy):
     tables = scope.tables
     if hit.kind == LINE:
         lines = tables.lines
-        return abs(vx * lines[hit.number, LINE_NORMAL_X] + vy * lines[hit.number, LINE_NORMAL_Y])
+        return abs(vx * lines[hit.number, c.LINE_NORMAL_X] + vy * lines[hit.number, c.LINE_NORMAL_Y])
     if hit.kind == CIRCLE or hit.kind == ELLIPSE:
         arc = arc_of(tables, hit.kind, hit.number)
-        return arc_incidence(arc, hit.time, px, py, vx, vy, arc[STRETCH])
+        return arc_incidence(arc, hit.time, px, py, vx, vy, arc[c.STRETCH])
     if hit.kind == BEZIER:
         tx, ty = bezier_tangent(tables.beziers[hit.number], hit.s)
         return abs(tx * vy - ty * vx) / math.sqrt(tx * tx + ty * ty)
@@ -268,12 +231,17 @@ def line_reflect(scope, hit, own, vx, vy):
     """-> (px, py, vx, vy, at_corner): the ray after its reflection on a line, and whether it is at a corner."""
     joints, lines, line = scope.tables.joints, scope.tables.lines, hit.number
     near = line if hit.s >= 0.0 else line + 1
-    px, py = joints[near, JOINT_X] + hit.s * lines[line, EDGE_X], joints[near, JOINT_Y] + hit.s * lines[line, EDGE_Y]
+    px, py = (
+        joints[near, c.JOINT_X] + hit.s * lines[line, c.EDGE_X],
+        joints[near, c.JOINT_Y] + hit.s * lines[line, c.EDGE_Y],
+    )
     # a first hit near an end of the opening is as accurate as the ray, at any distance from that corner
-    room = LEAST_FRACTION * lines[line, LENGTH] if own.bounces == 0 and joints[near, JOINT_Y] == 0.0 else scope.slack
-    at_corner = abs(hit.s) * lines[line, LENGTH] <= room and joints[near, IS_CORNER] > 0.0
-    w = 2.0 * (vx * lines[line, LINE_NORMAL_X] + vy * lines[line, LINE_NORMAL_Y])
-    return px, py, vx - w * lines[line, LINE_NORMAL_X], vy - w * lines[line, LINE_NORMAL_Y], at_corner
+    room = (
+        LEAST_FRACTION * lines[line, c.LENGTH] if own.bounces == 0 and joints[near, c.JOINT_Y] == 0.0 else scope.slack
+    )
+    at_corner = abs(hit.s) * lines[line, c.LENGTH] <= room and joints[near, c.IS_CORNER] > 0.0
+    w = 2.0 * (vx * lines[line, c.LINE_NORMAL_X] + vy * lines[line, c.LINE_NORMAL_Y])
+    return px, py, vx - w * lines[line, c.LINE_NORMAL_X], vy - w * lines[line, c.LINE_NORMAL_Y], at_corner
 
 
 @inlined
@@ -291,7 +259,7 @@ def reflect(scope, hit, own, px, py, vx, vy):
             px, py, wx, wy = bezier_reflect(curve, hit.s, vx, vy)
         else:
             curve = arc_of(tables, hit.kind, hit.number)
-            px, py, wx, wy = arc_reflect(curve, hit.time, px, py, vx, vy, curve[STRETCH])
+            px, py, wx, wy = arc_reflect(curve, hit.time, px, py, vx, vy, curve[c.STRETCH])
         at_corner = near_end(curve, px, py, scope.slack)
     if at_corner:
         return px, py, vx, vy, True
@@ -303,25 +271,25 @@ def may_run(tables, hit, own, px, py, vx, vy):
     """-> bool: whether a run of hits may follow a hit, so that `skip_run` is worth a call."""
     if hit.kind == CIRCLE:
         arc = tables.circles[hit.number]
-        qx, qy = px - arc[START_X], py - arc[START_Y]
-        nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
-        return vx * nx + vy * ny <= arc[RUN_SINE]
+        qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
+        nx, ny = arc[c.NORMAL_X] - arc[c.CURVATURE] * qx, arc[c.NORMAL_Y] - arc[c.CURVATURE] * qy
+        return vx * nx + vy * ny <= arc[c.RUN_SINE]
     # the ray came from this line, hit the other one, and came back
     came_back = hit.kind == LINE and own.kind == LINE and own.before == hit.number
-    return came_back and tables.lines[hit.number, PAIRS_END] > 0.0
+    return came_back and tables.lines[hit.number, c.PAIRS_END] > 0.0
 
 
 @inner
 def skip_run(scope, hit, own, px, py, vx, vy, most):
     """-> (px, py, vx, vy, hits): the ray after the run of hits that follows a hit; no hits if a run does not pay."""
     tables, number = scope.tables, hit.number
-    if hit.kind == CIRCLE and tables.circles[number, RUN_SINE] > 0.0:
+    if hit.kind == CIRCLE and tables.circles[number, c.RUN_SINE] > 0.0:
         return skip_chords(tables.circles[number], px, py, vx, vy, most)
     if hit.kind == LINE:
         lines, pairs = tables.lines, tables.pairs
-        normal = lines[number, LINE_NORMAL_X], lines[number, LINE_NORMAL_Y]
-        for row in range(np.int64(lines[number, FIRST_PAIR]), np.int64(lines[number, PAIRS_END])):
-            if pairs[row, PARTNER] == own.number:
+        normal = lines[number, c.LINE_NORMAL_X], lines[number, c.LINE_NORMAL_Y]
+        for row in range(np.int64(lines[number, c.FIRST_PAIR]), np.int64(lines[number, c.PAIRS_END])):
+            if pairs[row, c.PARTNER] == own.number:
                 return skip_crossings(pairs[row], normal, px, py, vx, vy, scope.slack, most)
     return px, py, vx, vy, np.int64(0)
 
@@ -348,7 +316,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
     own = Own(OPENING, -1, -1.0, 0.0, -1, 0)
     steps, label, with_path = 0, np.uint64(0), path.shape[0] > 0
     if with_path:
-        path[0, POINT_X], path[0, POINT_Y] = px, py
+        path[0, c.POINT_X], path[0, c.POINT_Y] = px, py
     while True:
         hit, corner = nearest_piece(scope, own, px, py, vx, vy)
         bounces = own.bounces
@@ -362,7 +330,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
             return shift + px, vx, vy, bounces, CORNER, label, steps
         if hit.kind == OPENING:
             if with_path:
-                path[bounces + 1, POINT_X], path[bounces + 1, POINT_Y] = shift + px + hit.time * vx, 0.0
+                path[bounces + 1, c.POINT_X], path[bounces + 1, c.POINT_Y] = shift + px + hit.time * vx, 0.0
             return shift + px + hit.time * vx, vx, vy, bounces, ESCAPED, label, steps
         if hit.doubt != 0:
             return shift + px, vx, vy, bounces, GRAZING, label, steps
@@ -372,7 +340,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
             label = HASH_FACTOR * label + piece_label(scope.tables, hit, vx)
         if hit.kind == SIDE:
             # the two ends of the wall are the same point, and a ray passes a side above this point
-            py = max(py + hit.time * vy, scope.tables.joints[scope.joints[0], JOINT_Y])
+            py = max(py + hit.time * vy, scope.tables.joints[scope.joints[0], c.JOINT_Y])
             px = scope.left if vx > 0.0 else scope.right
             shift += (scope.right - scope.left) if vx > 0.0 else (scope.left - scope.right)
             own = Own(SIDE, -1, -1.0, own.flown, -1, bounces)
@@ -401,7 +369,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
         before = own.number if own.kind == LINE else -1
         own = Own(hit.kind, hit.number, hit.s if hit.kind == BEZIER else -1.0, flown, before, bounces)
         if with_path:
-            path[bounces, POINT_X], path[bounces, POINT_Y] = px + shift, py
+            path[bounces, c.POINT_X], path[bounces, c.POINT_Y] = px + shift, py
 
 
 @compiled
@@ -436,7 +404,7 @@ def trace_rays(x, theta, tables, limit, stop, results, details, slots):
             details.itinerary[i], details.segments[i] = label, steps
         velocity = details.velocity
         if velocity.shape[0] > 0:
-            velocity[i, POINT_X], velocity[i, POINT_Y] = vx, vy
+            velocity[i, c.POINT_X], velocity[i, c.POINT_Y] = vx, vy
 
 
 def _late_functions() -> tuple[Late, ...]:

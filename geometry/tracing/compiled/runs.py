@@ -10,24 +10,7 @@ import math
 
 import numpy as np
 
-from ...scene.columns import (
-    APEX_X,
-    APEX_Y,
-    CURVATURE,
-    FAR_X,
-    FAR_Y,
-    GAP,
-    NEAR_X,
-    NEAR_Y,
-    NORMAL_X,
-    NORMAL_Y,
-    PAIR_ANGLE,
-    PAIR_SINE,
-    RUN_SINE,
-    SPAN,
-    START_X,
-    START_Y,
-)
+from ...scene import columns as c
 from .options import linked
 
 # Least number of hits in a run, which costs about one arctangent and three sines; not tuned.
@@ -42,19 +25,19 @@ END_SLACKS = 2.0
 @linked
 def skip_chords(arc, px, py, vx, vy, most):
     """-> (px, py, vx, vy, chords): move a ray along a circular arc by all whole chords of its run, up to ``most``."""
-    qx, qy = px - arc[START_X], py - arc[START_Y]
-    nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
+    qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
+    nx, ny = arc[c.NORMAL_X] - arc[c.CURVATURE] * qx, arc[c.NORMAL_Y] - arc[c.CURVATURE] * qy
     sine = vx * nx + vy * ny
     # the free side, and so the normal n, is on the left of the tangent in the direction of travel
     cosine = vx * ny - vy * nx
-    if sine <= 0.0 or sine > arc[RUN_SINE]:
+    if sine <= 0.0 or sine > arc[c.RUN_SINE]:
         return px, py, vx, vy, 0
     chord_angle = 2.0 * math.atan2(sine, abs(cosine))
     # q = (sin(phi) t0 + (1 - cos(phi)) n0) / kappa with t0 = (n0y, -n0x)
-    phi = 2.0 * math.atan2(qx * arc[NORMAL_X] + qy * arc[NORMAL_Y], qx * arc[NORMAL_Y] - qy * arc[NORMAL_X])
+    phi = 2.0 * math.atan2(qx * arc[c.NORMAL_X] + qy * arc[c.NORMAL_Y], qx * arc[c.NORMAL_Y] - qy * arc[c.NORMAL_X])
     if phi < 0.0:
         phi += 2.0 * math.pi
-    room = arc[SPAN] - phi if cosine > 0.0 else phi
+    room = arc[c.SPAN] - phi if cosine > 0.0 else phi
     count = room / chord_angle
     if count < 1.0 or most < 1:
         return px, py, vx, vy, 0
@@ -62,11 +45,11 @@ def skip_chords(arc, px, py, vx, vy, most):
     turn = chords * chord_angle if cosine > 0.0 else -chords * chord_angle
     phi += turn
     half = 0.5 * phi
-    chord = 2.0 * math.sin(half) / arc[CURVATURE]
+    chord = 2.0 * math.sin(half) / arc[c.CURVATURE]
     along, inward = chord * math.cos(half), chord * math.sin(half)
-    qx, qy = along * arc[NORMAL_Y] + inward * arc[NORMAL_X], -along * arc[NORMAL_X] + inward * arc[NORMAL_Y]
-    c, s = math.cos(turn), math.sin(turn)
-    return arc[START_X] + qx, arc[START_Y] + qy, c * vx - s * vy, s * vx + c * vy, chords
+    qx, qy = along * arc[c.NORMAL_Y] + inward * arc[c.NORMAL_X], -along * arc[c.NORMAL_X] + inward * arc[c.NORMAL_Y]
+    cosine, sine = math.cos(turn), math.sin(turn)
+    return arc[c.START_X] + qx, arc[c.START_Y] + qy, cosine * vx - sine * vy, sine * vx + cosine * vy, chords
 
 
 @linked
@@ -83,11 +66,11 @@ def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
     accurate down to beta = 0, because the distance g / sin(beta) of the apex enters only by its inverse.
     """
     nx, ny = normal
-    ux, uy, sine, beta = pair[APEX_X], pair[APEX_Y], pair[PAIR_SINE], pair[PAIR_ANGLE]
+    ux, uy, sine, beta = pair[c.APEX_X], pair[c.APEX_Y], pair[c.PAIR_SINE], pair[c.PAIR_ANGLE]
     along, away = vx * ux + vy * uy, vx * nx + vy * ny
-    ahead = (pair[NEAR_X] - px) * ux + (pair[NEAR_Y] - py) * uy
-    behind = (px - pair[FAR_X]) * ux + (py - pair[FAR_Y]) * uy
-    gap = pair[GAP] + ahead * sine
+    ahead = (pair[c.NEAR_X] - px) * ux + (pair[c.NEAR_Y] - py) * uy
+    behind = (px - pair[c.FAR_X]) * ux + (py - pair[c.FAR_Y]) * uy
+    gap = pair[c.GAP] + ahead * sine
     ahead -= END_SLACKS * slack
     behind -= END_SLACKS * slack
     if not (ahead > 0.0 and behind > 0.0 and away > 0.0 and gap > 0.0):
@@ -105,7 +88,7 @@ def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
         # the facing part ends on circles about the apex; curvature is that of the circle through the ray's position
         curvature = sine / gap
         # radius of the nearer circle relative to the ray's; the line meets it if its distance from the apex is less
-        narrow = (pair[GAP] + END_SLACKS * slack * sine) / gap
+        narrow = (pair[c.GAP] + END_SLACKS * slack * sine) / gap
         if along > 0.0 and narrow >= away:
             root = math.sqrt((narrow - away) * (narrow + away))
             t = ahead * (2.0 - ahead * curvature) / (along + root)
@@ -125,6 +108,6 @@ def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
     turn = hits * beta
     angle = math.atan2(away, along)
     last = angle + turn
-    c, s = math.cos(last), math.sin(last)
-    step = gap * (2.0 * math.sin(0.5 * turn) / sine) * math.cos(angle + 0.5 * turn) / s
-    return px + step * ux, py + step * uy, c * ux + s * nx, c * uy + s * ny, hits
+    new_along, new_away = math.cos(last), math.sin(last)
+    step = gap * (2.0 * math.sin(0.5 * turn) / sine) * math.cos(angle + 0.5 * turn) / new_away
+    return px + step * ux, py + step * uy, new_along * ux + new_away * nx, new_along * uy + new_away * ny, hits

@@ -8,42 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...scene import columns as c
 from ...scene.boxes import BOXES
-from ...scene.columns import (
-    BEZIERS_END,
-    CHORD_X,
-    CHORD_Y,
-    CIRCLES_END,
-    CURVATURE,
-    EDGE_X,
-    EDGE_Y,
-    END_CORNER,
-    END_X,
-    END_Y,
-    FIRST_BEZIER,
-    FIRST_CIRCLE,
-    FIRST_JOINT,
-    FIRST_PAIR,
-    IS_CORNER,
-    JOINT_X,
-    JOINT_Y,
-    JOINTS_END,
-    LENGTH,
-    LINE_NORMAL_X,
-    LINE_NORMAL_Y,
-    NORMAL_X,
-    NORMAL_Y,
-    PAIRS_END,
-    PARTNER,
-    RUN_SINE,
-    SHORT_CHORD,
-    START_CORNER,
-    START_X,
-    START_Y,
-    STARTS_LINE,
-    X3,
-    Y3,
-)
 from ...scene.tolerances import NEARBY_SLACKS
 from .beziers import gather_near, meet_cubic, meet_parabola
 from .lanes import (
@@ -125,8 +91,8 @@ def begins_run(tables, work, i, slack, limit):
     if piece < 0:
         _, _, _, _, hits = skip_chords(tables.circles[int(CIRCLE_NUMBERS) - piece], px, py, vx, vy, most)
         return hits > 0
-    for row in range(int(tables.lines[piece, FIRST_PAIR]), int(tables.lines[piece, PAIRS_END])):
-        if tables.pairs[row, PARTNER] == work[OWN + i]:
+    for row in range(int(tables.lines[piece, c.FIRST_PAIR]), int(tables.lines[piece, c.PAIRS_END])):
+        if tables.pairs[row, c.PARTNER] == work[OWN + i]:
             _, _, _, _, hits = skip_crossings(tables.pairs[row], (nx, ny), px, py, vx, vy, slack, most)
             return hits > 0
     return False
@@ -148,27 +114,27 @@ def meet_boxes(scope, work, walks, count):
             line, fraction = walks[FOUND + i], work[FRACTION + i]
             near = line if fraction >= 0.0 else line + 1
             work[TIME + i], work[PIECE + i] = work[NEAREST + i], line
-            work[HIT_X + i] = joints[near, JOINT_X] + fraction * lines[line, EDGE_X]
-            work[HIT_Y + i] = joints[near, JOINT_Y] + fraction * lines[line, EDGE_Y]
-            work[FACE_X + i], work[FACE_Y + i] = lines[line, LINE_NORMAL_X], lines[line, LINE_NORMAL_Y]
-            may_run = work[BEFORE + i] == line and lines[line, PAIRS_END] > 0.0
-            at_corner = abs(fraction) * lines[line, LENGTH] <= scope.slack and joints[near, IS_CORNER] > 0.0
+            work[HIT_X + i] = joints[near, c.JOINT_X] + fraction * lines[line, c.EDGE_X]
+            work[HIT_Y + i] = joints[near, c.JOINT_Y] + fraction * lines[line, c.EDGE_Y]
+            work[FACE_X + i], work[FACE_Y + i] = lines[line, c.LINE_NORMAL_X], lines[line, c.LINE_NORMAL_Y]
+            may_run = work[BEFORE + i] == line and lines[line, c.PAIRS_END] > 0.0
+            at_corner = abs(fraction) * lines[line, c.LENGTH] <= scope.slack and joints[near, c.IS_CORNER] > 0.0
             work[UNCERTAIN + i] = AT_CORNER if at_corner else (BEFORE_RUN if may_run else 0.0)
 
 
 @inlined
 def has_many_beziers(hollow):
     """-> bool: whether rays of a hollow are gathered for each Bezier piece; circles come before, in the same order."""
-    many = hollow[BEZIERS_END] - hollow[FIRST_BEZIER] >= MANY_BEZIERS
-    return many and hollow[CIRCLES_END] == hollow[FIRST_CIRCLE]
+    many = hollow[c.BEZIERS_END] - hollow[c.FIRST_BEZIER] >= MANY_BEZIERS
+    return many and hollow[c.CIRCLES_END] == hollow[c.FIRST_CIRCLE]
 
 
 @linked
 def meet_bezier(beziers, k, slack, work, first):
     """Find the nearest hits of eight rays on Bezier piece k."""
     curve = beziers[k]
-    slacks = corner_slack(curve[START_CORNER], slack), corner_slack(curve[END_CORNER], slack)
-    if curve[X3] == 0.0 and curve[Y3] == 0.0:
+    slacks = corner_slack(curve[c.START_CORNER], slack), corner_slack(curve[c.END_CORNER], slack)
+    if curve[c.X3] == 0.0 and curve[c.Y3] == 0.0:
         meet_parabola(work, first, beziers, k, slacks, BEZIER_NUMBERS - k)
     else:
         meet_cubic(work, first, beziers, k, slacks, BEZIER_NUMBERS - k)
@@ -181,7 +147,7 @@ def meet_gathered(scope, work, count):
     some = work[WORK:]
     for first in range(0, count, BOXES):
         clear_hits(work, first)
-    for k in range(int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])):
+    for k in range(int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])):
         number, chosen = BEZIER_NUMBERS - k, 0
         for first in range(0, count, BOXES):
             chosen += gather_near(work, first, count, beziers, k, number, WORK + chosen)
@@ -208,11 +174,12 @@ def meet_gathered(scope, work, count):
 def meet_arcs(scope, work, first):
     """-> HITS: the nearest hits of eight rays on the circular arcs of a hollow."""
     circles, close, arcs = scope.tables.circles, NEARBY_SLACKS * scope.slack, no_arcs()
-    for k in range(int(scope.hollow[FIRST_CIRCLE]), int(scope.hollow[CIRCLES_END])):
+    for k in range(int(scope.hollow[c.FIRST_CIRCLE]), int(scope.hollow[c.CIRCLES_END])):
         arc = circles[k]
         arcs = meet_circle(
-            work, first, arcs, (arc[START_X], arc[START_Y], arc[END_X], arc[END_Y]), (arc[NORMAL_X], arc[NORMAL_Y]),
-            arc[CURVATURE], (arc[CHORD_X], arc[CHORD_Y], arc[SHORT_CHORD]), RUN_MARGIN * arc[RUN_SINE],
+            work, first, arcs, (arc[c.START_X], arc[c.START_Y], arc[c.END_X], arc[c.END_Y]),
+            (arc[c.NORMAL_X], arc[c.NORMAL_Y]), arc[c.CURVATURE],
+            (arc[c.CHORD_X], arc[c.CHORD_Y], arc[c.SHORT_CHORD]), RUN_MARGIN * arc[c.RUN_SINE],
             close, CIRCLE_NUMBERS - k,
         )  # fmt: skip
     return hits_on_arcs(work, first, arcs, close)
@@ -222,14 +189,14 @@ def meet_arcs(scope, work, first):
 def meet_lines(scope, work, first, hits):
     """-> HITS: the nearest hits of eight rays, also on the lines of a hollow; rays that meet corners are doubted."""
     joints, lines, hollow, slack = scope.tables.joints, scope.tables.lines, scope.hollow, scope.slack
-    for j in range(int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])):
-        x, y, at_joint = joints[j, JOINT_X], joints[j, JOINT_Y], corner_slack(joints[j, IS_CORNER], slack)
-        if joints[j, STARTS_LINE] > 0.0:
-            end = joints[j + 1, JOINT_X], joints[j + 1, JOINT_Y], corner_slack(joints[j + 1, IS_CORNER], slack)
+    for j in range(int(hollow[c.FIRST_JOINT]), int(hollow[c.JOINTS_END])):
+        x, y, at_joint = joints[j, c.JOINT_X], joints[j, c.JOINT_Y], corner_slack(joints[j, c.IS_CORNER], slack)
+        if joints[j, c.STARTS_LINE] > 0.0:
+            end = joints[j + 1, c.JOINT_X], joints[j + 1, c.JOINT_Y], corner_slack(joints[j + 1, c.IS_CORNER], slack)
             hits = meet_line(
-                work, first, hits, (x, y, at_joint), end, (lines[j, EDGE_X], lines[j, EDGE_Y]),
-                (lines[j, LINE_NORMAL_X], lines[j, LINE_NORMAL_Y]), lines[j, LENGTH], NEARBY_SLACKS * slack,
-                (float(j), float(j) if lines[j, PAIRS_END] > 0.0 else NO_LINE),
+                work, first, hits, (x, y, at_joint), end, (lines[j, c.EDGE_X], lines[j, c.EDGE_Y]),
+                (lines[j, c.LINE_NORMAL_X], lines[j, c.LINE_NORMAL_Y]), lines[j, c.LENGTH], NEARBY_SLACKS * slack,
+                (float(j), float(j) if lines[j, c.PAIRS_END] > 0.0 else NO_LINE),
             )  # fmt: skip
         elif at_joint > 0.0:
             meet_corner(work, first, x, y, slack)
@@ -243,10 +210,10 @@ def meet_pieces(scope, work, first, is_gathered):
     The lines of a tree of boxes are left to `meet_boxes`.
     """
     hollow = scope.hollow
-    arcs, curves = hollow[CIRCLES_END] - hollow[FIRST_CIRCLE], hollow[BEZIERS_END] - hollow[FIRST_BEZIER]
+    arcs, curves = hollow[c.CIRCLES_END] - hollow[c.FIRST_CIRCLE], hollow[c.BEZIERS_END] - hollow[c.FIRST_BEZIER]
     has_arcs, has_curves = arcs > 0.0, curves > 0.0
     # the chain of a hollow has one joint more than pieces
-    has_lines = not scope.has_tree and hollow[JOINTS_END] - hollow[FIRST_JOINT] - 1.0 > arcs + curves
+    has_lines = not scope.has_tree and hollow[c.JOINTS_END] - hollow[c.FIRST_JOINT] - 1.0 > arcs + curves
     if not is_gathered:
         clear_hits(work, first)
     hits = meet_arcs(scope, work, first) if has_arcs else no_hits()
@@ -254,7 +221,7 @@ def meet_pieces(scope, work, first, is_gathered):
         if has_arcs:
             keep_hits(work, first, hits)
         if not is_gathered:
-            for k in range(int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])):
+            for k in range(int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])):
                 meet_bezier(scope.tables.beziers, k, scope.slack, work, first)
         if has_lines:
             hits = hits_at(work, first)

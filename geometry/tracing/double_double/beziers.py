@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ....core.compilation import jit
-from ...scene.columns import END_X, END_Y, START_X, START_Y, X1, X2, X3, Y1, Y2, Y3
+from ...scene import columns as c
 from ...scene.tolerances import NEARBY
 from .arithmetic import LOCAL_ERROR, add, cross, divide, dot, multiply, negate, square_root, subtract, wide
 
@@ -54,11 +54,11 @@ def falling_root(a0, a1, a2, a3, low, high):
 @_compile
 def bezier_coefficients(curve):
     """-> (ax0, ay0, ..., ay3): the coefficients; the highest one makes the curve end exactly at its joint."""
-    ax0, ax1, ax2, ax3 = wide(curve[START_X]), wide(curve[X1]), wide(curve[X2]), wide(curve[X3])
-    ay0, ay1, ay2, ay3 = wide(curve[START_Y]), wide(curve[Y1]), wide(curve[Y2]), wide(curve[Y3])
-    rest_x = subtract(subtract(wide(curve[END_X]), ax0), ax1)
-    rest_y = subtract(subtract(wide(curve[END_Y]), ay0), ay1)
-    if curve[X3] == 0.0 and curve[Y3] == 0.0:
+    ax0, ax1, ax2, ax3 = wide(curve[c.START_X]), wide(curve[c.X1]), wide(curve[c.X2]), wide(curve[c.X3])
+    ay0, ay1, ay2, ay3 = wide(curve[c.START_Y]), wide(curve[c.Y1]), wide(curve[c.Y2]), wide(curve[c.Y3])
+    rest_x = subtract(subtract(wide(curve[c.END_X]), ax0), ax1)
+    rest_y = subtract(subtract(wide(curve[c.END_Y]), ay0), ay1)
+    if curve[c.X3] == 0.0 and curve[c.Y3] == 0.0:
         ax2, ay2 = rest_x, rest_y
     else:
         ax3, ay3 = subtract(rest_x, ax2), subtract(rest_y, ay2)
@@ -152,7 +152,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
     if own_s[0] >= 0.0:
         best_t, best_s = hit_from_own(coefficients, (a0, a1, a2, a3), own_s, px, py, vx, vy)
         return best_t, best_s, undecided, near_s
-    size = abs(curve[START_X] - px[0]) + abs(curve[START_Y] - py[0]) + curve_size(curve)
+    size = abs(curve[c.START_X] - px[0]) + abs(curve[c.START_Y] - py[0]) + curve_size(curve)
     c1, c2 = extrema(a1, a2, a3)
     low, value_low = 0.0, a0
     for part in range(3):
@@ -162,7 +162,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
                 continue
             high = 1.0
         if high == 1.0:
-            value_high = cross(subtract(wide(curve[END_X]), px), subtract(wide(curve[END_Y]), py), vx, vy)
+            value_high = cross(subtract(wide(curve[c.END_X]), px), subtract(wide(curve[c.END_Y]), py), vx, vy)
         else:
             value_high = cubic(a0, a1, a2, a3, (high, 0.0))
             if abs(value_high[0]) <= error:
@@ -196,4 +196,6 @@ def bezier_point(curve, s):
 @_compile
 def curve_size(curve):
     """Return a bound on the extent of a Bezier piece: the sum of the absolute non-constant coefficients."""
-    return abs(curve[X1]) + abs(curve[Y1]) + abs(curve[X2]) + abs(curve[Y2]) + abs(curve[X3]) + abs(curve[Y3])
+    return (
+        abs(curve[c.X1]) + abs(curve[c.Y1]) + abs(curve[c.X2]) + abs(curve[c.Y2]) + abs(curve[c.X3]) + abs(curve[c.Y3])
+    )

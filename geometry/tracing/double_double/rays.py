@@ -28,33 +28,7 @@ import numpy as np
 
 from ....core.compilation import jit
 from ....core.rounding import EPS
-from ...scene.columns import (
-    BAND_HIGH,
-    BAND_LOW,
-    BEZIERS_END,
-    CIRCLES_END,
-    CORNER_EDGE,
-    ELLIPSES_END,
-    FIRST_BEZIER,
-    FIRST_CIRCLE,
-    FIRST_ELLIPSE,
-    FIRST_JOINT,
-    HIGH,
-    IS_CORNER,
-    JOINT_X,
-    JOINT_Y,
-    JOINTS_END,
-    LEFT,
-    LEFT_EDGE,
-    LENGTH,
-    LOW,
-    NO_EDGE,
-    RIGHT,
-    RIGHT_EDGE,
-    SIZE,
-    STARTS_LINE,
-    WIDE_STRETCH,
-)
+from ...scene import columns as c
 from ...scene.tolerances import JOINT_ULPS
 from .arcs import arc_hit, arc_point
 from .arithmetic import (
@@ -99,7 +73,7 @@ def free_cells(bands, py, vx, vy, cell, width, spread):
     if vx[0] == 0.0 or vy[0] == 0.0:
         return 0.0, (0.0, 0.0)
     for row in range(bands.shape[0]):
-        low, high = bands[row, BAND_LOW], bands[row, BAND_HIGH]
+        low, high = bands[row, c.BAND_LOW], bands[row, c.BAND_HIGH]
         if low < py[0] < high:
             behind, room = py[0] - low, min(high, 0.0) - py[0]
             if vy[0] < 0.0:
@@ -145,7 +119,7 @@ def meets(tables, hit, own, px, py, vx, vy, clearance):
 def is_beside(joints, index, corner):
     """-> bool: whether a corner lies on a line or on its free side; a ray that hits the line meets no corner behind."""
     x0, y0, x1, y1 = line_ends(joints, index)
-    return orientation(x0, y0, x1, y1, joints[corner, JOINT_X], joints[corner, JOINT_Y]) >= 0.0
+    return orientation(x0, y0, x1, y1, joints[corner, c.JOINT_X], joints[corner, c.JOINT_Y]) >= 0.0
 
 
 @_compile
@@ -227,13 +201,13 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
     nearest, corner = WideHit((np.inf, 0.0), NO_PIECE, -1, (0.0, 0.0)), np.inf
     before = (0.0, 0.0)
     for j in range(first, end):
-        dx, dy = subtract(wide(joints[j, JOINT_X]), px), subtract(wide(joints[j, JOINT_Y]), py)
+        dx, dy = subtract(wide(joints[j, c.JOINT_X]), px), subtract(wide(joints[j, c.JOINT_Y]), py)
         after = cross(dx, dy, vx, vy)
-        if joints[j, IS_CORNER] > 0.0:
+        if joints[j, c.IS_CORNER] > 0.0:
             ahead = dot(dx, dy, vx, vy)[0]
             if abs(after[0]) <= width_at(scope, sizes, ahead, error) and 0.0 < ahead < corner:
                 corner = ahead
-        starts_here = j > first and joints[j - 1, STARTS_LINE] > 0.0
+        starts_here = j > first and joints[j - 1, c.STARTS_LINE] > 0.0
         is_own = own.kind == LINE and own.number == j - 1
         if starts_here and not is_own and before[0] >= 0.0 >= after[0] and before[0] > after[0]:
             fraction = divide(before, subtract(before, after))
@@ -241,7 +215,7 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
             dx = subtract(add(wide(x0), multiply(fraction, two_sum(x1, -x0))), px)
             dy = subtract(add(wide(y0), multiply(fraction, two_sum(y1, -y0))), py)
             t = dot(dx, dy, vx, vy)
-            height = t[0] * (before[0] - after[0]) / tables.lines[j - 1, LENGTH]
+            height = t[0] * (before[0] - after[0]) / tables.lines[j - 1, c.LENGTH]
             hit = WideHit(t, LINE, j - 1, fraction)
             if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, (height, scope.slack, error)):
                 nearest = hit
@@ -256,7 +230,7 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
     graze = np.inf
     for low, high in (scope.circles, scope.ellipses):
         for k in range(low, high):
-            widest = max(1.0, tables.arcs[k, WIDE_STRETCH])
+            widest = max(1.0, tables.arcs[k, c.WIDE_STRETCH])
             is_own = own.kind == ARC and own.number == k
             t, undecided, height = arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
             graze = min(graze, undecided)
@@ -330,8 +304,8 @@ def meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
     joints, error = scope.tables.joints, error_of(scope, sizes)
     first, end = scope.joints
     for j in range(first, end):
-        if joints[j, IS_CORNER] > 0.0:
-            dx, dy = subtract(wide(joints[j, JOINT_X]), px), subtract(wide(joints[j, JOINT_Y]), py)
+        if joints[j, c.IS_CORNER] > 0.0:
+            dx, dy = subtract(wide(joints[j, c.JOINT_X]), px), subtract(wide(joints[j, c.JOINT_Y]), py)
             ahead = dot(dx, dy, vx, vy)[0]
             width = width_at(scope, sizes, ahead, error)
             met = ahead > 0.0 and (ahead - hit.time[0]) * incidence <= 2.0 * width
@@ -349,7 +323,7 @@ def pass_cells(scope, sizes, py, vx, vy, error):
     """
     cell, scale = scope.tables.cell, scope.scale
     # the two ends of the wall are the same point, and a ray passes a side above this point
-    end = wide(scope.tables.joints[scope.joints[0], JOINT_Y])
+    end = wide(scope.tables.joints[scope.joints[0], c.JOINT_Y])
     py = end if subtract(py, end)[0] < 0.0 else py
     spread = WIDTH_MARGIN * sizes.half_ulp * abs(sizes.a2) + error / scale
     width = WIDTH_MARGIN * sizes.half_ulp * scale * abs(sizes.j2) + error
@@ -441,14 +415,14 @@ def wide_scope(tables, h):
     hollow, ellipse = tables.hollows[h], tables.first_ellipse
     return WideScope(
         tables,
-        hollow[LEFT],
-        hollow[RIGHT],
-        tables.cell + hollow[SIZE],
-        JOINT_ULPS * EPS * hollow[SIZE],
-        (int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])),
-        (int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])),
-        (ellipse + int(hollow[FIRST_ELLIPSE]), ellipse + int(hollow[ELLIPSES_END])),
-        (int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])),
+        hollow[c.LEFT],
+        hollow[c.RIGHT],
+        tables.cell + hollow[c.SIZE],
+        JOINT_ULPS * EPS * hollow[c.SIZE],
+        (int(hollow[c.FIRST_JOINT]), int(hollow[c.JOINTS_END])),
+        (int(hollow[c.FIRST_CIRCLE]), int(hollow[c.CIRCLES_END])),
+        (ellipse + int(hollow[c.FIRST_ELLIPSE]), ellipse + int(hollow[c.ELLIPSES_END])),
+        (int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])),
     )
 
 
@@ -458,16 +432,16 @@ def hollow_at(hollows, entry):
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
-        if subtract(entry, wide(hollows[middle, LEFT]))[0] >= 0.0:
+        if subtract(entry, wide(hollows[middle, c.LEFT]))[0] >= 0.0:
             low = middle + 1
         else:
             high = middle
     h = low - 1
-    at_left = h >= 0 and subtract(entry, wide(hollows[h, LEFT]))[0] == 0.0 and hollows[h, LEFT_EDGE] != NO_EDGE
-    to_right = subtract(entry, wide(hollows[h, RIGHT]))[0] if h >= 0 else 1.0
+    at_left = h >= 0 and subtract(entry, wide(hollows[h, c.LEFT]))[0] == 0.0 and hollows[h, c.LEFT_EDGE] != c.NO_EDGE
+    to_right = subtract(entry, wide(hollows[h, c.RIGHT]))[0] if h >= 0 else 1.0
     if h < 0 or to_right >= 0.0 or at_left:
-        is_left = at_left and hollows[h, LEFT_EDGE] == CORNER_EDGE
-        is_right = h >= 0 and to_right == 0.0 and hollows[h, RIGHT_EDGE] == CORNER_EDGE
+        is_left = at_left and hollows[h, c.LEFT_EDGE] == c.CORNER_EDGE
+        is_right = h >= 0 and to_right == 0.0 and hollows[h, c.RIGHT_EDGE] == c.CORNER_EDGE
         return -1, is_left or is_right
     return h, False
 
@@ -488,16 +462,16 @@ def refined_rays(x, theta, tables, limit, most_segments, results):
         h, is_edge = hollow_at(tables.hollows, entry)
         if h < 0:
             amplification[i], rounding[i] = 1.0, LOCAL_ERROR
-            out_x[i, HIGH], out_x[i, LOW] = x[i], 0.0
+            out_x[i, c.HIGH], out_x[i, c.LOW] = x[i], 0.0
             mirrored = two_sum(math.pi, -theta[i])
-            out_theta[i, HIGH], out_theta[i, LOW] = add(mirrored, (PI_REST, 0.0))
+            out_theta[i, c.HIGH], out_theta[i, c.LOW] = add(mirrored, (PI_REST, 0.0))
             bounces[i], status[i] = 1, ESCAPED
             if is_edge:
-                out_theta[i, HIGH], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
+                out_theta[i, c.HIGH], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
             continue
         scope = wide_scope(tables, h)
         end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
             scope, entry, theta[i], limit, most_segments
         )
-        out_x[i, HIGH], out_x[i, LOW] = add(base, end)
-        out_theta[i, HIGH], out_theta[i, LOW] = angle
+        out_x[i, c.HIGH], out_x[i, c.LOW] = add(base, end)
+        out_theta[i, c.HIGH], out_theta[i, c.LOW] = angle

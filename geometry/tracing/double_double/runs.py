@@ -10,18 +10,7 @@ import math
 import numpy as np
 
 from ....core.compilation import jit
-from ...scene.columns import (
-    FAR_Y,
-    FIRST_PAIR,
-    JOINT_X,
-    NEAR_Y,
-    PAIRS_END,
-    PARTNER,
-    START_X,
-    START_Y,
-    WIDE_RUN_SINE,
-    WIDE_SPAN,
-)
+from ...scene import columns as c
 from .arcs import wide_arc
 from .arithmetic import (
     add,
@@ -48,14 +37,17 @@ def crossings(tables, index, other, py, vx, vy, most):
     """-> (hits, travel, flight): an even number of hits between two facing vertical sides, travel along y, and time."""
     joints, lines, pairs = tables.joints, tables.lines, tables.pairs
     travel, flight = (0.0, 0.0), 0.0
-    if joints[index, JOINT_X] != joints[index + 1, JOINT_X] or joints[other, JOINT_X] != joints[other + 1, JOINT_X]:
+    if (
+        joints[index, c.JOINT_X] != joints[index + 1, c.JOINT_X]
+        or joints[other, c.JOINT_X] != joints[other + 1, c.JOINT_X]
+    ):
         return 0, travel, flight
-    for row in range(int(lines[index, FIRST_PAIR]), int(lines[index, PAIRS_END])):
-        if pairs[row, PARTNER] == other:
-            gap = two_sum(joints[other, JOINT_X], -joints[index, JOINT_X])
+    for row in range(int(lines[index, c.FIRST_PAIR]), int(lines[index, c.PAIRS_END])):
+        if pairs[row, c.PARTNER] == other:
+            gap = two_sum(joints[other, c.JOINT_X], -joints[index, c.JOINT_X])
             time = divide(gap, vx)
             step = multiply(time, vy)
-            low, high = min(pairs[row, NEAR_Y], pairs[row, FAR_Y]), max(pairs[row, NEAR_Y], pairs[row, FAR_Y])
+            low, high = min(pairs[row, c.NEAR_Y], pairs[row, c.FAR_Y]), max(pairs[row, c.NEAR_Y], pairs[row, c.FAR_Y])
             room = high - py[0] if step[0] > 0.0 else py[0] - low
             count = room / abs(step[0]) - LAST_HITS if step[0] != 0.0 else 0.0
             if count > LONGEST_FOLLOWED and count < most and time[0] > 0.0:
@@ -79,17 +71,17 @@ def skip_chords(arc, px, py, vx, vy, most):
     the ray moves by (2 sin(tau/2) / kappa) (cos(tau/2) t + sin(tau/2) n).
     """
     n0x, n0y, curvature, _ = wide_arc(arc)
-    qx, qy = subtract(px, wide(arc[START_X])), subtract(py, wide(arc[START_Y]))
+    qx, qy = subtract(px, wide(arc[c.START_X])), subtract(py, wide(arc[c.START_Y]))
     nx, ny = subtract(n0x, multiply(curvature, qx)), subtract(n0y, multiply(curvature, qy))
     sine, cosine = dot(vx, vy, nx, ny), cross(vx, vy, nx, ny)
-    if sine[0] <= 0.0 or sine[0] > arc[WIDE_RUN_SINE]:
+    if sine[0] <= 0.0 or sine[0] > arc[c.WIDE_RUN_SINE]:
         return 0, px, py, vx, vy
     forward = cosine[0] > 0.0
     half_chord = direction_angle(cosine if forward else negate(cosine), sine)
     phi = 2.0 * math.atan2(dot(qx, qy, n0x, n0y)[0], cross(qx, qy, n0x, n0y)[0])
     if phi < 0.0:
         phi += 2.0 * math.pi
-    room = arc[WIDE_SPAN] - phi if forward else phi
+    room = arc[c.WIDE_SPAN] - phi if forward else phi
     count = 0.5 * room / half_chord[0] - LAST_HITS
     if not LONGEST_FOLLOWED < count < most:
         return 0, px, py, vx, vy
@@ -97,11 +89,11 @@ def skip_chords(arc, px, py, vx, vy, most):
     half = multiply((float(chords), 0.0), half_chord)
     high, low = sine_cosine(half[0])
     # the low part of the angle is below an ulp of it, and its square below all errors
-    s = add(high, multiply((half[1], 0.0), low))
-    c = subtract(low, multiply((half[1], 0.0), high))
-    s = s if forward else negate(s)
-    dx, dy = turned(ny, negate(nx), s, c)
-    way = divide((2.0 * s[0], 2.0 * s[1]), curvature)
-    vx, vy = turned(vx, vy, s, c)
-    vx, vy = turned(vx, vy, s, c)
+    sine = add(high, multiply((half[1], 0.0), low))
+    cosine = subtract(low, multiply((half[1], 0.0), high))
+    sine = sine if forward else negate(sine)
+    dx, dy = turned(ny, negate(nx), sine, cosine)
+    way = divide((2.0 * sine[0], 2.0 * sine[1]), curvature)
+    vx, vy = turned(vx, vy, sine, cosine)
+    vx, vy = turned(vx, vy, sine, cosine)
     return chords, add(px, multiply(way, dx)), add(py, multiply(way, dy)), vx, vy

@@ -25,7 +25,7 @@ import numpy as np
 from ....core.checks import Floats
 from ....core.compilation import jit
 from ....core.rounding import EPS, UNIT_ROUNDOFF
-from ...scene.columns import END_X, END_Y, JOINT_X, JOINT_Y, START_X, START_Y
+from ...scene import columns as c
 from .arcs import arc_height
 from .arithmetic import add, divide, dot, multiply, negate, square_root, subtract, two_product, two_sum, wide
 from .beziers import bezier_coefficients, bezier_point, cubic, cubic_slope
@@ -97,7 +97,12 @@ def orientation(ax, ay, bx, by, cx, cy):
 @_compile
 def line_ends(joints, index):
     """-> (x0, y0, x1, y1): the joints of the line that starts at joint ``index``."""
-    return joints[index, JOINT_X], joints[index, JOINT_Y], joints[index + 1, JOINT_X], joints[index + 1, JOINT_Y]
+    return (
+        joints[index, c.JOINT_X],
+        joints[index, c.JOINT_Y],
+        joints[index + 1, c.JOINT_X],
+        joints[index + 1, c.JOINT_Y],
+    )
 
 
 @_compile
@@ -157,7 +162,7 @@ def ends_of(joints, face):
     if face.kind == LINE:
         return line_ends(joints, face.number)
     curve = face.arc if face.kind == ARC else face.curve
-    return curve[START_X], curve[START_Y], curve[END_X], curve[END_Y]
+    return curve[c.START_X], curve[c.START_Y], curve[c.END_X], curve[c.END_Y]
 
 
 @_compile
