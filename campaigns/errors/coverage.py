@@ -31,6 +31,8 @@ REPEATS, BLOCKS = 25, 12
 RAYS, EIGENVALUE_RAYS, RESISTANCE_RAYS, PAIRS, DISTANCE_PAIRS = 4096, 2**14, 2**14, 8000, 4000
 ALARM_PAIRS, ALARM_LEVEL = 300, 0.05
 TEETH, ARC = ker.TriangularTeethLaw(1.1), ker.CircularArcLaw(1.2)
+# Flat but for notches that few of the rays meet, or none.
+NOTCHES = [ker.RectangularTeethLaw(depth) for depth in (1e-6, 1e-4, 3e-4, 1e-3)]
 SCATTERING, MAXWELL = ker.henyey_greenstein(0.6), ker.maxwell(0.4)
 PANELS = ker.Panels(np.linspace(0.0, np.pi, 5), 2)
 # The true error and the reported one of one repetition.
@@ -89,6 +91,13 @@ def distance(order: float, kind: str, alike: bool, sampled: int, rng: np.random.
     return abs(found.value - float(ker.distance(*exact, order, kind))), found.error
 
 
+def flat_distance(law: ker.Law, method: ker.Method, rng: np.random.Generator) -> Errors:
+    """The distance of a wall from a flat one, by rays."""
+    flat = ker.discretise(ker.specular(), ker.Bins(16))
+    found = ker.distance(ker.discretise(law, flat.basis, method, samples=RAYS, rng=rng), flat)
+    return abs(found.value - float(ker.distance(ker.discretise(law, flat.basis, tolerance=1e-10), flat))), found.error
+
+
 @dataclass(frozen=True)
 class Rays(ker.DrivenLaw):
     """Triangular teeth, accessible through rays only."""
@@ -140,6 +149,9 @@ def estimates() -> dict[str, Callable[[np.random.Generator], Errors]]:
         for method in ("monte-carlo",) if (law, basis) in smooth else ("monte-carlo", "qmc"):
             for symmetrise in (False, True):
                 add(matrix, law, basis, method, symmetrise)
+    for law, method in product(NOTCHES, ("monte-carlo", "qmc")):
+        add(matrix, law, ker.Bins(16), method, False)
+        add(flat_distance, law, method)
     for basis, *flags in product((ker.Bins(4), ker.Bins(12), ker.Legendre(6)), (True, False), (False, True)):
         add(pairs, basis, *flags)
     for law, basis in ((TEETH, ker.Bins(8)), (TEETH, ker.Legendre(6)), (ARC, ker.Bins(12)), (ARC, ker.Legendre(6))):

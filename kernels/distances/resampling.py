@@ -10,7 +10,7 @@ from ...core.checks import Floats
 from ...core.errors import InputError
 from ...core.long_runs import progress_bar
 from ..matrices.matrix import KernelMatrix, check_same_basis
-from ..sampling.counts import Counts
+from ..sampling.counts import Counts, missed_fraction
 from .transport import grid_wasserstein, power_mean
 
 # From two arrays of probabilities, shape (..., n, n), to their distances, shape (...).
@@ -126,16 +126,19 @@ def matrices_error(first: KernelMatrix, second: KernelMatrix, order: float, sup:
     """Error of the distance of two matrices: the sum of the distances of both matrices from their laws.
 
     For a matrix with counts it is the mean distance of resamples from the sample, plus a multiple of the standard
-    deviation. Otherwise the Frobenius error E of ``symmetric`` gives a bound: W_1 <= pi/2 sum_j |dP_ij|, with a mean
-    over i of at most pi/2 E by Cauchy and Schwarz and a maximum of pi/2 E / sqrt(w_i); W_p^p <= pi^(p - 1) W_1.
+    deviation, and at least pi p^(1/order) with the probability p of an event that no ray met, see `missed_fraction`: of
+    all rays, or of those of the row with the fewest. Otherwise the Frobenius error E of ``symmetric`` gives a bound:
+    W_1 <= pi/2 sum_j |dP_ij|, with a mean over i of at most pi/2 E by Cauchy and Schwarz and a maximum of pi/2 E /
+    sqrt(w_i); W_p^p <= pi^(p - 1) W_1.
     """
-    known, mean, variance = 0.0, 0.0, 0.0
+    known, mean, variance, missed = 0.0, 0.0, 0.0, 0.0
     for matrix in (first, second):
         if matrix.counts is None:
             error = float(matrix.error) / (float(np.sqrt(matrix.weights.min())) if sup else 1.0)
             known += float(np.pi * min(0.5 * error, 1.0) ** (1.0 / order))
             continue
-        own = stochastic_rows(matrix)
+        own, rays = stochastic_rows(matrix), matrix.counts.sum(axis=1)
+        missed += float(np.pi * missed_fraction(max(int(rays.min() if sup else rays.sum()), 1)) ** (1.0 / order))
         between = distance_of_rows(matrix, order, sup)
         draws = resampled(matrix.counts, own, RESAMPLES, np.random.default_rng(SEED))
         parts = []
@@ -146,4 +149,5 @@ def matrices_error(first: KernelMatrix, second: KernelMatrix, order: float, sup:
         found = np.concatenate(parts)
         mean += float(np.mean(found))
         variance += float(np.var(found, ddof=1))
-    return known + mean + (DEVIATIONS_OF_SUPREMUM if sup else DEVIATIONS) * float(np.sqrt(variance))
+    spread = mean + (DEVIATIONS_OF_SUPREMUM if sup else DEVIATIONS) * float(np.sqrt(variance))
+    return known + max(spread, missed)

@@ -53,7 +53,8 @@ def estimate(
     KernelMatrix
         The matrix, with the raw ``counts`` for Bins. Its ``error`` is the 95 % quantile of the sampling error, from
         the variance of multinomial counts or from the spread of batches (32 in bases without cells, 8 of weighted
-        pairs). The truncation to the basis is not included.
+        pairs), and at least the change by an event that none of the pairs may have met. The truncation to the basis is
+        not included.
 
     Raises
     ------
@@ -104,6 +105,7 @@ def matrix_of_pairs(
             array = array_from_counts(fluxes, basis, symmetrise=symmetrise, independent=False)
         else:
             array = array_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=False)
+    array = array.with_missed_events(pairs)
     return KernelMatrix(
         array.symmetric,
         basis,

@@ -90,7 +90,8 @@ class RaySums:
     def array(self, *, symmetrise: bool, mirrored: bool = False) -> tuple[SampledArray, int, float]:
         """The matrix, the number of rays used, and the fraction of rays that did not escape.
 
-        The error includes twice this fraction times sup |e|^2. If ``mirrored``, every ray counts with its mirror image.
+        The error includes twice this fraction times sup |e|^2; see also `SampledArray.with_missed_events`. If
+        ``mirrored``, every ray counts with its mirror image.
 
         Raises
         ------
@@ -112,6 +113,7 @@ class RaySums:
             means = [part / (2 * self.each if mirrored else self.each) for part in parts]
             keeps_measure = bool(self.law.reversible)
             array = array_from_sums(means, self.basis, symmetrise=symmetrise, keeps_measure=keeps_measure)
+        array = array.with_missed_events(used)
         if fraction > 0.0:
             extra = 2.0 * fraction * largest_square_sum(self.basis)
             array = SampledArray(array.symmetric, array.error + extra, array.replicates, array.raw_defect, array.counts)

@@ -9,6 +9,7 @@ import numpy as np
 from ...core.checks import Floats, Rng, check_memory, generator, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, student_95
+from ...kernels.sampling.counts import missed_fraction
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -25,14 +26,19 @@ def sampling_errors(matrix: KernelMatrix, vectors: Floats, values: Floats) -> Fl
     """One standard error of each eigenvalue, shape (k,); zeros for unsampled matrices.
 
     To first order an eigenvalue changes by v^T (S_hat - S) v. If the matrix has replicates, the spread of v^T S_r v
-    over them is used; otherwise the multinomial variance of the counts.
+    over them is used; otherwise the multinomial variance of the counts. An event that no ray met, of probability p at
+    all angles, changes an eigenvalue by at most 2 p; see `missed_fraction`.
     """
+    errors = np.zeros(len(values))
     if len(matrix.replicates) > 1:
         each = np.array([_quadratic_forms(replicate, vectors) for replicate in matrix.replicates])
-        return np.asarray(each.std(axis=0, ddof=1) / np.sqrt(len(each)))
-    if matrix.counts is not None:
-        return np.sqrt(_count_variances(matrix, vectors))
-    return np.zeros(len(values))
+        errors = np.asarray(each.std(axis=0, ddof=1) / np.sqrt(len(each)))
+    elif matrix.counts is not None:
+        errors = np.sqrt(_count_variances(matrix, vectors))
+    if matrix.samples == 0:
+        return errors
+    beside = np.maximum(1.0 - (matrix.basis.constant @ vectors) ** 2, 0.0)
+    return np.maximum(errors, 2.0 * missed_fraction(matrix.samples) * beside / sampling_quantile(matrix))
 
 
 def _quadratic_forms(symmetric: Floats | csr_array[Any], vectors: Floats) -> Floats:

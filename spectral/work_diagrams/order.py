@@ -107,7 +107,8 @@ def _by_scatter(sizes: Floats, errors: Floats) -> tuple[float, float]:
     """Slope and half width of its interval, by Student's t."""
     from scipy.stats import t
 
-    x, y = np.log(sizes) - np.mean(np.log(sizes)), np.log(errors)
+    # relative to the first error, so that equal errors are 0 without rounding
+    x, y = np.log(sizes) - np.mean(np.log(sizes)), np.log(errors) - np.log(errors[0])
     slope = float(x @ y / (x @ x))
     rest = y - np.mean(y) - slope * x
     spread = float(np.sqrt(rest @ rest / (len(x) - 2) / (x @ x)))

@@ -255,7 +255,8 @@ def listening(_=None):
     found = []
     for table in map(Path, ("/proc/net/tcp", "/proc/net/tcp6")):
         lines = [line.split() for line in table.read_text().splitlines()[1:]] if table.exists() else []
-        found += [line for line in lines if line[3] == "0A" and f"socket:[{line[9]}]" in held]
+        # without the number of the line, which changes with the sockets of other processes
+        found += [line[1:] for line in lines if line[3] == "0A" and f"socket:[{line[9]}]" in held]
     named = [line.split() for line in Path("/proc/net/unix").read_text().splitlines()[1:]]
     # flags with 10000: it accepts connections
     return found + [line for line in named if line[3] == "00010000" and f"socket:[{line[6]}]" in held]
