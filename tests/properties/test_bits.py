@@ -217,7 +217,9 @@ def stored(monkeypatch):
 @pytest.fixture(scope="module")
 def workers():
     distributed = pytest.importorskip("distributed")
-    with distributed.Client(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as client:
+    with distributed.Client(
+        n_workers=2, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
+    ) as client:
         yield client
 
 

@@ -53,6 +53,8 @@ def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = Non
     wall = wall_from_text(text)
     name, parameters = _called(text)
     panel = _panel()
+    from tornado.ioloop import IOLoop
+
     from .page import Page
 
     def page() -> Any:
@@ -70,6 +72,8 @@ def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = Non
             page, address=ADDRESS, port=number, prefix=token, show=False, start=False, title="asperity explore",
             websocket_origin=hosts, websocket_max_message_size=LARGEST_MESSAGE,
             check_unused_sessions_milliseconds=CHECKED_EVERY, unused_session_lifetime_milliseconds=CLOSED_AFTER,
+            # from Python 3.14 on no loop is made without being asked for
+            loop=IOLoop(),
         )  # fmt: skip
     finally:
         signal.signal(signal.SIGINT, interrupt)

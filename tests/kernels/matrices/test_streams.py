@@ -100,7 +100,9 @@ def test_arrays_of_zarr_give_the_bits_of_numpys_whatever_their_chunks(basis, tmp
 def workers():
     import distributed
 
-    with distributed.Client(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as client:
+    with distributed.Client(
+        n_workers=2, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
+    ) as client:
         yield client
 
 
