@@ -56,8 +56,7 @@ class Late:
         """
         self._uses += uses
         if self._words[0] == 0 and self._uses < enough and not self._stored:
-            kinds = tuple(typeof(argument) for argument in self._arguments)
-            self._stored = is_stored(self._function, kinds)
+            self._stored = is_stored(self._function)
         return bool(self._words[0] != 0 or self._stored or self._uses >= enough)
 
     def load(self) -> int:

@@ -1,39 +1,32 @@
-"""The decorator of compiled functions, and the cache that stores them on disk. Loads numba.
+"""The decorator of compiled functions. Loads numba.
 
 numba compiles a function when it is first called, and stores the result beside the module, else in the user's cache
-folder. If both are read-only, as in containers, or others can write them, it is stored in a temporary folder. A damaged
-file is ignored, and written again.
+folder; NUMBA_CACHE_DIR names another one.
 """
 
 from __future__ import annotations
 
 import builtins
 import gc
-import grp
 import hashlib
 import importlib
 import logging
 import math
 import multiprocessing
 import operator
-import os
-import pickle
-import pwd
-import stat
 import sys
 from collections.abc import Callable
-from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from inspect import signature
 from pathlib import Path
-from tempfile import gettempdir, mkdtemp
+from types import CellType, FunctionType
 from typing import Any, ClassVar
+from weakref import WeakSet
 
 from numba import njit, types
 from numba._dynfunc import make_function
+from numba.core import event
 from numba.core.base import BaseContext
-from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator, _CacheLocator
-from numba.core.caching import _SourceFileBackedLocatorMixin as SourceStamp
 from numba.core.cgutils import alloca_once
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
@@ -41,13 +34,10 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.ir import UNDEFINED
 from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
-from numba.core.serialize import dumps
 from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
 from numba.core.typing.context import Context
 from numba.core.untyped_passes import InlineClosureLikes
 from numba.np import linalg
-
-from .errors import InputError
 
 logger = logging.getLogger("asperity")
 
@@ -268,20 +258,17 @@ def jit(*, linked: bool = False, **options: Any) -> Callable[[Any], Any]:
     """
     linked = linked or bool(options.get("forceinline"))
     options |= {"no_cpython_wrapper": True} if linked else {}
-    pipeline = _LinkedPipeline if linked else _Pipeline
-    decorate: Any = njit(pipeline_class=pipeline, **{**OPTIONS, **options})
+    decorate: Any = partial(njit, pipeline_class=_LinkedPipeline if linked else _Pipeline, **{**OPTIONS, **options})
 
     def compiled(function: Any) -> Any:
-        dispatcher = decorate(function)
+        try:
+            dispatcher = decorate(cache=not linked)(function if linked else _with_digest(function))
+        except RuntimeError:
+            _warn_of_no_folder()
+            dispatcher = decorate()(function)
+        COMPILED.add(dispatcher)
         if options.get("no_cpython_wrapper") and isinstance(dispatcher, CPUDispatcher):
             dispatcher.__class__ = _Inner
-        # not with numba's switch that turns compilation off
-        if hasattr(dispatcher, "enable_caching") and not linked:
-            try:
-                # what the option ``cache`` does, with another cache
-                dispatcher._cache = _SafeCache(function)
-            except RuntimeError:
-                logger.warning("no folder is writable, so compiled functions are not stored; set NUMBA_CACHE_DIR")
         return dispatcher
 
     return compiled
@@ -295,158 +282,58 @@ class _Inner(CPUDispatcher):
 
 
 @cache
+def digest() -> int:
+    """Return a number for the sources of all compiled functions and of the constants in them."""
+    package = Path(__file__).parents[1]
+    sources = [Path(__file__), package / "core" / "rounding.py"]
+    for folder in ("compiled", "double_double", "scene"):
+        sources += sorted(package.glob(f"geometry/**/{folder}/*.py"))
+    return int.from_bytes(hashlib.sha256(b"".join(source.read_bytes() for source in sources)).digest()[:8], "big")
+
+
+def _with_digest(function: Any) -> Any:
+    """Return the function with the digest among the variables of its closure.
+
+    numba finds a stored function by its own source and by these variables, but not by the functions that it calls.
+    """
+    code = function.__code__.replace(co_freevars=(*function.__code__.co_freevars, "digest"))
+    closure = (*(function.__closure__ or ()), CellType(digest()))
+    made = FunctionType(code, function.__globals__, function.__name__, function.__defaults__, closure)
+    made.__module__, made.__qualname__, made.__doc__ = function.__module__, function.__qualname__, function.__doc__
+    return made
+
+
+@cache
+def _warn_of_no_folder() -> None:
+    logger.warning("no folder is writable, so compiled functions are not stored; set NUMBA_CACHE_DIR")
+
+
+class _Announcement(event.Listener):
+    """Says once that functions are being compiled: in the log, and on a terminal."""
+
+    def on_start(self, event: Any) -> None:
+        if event.data["dispatcher"] in COMPILED:
+            announce()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+COMPILED: WeakSet[Any] = WeakSet()
+event.register("numba:compile", _Announcement())
+
+
+@cache
 def announce() -> None:
-    """Say once that functions are being compiled: in the log, and on a terminal."""
+    """Say that functions are being compiled."""
     text = "asperity: compiling, once (about 10 s)"
     logger.info(text)
     if sys.stderr is not None and sys.stderr.isatty() and multiprocessing.parent_process() is None:
         print(text, file=sys.stderr, flush=True)
 
 
-@cache
-def temporary_folder() -> Path:
-    """Return a folder of this user alone, because functions in it are executed; the same one in all processes."""
-    folder = Path(gettempdir()) / f"asperity-{os.getuid()}"
-    with suppress(OSError):
-        folder.mkdir(mode=0o700, exist_ok=True)
-        state = folder.lstat()
-        if stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and not state.st_mode & 0o077:
-            logger.info("compiled functions are stored in %s; to choose a folder set NUMBA_CACHE_DIR", folder)
-            return folder
-    return Path(mkdtemp(prefix="asperity-"))
-
-
-@cache
-def why_unsafe(folder: Path, owners: frozenset[int]) -> str:
-    """Return who else can put files into a folder, or replace it; empty if nobody but root and these owners can.
-
-    A group is the owner's alone if it has the owner's name and no other member.
-    """
-    for path in dict.fromkeys([*(folder, *folder.parents), *(folder.resolve(), *folder.resolve().parents)]):
-        for state in (path.lstat(), path.stat()):
-            if state.st_uid not in owners | {0}:
-                return f"{path} belongs to another user"
-            # in a folder with the sticky bit, such as /tmp, nobody replaces what is another's
-            if stat.S_ISLNK(state.st_mode) or (path not in (folder, folder.resolve()) and state.st_mode & stat.S_ISVTX):
-                continue
-            if state.st_mode & stat.S_IWOTH:
-                return f"everybody may write {path}"
-            if state.st_mode & stat.S_IWGRP and not _is_private(state):
-                return f"a group may write {path}"
-    return ""
-
-
-def _is_private(state: os.stat_result) -> bool:
-    try:
-        group, user = grp.getgrgid(state.st_gid), pwd.getpwuid(state.st_uid)
-    except KeyError:
-        return False
-    return group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name}
-
-
-def _guarded(kind: Any) -> Any:
-    """A way of numba to find a folder; it passes over one that others can write, because what is there is executed."""
-
-    class Guarded(kind):  # type: ignore[misc]
-        @classmethod
-        def from_function(cls, function: Any, file: str) -> Any:
-            found = super().from_function(function, file)
-            if found is None:
-                return None
-            # who owns the source can have anything executed
-            source = Path(file)
-            owners = {os.getuid(), *([source.stat().st_uid] if source.exists() else [])}
-            folder = Path(found.get_cache_path()).absolute()
-            reason = why_unsafe(folder, frozenset(owners))
-            if reason:
-                why_unsafe.cache_clear()
-            if reason and issubclass(kind, UserProvidedCacheLocator):
-                raise InputError(
-                    f"NUMBA_CACHE_DIR: expected a folder that only you can write, because what is in it is executed; "
-                    f"{reason}: remove that permission (chmod go-w) or name another folder"
-                )
-            if reason:
-                logger.info("compiled functions are not stored in %s: %s", folder, reason)
-            return None if reason else found
-
-    return Guarded
-
-
-class _Temporary(SourceStamp, _CacheLocator):
-    """The last folder that is tried."""
-
-    def __init__(self, function: Any, file: str) -> None:
-        self._py_file, self._lineno = file, function.__code__.co_firstlineno
-        self._path = str(temporary_folder() / self.get_suitable_cache_subpath(file))
-
-    def get_cache_path(self) -> str:
-        return self._path
-
-    @classmethod
-    def from_function(cls, function: Any, file: str) -> Any:
-        try:
-            return super().from_function(function, file)
-        except OSError:
-            return None
-
-
-class _Checked(CompileResultCacheImpl):
-    """Stores a function with its sha256, because damaged machine code would end the process."""
-
-    _locator_classes = [*map(_guarded, CacheImpl._locator_classes), _Temporary]  # noqa: RUF012 - numba's base class says how
-
-    def reduce(self, result: Any) -> tuple[bytes, bytes]:
-        whole = dumps(super().reduce(result))
-        return hashlib.sha256(whole).digest(), whole
-
-    def rebuild(self, context: Any, stored: tuple[bytes, bytes]) -> Any:
-        digest, whole = stored
-        if hashlib.sha256(whole).digest() != digest:
-            raise pickle.UnpicklingError("its sha256 is another one")
-        return super().rebuild(context, pickle.loads(whole))
-
-
-class _SafeCache(FunctionCache):
-    """A function's files, which are written again if they are damaged."""
-
-    _impl_class = _Checked
-
-    def load_overload(self, signature: Any, context: Any) -> Any:
-        found = None
-        try:
-            found = super().load_overload(signature, context)
-        # a damaged pickle can raise anything
-        except Exception as reason:
-            self._forget(reason)
-        if found is None:
-            announce()
-        return found
-
-    def save_overload(self, signature: Any, result: Any) -> None:
-        try:
-            try:
-                super().save_overload(signature, result)
-            except OSError:
-                raise
-            except Exception as reason:
-                self._forget(reason)
-                super().save_overload(signature, result)
-        except OSError as reason:
-            logger.warning("a compiled function is not stored in %s (%s)", self.cache_path, reason)
-
-    def _forget(self, reason: Exception) -> None:
-        logger.info("a damaged file of compiled functions in %s is made again (%r)", self.cache_path, reason)
-        with suppress(OSError):
-            self.flush()
-
-
-def is_stored(function: Any, kinds: tuple[Any, ...]) -> bool:
-    """Return whether a function compiled for arguments of these numba types is on disk."""
-    cache = function._cache
-    if not isinstance(cache, _SafeCache):
-        return False
-    try:
-        return cache._index_key(kinds, function.targetctx.codegen()) in cache._cache_file._load_index()
-    # a damaged index can raise anything
-    except Exception:
-        return False
+def is_stored(function: Any) -> bool:
+    """Return whether a compiled function has been stored on disk, perhaps from other sources."""
+    folder = function.stats.cache_path
+    name = f"{Path(function.py_func.__code__.co_filename).stem}.{function.py_func.__name__}-"
+    return folder is not None and any(path.name.startswith(name) for path in Path(folder).glob("*.nbi"))
