@@ -273,8 +273,7 @@ def _matrix(
 def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
     """Trace rays that enter the hollows with the invariant measure."""
     wall = wall.cell
-    widths = np.array([hollow.width for hollow in wall.hollows])
-    lefts = np.array([hollow.left for hollow in wall.hollows])
+    lefts, widths = np.array([(hollow.left, hollow.width) for hollow in wall.hollows]).T
     which = rng.choice(len(widths), CHECK_RAYS, p=widths / widths.sum())
     ray = trace(wall, lefts[which] + widths[which] * rng.random(CHECK_RAYS), SINE.sample(CHECK_RAYS, rng))
     boundary = wall.arc_length - wall.flat_top
