@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -202,19 +203,13 @@ def prepare_folder(folder: str | Path, *, overwrite: bool, picture_format: str =
     target, names = Path(folder), (*picture_names(picture_format), *DATA)
     try:
         existing = [name for name in names if os.path.exists(target / name)]
-        if existing and not overwrite:
-            raise FileExistsRefusal(
-                f"{target}: {', '.join(existing)} exist; use another folder or --force to replace them"
-            )
-        target.mkdir(parents=True, exist_ok=True)
-        probe = target / ".asperity-probe"
-        probe.touch()
-        probe.unlink()
-    except FileExistsRefusal:
-        raise
+        if overwrite or not existing:
+            target.mkdir(parents=True, exist_ok=True)
+            TemporaryDirectory(dir=target, prefix=".asperity-").cleanup()
+            return target
     except OSError as reason:
         raise InputError(f"{target}: cannot write there ({reason.strerror}); choose another folder") from reason
-    return target
+    raise FileExistsRefusal(f"{target}: {', '.join(existing)} exist; use another folder or --force to replace them")
 
 
 def _or_refusal(
