@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from textwrap import shorten
 from typing import Any
 
@@ -275,14 +276,7 @@ def quotation(gap: SpectralGap) -> str:
 
 def enclosures_as_list(found: Enclosures) -> list[dict[str, Any]]:
     """Enclosures as plain values, ready for JSON."""
-    return [
-        {
-            "value": item.value, "low": item.low, "high": item.high, "label": item.label, "index": item.index,
-            "residual": item.residual, "kind": item.kind, "reason": item.reason, "parity": item.parity,
-            "method": found.method, "convention": found.convention,
-        }
-        for item in found
-    ]  # fmt: skip
+    return [{**asdict(item), "method": found.method, "convention": found.convention} for item in found]
 
 
 def _matrix(matrix: KernelMatrix) -> dict[str, Any]:
