@@ -11,13 +11,13 @@ from ..core.version import __version__
 from ..geometry import Wall
 from ..kernels import KernelMatrix
 from ..spectral import Enclosures, SpectralGap
+from ..spectral.plotting import CONVENTIONS
 from .result import StudyResult, TracerCheck
 
 # Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
 KAC_Z = 4.5
 # Characters; the detailed report has the whole reason.
 LONGEST_REFUSAL = 110
-CONVENTIONS = {"paper": "retroreflection is the identity", "specular": "specular reflection is the identity"}
 
 
 def summary_of(study: StudyResult) -> str:
