@@ -70,9 +70,9 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
         from matplotlib import pyplot
 
         ax = pyplot.figure(layout="constrained").subplots()
-    free, floor = _heights(wall)
+    free, floor = heights(wall)
     rays = [
-        _Ray(wall, float(place), float(angle), free)
+        RayPath(wall, float(place), float(angle), free)
         for place, angle in zip(np.ravel(entries), np.ravel(incoming), strict=True)
     ]
     inside = np.concatenate([[0.0, 1.0], *(ray.points[:, 0] / wall.period for ray in rays)])
@@ -108,20 +108,20 @@ def vertical_stretch(wall: Wall) -> float:
     """
     if wall.depth == 0.0 or SHALLOWEST * wall.period <= wall.depth <= DEEPEST * wall.period:
         return 1.0
-    free, floor = _heights(wall)
+    free, floor = heights(wall)
     shape = SHALLOW_SHAPE if wall.depth < wall.period else DEEP_SHAPE
     return shape * (1.0 + 2.0 * MARGIN) * wall.period / (free - floor)
 
 
-def _heights(wall: Wall) -> tuple[float, float]:
+def heights(wall: Wall) -> tuple[float, float]:
     """Return y at the top and at the bottom of the plot."""
     shallow = 0.0 < wall.depth < SHALLOWEST * wall.period
     free = wall.depth if shallow else FREE * max(wall.period, wall.depth)
     return free, -wall.depth - 0.25 * free
 
 
-class _Ray:
-    """The path of one ray: the start of its arrival, its points in the wall, the end of its departure."""
+class RayPath:
+    """The path of one ray: the start of its arrival, its points in the wall, and the end of its departure."""
 
     def __init__(self, wall: Wall, x: float, theta: float, free: float) -> None:
         from ..tracing.tracing import trace, trajectory
@@ -134,6 +134,8 @@ class _Ray:
         if bool(result.escaped):
             self.points[-1] = (float(result.x), 0.0)
             self.departure = self.points[-1] + _up_to(free, float(result.theta), stretch)
+        ends = [] if self.departure is None else [self.departure]
+        self.path = np.vstack([self.arrival, self.points, *ends])
 
 
 def _up_to(height: float, theta: float, stretch: float) -> Floats:
@@ -174,11 +176,9 @@ def _thinned(points: Floats, step: Floats) -> Floats:
     return np.asarray(points[np.concatenate([[True], keep])])
 
 
-def _draw_ray(ax: Axes, ray: _Ray, colour: str) -> None:
+def _draw_ray(ax: Axes, ray: RayPath, colour: str) -> None:
     """Draw one trajectory: the path with arrows in and out, a dot at the entry, and a ring at the exit."""
-    ends = [ray.departure] if ray.departure is not None else []
-    path = np.vstack([ray.arrival, ray.points, *ends])
-    ax.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.1, zorder=3)
+    ax.plot(ray.path[:, 0], ray.path[:, 1], color=colour, linewidth=1.1, zorder=3)
     style = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 13.0}
     arrows = [(ray.arrival, ray.points[0], 0.55)]
     ax.plot(*ray.points[0], "o", color=colour, markersize=4.5, zorder=4)

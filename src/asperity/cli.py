@@ -44,7 +44,10 @@ class OneLineErrors(click.Group):
             sys.exit(1)
 
 
-# Options of several commands.
+# Options of several commands, and their kinds.
+NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
+FORMAT = click.Choice(["png", "svg", "pdf"])
+NEW_FILE = click.Path(path_type=Path, dir_okay=False)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of the random generator.")
 
@@ -84,13 +87,7 @@ def main() -> None:
 @click.option("--force", is_flag=True, help="Replace the files of an earlier study in the folder.")
 @click.option("-v", "--verbose", is_flag=True, help="Print methods, spectrum, enclosures and evidence too.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-@click.option(
-    "--format",
-    "picture_format",
-    type=click.Choice(["png", "svg", "pdf"]),
-    default="png",
-    help="Format of the pictures.",
-)
+@click.option("--format", "picture_format", type=FORMAT, default="png", help="Format of the pictures.")
 @click.option("--dpi", type=click.FloatRange(10, 2400), default=100, help="Dots per inch of the pictures.")
 def study(
     wall: str, mass: float, inertia: float, seed: int, out: Path | None, force: bool, picture_format: str, dpi: float,
@@ -103,8 +100,6 @@ def study(
       asperity study focusing-arcs:half_angle=0.9 --out study
       asperity study profile.txt --mass 1 --inertia 0.5 --json
     """
-    import numpy as np
-
     from .core.files import removed_on_failure
     from .geometry import Disk, wall_from_text
     from .study import prepare_folder, study_wall
@@ -117,8 +112,7 @@ def study(
         if out is not None:
             # refuse before the work, not after it
             prepare_folder(out, overwrite=force, picture_format=picture_format)
-        rng = np.random.default_rng(seed)
-        report = study_wall(found_wall, Path(wall).name, disk, rng=rng, progress=not quiet, **asked)
+        report = study_wall(found_wall, Path(wall).name, disk, rng=seed, progress=not quiet, **asked)
         if not quiet:
             click.echo(report.to_json() if as_json else report.summary(verbose=verbose))
         if out is not None:
@@ -150,27 +144,20 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool
     law = WallLaw(wall_from_text(wall))
     chosen = law.in_specular_frame() if specular else law
     found = spectral_gap(chosen, tolerance)
-    enclosed, refusal = None, ""
+    lines, plain = [quotation(found), *(f"  {line}" for line in found.evidence)], gap_as_dict(found)
     if enclose:
         try:
             enclosed = enclosures(chosen, enclose)
+            lines += ["enclosures:", *(f"  {line}" for line in enclosures_as_text(enclosed))]
+            plain["enclosures"] = enclosures_as_list(enclosed)
         except (AccuracyError, InputError) as reason:
-            refusal = str(reason)
-    if as_json:
-        listed = None if enclosed is None else enclosures_as_list(enclosed)
-        extra: dict[str, Any] = {"enclosures": listed} if enclose else {}
-        extra |= {"refusals": {"enclosures": refusal}} if refusal else {}
-        click.echo(json.dumps({**gap_as_dict(found), **extra}, indent=2, allow_nan=False))
-        return
-    click.echo("\n".join([quotation(found), *(f"  {line}" for line in found.evidence)]))
-    if enclosed is not None:
-        click.echo("\n".join(["enclosures:", *(f"  {line}" for line in enclosures_as_text(enclosed))]))
-    if refusal:
-        click.echo(f"enclosures refused: {refusal}")
+            lines.append(f"enclosures refused: {reason}")
+            plain |= {"enclosures": None, "refusals": {"enclosures": str(reason)}}
+    click.echo(json.dumps(plain, indent=2, allow_nan=False) if as_json else "\n".join(lines))
 
 
 @main.command()
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Draw them all into this picture file.")
+@click.option("--out", type=NEW_FILE, help="Draw them all into this picture file.")
 @click.option("--force", is_flag=True, help="Replace the picture if it exists.")
 def walls(out: Path | None, force: bool) -> None:
     """List the named walls with their parameters and defaults, and draw them."""
@@ -193,9 +180,7 @@ def with_engine(command: Callable[..., None]) -> Callable[..., None]:
         click.option("--force", is_flag=True, help="Replace other results in the folder; by default a run goes on."),
         click.option("--scheduler", help="Address of a dask scheduler, whose workers are used."),
         click.option("--workers", type=click.IntRange(min=1), help="So many processes on this machine."),
-        click.option(
-            "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder for the tables."
-        ),
+        click.option("--out", required=True, type=NEW_FOLDER, help="Folder for the tables."),
         click.option("--tolerance", default=1e-6, help="Error asked of each quantity."),
         click.option(
             "--quantity",
@@ -217,29 +202,24 @@ def _run_in_folder(
         raise click.UsageError("--workers are started here, a --scheduler has its own; choose one")
     checkpoint = checkpoint_in(out, overwrite=force)
     quantities = [name.strip() for name in asked.pop("quantity").split(",")]
-    with _ending_at_ctrl_c(), _with_a_sign_of_life():
+    with _long_run():
         return run(quantities=quantities, checkpoint=checkpoint, client=scheduler or workers, progress=True, **asked)
 
 
 @contextmanager
-def _ending_at_ctrl_c() -> Iterator[None]:
-    """Say what Ctrl-C stopped, and end the program at once: libraries would wait for their threads."""
-    try:
-        yield
-    except KeyboardInterrupt as stop:
-        click.echo(f"asperity: {stop}", err=True)
-        os._exit(INTERRUPTED)
-
-
-@contextmanager
-def _with_a_sign_of_life() -> Iterator[None]:
-    """Say after a second that the work is under way: the first wall may take minutes, and a pipe shows no bar."""
+def _long_run() -> Iterator[None]:
+    """Say after a second that the work is under way; at Ctrl-C say what is stopped, and end the program at once."""
+    # the first wall may take minutes, and a pipe shows no bar
     words = "asperity: computing; Ctrl-C stops it, and the same command goes on"
     timer = threading.Timer(1.0, click.echo, [words], {"err": True})
     timer.daemon = True
     timer.start()
     try:
         yield
+    except KeyboardInterrupt as stop:
+        click.echo(f"asperity: {stop}", err=True)
+        # libraries would wait for their threads
+        os._exit(INTERRUPTED)
     finally:
         timer.cancel()
 
@@ -318,7 +298,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
     for path in save_ensemble(found, out):
         click.echo(f"wrote {path}")
     if bins is not None:
-        with _ending_at_ctrl_c(), _with_a_sign_of_life():
+        with _long_run():
             law = mean_law(
                 family, walls, Bins(bins), given["tolerance"], rng=seed, checkpoint=out / LAW_CHECKPOINT,
                 client=given["scheduler"] or given["workers"],
@@ -331,7 +311,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
 @click.argument("wall", default="triangular-teeth")
 @click.option("--port", type=click.IntRange(0, 65535), default=5006, help="0 for any that is free.")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Write what is saved into this folder.")
+@click.option("--out", type=NEW_FOLDER, help="Write what is saved into this folder.")
 def explore(wall: str, port: int, no_browser: bool, out: Path | None) -> None:
     """Show WALL on a page in the browser: drag its vertices, and law, spectrum and collision follow.
 
@@ -344,10 +324,7 @@ def explore(wall: str, port: int, no_browser: bool, out: Path | None) -> None:
     """
     from .explore.server import serve_page
 
-    def say(line: str) -> None:
-        click.echo(f"asperity: {line}", err=True)
-
-    serve_page(wall, port, out, browser=not no_browser, say=say)
+    serve_page(wall, port, out, browser=not no_browser, say=lambda line: click.echo(f"asperity: {line}", err=True))
 
 
 @main.command()
@@ -358,7 +335,7 @@ def explore(wall: str, port: int, no_browser: bool, out: Path | None) -> None:
 @click.option("--mass", type=float, help="Unforeshorten the wall for a disk of this mass ...")
 @click.option("--inertia", type=float, help="... and this moment of inertia.")
 @SEED
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the wall into this TOML file.")
+@click.option("--out", type=NEW_FILE, help="Write the wall into this TOML file.")
 @click.option("--force", is_flag=True, help="Replace the file if it exists.")
 def realise(
     law: str, moments: int, tolerance: float, hollows: int | None, mass: float | None, inertia: float | None,
@@ -374,8 +351,6 @@ def realise(
       asperity realise lambertian --out lambert.toml
       asperity realise maxwell:0.5 --mass 1 --inertia 0.5 --out wall.toml
     """
-    import numpy as np
-
     from .core.files import check_writable
     from .geometry import Disk
     from .kernels import wall_for
@@ -388,10 +363,10 @@ def realise(
         if out.exists() and not force:
             raise FileExistsRefusal(f"{out} exists; use another name or --force to replace it")
     disk = None if mass is None or inertia is None else Disk(mass, inertia)
-    found = wall_for(law_from_text(law), moments, tolerance, rng=np.random.default_rng(seed), most_hollows=hollows)
+    found = wall_for(law_from_text(law), moments, tolerance, rng=seed, most_hollows=hollows)
     wall = found.wall if disk is None else found.wall.unforeshorten(disk)
-    click.echo(f"wall       {len(found.hollows)} hollows, {len(wall.pieces)} pieces, depth {wall.depth:.6g}")
     click.echo(
+        f"wall       {len(found.hollows)} hollows, {len(wall.pieces)} pieces, depth {wall.depth:.6g}\n"
         f"defect     {described(found.defect)} in {found.moments} moments; at most {float(found.bound):.2g} too much"
     )
     if found.law is not None:

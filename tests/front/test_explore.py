@@ -338,7 +338,7 @@ def test_numbers_past_the_end_of_a_slider_are_refused_before_any_work(page):
 def test_walls_of_too_many_pieces_are_refused_with_another_command():
     wall = lambda: geo.Wall.from_vertices(np.c_[np.linspace(0, 1, 10_002), np.r_[0, np.full(10_000, -0.1), 0]])  # noqa: E731
     with pytest.raises(InputError, match="at most 10000 pieces, got 10001; thin it out, or use the command"):
-        next(pictured_and_answered(wall, "long", geo.Disk(), "paper", False, False))
+        next(pictured_and_answered(wall, "long"))
 
 
 def test_after_a_refused_wall_the_answers_of_the_last_one_go_on(page):
@@ -416,6 +416,6 @@ def test_the_legend_of_the_collision_is_above_the_bars():
     from asperity.explore.drawing import CollisionFigure
 
     figure = CollisionFigure()
-    figure.show(first_answer(Question(geo.flat(), "flat")).collision)
+    figure.show(first_answer(Question(geo.flat(), "flat")))
     assert [entry.label.value for entry in figure.plot.legend[0].items] == ["smooth disk", "no-slip disk"]
     assert figure.plot.legend[0] in figure.plot.above

@@ -14,9 +14,8 @@ from ..spectral import ReferenceValue, WorkMethod, WorkProblem
 from ..spectral.work_diagrams.machine import on_few_cores
 from ..spectral.work_diagrams.runs import measure, parts_of, solve_once
 from .quantities.collision import COLLISION, DISK, TRUE_DISK, by_true_disks
-from .quantities.distance import DISTANCE
-from .quantities.matrix import LAW, MOMENT, RESISTANCE
-from .quantities.quantity import Methods
+from .quantities.matrix import DISTANCE, LAW, MOMENT, RESISTANCE
+from .quantities.methods import Methods
 from .quantities.spectral import DIFFUSIVITY, EIGENVALUE
 from .quantities.walls import scenes, standard_names, wall_of
 
@@ -34,21 +33,18 @@ def problem_names(patterns: Sequence[str] = ()) -> list[str]:
 
     A pattern is a name with wildcards, a scene, a quantity, or a wall as `wall_from_text` reads it.
     """
-    standard = [
-        f"{scene}/{one.name}" for scene in standard_names() for one in QUANTITIES.values() if scene in one.scenes
-    ]
-    random = [f"{scene}/{RANDOM_QUANTITY}" for scene in scenes() if scene not in standard_names()]
+    standard = {
+        f"{scene}/{one.name}": (scene, one.name)
+        for scene in standard_names() for one in QUANTITIES.values() if scene in one.scenes
+    }  # fmt: skip
+    # a quantity alone means the scenes of the standard set
+    random = {f"{scene}/{RANDOM_QUANTITY}": (scene,) for scene in scenes() if scene not in standard_names()}
     chosen: list[str] = []
     for pattern in patterns:
-        found = [
-            name
-            for name in standard + random
-            if any(fnmatch(part, pattern) for part in (name, *name.split("/")))
-            # a quantity alone means the scenes of the standard set
-            and (name in standard or fnmatch(name, pattern) or fnmatch(name.split("/")[0], pattern))
-        ]
+        known = (standard | random).items()
+        found = [name for name, parts in known if any(fnmatch(part, pattern) for part in (name, *parts))]
         chosen += found or _of_wall(pattern)
-    return list(dict.fromkeys(chosen)) if patterns else standard
+    return list(dict.fromkeys(chosen)) if patterns else list(standard)
 
 
 def _of_wall(text: str) -> list[str]:

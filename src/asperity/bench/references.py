@@ -24,7 +24,7 @@ from .run import scene_of
 FILE = Path(__file__).with_name("standard_references.json")
 # Budgets of the reference of a user's wall: of each method the finest that is done in time. Rays are more than in rows.
 FINEST = {
-    CLOSED_FORM.name: (1.0,), BEAMS.name: (1e4, 1e5, 1e6), ROWS.name: (1e3, 1e4, 1e6, 1e8), QMC.name: (4.0**9, 4.0**12),
+    CLOSED_FORM: (1.0,), BEAMS: (1e4, 1e5, 1e6), ROWS: (1e3, 1e4, 1e6, 1e8), QMC: (4.0**9, 4.0**12),
 }  # fmt: skip
 # A reference that is farther from that of rays, in half widths of 95 %, has this distance as its error.
 DISAGREE = 3.0
@@ -61,14 +61,14 @@ def made_references(name: str, child: ChildProcess, seconds: float) -> tuple[Ref
     """
     applicable = {method.name for method, _, _ in methods_of(name)}
     found = {method: _finest(name, method, child, seconds) for method in FINEST if method in applicable}
-    rays = found.pop(QMC.name)
+    rays = found.pop(QMC)
     checked = [one if rays is None else _beside(one, rays) for one in found.values() if one is not None]
     return tuple(sorted([*checked, *([] if rays is None else [rays])], key=lambda one: one.error))
 
 
 def _finest(name: str, method: str, child: ChildProcess, seconds: float) -> ReferenceValue | None:
     """The value at the largest budget that is done in time and reports an error."""
-    found, made_by = None, () if method == QMC.name else (method, *_chooses(scene_of(name), method))
+    found, made_by = None, () if method == QMC else (method, *_chooses(scene_of(name), method))
     child.start()
     end = time.monotonic() + seconds
     for budget in FINEST[method]:
@@ -89,7 +89,7 @@ def _chooses(scene: str, method: str) -> tuple[str, ...]:
     law = WallLaw(wall)
     # of these walls it takes the closed form or beams, whatever the tolerance
     exact = law.closed_form is not None or (len(wall.pieces) <= FEW_PIECES and law.exact_law is not None)
-    return () if method == ROWS.name and exact else (AUTO.name,)
+    return () if method == ROWS and exact else (AUTO,)
 
 
 def _beside(found: ReferenceValue, rays: ReferenceValue) -> ReferenceValue:

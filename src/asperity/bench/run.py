@@ -203,13 +203,11 @@ def _cells(report: WorkReport) -> tuple[str, ...]:
 
 def _draw(reports: Sequence[WorkReport]) -> Figure:
     """Draw one panel for each report, three panels in a row."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     columns = min(COLUMNS, len(reports))
     rows = -(-len(reports) // columns)
     figure = Figure(figsize=(WIDTH * columns, HEIGHT * rows), layout="constrained")
-    FigureCanvasAgg(figure)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for panel, report in zip(panels, reports, strict=False):
         report.plot(panel)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -19,7 +19,6 @@ from .run import file_stem, scene_of
 Say = Callable[[str], None]
 
 
-@dataclass
 class TimePlan:
     """Divides ``seconds``, counted from construction, among ``parts``.
 
@@ -33,18 +32,13 @@ class TimePlan:
     5
     """
 
-    seconds: float
-    parts: int
-    _begun: float = field(default_factory=lambda: time.monotonic(), init=False)
-    _left: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._left = self.parts
+    def __init__(self, seconds: float, parts: int) -> None:
+        self._end, self._left = time.monotonic() + seconds, parts
 
     @property
     def remaining(self) -> float:
         """Remaining seconds, at least 0."""
-        return max(self.seconds - (time.monotonic() - self._begun), 0.0)
+        return max(self._end - time.monotonic(), 0.0)
 
     def next_fraction(self, weight: float = 1.0) -> float:
         """Seconds for the next part, which counts as ``weight`` later parts."""
@@ -118,7 +112,7 @@ def _run(name: str, effort: Effort, folder: Path | None, child: ChildProcess, wh
     entries = methods_of(name)
     plan = TimePlan(whole.next_fraction(), len(entries))
     # half of the time at most
-    seconds = min(effort.reference_seconds, 0.5 * plan.seconds / len(FINEST))
+    seconds = min(effort.reference_seconds, 0.5 * plan.remaining / len(FINEST))
     references = made_references(name, child, seconds) if stored is None else (stored,)
     methods = [method for method, _, _ in entries if any(method.name not in one.made_by for one in references)]
     if not methods:

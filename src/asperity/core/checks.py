@@ -73,12 +73,16 @@ def finite_array(name: str, value: ArrayLike) -> Floats:
         total = array.sum()
     if np.isfinite(total):
         return array
-    bad = ~np.isfinite(array)
+    _refuse_entries(name, "finite numbers", array, ~np.isfinite(array))
+    return array
+
+
+def _refuse_entries(name: str, expected: str, array: Floats, bad: NDArray[np.bool_]) -> None:
+    """Refuse an array with bad entries; the message names the first one."""
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(bad)[0])
-        index_text = f" at index {where}" if where else ""
-        raise InputError(f"{name}: expected finite numbers, got {array[where]}{index_text} ({int(bad.sum())} such)")
-    return array
+        index = f" at index {where}" if where else ""
+        raise InputError(f"{name}: expected {expected}, got {float(array[where])!r}{index} ({int(bad.sum())} such)")
 
 
 def shaped(name: str, value: ArrayLike, *axes: int | str) -> Floats:
@@ -105,7 +109,11 @@ def shaped(name: str, value: ArrayLike, *axes: int | str) -> Floats:
 
 def finite_number(name: str, value: Any) -> float:
     """Return ``value`` as a finite float."""
-    array = finite_array(name, value)
+    return one_number(name, finite_array(name, value))
+
+
+def one_number(name: str, array: Floats) -> float:
+    """Return the number in an array of no dimension."""
     if array.ndim:
         raise InputError(f"{name}: expected one number, got an array of shape {array.shape}")
     return float(array)
@@ -239,13 +247,7 @@ def angles(name: str, value: ArrayLike) -> Floats:
     if array.size and not (array.min() > 0.0 and array.max() < np.pi):
         finite_array(name, array)
         bad = ~((array > 0.0) & (array < np.pi))
-        where = tuple(int(i) for i in np.argwhere(bad)[0])
-        index_text = f" at index {where}" if where else ""
-        raise InputError(
-            f"{name}: expected angles in the open interval (0, pi), in radians, got {float(array[where])!r}"
-            f"{index_text} "
-            f"({int(bad.sum())} such)"
-        )
+        _refuse_entries(name, "angles in the open interval (0, pi), in radians", array, bad)
     return array
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Literal
 
-from .checks import numbers
+from .checks import choice, numbers, one_number
 from .errors import InputError
 from .tables import html_table
 
@@ -72,12 +72,11 @@ class Estimate:
     method: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "value", _number("value", self.value))
-        object.__setattr__(self, "error", _number("error", self.error))
+        object.__setattr__(self, "value", one_number("value", numbers("value", self.value)))
+        object.__setattr__(self, "error", one_number("error", numbers("error", self.error)))
         if not self.error >= 0.0:
             raise InputError(f"error: expected a half width of at least 0, got {self.error!r}; inf if it is not known")
-        if not isinstance(self.kind, str) or self.kind not in ("bound", "estimate"):
-            raise InputError(f"kind: expected 'bound' or 'estimate', got {self.kind!r}")
+        choice("kind", self.kind, ("bound", "estimate"))
         if not isinstance(self.method, str):
             raise InputError(f"method: expected words, got {self.method!r}")
 
@@ -93,13 +92,6 @@ class Estimate:
     def _repr_html_(self) -> str:
         lines = {"error": f"{self.error:.2g} ({self.kind})", "method": self.method}
         return html_table(f"{type(self).__name__} {self}", lines)
-
-
-def _number(name: str, value: Any) -> float:
-    found = numbers(name, value)
-    if found.ndim:
-        raise InputError(f"{name}: expected a number, got {value!r}")
-    return float(found)
 
 
 def compact(number: Estimate) -> str:

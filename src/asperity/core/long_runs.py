@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypedDict, TypeVar
 
@@ -50,19 +50,12 @@ class Engine(TypedDict, total=False):
     client: Any
 
 
-@dataclass(frozen=True)
-class _Packed:
-    """What a worker is sent: the function, whose arrays come back as a file of numpy's without pickle."""
-
-    function: Callable[[int], Mapping[str, Any]]
-
-    def part(self, number: int) -> bytes | tuple[str, str]:
-        """The packed arrays of a part, or the class and the words of the error that it ended with."""
-        try:
-            found = self.function(number)
-        except AsperityError as reason:  # a task must not raise
-            return type(reason).__name__, str(reason)
-        return packed_arrays(found)
+def _packed_part(function: Callable[[int], Mapping[str, Any]], number: int) -> bytes | tuple[str, str]:
+    """The arrays of a part as a file of numpy without pickle, or the class and the words of the error that ended it."""
+    try:
+        return packed_arrays(function(number))
+    except AsperityError as reason:  # a task must not raise
+        return type(reason).__name__, str(reason)
 
 
 def all_parts(
@@ -113,7 +106,7 @@ def all_parts(
                 packed |= {int(key): content for key, content in store.parts(read)}
             workers = stack.enter_context(connected(engine.get("client")))
             rest = [part for part in range(number) if part not in packed]
-            for part, content in results(_Packed(function).part, rest, workers):
+            for part, content in results(partial(_packed_part, function), rest, workers):
                 if isinstance(content, tuple):
                     raise (InputError if content[0] == "InputError" else AsperityError)(content[1])
                 packed[part] = content

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ..core.rounding import EPS
 from ..geometry import Disk
 from ..kernels import Bins, KernelMatrix, discretise, no_slip_matrix, smooth_matrix
 from ..spectral import SpectralGap, spectral_gap, spectrum
+from ..study.pictures import INCOMING, allowed_velocities
 from .question import Question
 
 # The first matrix: polygons of few pieces are exact, other walls have so many rays at most.
@@ -23,8 +25,7 @@ GAP_TOLERANCES = (0.1, 1e-3, 1e-6)
 # The last matrix, and the error asked of the image of each of its bins.
 BINS, BIN_TOLERANCE, RAYS = 96, 1e-3, 2**22
 EIGENVALUES, EIGENVALUE_TOLERANCE = 10, 1e-4
-# A disk that comes in at 45 degrees without spin; collisions of the first and of the last histogram.
-INCOMING = (1.0, -1.0, 0.0)
+# Collisions of the first and of the last histogram.
 FIRST_COLLISIONS, COLLISIONS, VELOCITY_BINS = 2**13, 2**18, 40
 
 
@@ -87,7 +88,17 @@ class Answer:
 
     def refused(self, quantity: str, reason: object) -> Answer:
         """The same with a reason why a quantity is missing."""
-        return replace(self, refusals=(*((q, r) for q, r in self.refusals if q != quantity), (quantity, str(reason))))
+        return replace(self, refusals=(*self._refusals_but(quantity), (quantity, str(reason))))
+
+    def improved(self, quantity: str, compute: Callable[[], dict[str, Any]], *, keep: bool = False) -> Answer:
+        """The same with the attributes that are computed, or with the reason why not, unless the old ones are kept."""
+        try:
+            return replace(self, refusals=self._refusals_but(quantity), **compute())
+        except AsperityError as reason:
+            return self if keep else self.refused(quantity, reason)
+
+    def _refusals_but(self, quantity: str) -> tuple[tuple[str, str], ...]:
+        return tuple(refusal for refusal in self.refusals if refusal[0] != quantity)
 
 
 def answers_to(question: Question) -> Iterator[Answer]:
@@ -106,13 +117,12 @@ def answers_to(question: Question) -> Iterator[Answer]:
     yield answer
     decided = answer.gap is not None and answer.gap.verdict == "no gap"
     for tolerance in () if decided else GAP_TOLERANCES[:-1]:
-        if _reached(answer, tolerance):
-            continue
-        answer = replace(_with_gap(answer, question, tolerance), stage=f"gap to {tolerance:g}")
-        yield answer
+        if not _reached(answer, tolerance):
+            answer = replace(_with_gap(answer, question, tolerance), stage=f"gap to {tolerance:g}")
+            yield answer
     answer = replace(_with_collision(answer, question, COLLISIONS), stage="collision")
     yield answer
-    answer = replace(_with_matrix(answer, question), stage="kernel")
+    answer = replace(_with_matrix(answer, question, BINS, BIN_TOLERANCE * BINS**0.5, RAYS), stage="kernel")
     yield answer
     answer = _with_eigenvalues_of_matrix(answer)
     if not (decided or _reached(answer, GAP_TOLERANCES[-1])):
@@ -130,14 +140,10 @@ def _reached(answer: Answer, tolerance: float) -> bool:
 
 def first_answer(question: Question) -> Answer:
     """A coarse answer: a small matrix, its eigenvalues, an upper limit of the gap, a small sample of collisions."""
-    answer = Answer("coarse")
-    try:
-        matrix = discretise(
-            question.law, Bins(FIRST_BINS), tolerance=FIRST_TOLERANCE, samples=FIRST_RAYS, rng=0
-        )  # fmt: skip
-        answer = _with_eigenvalues_of_matrix(replace(answer, matrix=matrix))
-    except AsperityError as reason:
-        answer = answer.refused("kernel", reason).refused("gap", reason).refused("spectrum", reason)
+    answer = _with_matrix(Answer("coarse"), question, FIRST_BINS, FIRST_TOLERANCE, FIRST_RAYS)
+    for _, reason in answer.refusals:
+        answer = answer.refused("gap", reason).refused("spectrum", reason)
+    answer = _with_eigenvalues_of_matrix(answer)
     if question.seen.is_polygonal and not question.seen.islands:
         # a theorem decides
         answer = _with_gap(answer, question, GAP_TOLERANCES[0])
@@ -164,60 +170,56 @@ def largest_gap(matrix: KernelMatrix) -> SpectralGap:
 
 
 def _with_eigenvalues_of_matrix(answer: Answer) -> Answer:
-    if answer.matrix is None:
+    matrix = answer.matrix
+    if matrix is None:
         return answer
-    try:
-        found = spectrum(answer.matrix, EIGENVALUES)
-    except AsperityError as reason:
-        return answer.refused("spectrum", reason)
-    parts = found.errors
-    errors = parts.algebraic + parts.quantile * parts.sampling
-    if not answer.matrix.samples:
-        errors = errors + float(answer.matrix.error)
-    return replace(answer, eigenvalues=Eigenvalues(found.values, errors, f"the matrix in {answer.matrix.basis!r}"))
+
+    def compute() -> dict[str, Any]:
+        found = spectrum(matrix, EIGENVALUES)
+        parts = found.errors
+        errors = parts.algebraic + parts.quantile * parts.sampling + (0.0 if matrix.samples else float(matrix.error))
+        return {"eigenvalues": Eigenvalues(found.values, errors, f"the matrix in {matrix.basis!r}")}
+
+    return answer.improved("spectrum", compute)
 
 
 def _with_eigenvalues_of_law(answer: Answer, question: Question) -> Answer:
-    try:
+    def compute() -> dict[str, Any]:
         found = spectrum(question.law, EIGENVALUES, tolerance=EIGENVALUE_TOLERANCE, rng=0)
-    except AsperityError as reason:
-        return answer.refused("spectrum", reason)
-    return replace(answer, eigenvalues=Eigenvalues(found.values, found.errors.total(), "the law"))
+        return {"eigenvalues": Eigenvalues(found.values, found.errors.total(), "the law")}
+
+    return answer.improved("spectrum", compute)
 
 
 def _with_gap(answer: Answer, question: Question, tolerance: float) -> Answer:
-    try:
-        found = spectral_gap(question.law, tolerance, 0)
-    except AsperityError as reason:
-        return answer if answer.gap is not None else answer.refused("gap", reason)
-    refusals = tuple((quantity, why) for quantity, why in answer.refusals if quantity != "gap")
-    return replace(answer, gap=found, refusals=refusals)
+    return answer.improved(
+        "gap", lambda: {"gap": spectral_gap(question.law, tolerance, 0)}, keep=answer.gap is not None
+    )
 
 
-def _with_matrix(answer: Answer, question: Question) -> Answer:
-    basis = Bins(BINS)
-    try:
-        matrix = discretise(question.law, basis, tolerance=BIN_TOLERANCE * np.sqrt(BINS), samples=RAYS, rng=0)
-    except AsperityError as reason:
-        return answer if answer.matrix is not None else answer.refused("kernel", reason)
-    return replace(answer, matrix=matrix)
+def _with_matrix(answer: Answer, question: Question, bins: int, tolerance: float, rays: int) -> Answer:
+    def compute() -> dict[str, Any]:
+        return {"matrix": discretise(question.law, Bins(bins), tolerance=tolerance, samples=rays, rng=0)}
+
+    return answer.improved("kernel", compute, keep=answer.matrix is not None)
 
 
 def _with_collision(answer: Answer, question: Question, number: int) -> Answer:
-    try:
-        law = question.collision
-        outgoing = law.sample(np.tile(INCOMING, (number, 1)), np.random.default_rng(0))[:, 0]
-    except AsperityError as reason:
-        return answer.refused("collision", reason)
-    return replace(answer, collision=histogram(outgoing, question.disk))
+    def compute() -> dict[str, Any]:
+        incoming = np.tile(INCOMING, (number, 1))
+        outgoing = question.collision.sample(incoming, np.random.default_rng(0))[:, 0]
+        return {"collision": histogram(outgoing, question.disk)}
+
+    return answer.improved("collision", compute)
 
 
 def histogram(outgoing: Floats, disk: Disk) -> Histogram:
     """Outgoing velocities in bins, with the intervals of their probabilities."""
     from scipy.special import betaincinv
 
-    reach = _largest_velocity(disk)
-    edges = np.linspace(reach[0], reach[1], VELOCITY_BINS + 1)
+    allowed = allowed_velocities(disk)[:, 0]
+    reach = float(allowed.min()), float(allowed.max())
+    edges = np.linspace(*reach, VELOCITY_BINS + 1)
     number = len(outgoing)
     counts = np.histogram(np.clip(outgoing, *reach), edges)[0]
     tail = 0.5 * (1.0 - LEVEL)
@@ -231,11 +233,3 @@ def histogram(outgoing: Floats, disk: Disk) -> Histogram:
     incoming = np.array(INCOMING)
     smooth, no_slip = (float((matrix(disk) @ incoming)[0]) for matrix in (smooth_matrix, no_slip_matrix))
     return Histogram(edges, counts / number, low, high, mean, smooth, no_slip)
-
-
-def _largest_velocity(disk: Disk) -> tuple[float, float]:
-    """The range of v1 that energy and rolling momentum allow."""
-    along, up, roll = (float(disk.inner(np.array(INCOMING), direction)) for direction in np.asarray(disk.frame))
-    frame = np.asarray(disk.frame)
-    centre, radius = roll * frame[2, 0], float(np.hypot(along, up)) * abs(frame[0, 0])
-    return centre - radius, centre + radius

@@ -10,22 +10,17 @@ import numpy as np
 
 from ..core.checks import Floats
 from ..core.errors import InputError
-from ..geometry import Disk, Wall, trace, trajectory
-from ..geometry.plotting.walls import vertical_stretch
-from ..kernels.bases.basis import Frame
+from ..geometry import Wall
+from ..geometry.plotting.walls import MARGIN, RAY_COLOURS, RayPath, heights, vertical_stretch
 from ..study.pictures import chosen_rays
-from .answers import Answer, Eigenvalues, Histogram, answers_to
-from .question import Question, editable
+from .answers import Answer, answers_to
+from .question import Question
 
-# Okabe and Ito's colours, as in the pictures of a study.
-RAY_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 KNOWN, SOLID = "#0072B2", "#d1d1d1"
 # Pixels a side of the kernel, and the power of its colour scale.
 PIXELS, COLOUR_POWER = 240, 0.5
-# Tolerance of curves relative to the period; parts of a period beside the cell, and free space above it.
-OUTLINE, MARGIN, FREE = 2e-4, 0.12, 0.3
-# More vertices are not drawn as handles.
-MOST_HANDLES = 400
+# Tolerance of curves relative to the period.
+OUTLINE = 2e-4
 # Pieces of a wall that is shown: to draw its rays takes three seconds.
 MOST_PIECES = 10_000
 # Milliseconds between two messages of a vertex that is being dragged.
@@ -43,24 +38,15 @@ if (now - (window.asperity_sent ?? 0) > interval) {
 
 @dataclass(frozen=True)
 class Picture:
-    """What `WallFigure` shows of a question, and whether its wall is of the catalogue."""
+    """What `WallFigure` shows of a question."""
 
     question: Question
-    named: bool
-    wall: Wall
     solids: list[Floats]
     rays: list[Floats]
 
-    @property
-    def handles(self) -> list[tuple[float, float]]:
-        """The vertices that can be dragged: those of a polygon that is not foreshortened."""
-        return [] if self.question.foreshortened else [(float(x), float(y)) for x, y in handles_of(self.wall)]
 
-
-def pictured_and_answered(
-    wall: Wall | Callable[[], Wall], name: str, disk: Disk, convention: Frame, foreshortened: bool, named: bool
-) -> Iterator[Picture | Answer]:
-    """Make the wall, then its picture and the answers to its question.
+def pictured_and_answered(wall: Wall | Callable[[], Wall], *about: Any) -> Iterator[Picture | Answer]:
+    """Make the wall, then the picture and the answers of its `Question`, of which ``about`` is all but the wall.
 
     Raises
     ------
@@ -70,25 +56,41 @@ def pictured_and_answered(
     Examples
     --------
     >>> from asperity.geometry import triangular_teeth
-    >>> len(next(pictured_and_answered(triangular_teeth, "teeth", Disk(), "paper", False, True)).handles)
+    >>> len(next(pictured_and_answered(triangular_teeth, "teeth")).question.handles)
     3
     """
-    made = wall() if callable(wall) else wall
-    if len(made.pieces) > MOST_PIECES:
+    question = Question(wall() if callable(wall) else wall, *about)
+    number = len(question.wall.pieces)
+    if number > MOST_PIECES:
         raise InputError(
-            f"{name}: expected a wall of at most {MOST_PIECES} pieces, got {len(made.pieces)}; thin it out, or use the "
+            f"{question.name}: expected a wall of at most {MOST_PIECES} pieces, got {number}; thin it out, or use the "
             "command `asperity study`, which has no limit"
         )
-    question = Question(made, name, disk, convention, foreshortened)
-    yield pictured(question, named)
+    yield pictured(question)
     yield from answers_to(question)
 
 
-def pictured(question: Question, named: bool = True) -> Picture:
+def pictured(question: Question) -> Picture:
     """The picture of a question."""
-    wall = question.seen
-    floor, free = _heights(wall)
-    return Picture(question, named, wall, solids(wall, floor), ray_lines(wall, free))
+    wall, (free, floor) = question.seen, heights(question.seen)
+    rays = [RayPath(wall, float(x), float(theta), free).path for x, theta in zip(*chosen_rays(wall), strict=True)]
+    return Picture(question, solids(wall, floor), rays)
+
+
+def _empty(*columns: str) -> Any:
+    """A source of these columns, whose lines are shown as soon as it has some."""
+    from bokeh.models import ColumnDataSource
+
+    return ColumnDataSource({name: [] for name in columns})
+
+
+def _clear(source: Any) -> None:
+    source.data = {name: [] for name in source.data}
+
+
+def _both(paths: list[Floats]) -> dict[str, Any]:
+    """Columns of a source of many lines."""
+    return {"xs": [path[:, 0].tolist() for path in paths], "ys": [path[:, 1].tolist() for path in paths]}
 
 
 def _figure(title: str, **options: Any) -> Any:
@@ -106,21 +108,10 @@ class WallFigure:
     """The wall, its rays, and the vertices that can be dragged (`vertices`, a source with columns x and y)."""
 
     def __init__(self) -> None:
-        from bokeh.models import (
-            ColumnDataSource,
-            CustomJS,
-            DataRange1d,
-            PanTool,
-            PointDrawTool,
-            ResetTool,
-            WheelZoomTool,
-        )
+        from bokeh.models import CustomJS, DataRange1d, PanTool, PointDrawTool, ResetTool, WheelZoomTool
 
-        self.vertices = ColumnDataSource({"x": [], "y": []})
-        self._solid = ColumnDataSource({"xs": [], "ys": []})
-        self._rays = ColumnDataSource({"xs": [], "ys": [], "colour": []})
-        self._ends = ColumnDataSource({"x": [], "y": [], "fill": [], "colour": []})
-        self._view = ColumnDataSource({"x": [], "y": []})
+        self.vertices, self._view, self._solid = _empty("x", "y"), _empty("x", "y"), _empty("xs", "ys")
+        self._rays, self._ends = _empty("xs", "ys", "colour"), _empty("x", "y", "fill", "colour")
         self.plot = plot = _figure("Wall", tools="", match_aspect=True, x_range=DataRange1d(range_padding=0.0),
                                    y_range=DataRange1d(range_padding=0.0))  # fmt: skip
         plot.patches("xs", "ys", source=self._solid, fill_color=SOLID, line_color="#333333", line_width=1.2)
@@ -145,94 +136,51 @@ class WallFigure:
 
         # in other text bokeh reads formulas
         self.plot.title.text = PlainText(text=title)
-        paths, wall = picture.solids, picture.wall
-        self._solid.data = {
-            "xs": [path[:, 0].tolist() for path in paths], "ys": [path[:, 1].tolist() for path in paths],
+        self._solid.data = _both(picture.solids)
+        colours = [RAY_COLOURS[k % len(RAY_COLOURS)] for k in range(len(picture.rays))]
+        self._rays.data = {**_both(picture.rays), "colour": colours}
+        # a dot where a ray enters, a ring where it leaves
+        ends = [line[k].tolist() for line in picture.rays for k in (1, -2)]
+        self._ends.data = {
+            "x": [x for x, _ in ends], "y": [y for _, y in ends],
+            "fill": [fill for colour in colours for fill in (colour, "white")],
+            "colour": [colour for colour in colours for _ in range(2)],
         }  # fmt: skip
-        self._show_rays(picture.rays)
         if dragged:
             return
-        self.show_vertices(picture.handles)
+        wall, handles = picture.question.seen, picture.question.handles
+        vertices = {"x": [x for x, _ in handles], "y": [y for _, y in handles]}
+        if vertices != {name: list(self.vertices.data[name]) for name in vertices}:
+            self.vertices.data = vertices
         left, right = -MARGIN * wall.period, (1.0 + MARGIN) * wall.period
-        self._view.data = {"x": [left, right], "y": list(_heights(wall))}
+        self._view.data = {"x": [left, right], "y": list(heights(wall))}
         self.plot.aspect_scale = vertical_stretch(wall)
         self.plot.xaxis.axis_label = PlainText(text=f"x ({wall.unit or 'length units of the wall'})")
         self.plot.yaxis.axis_label = PlainText(text=f"y ({wall.unit})" if wall.unit else "y")
 
-    def show_vertices(self, points: list[tuple[float, float]]) -> None:
-        """Show handles at these points; none for a wall that is not `editable`."""
-        x, y = zip(*points, strict=True) if points else ((), ())
-        if list(x) != list(self.vertices.data["x"]) or list(y) != list(self.vertices.data["y"]):
-            self.vertices.data = {"x": list(x), "y": list(y)}
-
-    def _show_rays(self, lines: list[Floats]) -> None:
-        colours = [RAY_COLOURS[k % len(RAY_COLOURS)] for k in range(len(lines))]
-        self._rays.data = {
-            "xs": [line[:, 0].tolist() for line in lines], "ys": [line[:, 1].tolist() for line in lines],
-            "colour": colours,
-        }  # fmt: skip
-        # a dot where a ray enters, a ring where it leaves
-        ends = [line[k] for line in lines for k in (1, -2)]
-        self._ends.data = {
-            "x": [float(point[0]) for point in ends], "y": [float(point[1]) for point in ends],
-            "fill": [fill for colour in colours for fill in (colour, "white")],
-            "colour": [colour for colour in colours for _ in range(2)],
-        }  # fmt: skip
-
-
-def handles_of(wall: Wall) -> Any:
-    """The vertices of a wall that can be dragged, or none."""
-    return wall.vertices if editable(wall) and len(wall.vertices) <= MOST_HANDLES else []
-
-
-def _heights(wall: Wall) -> tuple[float, float]:
-    """y at the bottom and at the top of the figure."""
-    size = max(wall.depth, 0.02 * wall.period)
-    free = FREE * max(wall.depth, min(wall.period, 20.0 * size))
-    return -size - 0.35 * free, free
-
 
 def solids(wall: Wall, floor: float) -> list[Floats]:
     """The solid below three periods of the wall, down to ``floor``, and its islands, as closed polygons."""
-    outline = wall.outline(OUTLINE * wall.period)
-    shift = np.array([wall.period, 0.0])
+    outline, shift = wall.outline(OUTLINE * wall.period), np.array([wall.period, 0.0])
     path = np.concatenate([outline[:-1] - shift, outline[:-1], outline + shift])
     # below the figure, so that the line around the solid is not seen there
     low = 2.0 * floor - wall.period
-    below = [path, np.array([[path[-1, 0], low], [path[0, 0], low]])]
-    islands = [
-        np.vstack([piece.flattened(OUTLINE * wall.period) for piece in island]) + k * shift
-        for island in wall.islands
-        for k in (-1, 0, 1)
+    loops = [np.vstack([piece.flattened(OUTLINE * wall.period) for piece in island]) for island in wall.islands]
+    return [
+        np.vstack([path, [[path[-1, 0], low], [path[0, 0], low]]]),
+        *(loop + k * shift for loop in loops for k in (-1, 0, 1)),
     ]
-    return [np.vstack(below), *islands]
-
-
-def ray_lines(wall: Wall, free: float) -> list[Floats]:
-    """The paths of a few rays, from above the wall through its hollows and out again, each (n, 2)."""
-    x, theta = chosen_rays(wall)
-    lines = []
-    for place, angle in zip(x, theta, strict=True):
-        result = trace(wall, float(place), float(angle))
-        inside = np.asarray(trajectory(wall, float(place), float(angle)))
-        leaves = np.array([np.cos(float(result.theta)), np.sin(float(result.theta))])
-        comes = np.array([np.cos(float(angle)), np.sin(float(angle))])
-        last = np.array([float(result.x), inside[0, 1]])
-        points = [inside[0] + free * comes / comes[1], *inside[:-1], last]
-        lines.append(np.array([*points, last + free * leaves / max(leaves[1], 0.2 * abs(leaves[0]))]))
-    return lines
 
 
 class KernelFigure:
     """The density of the law with respect to the invariant measure."""
 
     def __init__(self) -> None:
-        from bokeh.models import BasicTicker, ColumnDataSource, HoverTool, LinearColorMapper
+        from bokeh.models import BasicTicker, HoverTool, LinearColorMapper
         from bokeh.models.annotations import ColorBar
         from bokeh.palettes import Viridis256
 
-        self._image = ColumnDataSource({"root": [], "density": []})
-        self._lines = ColumnDataSource({"x": [0.0, np.pi], "retro": [0.0, np.pi], "specular": [np.pi, 0.0]})
+        self._image, self._lines = _empty("root", "density"), _empty("x", "retro", "specular")
         self.plot = plot = _figure("Kernel", tools="pan,wheel_zoom,reset", x_range=(0.0, np.pi), y_range=(0.0, np.pi))
         self._mapper = LinearColorMapper(palette=Viridis256, low=0.0, high=1.0)
         image = plot.image("root", x=0.0, y=0.0, dw=np.pi, dh=np.pi, source=self._image, color_mapper=self._mapper)
@@ -250,7 +198,7 @@ class KernelFigure:
         """Draw the matrix with its error in the title; nothing where it is refused."""
         matrix = answer.matrix
         if matrix is None:
-            self._image.data = {"root": [], "density": []}
+            _clear(self._image)
             self.plot.title.text = "Kernel: refused"
             return
         # uniform angles, and the cell in which each is
@@ -260,9 +208,8 @@ class KernelFigure:
         root = np.maximum(density, 0.0) ** COLOUR_POWER
         self._mapper.high = float(root.max())
         self._image.data = {"root": [root.astype(np.float32)], "density": [density.astype(np.float32)]}
-        retro, specular = [0.0, np.pi], [np.pi, 0.0]
-        both = (retro, specular) if matrix.frame == "paper" else (specular, retro)
-        self._lines.data = {"x": [0.0, np.pi], "retro": both[0], "specular": both[1]}
+        retro = [0.0, np.pi] if matrix.frame == "paper" else [np.pi, 0.0]
+        self._lines.data = {"x": [0.0, np.pi], "retro": retro, "specular": retro[::-1]}
         self.plot.title.text = f"Kernel in {matrix.basis!r}, Frobenius error {float(matrix.error):.1e}"
 
 
@@ -270,10 +217,9 @@ class SpectrumFigure:
     """Eigenvalues with their errors; hollow if they are those of a matrix. The gap is shaded."""
 
     def __init__(self) -> None:
-        from bokeh.models import ColumnDataSource
         from bokeh.models.annotations import BoxAnnotation, Whisker
 
-        self._values = ColumnDataSource({"rank": [], "value": [], "low": [], "high": [], "fill": []})
+        self._values = _empty("rank", "value", "low", "high", "fill")
         self.plot = plot = _figure("Spectrum", tools="pan,wheel_zoom,reset", y_range=(-0.2, 1.1), x_range=(-0.7, 9.7))
         # the surest part of the gap, and what its error leaves open
         self._sure = BoxAnnotation(top=1.0, fill_color="#999999", fill_alpha=0.35, line_color=None, level="underlay")
@@ -288,41 +234,34 @@ class SpectrumFigure:
 
     def show(self, answer: Answer) -> None:
         """Draw eigenvalues and gap; nothing where they are refused."""
-        found = answer.eigenvalues
+        found, gap = answer.eigenvalues, answer.gap
         if found is None:
-            self._values.data = {name: [] for name in ("rank", "value", "low", "high", "fill")}
+            _clear(self._values)
             self.plot.title.text = "Spectrum: not known"
         else:
-            self._show_values(found)
-        gap = answer.gap
+            error = np.where(np.isfinite(found.errors), found.errors, 2.0)
+            low, high = np.clip(found.values - error, -1.0, 1.0), np.clip(found.values + error, -1.0, 1.0)
+            fill = KNOWN if found.of == "the law" else "white"
+            self._values.data = {
+                "rank": list(range(len(found.values))), "value": found.values.tolist(), "low": low.tolist(),
+                "high": high.tolist(), "fill": [fill] * len(found.values),
+            }  # fmt: skip
+            self.plot.y_range.start = -1.1 if low.min() < -0.5 else min(-0.2, float(low.min()) - 0.1)
+            self.plot.title.text = f"Eigenvalues of {found.of} ± {float(np.max(found.errors)):.0e}"
         shaded = gap is not None and gap.verdict != "no gap"
         self._sure.visible = self._open.visible = shaded
         if gap is not None and shaded:
-            low, high = max(gap.value - gap.error, 0.0), min(gap.value + gap.error, 2.0)
-            self._sure.bottom = 1.0 - low
-            self._open.top, self._open.bottom = 1.0 - low, 1.0 - high
-
-    def _show_values(self, found: Eigenvalues) -> None:
-        error = np.where(np.isfinite(found.errors), found.errors, 2.0)
-        low, high = np.clip(found.values - error, -1.0, 1.0), np.clip(found.values + error, -1.0, 1.0)
-        of_law = found.of == "the law"
-        self._values.data = {
-            "rank": list(range(len(found.values))), "value": found.values.tolist(), "low": low.tolist(),
-            "high": high.tolist(), "fill": [KNOWN if of_law else "white"] * len(found.values),
-        }  # fmt: skip
-        self.plot.y_range.start = -1.1 if low.min() < -0.5 else min(-0.2, float(low.min()) - 0.1)
-        largest = float(np.max(found.errors))
-        self.plot.title.text = f"Eigenvalues of {found.of} ± {largest:.0e}"
+            self._sure.bottom = self._open.top = 1.0 - max(gap.value - gap.error, 0.0)
+            self._open.bottom = 1.0 - min(gap.value + gap.error, 2.0)
 
 
 class CollisionFigure:
     """The outgoing velocity v1 of a disk that comes in at 45 degrees without spin."""
 
     def __init__(self) -> None:
-        from bokeh.models import ColumnDataSource
         from bokeh.models.annotations import Span, TeeHead, Whisker
 
-        self._bins = ColumnDataSource({"left": [], "right": [], "middle": [], "top": [], "low": [], "high": []})
+        self._bins = _empty("left", "right", "middle", "top", "low", "high")
         self.plot = plot = _figure("Collision", tools="pan,wheel_zoom,reset")
         plot.quad(left="left", right="right", top="top", bottom=0.0, source=self._bins, fill_color="#8c8c8c",
                   line_color="white", line_width=0.5)  # fmt: skip
@@ -344,10 +283,11 @@ class CollisionFigure:
         plot.yaxis.axis_label = "probability per bin"
         plot.y_range.start = 0.0
 
-    def show(self, found: Histogram | None) -> None:
+    def show(self, answer: Answer) -> None:
         """Draw the histogram with intervals of 95 %; nothing where it is refused."""
+        found = answer.collision
         if found is None:
-            self._bins.data = {name: [] for name in self._bins.data}
+            _clear(self._bins)
             self.plot.title.text = "Collision: refused"
             return
         self._bins.data = {

@@ -14,12 +14,12 @@ from bokeh.events import PanEnd, PanStart
 
 from ..core.errors import AsperityError
 from ..core.estimates import compact
-from ..geometry import WALLS, Disk, Wall
+from ..geometry import WALLS, Disk, Wall, wall_from_text
 from . import drawing
 from .answers import Answer
 from .background import Background
 from .files import new_folder, opened, plain_name, studied, unpacked, wall_as_toml
-from .question import Question, named, pinned, with_new_vertex
+from .question import MOST_HANDLES, Question, draggable_vertices, pinned, with_new_vertex
 
 # Milliseconds between two looks for better answers.
 INTERVAL = 40
@@ -31,7 +31,7 @@ RANGES = {
 }  # fmt: skip
 DRAWN = "a polygon of your own"
 CONVENTIONS = {"retroreflection = identity": "paper", "specular = identity": "specular"}
-REFINING = "refining"
+STRETCH: dict[str, Any] = {"sizing_mode": "stretch_width"}
 # As many columns of figures as fit.
 GRID = {"display": "grid", "grid-template-columns": "repeat(auto-fit, minmax(min(400px, 100%), 1fr))"}
 STYLE = """
@@ -66,7 +66,7 @@ class Page:
     def __init__(
         self, wall: Wall, name: str, parameters: dict[str, float | int] | None = None, out: Path | None = None
     ) -> None:
-        self.question = Question(wall, name)
+        self.question = Question(wall, name, of_catalogue=name in WALLS)
         self.answer: Answer | None = None
         self.message = ""
         self._out = out
@@ -77,7 +77,7 @@ class Page:
         self._was_busy = False
         self._make_figures()
         self._make_controls(parameters or {})
-        self.ask(wall, name, of_catalogue=name in WALLS)
+        self.ask(wall, name, of_catalogue=self.question.of_catalogue)
         if pn.state.curdoc is not None and pn.state.curdoc.session_context is not None:
             pn.state.add_periodic_callback(self.collect, INTERVAL)
 
@@ -90,24 +90,19 @@ class Page:
 
     def _make_controls(self, parameters: dict[str, float | int]) -> None:
         name = self.question.name
-        self.choice = pn.widgets.Select(name="Wall", options=[*WALLS, DRAWN], value=name if name in WALLS else DRAWN,
-                                        sizing_mode="stretch_width")  # fmt: skip
-        self.sliders = pn.Column(sizing_mode="stretch_width", margin=0)
+        chosen = name if self.question.of_catalogue else DRAWN
+        self.choice = pn.widgets.Select(name="Wall", options=[*WALLS, DRAWN], value=chosen, **STRETCH)
+        self.sliders = pn.Column(margin=0, **STRETCH)
         self.parameters: dict[str, Any] = {}
         self.mass = _slider("mass of the disk", *RANGES["mass"], self.question.disk.mass)
         self.inertia = _slider("inertia of the disk", *RANGES["inertia"], self.question.disk.inertia)
         self.convention = pn.widgets.RadioButtonGroup(
-            name="Convention", options=CONVENTIONS, value="paper", orientation="vertical", sizing_mode="stretch_width"
+            name="Convention", options=CONVENTIONS, value="paper", orientation="vertical", **STRETCH
         )
-        self.foreshortened = pn.widgets.Toggle(
-            name="Foreshorten: the wall as the disk feels it", sizing_mode="stretch_width"
-        )
-        self.file = pn.widgets.FileInput(name="Wall file or profile", sizing_mode="stretch_width")
-        self.options = pn.widgets.TextInput(
-            name="Options of a profile", placeholder="seam=step,units=um/nm", sizing_mode="stretch_width"
-        )
-        self.status = pn.pane.HTML("", sizing_mode="stretch_width", stylesheets=[STYLE])
-        self.table = pn.pane.HTML("", sizing_mode="stretch_width", stylesheets=[STYLE])
+        self.foreshortened = pn.widgets.Toggle(name="Foreshorten: the wall as the disk feels it", **STRETCH)
+        self.file = pn.widgets.FileInput(name="Wall file or profile", **STRETCH)
+        self.options = pn.widgets.TextInput(name="Options of a profile", placeholder="seam=step,units=um/nm", **STRETCH)
+        self.status, self.table, self.saved = (pn.pane.HTML("", stylesheets=[STYLE], **STRETCH) for _ in range(3))
         self._make_saving()
         self._make_sliders(parameters)
         self.choice.param.watch(lambda _: self._wall_chosen(), "value")
@@ -116,23 +111,21 @@ class Page:
             widget.param.watch(lambda _: self._ask_again(), "value")
 
     def _make_saving(self) -> None:
-        stretch: dict[str, Any] = {"sizing_mode": "stretch_width"}
-        self.study = pn.widgets.Button(name="Make the study", button_type="primary", **stretch)
+        self.study = pn.widgets.Button(name="Make the study", button_type="primary", **STRETCH)
         self.study.on_click(lambda _: self._study())
         if self._out is None:
             self.save: Any = pn.widgets.FileDownload(
                 callback=lambda: io.BytesIO(wall_as_toml(self.question.seen)), filename="wall.toml",
-                label="Save the wall", **stretch,
+                label="Save the wall", **STRETCH,
             )  # fmt: skip
             self.take: Any = pn.widgets.FileDownload(
                 callback=lambda: io.BytesIO(self._archive or b""), filename="study.zip", label="Take the study",
-                visible=False, **stretch,
+                visible=False, **STRETCH,
             )  # fmt: skip
         else:
-            self.save = pn.widgets.Button(name="Save the wall", **stretch)
+            self.save = pn.widgets.Button(name="Save the wall", **STRETCH)
             self.save.on_click(lambda _: self._write_wall())
             self.take = pn.Spacer(height=0)
-        self.saved = pn.pane.HTML("", sizing_mode="stretch_width", stylesheets=[STYLE])
 
     def _make_sliders(self, parameters: dict[str, float | int]) -> None:
         entry = WALLS.get(self.choice.value)
@@ -145,18 +138,17 @@ class Page:
 
     def view(self) -> Any:
         """Everything, in columns that wrap on narrow screens."""
-        figures = (self.wall_figure.plot, self.kernel.plot, self.spectrum.plot, self.collision.plot)
-        panes = [pn.pane.Bokeh(plot, sizing_mode="stretch_width", margin=4) for plot in figures]
+        figures = (self.wall_figure, self.kernel, self.spectrum, self.collision)
+        panes = [pn.pane.Bokeh(figure.plot, margin=4, **STRETCH) for figure in figures]
         controls = pn.Column(
             self.choice, self.sliders, self.mass, self.inertia, self.foreshortened, self.convention, self.options,
             self.file, self.save, self.study, self.take, self.saved, styles={"flex": "1 1 240px", "min-width": "240px"},
             margin=4,
         )  # fmt: skip
         title = pn.pane.HTML("<h2 style='margin: 4px 0'>asperity explore</h2>", stylesheets=[STYLE])
-        plots = pn.Column(*panes, styles=GRID, sizing_mode="stretch_width", margin=0)
+        plots = pn.Column(*panes, styles=GRID, margin=0, **STRETCH)
         shown = pn.Column(self.status, self.table, plots, styles={"flex": "5 1 300px", "min-width": "300px"}, margin=4)
-        both = pn.FlexBox(controls, shown, align_items="flex-start", sizing_mode="stretch_width")
-        return pn.Column(title, both, sizing_mode="stretch_width")
+        return pn.Column(title, pn.FlexBox(controls, shown, align_items="flex-start", **STRETCH), **STRETCH)
 
     # -- what the user does
 
@@ -164,16 +156,12 @@ class Page:
         if self._filling:
             return
         self._make_sliders({})
-        entry = WALLS.get(self.choice.value)
-        if entry is not None:
-            self.ask(partial(named, entry.name, {}), entry.name, of_catalogue=True)
+        if self.choice.value in WALLS:
+            self._parameters_moved()
         else:
-            self._polygon_from_here()
-
-    def _polygon_from_here(self) -> None:
-        """A polygon to drag, where the wall is one already, or a plain one."""
-        points = drawing.handles_of(self.question.wall)
-        self._ask_polygon(points if len(points) else [(0, 0), (0.3, -0.5), (0.6, -0.2), (1, 0)])
+            # the wall where it is a polygon that can be dragged already, or a plain one
+            points = draggable_vertices(self.question.wall)
+            self._ask_polygon(points or [(0, 0), (0.3, -0.5), (0.6, -0.2), (1, 0)])
 
     def _ask_polygon(self, points: Any) -> None:
         self.ask(partial(Wall.from_vertices, points, self.question.wall.unit), "polygon")
@@ -181,14 +169,14 @@ class Page:
     def _parameters_moved(self) -> None:
         if self._filling:
             return
-        name, values = self.choice.value, {key: slider.value for key, slider in self.parameters.items()}
         for key, slider in self.parameters.items():
             # what is sent to the server need not come from the slider
             start, end = slider.start or 0, slider.end or 0
             if isinstance(slider, pn.widgets.IntSlider) and not start <= (slider.value or 0) <= end:
                 self._refuse(f"{key}: expected {start} to {end}, got {slider.value}; use the slider")
                 return
-        self.ask(partial(named, name, values), name, of_catalogue=True)
+        name, values = self.choice.value, ",".join(f"{key}={one.value!r}" for key, one in self.parameters.items())
+        self.ask(partial(wall_from_text, f"{name}:{values}"), name, of_catalogue=True)
 
     def _file_sent(self) -> None:
         if not self.file.value:
@@ -212,14 +200,13 @@ class Page:
             self._settle()
 
     def _vertices_changed(self, _name: str, _old: Any, new: Any) -> None:
-        if len(new["x"]) > drawing.MOST_HANDLES:
-            self._refuse(
-                f"expected at most {drawing.MOST_HANDLES} vertices to drag, got {len(new['x'])}; open a file instead"
-            )
+        number = len(new["x"])
+        if number > MOST_HANDLES:
+            self._refuse(f"expected at most {MOST_HANDLES} vertices to drag, got {number}; open a file instead")
             self._settle()
             return
         points = list(zip(new["x"], new["y"], strict=True))
-        before = [] if self._picture is None else self._picture.handles
+        before = [] if self._picture is None else self._picture.question.handles
         if points == before and not self._awaited:
             return
         if len(points) == len(before) + 1 and not self._dragging:
@@ -260,14 +247,15 @@ class Page:
 
     def _ask_again(self) -> None:
         """Ask for the wall that is awaited, or else the last valid one, with the disk and convention chosen now."""
-        last = self.question.wall, self.question.name, self._picture is None or self._picture.named
+        last = self.question.wall, self.question.name, self.question.of_catalogue
         wall, name, of_catalogue = self._asked if self._awaited else last
         self.ask(wall, name, of_catalogue=of_catalogue)
 
     def _show_wall(self, picture: drawing.Picture, *, dragged: bool) -> None:
-        felt = ", as the disk feels it" if picture.question.foreshortened else ""
-        hint = ": drag its vertices, tap to add one" if picture.handles else ""
-        title = f"{picture.question.name}, depth {picture.wall.depth:.4g}{felt}{hint}"
+        question = picture.question
+        felt = ", as the disk feels it" if question.foreshortened else ""
+        hint = ": drag its vertices, tap to add one" if question.handles else ""
+        title = f"{question.name}, depth {question.seen.depth:.4g}{felt}{hint}"
         self.wall_figure.show(picture, title, dragged=dragged)
 
     def collect(self) -> None:
@@ -280,7 +268,9 @@ class Page:
                 self._came(result, outdated=outdated)
             else:
                 self.answer = result
-                self._show_answer(result)
+                for figure in (self.kernel, self.spectrum, self.collision):
+                    figure.show(result)
+                self.table.object = answer_as_html(result)
             self._show_status()
         for error, archive in self._saving.collect():
             self._study_came(error, archive)
@@ -292,7 +282,7 @@ class Page:
         """Take a valid wall; vertices that have changed since are left alone."""
         self._picture, self.question, self._awaited = picture, picture.question, outdated
         self._show_wall(picture, dragged=self._dragging or outdated)
-        if not picture.named and self.choice.value != DRAWN:
+        if not self.question.of_catalogue and self.choice.value != DRAWN:
             self._choose(DRAWN)
 
     def _failed(self, error: str, *, outdated: bool) -> None:
@@ -308,24 +298,16 @@ class Page:
                 self._awaited = False
         self.message = error
 
-    def _show_answer(self, answer: Answer) -> None:
-        self.kernel.show(answer)
-        self.spectrum.show(answer)
-        self.collision.show(answer.collision)
-        self.table.object = answer_as_html(answer)
-
     def _show_status(self) -> None:
         if self.message:
-            self.status.object = (
-                "<div role='alert' style='background: #fde8d8; border-left: 4px solid #D55E00; padding: 6px'>"
-                f"{html.escape(self.message)}. The last valid answer stays.</div>"
-            )
-            return
-        busy = self._background.busy
-        known = self.answer.stage if self.answer is not None else "nothing yet"
-        text = f"{REFINING}; known so far: {known}" if busy else "done"
-        colour = "#56B4E9" if busy else "#009E73"
-        self.status.object = f"<div role='status' style='border-left: 4px solid {colour}; padding: 6px'>{text}</div>"
+            role, style = "alert", "background: #fde8d8; border-left: 4px solid #D55E00"
+            text = f"{html.escape(self.message)}. The last valid answer stays."
+        elif self._background.busy:
+            role, style = "status", "border-left: 4px solid #56B4E9"
+            text = f"refining; known so far: {'nothing yet' if self.answer is None else self.answer.stage}"
+        else:
+            role, style, text = "status", "border-left: 4px solid #009E73", "done"
+        self.status.object = f"<div role='{role}' style='{style}; padding: 6px'>{text}</div>"
 
     # -- saving
 
@@ -336,8 +318,8 @@ class Page:
             self.question.seen.save(file)
         except AsperityError as reason:
             self._tell(str(reason))
-            return
-        self._tell(f"wrote {file}")
+        else:
+            self._tell(f"wrote {file}")
 
     def _study(self) -> None:
         self._archive, self.study.disabled = None, True
@@ -371,13 +353,9 @@ class Page:
 
 def _slider(name: str, low: float, high: float, value: float) -> Any:
     if isinstance(low, int):
-        return pn.widgets.IntSlider(
-            name=name, start=low, end=max(int(high), int(value)), value=int(value), sizing_mode="stretch_width"
-        )
-    return pn.widgets.EditableFloatSlider(
-        name=name, start=min(low, value), end=max(high, value), fixed_start=0.0, step=0.01, value=float(value),
-        sizing_mode="stretch_width",
-    )  # fmt: skip
+        return pn.widgets.IntSlider(name=name, start=low, end=max(int(high), int(value)), value=int(value), **STRETCH)
+    span: dict[str, float] = {"start": min(low, value), "end": max(high, value), "value": float(value)}
+    return pn.widgets.EditableFloatSlider(name=name, fixed_start=0.0, step=0.01, **span, **STRETCH)
 
 
 def _forget(sliders: Iterable[Any]) -> None:
@@ -408,14 +386,12 @@ def answer_as_html(answer: Answer) -> str:
         rows["by"] = html.escape(gap.method)
     if answer.matrix is not None:
         matrix, error = answer.matrix, answer.matrix.error
-        rows["kernel"] = html.escape(
-            f"{matrix.basis!r}, {matrix.method}, Frobenius error {float(error):.1e} ({error.kind})"
-        )
+        kernel = f"{matrix.basis!r}, {matrix.method}, Frobenius error {float(error):.1e} ({error.kind})"
+        rows["kernel"] = html.escape(kernel)
     if answer.collision is not None:
         mean = answer.collision.mean
-        rows["collision"] = (
-            f"mean outgoing v1 <b>{html.escape(compact(mean))}</b>, error {mean.error:.1e}, {mean.method}"
-        )
-    rows |= {f"{quantity}": f"refused: {html.escape(reason)}" for quantity, reason in answer.refusals}
+        value = f"<b>{html.escape(compact(mean))}</b>"
+        rows["collision"] = f"mean outgoing v1 {value}, error {mean.error:.1e}, {mean.method}"
+    rows |= {quantity: f"refused: {html.escape(reason)}" for quantity, reason in answer.refusals}
     cells = "".join(f"<tr><td>{title}</td><td>{text}</td></tr>" for title, text in rows.items())
     return f"<table class='asperity-answers'>{cells}</table>"

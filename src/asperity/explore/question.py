@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
 
 from ..core.checks import Floats
-from ..geometry import WALLS, Disk, Wall
+from ..geometry import Disk, Wall
 from ..kernels import CollisionLaw, Law, WallLaw
 from ..kernels.bases.basis import Frame
 
 Points: TypeAlias = Sequence[tuple[float, float]]
+# Of a wall with more vertices none can be dragged.
+MOST_HANDLES = 400
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,8 @@ class Question:
         Of kernel, spectrum and gap.
     foreshortened : bool
         Whether they are those of the wall that the disk feels, instead of the wall itself.
+    of_catalogue : bool
+        Whether the wall is a named one.
 
     Examples
     --------
@@ -43,8 +48,9 @@ class Question:
     disk: Disk = field(default_factory=Disk)
     convention: Frame = "paper"
     foreshortened: bool = False
+    of_catalogue: bool = False
 
-    @property
+    @cached_property
     def seen(self) -> Wall:
         """The wall whose law is shown."""
         return self.wall.foreshorten(self.disk) if self.foreshortened else self.wall
@@ -56,32 +62,28 @@ class Question:
         return law.in_specular_frame() if self.convention == "specular" else law
 
     @property
+    def handles(self) -> list[tuple[float, float]]:
+        """The vertices that can be dragged, none of a foreshortened wall."""
+        return [] if self.foreshortened else draggable_vertices(self.wall)
+
+    @property
     def collision(self) -> CollisionLaw:
         """The collision law of the disk with the wall itself."""
         return CollisionLaw.from_wall(self.wall, self.disk)
 
 
-def named(name: str, parameters: Mapping[str, float | int]) -> Wall:
-    """A wall of the catalogue.
-
-    Examples
-    --------
-    >>> named("triangular-teeth", {"angle": 1.0}) == WALLS["triangular-teeth"].build(angle=1.0)
-    True
-    """
-    return WALLS[name].build(**parameters)
-
-
-def editable(wall: Wall) -> bool:
-    """Whether the vertices of a wall can be dragged: a polygon without islands that begins at a highest point.
+def draggable_vertices(wall: Wall) -> list[tuple[float, float]]:
+    """The vertices that can be dragged: those of a polygon without islands that begins at a highest point.
 
     Examples
     --------
     >>> from asperity.geometry import focusing_arcs, triangular_teeth
-    >>> editable(triangular_teeth(1.0)), editable(focusing_arcs(1.0))
-    (True, False)
+    >>> len(draggable_vertices(triangular_teeth(1.0))), draggable_vertices(focusing_arcs(1.0))
+    (3, [])
     """
-    return wall.is_polygonal and not wall.islands and bool(wall.vertices[0, 1] == 0.0)
+    if not wall.is_polygonal or wall.islands or wall.vertices[0, 1] != 0.0 or len(wall.vertices) > MOST_HANDLES:
+        return []
+    return [(x, y) for x, y in wall.vertices.tolist()]
 
 
 def pinned(points: Points | Floats, period: float) -> list[tuple[float, float]]:
@@ -105,12 +107,10 @@ def with_new_vertex(points: Points | Floats) -> list[tuple[float, float]]:
     >>> with_new_vertex([(0, 0), (0.5, -1), (1, 0), (0.8, -0.3)])
     [(0.0, 0.0), (0.5, -1.0), (0.8, -0.3), (1.0, 0.0)]
     """
-    *old, new = np.asarray(points, dtype=np.float64)
-    starts, ends = np.array(old[:-1]), np.array(old[1:])
-    along = ends - starts
-    length = np.maximum(np.sum(along**2, axis=1), np.finfo(float).tiny)
-    fraction = np.clip(np.sum((new - starts) * along, axis=1) / length, 0.0, 1.0)
-    distance = np.linalg.norm(starts + fraction[:, None] * along - new, axis=1)
-    where = int(np.argmin(distance)) + 1
-    ordered = [*old[:where], new, *old[where:]]
-    return [(float(x), float(y)) for x, y in ordered]
+    *old, new = np.asarray(points, dtype=np.float64) @ [1.0, 1.0j]
+    starts, sides = np.array(old[:-1]), np.diff(old)
+    length = np.maximum(np.abs(sides) ** 2, np.finfo(float).tiny)
+    fraction = np.clip(((new - starts) * sides.conj()).real / length, 0.0, 1.0)
+    where = int(np.argmin(np.abs(starts + fraction * sides - new))) + 1
+    *old, new = points
+    return [(float(x), float(y)) for x, y in (*old[:where], new, *old[where:])]

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..core.errors import AsperityError
 from ..core.estimates import Estimate, estimate_as_dict, finite, rounded
-from ..spectral import diffusivity, mean_squared_slope
+from ..geometry import Wall
+from ..kernels import Law
+from ..spectral import Diffusivity, SpectralGap, Spectrum, diffusivity, mean_squared_slope
 from ..spectral.consequences.mixing import relaxation_time, slem_from_gap
-
-if TYPE_CHECKING:
-    from ..geometry import Wall
-    from ..kernels import Law
-    from ..spectral import Diffusivity, SpectralGap, Spectrum
 
 
 @dataclass(frozen=True)
@@ -70,15 +67,14 @@ class Consequences:
             else:
                 time = f"no relaxation time: slem {'is' if self.without_gap else 'may be'} 1"
             lines.append(f"slem {rounded(self.slem)} ({self.slem.kind}: {self.slem.method}), {time}")
-        if self.diffusion is not None:
-            found = self.diffusion
+        if (found := self.diffusion) is None:
+            lines.append(f"diffusivity refused: {self.refusal}")
+        else:
             eta = Estimate(found.eta, found.eta_error, found.kind, "")
             lines.append(
                 f"channel of half-width 1, speed 1: D = {found}, not L^2/tau itself, which has a constant besides; "
                 f"eta = {rounded(eta)}, zeta = {found.zeta:.6g} ({found.kind}: {found.method})"
             )
-        else:
-            lines.append(f"diffusivity refused: {self.refusal}")
         if math.isfinite(self.flatness):
             use = "" if self.without_gap else "; for shallow walls the specular gap is about 4 h"
             lines.append(f"mean squared slope h = {self.flatness:.6g}{use}")
@@ -89,10 +85,8 @@ def consequences_of(
     wall: Wall, law: Law, gap: SpectralGap | None, specular_gap: SpectralGap | None, found: Spectrum | None
 ) -> Consequences:
     """Derive what follows; a diffusivity that is infinite or out of reach is None, with the reason."""
-    modulus_gap = _modulus_gap(gap, specular_gap, found)
-    slem = None if modulus_gap is None else slem_from_gap(modulus_gap)
-    time = None if modulus_gap is None else relaxation_time(modulus_gap)
-    diffusion, refusal = None, ""
+    modulus_gap, diffusion, refusal = _modulus_gap(gap, specular_gap, found), None, ""
+    slem, time = (modulus_gap and derived(modulus_gap) for derived in (slem_from_gap, relaxation_time))
     try:
         diffusion = diffusivity(law)
     except AsperityError as reason:
@@ -108,7 +102,7 @@ def _modulus_gap(gap: SpectralGap | None, specular_gap: SpectralGap | None, foun
         return None
     if not specular_gap.self_adjoint:
         return specular_gap
-    nearer = gap if gap.value <= specular_gap.value else specular_gap
+    nearer = min(gap, specular_gap, key=float)
     lowest = int(found.values.argmin())
     if -found.values[lowest] > 1.0 - nearer.value + nearer.error:
         error = float(found.errors.total()[lowest])

@@ -15,14 +15,15 @@ from ..core.checks import Floats
 from ..core.errors import FileExistsRefusal, InputError
 from ..core.files import draw_whole, write_whole
 from ..core.tables import verbatim
+from ..geometry import WALLS, Disk, Wall, draw_wall, trace
+from ..geometry.plotting.walls import vertical_stretch
+from ..kernels import CollisionLaw, no_slip_matrix, smooth_matrix
+from ..spectral.gap.verdict import draw_spectrum
+from .result import StudyResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from ..geometry import Wall
-    from ..kernels import CollisionLaw
-    from .result import StudyResult
 
 # Dots per inch: pictures stay below 150 kB and are legible at the width of a page.
 RESOLUTION = 100
@@ -41,16 +42,20 @@ def save_pictures(study: StudyResult, paths: Sequence[Path], dpi: float = RESOLU
     """Write wall, kernel, spectrum and collision, in this order; returns the paths of those that could be drawn."""
     from matplotlib.figure import Figure
 
-    def write(path: Path, draw: Callable[..., object], size: tuple[float, float], stream: IO[bytes]) -> None:
-        last = draw is draw_outgoing_velocities
-        figure = Figure(figsize=size, layout="constrained" if last else None)
-        draw(*((study.collision, figure) if last else (study, figure.subplots())))
-        figure.savefig(stream, dpi=dpi, format=path.suffix[1:], bbox_inches=None if last else "tight")
-
     drawings: tuple[tuple[Callable[..., object], tuple[float, float]], ...] = (
         (draw_study_wall, (7.0, 5.0)), (_draw_kernel, (6.4, 5.0)), (_draw_spectrum, (7.0, 5.0)),
         (draw_outgoing_velocities, (7.0, 6.0)),
     )  # fmt: skip
+
+    def write(path: Path, draw: Callable[..., object], size: tuple[float, float], stream: IO[bytes]) -> None:
+        if draw is draw_outgoing_velocities:
+            figure, box = Figure(figsize=size, layout="constrained"), None
+            draw(study.collision, figure)
+        else:
+            figure, box = Figure(figsize=size), "tight"
+            draw(study, figure.subplots())
+        figure.savefig(stream, dpi=dpi, format=path.suffix[1:], bbox_inches=box)
+
     return [
         path for path, drawing in zip(paths, drawings, strict=True) if draw_whole(path, partial(write, path, *drawing))
     ]
@@ -58,8 +63,6 @@ def save_pictures(study: StudyResult, paths: Sequence[Path], dpi: float = RESOLU
 
 def draw_study_wall(study: StudyResult, ax: Axes) -> None:
     """The wall with some rays in its widest hollow."""
-    from ..geometry import draw_wall
-
     x, theta = chosen_rays(study.wall)
     draw_wall(study.wall, x, theta, ax=ax)
     key = "dot: a ray enters, ring: it leaves" if len(x) else f"no ray leaves within {MOST_BOUNCES} collisions"
@@ -68,9 +71,6 @@ def draw_study_wall(study: StudyResult, ax: Axes) -> None:
 
 def chosen_rays(wall: Wall) -> tuple[Floats, Floats]:
     """Entry points and angles of rays, spread over the widest hollow, that leave after few bounces."""
-    from ..geometry import trace
-    from ..geometry.plotting.walls import vertical_stretch
-
     low, high = 0.0, wall.period
     if wall.hollows:
         widest = max(wall.hollows, key=lambda hollow: hollow.width)
@@ -92,8 +92,6 @@ def _draw_kernel(study: StudyResult, ax: Axes) -> None:
 
 
 def _draw_spectrum(study: StudyResult, ax: Axes) -> None:
-    from ..spectral.gap.verdict import draw_spectrum
-
     if study.spectrum is None:
         ax.set_axis_off()
         reason = verbatim(textwrap.fill(study.refusals["spectrum"], TITLE_WIDTH))
@@ -111,12 +109,10 @@ def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:
     Above, the velocities that energy and rolling momentum allow, a half ellipse, and the outgoing ones on it; below,
     how likely they are. The spin is an affine function of v1, hence the second axis. Smooth and no-slip are marked.
     """
-    from ..kernels import no_slip_matrix, smooth_matrix
-
     disk, incoming = collision.disk, np.array(INCOMING)
     rolling = float(disk.rolling_momentum(incoming))
     outgoing = collision.sample(np.tile(incoming, (SAMPLES, 1)), np.random.default_rng(0))
-    allowed = _allowed_velocities(collision, incoming)
+    allowed = allowed_velocities(disk)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.0))
     above.plot(allowed[:, 0], allowed[:, 1], color="0.75", linewidth=5.0, solid_capstyle="butt",
                label="same energy and rolling momentum")  # fmt: skip
@@ -146,10 +142,10 @@ def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:
     spin.tick_params(labelsize=9)
 
 
-def _allowed_velocities(collision: CollisionLaw, incoming: Floats) -> Floats:
-    """The half ellipse of outgoing velocities with the kinetic energy and the rolling momentum of the incoming one."""
-    frame = np.asarray(collision.disk.frame)
-    along, up, roll = (float(collision.disk.inner(incoming, direction)) for direction in frame)
+def allowed_velocities(disk: Disk) -> Floats:
+    """The half ellipse of outgoing velocities with the kinetic energy and the rolling momentum of `INCOMING`."""
+    frame = np.asarray(disk.frame)
+    along, up, roll = (float(disk.inner(np.array(INCOMING), direction)) for direction in frame)
     theta = np.linspace(0.0, np.pi, 181)
     size = np.hypot(along, up)
     return np.asarray(size * (np.cos(theta)[:, None] * frame[0] + np.sin(theta)[:, None] * frame[1]) + roll * frame[2])
@@ -180,8 +176,6 @@ def gallery() -> Figure:
     """Every named wall with its default parameters."""
     from matplotlib.figure import Figure
 
-    from ..geometry import WALLS, draw_wall
-
     entries = list(WALLS.values())
     rows = -(-len(entries) // GALLERY_COLUMNS)
     figure = Figure(figsize=(3.4 * GALLERY_COLUMNS, 2.9 * rows), layout="constrained")
@@ -190,8 +184,7 @@ def gallery() -> Figure:
         draw_wall(entry.build(), ax=ax)
         parameters = ", ".join(f"{key}={value:g}" for key, value in entry.defaults.items())
         ax.set_title("\n".join([entry.name, *textwrap.wrap(parameters, 46)]), fontsize=9)
-        ax.set_xlabel("")
-        ax.set_ylabel("")
+        ax.set(xlabel="", ylabel="")
         ax.tick_params(labelsize=8)
         ax.locator_params(axis="both", nbins=5)
     for ax in axes[len(entries) :]:

@@ -2,48 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import asdict
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..core.estimates import Estimate, compact, estimate_as_dict, finite, rounded
 from ..core.version import __version__
-
-if TYPE_CHECKING:
-    from ..kernels import KernelMatrix
-    from ..spectral import Enclosures, SpectralGap
-    from .result import StudyResult, TracerCheck
+from ..geometry import Wall
+from ..kernels import KernelMatrix
+from ..spectral import Enclosures, SpectralGap
+from ..spectral.plotting import CONVENTIONS
+from .result import StudyResult, TracerCheck
 
 # Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
 KAC_Z = 4.5
 # Characters; the detailed report has the whole reason.
 LONGEST_REFUSAL = 110
-CONVENTIONS = {"paper": "retroreflection is the identity", "specular": "specular reflection is the identity"}
 
 
 def summary_of(study: StudyResult) -> str:
     """What was found, one fact a line; an error in brackets belongs to the last digits."""
     wall, disk, found = study.wall, study.disk, study.consequences
-    symmetry = "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
-    refused, unit = study.refusals.get, f" {wall.unit}" if wall.unit else ""
+    unit = f" {wall.unit}" if wall.unit else ""
     lines = {
         "wall": f"{study.name}: period {wall.period:g}{unit}, depth {wall.depth:.6g}{unit}, "
-        f"{counted(len(wall.pieces), 'piece')}, {symmetry}",
+        f"{counted(len(wall.pieces), 'piece')}, {_symmetry(wall)}",
         "rays": _rays(study.tracer),
         "law": _law_line(study.matrix),
-        "gap": _gap_words(study.gap, refused("gap", "not asked for")),
-        "": _gap_words(study.specular_gap, refused("specular_gap", "not asked for")),
+        "gap": _gap_words(study, "gap"),
+        "": _gap_words(study, "specular_gap"),
         "relaxation": _relaxation(found.relaxation_time, found.without_gap),
         "diffusion": _refused(found.refusal)
         if found.diffusion is None
         else f"D = {found.diffusion}; half-width 1, speed 1, tau the exit time",
         "disk": f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
         "as deep",
-        "collision": f"gap of that wall {_gap_words(study.collision_gap, refused('collision_gap', 'not asked for'))}",
+        "collision": f"gap of that wall {_gap_words(study, 'collision_gap')}",
         "conserved": f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
         f"{study.conservation['rolling_momentum_defect']:.0e}",
     }
     return "\n".join(f"{title:11s}{line}" for title, line in lines.items())
+
+
+def _symmetry(wall: Wall) -> str:
+    return "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
 
 
 def _refused(reason: str) -> str:
@@ -66,15 +68,20 @@ def _law_line(matrix: KernelMatrix) -> str:
     return f"{matrix.basis!r} by {matrix.method}, Frobenius error {float(matrix.error):.2g}{met}"
 
 
-def _gap_words(gap: SpectralGap | None, refusal: str) -> str:
+def _gap_words(study: StudyResult, which: str) -> str:
+    gap: SpectralGap | None = getattr(study, which)
     if gap is None:
-        return _refused(refusal)
+        return _refused(study.refusals[which])
     words = CONVENTIONS[gap.convention]
     if not gap.self_adjoint:
-        norm = compact(Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method))
-        return f"norm {norm} on functions of mean 0, not self-adjoint ({words})"
+        return f"norm {compact(_norm(gap))} on functions of mean 0, not self-adjoint ({words})"
     number = "0" if gap.verdict == "no gap" else compact(gap)
     return f"{number} {gap.verdict} ({words})"
+
+
+def _norm(gap: SpectralGap) -> Estimate:
+    """The norm on functions of mean 0 of a law that is not self-adjoint."""
+    return Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method)
 
 
 def _relaxation(time: Estimate | None, without_gap: bool) -> str:
@@ -88,40 +95,37 @@ def _relaxation(time: Estimate | None, without_gap: bool) -> str:
 def details_of(study: StudyResult) -> str:
     """The study as text, with methods, errors and evidence."""
     wall, disk = study.wall, study.disk
-    symmetry = "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
-    lines = [
-        f"wall       {study.name}: period {wall.period:g}, depth {wall.depth:.6g}, length {wall.arc_length:.6g}, "
-        f"{counted(len(wall.pieces), 'piece')}, "
-        + (counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell")
-        + (f", {counted(len(wall.islands), 'island')}" if wall.islands else "")
-        + f", {symmetry}"
-    ]
-    if study.tracer is not None:
-        lines += _tracer_lines(study.tracer)
-    lines += _block("law P~", _matrix_lines(study.matrix))
-    lines += [f"gap        {_gap_line(study, 'gap')}"]
-    lines += [f"           {_gap_line(study, 'specular_gap')}"]
-    lines += [
-        *_block("spectrum", _spectrum_lines(study)),
-        *_block("enclosed", _enclosure_lines(study)),
-        *_block("follows", study.consequences.lines()),
-        f"disk       mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, "
-        f"so it feels the wall {1.0 / disk.foreshortening:.6g} times as deep",
-    ]
+    cells = counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell"
+    islands = f", {counted(len(wall.islands), 'island')}" if wall.islands else ""
     first, *more = _matrix_lines(study.collision_matrix)
-    lines += [
-        f"collision  K = delta x P~ x delta(pi - psi) with P~ of that deeper wall, {first}",
-        *(f"           {line}" for line in more),
-        f"           gap of that P~: {_gap_line(study, 'collision_gap')}",
-        f"           energy kept to {study.conservation['energy_defect']:.1e}, rolling momentum -m v1 + J omega "
-        f"to {study.conservation['rolling_momentum_defect']:.1e} (relative)",
-    ]
-    return "\n".join(lines)
-
-
-def _block(title: str, lines: Sequence[str]) -> list[str]:
-    """Lines under one title."""
-    return [f"{title if i == 0 else '':11s}{line}" for i, line in enumerate(lines)]
+    blocks = {
+        "wall": [
+            f"{study.name}: period {wall.period:g}, depth {wall.depth:.6g}, length {wall.arc_length:.6g}, "
+            f"{counted(len(wall.pieces), 'piece')}, {cells}{islands}, {_symmetry(wall)}"
+        ],
+        "rays": [] if study.tracer is None else _tracer_lines(study.tracer),
+        "law P~": _matrix_lines(study.matrix),
+        "gap": [_gap_line(study, "gap"), _gap_line(study, "specular_gap")],
+        "spectrum": _spectrum_lines(study),
+        "enclosed": [f"refused: {study.refusals['enclosures']}"]
+        if study.enclosures is None
+        else enclosures_as_text(study.enclosures),
+        "follows": study.consequences.lines(),
+        "disk": [
+            f"mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, "
+            f"so it feels the wall {1.0 / disk.foreshortening:.6g} times as deep"
+        ],
+        "collision": [
+            f"K = delta x P~ x delta(pi - psi) with P~ of that deeper wall, {first}",
+            *more,
+            f"gap of that P~: {_gap_line(study, 'collision_gap')}",
+            f"energy kept to {study.conservation['energy_defect']:.1e}, rolling momentum -m v1 + J omega "
+            f"to {study.conservation['rolling_momentum_defect']:.1e} (relative)",
+        ],
+    }
+    return "\n".join(
+        f"{'' if number else title:11s}{line}" for title, lines in blocks.items() for number, line in enumerate(lines)
+    )
 
 
 def _tracer_lines(tracer: TracerCheck) -> list[str]:
@@ -129,19 +133,18 @@ def _tracer_lines(tracer: TracerCheck) -> list[str]:
     flagged = [f"{n} {status.replace('_', ' ')}" for status, n in tracer.counts.items() if n and status != "escaped"]
     found, expected = tracer.mean_collisions, tracer.expected_collisions
     lines = [
-        f"rays       {total} into the hollows; " + (f"not escaped: {', '.join(flagged)}" if flagged else "all escaped"),
-        f"           mean collisions {rounded(found)}, length of boundary over opening (Kac) {expected:.6g}, "
+        f"{total} into the hollows; " + (f"not escaped: {', '.join(flagged)}" if flagged else "all escaped"),
+        f"mean collisions {rounded(found)}, length of boundary over opening (Kac) {expected:.6g}, "
         f"z = {tracer.z_score:+.2f}",
     ]
     if tracer.z_score < -KAC_Z:
-        fraction = 1.0 - found.value / expected
         lines.append(
-            f"           Kac's formula presumes that every ray inside can come from the opening; "
-            f"{100.0 * fraction:.3g} % of the boundary's rays cannot if the tracer is right, as those that "
-            "stay in a mushroom's cap for ever"
+            "Kac's formula presumes that every ray inside can come from the opening; "
+            f"{100.0 * (1.0 - found.value / expected):.3g} % of the boundary's rays cannot if the tracer is right, as "
+            "those that stay in a mushroom's cap for ever"
         )
     elif tracer.z_score > KAC_Z:
-        lines.append("           more collisions than Kac's formula allows: do not trust this wall's numbers")
+        lines.append("more collisions than Kac's formula allows: do not trust this wall's numbers")
     return lines
 
 
@@ -159,7 +162,7 @@ def _matrix_lines(matrix: KernelMatrix) -> list[str]:
 def _gap_line(study: StudyResult, which: str) -> str:
     gap: SpectralGap | None = getattr(study, which)
     if gap is None:
-        return f"refused: {study.refusals.get(which, 'not asked for')}"
+        return f"refused: {study.refusals[which]}"
     words = f"{gap.convention} convention: "
     if not gap.self_adjoint:
         return words + _contraction(gap, study.tolerance)
@@ -179,10 +182,9 @@ def _contraction(gap: SpectralGap, tolerance: float) -> str:
     words = "P_F is not known to be self-adjoint, the cell has no mirror axis; "
     if gap.verdict == "no gap":
         return words + "its norm on functions of mean 0 is 1 (no gap)"
-    norm = Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method)
     return (
-        f"{words}a step shrinks functions of mean 0 by the factor {rounded(norm)} at most, its norm there and the slem "
-        f"of P~ ({gap.kind}: {gap.method}), {_met(gap.error <= tolerance, tolerance)}"
+        f"{words}a step shrinks functions of mean 0 by the factor {rounded(_norm(gap))} at most, its norm there and "
+        f"the slem of P~ ({gap.kind}: {gap.method}), {_met(gap.error <= tolerance, tolerance)}"
     )
 
 
@@ -195,22 +197,13 @@ def _spectrum_lines(study: StudyResult) -> list[str]:
     # the second largest modulus may be that of the most negative
     order = sorted(range(len(numbers)), key=lambda i: (i > 0, -abs(numbers[i].value)))
     shown = [rounded(numbers[i]) + ("" if found.parity[i] == "none" else f" {found.parity[i]}") for i in order]
-    caution = ""
-    if study.gap is not None and study.gap.verdict == "no gap":
-        caution = "; they belong to the grid, for the law has no gap"
-    method = found.estimates()[0].method
+    of_grid = study.gap is not None and study.gap.verdict == "no gap"
+    caution = "; they belong to the grid, for the law has no gap" if of_grid else ""
     return [
-        f"the {len(shown)} of largest modulus: {', '.join(shown)} ({found.convention} convention, estimate: {method}"
-        f"{caution})",
+        f"the {len(shown)} of largest modulus: {', '.join(shown)} ({found.convention} convention, estimate: "
+        f"{numbers[0].method}{caution})",
         f"completeness: {found.completeness}",
     ]
-
-
-def _enclosure_lines(study: StudyResult) -> list[str]:
-    found = study.enclosures
-    if found is None:
-        return [f"refused: {study.refusals.get('enclosures', 'not asked for')}"]
-    return enclosures_as_text(found)
 
 
 def enclosures_as_text(found: Enclosures) -> list[str]:
@@ -283,14 +276,7 @@ def quotation(gap: SpectralGap) -> str:
 
 def enclosures_as_list(found: Enclosures) -> list[dict[str, Any]]:
     """Enclosures as plain values, ready for JSON."""
-    return [
-        {
-            "value": item.value, "low": item.low, "high": item.high, "label": item.label, "index": item.index,
-            "residual": item.residual, "kind": item.kind, "reason": item.reason, "parity": item.parity,
-            "method": found.method, "convention": found.convention,
-        }
-        for item in found
-    ]  # fmt: skip
+    return [{**asdict(item), "method": found.method, "convention": found.convention} for item in found]
 
 
 def _matrix(matrix: KernelMatrix) -> dict[str, Any]:

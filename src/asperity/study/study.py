@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -202,19 +203,13 @@ def prepare_folder(folder: str | Path, *, overwrite: bool, picture_format: str =
     target, names = Path(folder), (*picture_names(picture_format), *DATA)
     try:
         existing = [name for name in names if os.path.exists(target / name)]
-        if existing and not overwrite:
-            raise FileExistsRefusal(
-                f"{target}: {', '.join(existing)} exist; use another folder or --force to replace them"
-            )
-        target.mkdir(parents=True, exist_ok=True)
-        probe = target / ".asperity-probe"
-        probe.touch()
-        probe.unlink()
-    except FileExistsRefusal:
-        raise
+        if overwrite or not existing:
+            target.mkdir(parents=True, exist_ok=True)
+            TemporaryDirectory(dir=target, prefix=".asperity-").cleanup()
+            return target
     except OSError as reason:
         raise InputError(f"{target}: cannot write there ({reason.strerror}); choose another folder") from reason
-    return target
+    raise FileExistsRefusal(f"{target}: {', '.join(existing)} exist; use another folder or --force to replace them")
 
 
 def _or_refusal(
@@ -273,8 +268,7 @@ def _matrix(
 def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
     """Trace rays that enter the hollows with the invariant measure."""
     wall = wall.cell
-    widths = np.array([hollow.width for hollow in wall.hollows])
-    lefts = np.array([hollow.left for hollow in wall.hollows])
+    lefts, widths = np.array([(hollow.left, hollow.width) for hollow in wall.hollows]).T
     which = rng.choice(len(widths), CHECK_RAYS, p=widths / widths.sum())
     ray = trace(wall, lefts[which] + widths[which] * rng.random(CHECK_RAYS), SINE.sample(CHECK_RAYS, rng))
     boundary = wall.arc_length - wall.flat_top

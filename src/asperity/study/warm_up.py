@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from math import pi
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -44,15 +43,13 @@ def _disks() -> None:
     geo.collide_cylinder(disk, geo.triangular_teeth(0.7), 0.02, [[0.3, 0.1]], [[0.2, -1.0, 0.1]])
 
 
-TASKS: Mapping[str, Callable[[], None]] = MappingProxyType(
-    {
-        "rays": _rays,
-        "rays that double precision leaves open": _difficult_rays,
-        "distributions of outgoing angles": _distributions,
-        "exact matrices of polygons": _polygons,
-        "collisions of disks": _disks,
-    }
-)
+TASKS: dict[str, Callable[[], None]] = {
+    "rays": _rays,
+    "rays that double precision leaves open": _difficult_rays,
+    "distributions of outgoing angles": _distributions,
+    "exact matrices of polygons": _polygons,
+    "collisions of disks": _disks,
+}
 
 
 def folder() -> Path:

@@ -9,16 +9,12 @@ import numpy as np
 from ... import geometry as geo
 from ...core.checks import Floats
 from ...core.estimates import Estimate
-from ...geometry import Wall
 from ...kernels import CollisionLaw, Legendre
 from ...spectral import WorkMethod
-from .methods import RANDOM_ORDER
-from .quantity import QUICK_RAYS, RAYS, Methods, Quantity
+from .methods import AUTO, QUICK_RAYS, RANDOM_ORDER, RAYS, Methods, Quantity
 from .walls import standard_names
 
 DISK = geo.Disk(1.0, 0.5)
-# Means over Lambda^2 of sin(psi)^2 and cos(psi)^2.
-SINE_MEAN, COSINE_MEAN = 0.75, 0.25
 # Number of true disks at every scale; their noise is about 0.002.
 TRUE_DISKS = 2**18
 # Not the wall of all kinds of pieces, for which there are no reference values of collisions.
@@ -32,18 +28,18 @@ def velocity_fraction() -> tuple[float, float]:
 
 
 def square_of_v1() -> float:
-    """<v1, v1> in Lambda^2."""
+    """<v1, v1> in Lambda^2, where the means of (cos(theta) sin(psi))^2 and of cos(psi)^2 are 1/4."""
     along, roll = velocity_fraction()
-    return along**2 * SINE_MEAN / 3.0 + roll**2 * COSINE_MEAN
+    return 0.25 * (along**2 + roll**2)
 
 
-def correlation_of(moment: float) -> float:
+def correlation_of(moment: float, turn: float = -1.0) -> float:
     r"""<v1, K v1>/<v1, v1> in Lambda^2 from <u, P~ u>/<u, u>.
 
-    v1 = a cos theta sin psi + b cos psi. K preserves sin psi and changes the sign of cos psi.
+    v1 = a cos theta sin psi + b cos psi. K preserves sin psi and multiplies cos psi by ``turn``, -1.
     """
-    along, roll = (fraction**2 for fraction in velocity_fraction())
-    return (along * SINE_MEAN / 3.0 * moment - roll * COSINE_MEAN) / square_of_v1()
+    along, roll = velocity_fraction()
+    return 0.25 * (along**2 * moment + roll**2 * turn) / square_of_v1()
 
 
 def sampled_velocities(number: int, rng: np.random.Generator) -> Floats:
@@ -55,8 +51,8 @@ def sampled_velocities(number: int, rng: np.random.Generator) -> Floats:
     return np.asarray(DISK.from_angles(np.arccos(cos_theta), psi))
 
 
-def _collision_methods(wall: Wall) -> Methods:
-    by_tolerance = WorkMethod("auto", lambda n, rng: by_operator(wall, tolerance=1.0 / n, rng=rng), True)
+def _collision_methods(wall: geo.Wall) -> Methods:
+    by_tolerance = WorkMethod(AUTO, lambda n, rng: by_operator(wall, tolerance=1.0 / n, rng=rng), True)
     by_nets = WorkMethod("QMC operator", lambda n, rng: by_operator(wall, method="qmc", samples=n, rng=rng), True)
     by_sampling = WorkMethod("sampled velocities", lambda n, rng: by_velocities(wall, n, rng), True, RANDOM_ORDER)
     by_means = WorkMethod("means over outgoing angles", lambda n: by_action(wall, n))
@@ -68,27 +64,24 @@ def _collision_methods(wall: Wall) -> Methods:
     ]
 
 
-def by_operator(wall: Wall, **how: Any) -> Estimate:
+def by_operator(wall: geo.Wall, **how: Any) -> Estimate:
     """From the matrix of K on polynomials of degree below 2 in each angle, whose span contains v1."""
     operator = CollisionLaw.from_wall(wall, DISK).operator(Legendre(2), Legendre(2, weight="sin2"), **how)
-    along, roll = velocity_fraction()
+    matrix = operator.theta_matrix
     # sin(psi) is no polynomial in the product basis, so its mean over psi is treated separately
-    moment = operator.theta_matrix.symmetric[1, 1]
-    psi = operator.flip[1, 1]
-    plane, turn = along**2 * SINE_MEAN / 3.0, roll**2 * COSINE_MEAN
-    error = plane / (plane + turn) * operator.theta_matrix.error.value
-    value = (plane * moment + turn * psi) / (plane + turn)
-    return Estimate(value, error, operator.theta_matrix.error.kind, operator.theta_matrix.method)
+    value = correlation_of(float(matrix.symmetric[1, 1]), float(operator.flip[1, 1]))
+    error = 0.25 * velocity_fraction()[0] ** 2 / square_of_v1() * matrix.error.value
+    return Estimate(value, error, matrix.error.kind, matrix.method)
 
 
-def by_velocities(wall: Wall, number: int, rng: np.random.Generator) -> float:
+def by_velocities(wall: geo.Wall, number: int, rng: np.random.Generator) -> float:
     """By sampling in the original coordinates: incoming velocities from Lambda^2, one collision each."""
     incoming = -sampled_velocities(number, rng)
     outgoing = CollisionLaw.from_wall(wall, DISK).sample(incoming, rng)
     return float(np.mean(-incoming[:, 0] * outgoing[:, 0]) / square_of_v1())
 
 
-def by_action(wall: Wall, nodes: int) -> float:
+def by_action(wall: geo.Wall, nodes: int) -> float:
     """From K v1 at Gauss nodes in cos(theta) and Gauss-Chebyshev nodes in psi."""
     along, roll = velocity_fraction()
     cosines, weights = np.polynomial.legendre.leggauss(nodes)
@@ -104,20 +97,18 @@ def by_action(wall: Wall, nodes: int) -> float:
     return float(total) / square_of_v1()
 
 
-def _disk_methods(wall: Wall) -> Methods:
-    scales = (10.0, 100.0, 1000.0)
+def _disk_methods(wall: geo.Wall) -> Methods:
     method = WorkMethod("true disk, budget 1/eps", lambda inverse, rng: by_true_disks(wall, 1.0 / inverse, rng), True)
-    return [(method, scales, (*scales, 1e4, 1e5))]
+    return [(method, (1e1, 1e2, 1e3), (1e1, 1e2, 1e3, 1e4, 1e5))]
 
 
-def by_true_disks(wall: Wall, scale: float, rng: np.random.Generator, number: int = TRUE_DISKS) -> float:
+def by_true_disks(wall: geo.Wall, scale: float, rng: np.random.Generator, number: int = TRUE_DISKS) -> float:
     """<v1, K v1>/<v1, v1> of the disk with satellites above a wall whose period is ``scale``."""
     incoming = -sampled_velocities(number, rng)
     position = np.column_stack([scale * rng.random(number), 2.0 * np.pi * rng.random(number)])
     # the incoming velocities have the density sin(theta), as the flux through x2 = 0
     hit = geo.collide(DISK, wall, scale / wall.period, position, incoming)
-    found = float(np.mean((-incoming[:, 0] * hit.velocity[:, 0])[hit.escaped]))
-    return found / square_of_v1()
+    return float(np.mean((-incoming[:, 0] * hit.velocity[:, 0])[hit.escaped])) / square_of_v1()
 
 
 # <v1, K v1>/<v1, v1> of a uniform disk, in the small-scale limit and for the true disk at a scale.

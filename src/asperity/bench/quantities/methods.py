@@ -1,4 +1,4 @@
-"""The methods for the matrix of a wall's law: each method alone, and the library's choice."""
+"""A quantity of the standard set, and the methods for the matrix of a law: each alone, and the library's choice."""
 
 from __future__ import annotations
 
@@ -8,13 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry import Wall
-from ...kernels import Basis, KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
+from ...kernels import Basis, Bins, KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
 from ...kernels.discretisation.method import Budget
 from ...kernels.discretisation.traced import traced_matrix
 from ...kernels.matrices.matrix import frobenius_error
-from .quantity import QUICK_RAYS, RAYS
+from ...spectral import WorkMethod
 
-MakeMatrix = Callable[..., KernelMatrix]
+# Methods with their budgets in the quick set and in the full set.
+Methods = list[tuple[WorkMethod, tuple[float, ...], tuple[float, ...]]]
+# Numbers of rays of sampling methods; the full ladder resolves orders to 0.15.
+QUICK_RAYS, RAYS = tuple(4.0**k for k in (6, 7, 8)), tuple(4.0**k for k in (5, 6, 7, 8, 9, 10))
+# Names of methods that are the library's own choice, or make references.
+AUTO, CLOSED_FORM, BEAMS, ROWS, QMC = "auto", "closed form", "beams", "adaptive angles", "randomised QMC"
 # The error of sampled rays decreases with order 1/2. Strata and scrambled Sobol sequences in two dimensions reach 3/4
 # if the integrand jumps along curves, as for indicators of bins and the laws of most walls.
 RANDOM_ORDER, JUMPING_ORDER = 0.5, 0.75
@@ -24,72 +29,71 @@ MANY_PIECES = 512
 
 
 @dataclass(frozen=True)
-class MatrixMethod:
-    """One method for a matrix.
+class Quantity:
+    """A quantity of a wall.
 
     Attributes
     ----------
     name : str
-    matrix : callable
-        ``matrix(wall, basis, budget)`` or ``matrix(wall, basis, budget, rng)``.
-    quick, full : tuple of float
-        Budgets of the quick and the full set.
-    is_random : bool
-    order : float or None
-        Declared order of the error for matrices in bins.
+    methods : callable
+        ``methods(wall)`` returns triples of a `WorkMethod` and its budgets (quick, full).
+    scenes : tuple of str
+        Scenes of the standard set on which the quantity is measured.
     """
 
     name: str
-    matrix: MakeMatrix
-    quick: tuple[float, ...]
-    full: tuple[float, ...]
-    is_random: bool = False
-    order: float | None = None
+    methods: Callable[[Wall], Methods]
+    scenes: tuple[str, ...]
 
 
-def methods_for(wall: Wall) -> tuple[MatrixMethod, ...]:
-    """The methods that apply to a wall, the library's own choice first."""
-    found = [AUTO]
-    if WallLaw(wall).closed_form is not None:
-        found.append(CLOSED_FORM)
-    if wall.is_polygonal and wall.closes:
-        found.append(BEAMS)
-    found += [ROWS, QMC, STRATIFIED, MONTE_CARLO]
-    return tuple(found)
+def matrix_methods(wall: Wall, basis: Basis) -> Methods:
+    """The methods for the matrix of a wall's law that apply to the wall, the library's own choice first.
 
-
-def declared_order(chosen: MatrixMethod, wall: Wall) -> float | None:
-    """The order of a method for matrices in bins, at the ladders' numbers of rays.
+    The budget of "auto" and "adaptive angles" is 1/tolerance, that of "beams" the beams a hollow, with a bound for the
+    others; all other methods have rays.
 
     >>> from asperity.bench.quantities.walls import wall_of
-    >>> [declared_order(STRATIFIED, wall_of(name)) for name in ("cusps", "profile")]
-    [0.75, 0.5]
+    >>> [[method.order for method, *_ in matrix_methods(wall_of(name), Bins(4))][-3:] for name in ("cusps", "profile")]
+    [[0.75, 0.75, 0.5], [0.5, 0.5, 0.5]]
     """
-    return RANDOM_ORDER if chosen.order == JUMPING_ORDER and len(wall.pieces) > MANY_PIECES else chosen.order
+    # strata and Sobol sequences exceed 3/4 for continuous integrands, so orders are declared for bins only
+    order = (RANDOM_ORDER if len(wall.pieces) > MANY_PIECES else JUMPING_ORDER) if isinstance(basis, Bins) else None
+
+    def chosen(budget: float, rng: np.random.Generator) -> KernelMatrix:
+        # each repeat has its own generator for sampling
+        return discretise(WallLaw(wall), basis, tolerance=1.0 / budget, rng=rng)
+
+    def sobol(rays: float, rng: np.random.Generator) -> KernelMatrix:
+        return discretise(WallLaw(wall), basis, "qmc", samples=int(rays), rng=rng)
+
+    def beams(number: float) -> KernelMatrix:
+        return discretise(PolygonLaw(wall, max_beams=int(number)), basis, "exact")
+
+    def by_formula(_: float) -> KernelMatrix:
+        law = WallLaw(wall).closed_form
+        assert law is not None
+        return discretise(law, basis)
+
+    found: Methods = [(WorkMethod(AUTO, chosen, True), (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8))]
+    if WallLaw(wall).closed_form is not None:
+        found.append((WorkMethod(CLOSED_FORM, by_formula), (1.0,), (1.0,)))
+    if wall.is_polygonal and wall.closes:
+        found.append((WorkMethod(BEAMS, beams), (1e3, 1e4), (1e2, 1e3, 1e4, 1e5)))
+    adaptive = WorkMethod(ROWS, lambda budget: adaptive_matrix(wall, basis, 1.0 / budget))
+    sampled = (
+        WorkMethod(QMC, sobol, True, order),
+        WorkMethod("stratified", lambda rays, rng: stratified_matrix(wall, basis, rays, rng), True, order),
+        WorkMethod("Monte Carlo", lambda rays, rng: monte_carlo_matrix(wall, basis, rays, rng), True, RANDOM_ORDER),
+    )
+    found.append((adaptive, (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8)))
+    return [*found, *((method, QUICK_RAYS, RAYS) for method in sampled)]
 
 
-def closed_form_matrix(wall: Wall, basis: Basis, budget: float = 1.0) -> KernelMatrix:
-    """From the closed form of the wall's hollows."""
-    law = WallLaw(wall).closed_form
-    assert law is not None  # `methods_for` checks that the closed form exists
-    return discretise(law, basis)
-
-
-def beam_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
-    """From at most ``budget`` beams for each hollow, with a bound for the others."""
-    return discretise(PolygonLaw(wall, max_beams=int(budget)), basis, "exact")
-
-
-def adaptive_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
-    """By adaptive conditional distributions to the tolerance 1/budget, for every wall."""
-    symmetric, error, rays = traced_matrix(wall, basis, Budget(1.0 / budget))
+def adaptive_matrix(wall: Wall, basis: Basis, tolerance: float) -> KernelMatrix:
+    """By adaptive conditional distributions, for every wall."""
+    symmetric, error, rays = traced_matrix(wall, basis, Budget(tolerance))
     how = frobenius_error(error, "estimate", f"adaptive angles, {rays} rays")
     return KernelMatrix(symmetric, basis, how, method="adaptive angles")
-
-
-def qmc_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
-    """From ``budget`` rays of scrambled Sobol sequences."""
-    return discretise(WallLaw(wall), basis, "qmc", samples=int(budget), rng=rng)
 
 
 def stratified_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
@@ -106,18 +110,3 @@ def monte_carlo_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.G
     """From ``budget`` independent rays, traced even if a closed form could be sampled."""
     theta = np.arccos(1.0 - 2.0 * rng.random(int(budget)))
     return estimate(theta, WallLaw(wall).reflect(rng.random(int(budget)), theta), basis)
-
-
-def auto_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
-    """By the library's choice, to the tolerance 1/budget; each repeat has its own generator for sampling."""
-    return discretise(WallLaw(wall), basis, tolerance=1.0 / budget, rng=rng)
-
-
-# The budget of AUTO and ROWS is 1/tolerance, that of BEAMS the beams a hollow; the others have rays.
-AUTO = MatrixMethod("auto", auto_matrix, (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8), True)
-CLOSED_FORM = MatrixMethod("closed form", closed_form_matrix, (1.0,), (1.0,))
-BEAMS = MatrixMethod("beams", beam_matrix, (1e3, 1e4), (1e2, 1e3, 1e4, 1e5))
-ROWS = MatrixMethod("adaptive angles", adaptive_matrix, (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8))
-QMC = MatrixMethod("randomised QMC", qmc_matrix, QUICK_RAYS, RAYS, True, JUMPING_ORDER)
-STRATIFIED = MatrixMethod("stratified", stratified_matrix, QUICK_RAYS, RAYS, True, JUMPING_ORDER)
-MONTE_CARLO = MatrixMethod("Monte Carlo", monte_carlo_matrix, QUICK_RAYS, RAYS, True, RANDOM_ORDER)

@@ -8,7 +8,7 @@ from ...core.estimates import Estimate
 from ...geometry import Wall
 from ...kernels import Basis, Bins, Legendre, Panels, WallLaw, discretise
 from ...spectral import WorkMethod, diffusivity, spectral_gap, spectrum
-from .quantity import Methods, Quantity
+from .methods import AUTO, Methods, Quantity
 from .walls import standard_names
 
 # Entry points at one grazing angle; the error of their midpoint rule is below the error of the finite angle.
@@ -33,7 +33,7 @@ def _eigenvalue_methods(wall: Wall) -> Methods:
 
     sizes = (4.0, 8.0, 16.0)
     return [
-        (WorkMethod("auto", lambda n, rng: _auto_second(wall, n, rng), True), (1e2,), (1e2, 1e4, 1e6)),
+        (WorkMethod(AUTO, lambda n, rng: _auto_second(wall, n, rng), True), (1e2,), (1e2, 1e4, 1e6)),
         (WorkMethod("Legendre", lambda n: _second(wall, Legendre(n))), sizes, (*sizes, 32.0, 64.0)),
         (WorkMethod("bins", lambda n: _second(wall, Bins(n))), sizes, (*sizes, 32.0, 64.0, 128.0)),
         (WorkMethod("panels", panels), (1.0, 2.0), (1.0, 2.0, 3.0, 4.0)),
@@ -43,7 +43,7 @@ def _eigenvalue_methods(wall: Wall) -> Methods:
 def _diffusivity_methods(wall: Wall) -> Methods:
     angles = (1e1, 1e2, 1e3)
     return [
-        (WorkMethod("auto", lambda budget: _auto_eta(wall)), (1.0,), (1.0,)),
+        (WorkMethod(AUTO, lambda budget: _auto_eta(wall)), (1.0,), (1.0,)),
         (WorkMethod("rays at the angle 1/budget", lambda n: eta_at(wall, 1.0 / n)), angles, (*angles, 1e4, 1e5, 1e6)),
     ]
 

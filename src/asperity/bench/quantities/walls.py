@@ -6,23 +6,18 @@ from collections.abc import Callable
 from functools import cache, partial
 from itertools import pairwise
 from math import pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ... import geometry as geo
 from ...core.checks import Floats
 from ...core.errors import InputError
-
-if TYPE_CHECKING:
-    from ...geometry import Curve, Wall
 
 Point = tuple[float, float]
 
 METRES_PER_DEGREE = 111_200.0
 TRANSECT_ROW, EXAGGERATION = 170, 3.0
 RANDOM_WALLS = 20
-# Limit on attempts to generate a valid wall; a few always suffice.
-ATTEMPTS = 1000
 
 
 def terrain_profile() -> tuple[Floats, Floats]:
@@ -38,32 +33,18 @@ def terrain_profile() -> tuple[Floats, Floats]:
     return spacing * np.arange(len(height)), height
 
 
-def _measured() -> Wall:
-    from ...geometry import Wall
-
+def _measured() -> geo.Wall:
     x, height = terrain_profile()
-    return Wall.from_profile(x, EXAGGERATION * height, seam="mirror")
+    return geo.Wall.from_profile(x, EXAGGERATION * height, seam="mirror")
 
 
-def _mixed() -> Wall:
-    from ...geometry import Arc, Bezier, Segment, Wall
-
-    teeth = [Segment((0.0, 0.0), (0.2, -0.3)), Segment((0.2, -0.3), (0.35, 0.0)), Segment((0.35, 0.0), (0.45, 0.0))]
-    curves = [
-        Arc((0.6, 0.0), 0.15, pi, 2.0 * pi),
-        Bezier([(0.75, 0.0), (0.8, -0.4), (0.95, -0.4), (1.0, 0.0)]),
-    ]
-    return Wall([*teeth, *curves], period=1.0)
+def _mixed() -> geo.Wall:
+    lines = geo.Segment.path(np.array([(0.0, 0.0), (0.2, -0.3), (0.35, 0.0), (0.45, 0.0)]))
+    arc = geo.Arc((0.6, 0.0), 0.15, pi, 2.0 * pi)
+    return geo.Wall([*lines, arc, geo.Bezier([(0.75, 0.0), (0.8, -0.4), (0.95, -0.4), (1.0, 0.0)])], period=1.0)
 
 
-def _named(name: str, *parameters: float) -> Wall:
-    from ... import geometry
-
-    wall: Wall = getattr(geometry, name)(*parameters)
-    return wall
-
-
-def random_wall(number: int) -> Wall:
+def random_wall(number: int) -> geo.Wall:
     """Random wall ``number``: the first valid wall from its own generator.
 
     The generator is ``numpy.random.default_rng([8, number])``. One to four joints have positions uniform in (0.1, 0.9)
@@ -72,28 +53,24 @@ def random_wall(number: int) -> Wall:
     whose inner control points are off the chord by up to 0.35 chords. Every third wall has an additional flat top of
     length 0.25.
     """
-    from ...geometry import Segment, Wall
-
     rng = np.random.default_rng([8, number])
-    for _ in range(ATTEMPTS):
+    while True:
         inner = np.sort(rng.uniform(0.1, 0.9, int(rng.integers(1, 5))))
         joints = [(0.0, 0.0), *((float(x), -float(rng.uniform(0.05, 0.8))) for x in inner), (1.0, 0.0)]
         try:
             pieces = [_piece(start, end, number % 2 == 1, rng) for start, end in pairwise(joints)]
             if number % 3 == 0:
-                pieces.append(Segment((1.0, 0.0), (1.25, 0.0)))
-            return Wall(pieces, period=1.25 if number % 3 == 0 else 1.0)
+                pieces.append(geo.Segment((1.0, 0.0), (1.25, 0.0)))
+            return geo.Wall(pieces, period=1.25 if number % 3 == 0 else 1.0)
         except InputError:
+            # its pieces cross; draw again
             continue
-    raise InputError(f"number: no wall after {ATTEMPTS} attempts for {number!r}; choose another")
 
 
-def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> Curve:
-    from ...geometry import Arc, Bezier, Segment
-
+def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> geo.Curve:
     kind = int(rng.integers(0, 3)) if curved else 0
     if kind == 0:
-        return Segment(start, end)
+        return geo.Segment(start, end)
     first, last = np.array(start), np.array(end)
     along = last - first
     chord = float(np.hypot(*along))
@@ -106,19 +83,19 @@ def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> 
         begin, finish = (float(np.arctan2(*(point - center)[::-1])) for point in (first, last))
         if side * (finish - begin) < 0.0:
             finish += side * 2.0 * pi
-        return Arc(tuple(center), radius, begin, finish).pinned(start, end)
+        return geo.Arc(tuple(center), radius, begin, finish).pinned(start, end)
     bends = rng.uniform(-0.35, 0.35, 2)
     control = [tuple(first + (k + 1) / 3 * along + bends[k] * normal) for k in range(2)]
-    return Bezier([start, *control, end])
+    return geo.Bezier([start, *control, end])
 
 
-_STANDARD: dict[str, Callable[[], Wall]] = {
-    "triangular-teeth": partial(_named, "triangular_teeth", 0.7),
-    "rectangular-teeth": partial(_named, "rectangular_teeth", 2.0),
-    "focusing-arc": partial(_named, "focusing_arcs", 1.2),
-    "cusps": partial(_named, "dispersing_arcs", 2.0),
-    "mushroom": partial(_named, "mushrooms", 0.3, 0.5),
-    "koch": partial(_named, "koch", 4),
+_STANDARD: dict[str, Callable[[], geo.Wall]] = {
+    "triangular-teeth": partial(geo.triangular_teeth, 0.7),
+    "rectangular-teeth": partial(geo.rectangular_teeth, 2.0),
+    "focusing-arc": partial(geo.focusing_arcs, 1.2),
+    "cusps": partial(geo.dispersing_arcs, 2.0),
+    "mushroom": partial(geo.mushrooms, 0.3, 0.5),
+    "koch": partial(geo.koch, 4),
     "profile": _measured,
     "mixed": _mixed,
 }
@@ -136,9 +113,7 @@ def standard_names() -> tuple[str, ...]:
 
 
 @cache
-def wall_of(scene: str) -> Wall:
+def wall_of(scene: str) -> geo.Wall:
     """The wall of a scene, or of a text as `wall_from_text` reads it, constructed once in each process."""
-    from ...geometry import wall_from_text
-
     build = (_STANDARD | _RANDOM).get(scene)
-    return wall_from_text(scene) if build is None else build()
+    return geo.wall_from_text(scene) if build is None else build()
