@@ -16,11 +16,11 @@ from asperity import kernels as ker
 from asperity.core.checks import Floats
 from asperity.errors import AccuracyError, WallError
 from asperity.geometry import Arc, Bezier, Segment
+from campaigns.cases.random_curved_walls import COUNT as CURVED
+from campaigns.cases.random_curved_walls import random_curved_wall
+from campaigns.cases.random_hollows import random_hollow, wall_with
 from campaigns.engine import Campaign, Judged
 from campaigns.judges.plain_tracer import PlainTracer
-from campaigns.judges.random_curved_walls import COUNT as CURVED
-from campaigns.judges.random_curved_walls import random_curved_wall
-from campaigns.judges.random_hollows import random_hollow, wall_with
 
 WALLS, RAYS, JUDGED, DISKS, SPIKES = 200, 5_000, 20, 500, 2_000
 # After more hits, rounding changes positions and angles too much for a comparison.
