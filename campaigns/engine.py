@@ -15,6 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import import_module
@@ -107,15 +108,19 @@ class Campaign:
         return list(self.judge(self.draw(number)))
 
     def run(self, numbers: Iterable[int], jobs: int, record: Path | None = None) -> Iterator[tuple[int, list[Judged]]]:
-        """The judgements of these cases in child processes, in order; those in the record are not repeated."""
+        """The judgements of these cases in child processes, in order; those in the record are not repeated.
+
+        The processes end with the iterator, also where it is closed or fails.
+        """
         done = _recorded(record)
-        owned = local()
+        owned, children = local(), list[ChildProcess]()
 
         def one(number: int) -> list[Judged]:
             if number in done:
                 return done[number]
             if not hasattr(owned, "child"):
                 owned.child = ChildProcess()
+                children.append(owned.child)
             try:
                 found: list[Judged] = owned.child.call(judged, self.name, number, seconds=self.seconds)
             except OutOfTime:
@@ -124,13 +129,23 @@ class Campaign:
                 return [Judged("exception", fault=f"{type(reason).__name__}: {reason}")]
             return found
 
-        with ThreadPoolExecutor(jobs) as pool:
+        def end() -> None:
+            for child in children:
+                child.end()
+
+        with ExitStack() as ends, ThreadPoolExecutor(jobs) as pool:
+            ends.callback(end)
             numbers = list(numbers)
-            for number, found in zip(numbers, pool.map(one, numbers), strict=True):
-                if record is not None and number not in done:
-                    with record.open("a", encoding="utf-8") as file:
-                        file.write(json.dumps([number, [asdict(each) for each in found]]) + "\n")
-                yield number, found
+            try:
+                for number, found in zip(numbers, pool.map(one, numbers), strict=True):
+                    if record is not None and number not in done:
+                        with record.open("a", encoding="utf-8") as file:
+                            file.write(json.dumps([number, [asdict(each) for each in found]]) + "\n")
+                    yield number, found
+            finally:
+                # of an unfinished run: the judges at work end, and no other case begins
+                pool.shutdown(wait=False, cancel_futures=True)
+                end()
 
 
 def _recorded(record: Path | None) -> dict[int, list[Judged]]:

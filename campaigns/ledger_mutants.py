@@ -34,7 +34,7 @@ from asperity.geometry.disk import disk, rolling
 from asperity.kernels.walls import circular_arc, triangular
 from asperity.ledger import Entry
 from asperity.ledger import index as ledger
-from campaigns.judges.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
+from campaigns.cases.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 
 from .pages import print_table
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from campaigns.judges.bezier_pieces import parabola_as_a_cubic, wall_with_inflections
 from campaigns.rays.aimed_rays import WALLS as AIMED_AT
 
 from asperity import geometry as geo
@@ -19,6 +18,23 @@ FLOOR = [(0.0, -0.9), (1.0, -0.9)]
 def polygon(*points):
     """The sides of a polygon with these vertices."""
     return [Segment(p, q) for p, q in pairwise(points)]
+
+
+def parabola_as_a_cubic(start, middle, end, bump=0.0):
+    """The quadratic Bezier piece of these points as a cubic one, whose second point is raised by ``bump``."""
+    start, middle, end = map(np.array, (start, middle, end))
+    second = start + (middle - start) * 2 / 3 + [0.0, bump]
+    return Bezier([start, second, end + (middle - end) * 2 / 3, end])
+
+
+def wall_with_inflections():
+    """Two pieces with an inflection each."""
+    return geo.Wall(
+        [
+            Bezier([(0, 0), (0.8, -0.3), (-0.1, -0.6), (0.5, -0.9)]),
+            Bezier([(0.5, -0.9), (1.1, -0.6), (0.2, -0.3), (1, 0)]),
+        ]
+    )
 
 
 def over_floor(*islands):

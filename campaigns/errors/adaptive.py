@@ -18,8 +18,8 @@ from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import traced_matrix
 from asperity.kernels.walls.conditionals import adaptive_conditionals
+from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
 from campaigns.engine import Campaign, Judged
-from campaigns.judges.random_curved_walls import COUNT, random_curved_wall
 from campaigns.judges.reference_rows import references
 
 # A wall with a basis, its exact or fine matrix, the error of that matrix, and the kind of the case.

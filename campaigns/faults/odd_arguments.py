@@ -24,8 +24,8 @@ import numpy as np
 
 from asperity import kernels as ker
 from asperity.errors import AsperityError
+from campaigns.cases import public_calls
 from campaigns.engine import Campaign, Judged
-from campaigns.judges import public_calls
 
 SECONDS = 60.0
 SAME, REFUSED, OTHER = "same numbers", "no numbers", "other numbers"

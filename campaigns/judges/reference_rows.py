@@ -19,12 +19,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from campaigns.judges.random_curved_walls import COUNT, random_curved_wall
-from campaigns.judges.textbook_tracer import compiled, follow, table_of
 
 from asperity.kernels import Legendre
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import panel_edges
+from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
+from campaigns.judges.textbook_tracer import compiled, follow, table_of
 
 FILE = Path(__file__).with_suffix(".json")
 ANGLES = (0.21, 0.83, 1.37, 1.96, 2.77)

@@ -16,17 +16,19 @@ from asperity import kernels as ker
 from asperity.core.checks import Floats
 from asperity.errors import AccuracyError, WallError
 from asperity.geometry import Arc, Bezier, Segment
+from campaigns.cases.random_curved_walls import COUNT as CURVED
+from campaigns.cases.random_curved_walls import random_curved_wall
+from campaigns.cases.random_hollows import random_hollow, wall_with
 from campaigns.engine import Campaign, Judged
 from campaigns.judges.plain_tracer import PlainTracer
-from campaigns.judges.random_curved_walls import COUNT as CURVED
-from campaigns.judges.random_curved_walls import random_curved_wall
-from campaigns.judges.random_hollows import random_hollow, wall_with
 
 WALLS, RAYS, JUDGED, DISKS, SPIKES = 200, 5_000, 20, 500, 2_000
 # After more hits, rounding changes positions and angles too much for a comparison.
 MOST_HITS = 200
 # Allowed difference of angles; rounding grows along a ray, on bumps by up to a factor of ten at each hit.
 SAME_ANGLE = 1e-6
+# Allowed relative change of the energy of a disk: each contact ends with a Newton step to the norm of the velocity.
+SAME_ENERGY = 1e-14
 SCALE, SPACING = 1e-3, 2.0 * np.pi / 80
 # Flatter rays pass too many cells for the plain tracer.
 STEEP = 0.3
@@ -176,7 +178,7 @@ def _misjudged(one: Rolled, rng: np.random.Generator) -> Floats:
 
 
 def _other_disks(one: Rolled, rng: np.random.Generator) -> Floats:
-    """Which disks end otherwise and do not say that they may; none over Bezier pieces."""
+    """Which disks end otherwise and do not say that they may, or with another energy; none over Bezier pieces."""
     if any(isinstance(piece, Bezier) for piece in one.wall.pieces):
         return np.zeros(0, dtype=bool)
     scale = SCALE / max(one.rolled.depth, one.rolled.period)
@@ -186,16 +188,19 @@ def _other_disks(one: Rolled, rng: np.random.Generator) -> Floats:
     flight = scale * one.drop / -velocity[:, 1]
     start = position + flight[:, None] * velocity[:, [0, 2]] - [scale * one.shift[0], 0.0]
     limit = {"spacing": SPACING, "max_contacts": MOST_HITS}
-    here = geo.collide(geo.Disk(), one.wall, scale, start, velocity, **limit)
-    there = geo.collide(geo.Disk(), one.rolled, scale, position, velocity, **limit)
+    disk = geo.Disk()
+    here = geo.collide(disk, one.wall, scale, start, velocity, **limit)
+    there = geo.collide(disk, one.rolled, scale, position, velocity, **limit)
     out = here.escaped & there.escaped
     climb = scale * one.drop / np.where(out, here.velocity[:, 1], 1.0)
     place = here.position + [scale * one.shift[0], 0.0] + climb[:, None] * here.velocity[:, [0, 2]]
     apart = np.abs(here.velocity - there.velocity).max(axis=1) > SAME_ANGLE
     apart |= np.abs(place - there.position).max(axis=1) > SAME_ANGLE * (1.0 + climb / here.velocity[:, 1])
-    # the status says on both walls that rounding decides the disk
+    # the status says on both walls that rounding decides the path, never the energy
     amplified = (here.status == geo.DiskStatus.AMPLIFIED) & (there.status == geo.DiskStatus.AMPLIFIED)
-    return ~amplified & np.where(out, apart | (here.contacts != there.contacts), here.escaped != there.escaped)
+    energies = [disk.inner(end, end) / disk.inner(velocity, velocity) for end in (here.velocity, there.velocity)]
+    lost = np.abs(np.array(energies) - 1.0).max(axis=0) > SAME_ENERGY
+    return lost | ~amplified & np.where(out, apart | (here.contacts != there.contacts), here.escaped != there.escaped)
 
 
 def _same_properties(one: Rolled) -> bool:

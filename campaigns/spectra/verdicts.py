@@ -23,9 +23,9 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.checks import Floats
 from asperity.errors import InputError
+from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
+from campaigns.cases.random_hollows import random_hollow, wall_with
 from campaigns.engine import Campaign, Judged
-from campaigns.judges.random_curved_walls import COUNT, random_curved_wall
-from campaigns.judges.random_hollows import random_hollow, wall_with
 from campaigns.judges.textbook_tracer import legendre_functions, outgoing_angles
 
 POLYGONS, WALLS, TOLERANCE, FRACTION = 20, 48, 1e-3, 0.3

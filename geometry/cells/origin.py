@@ -16,6 +16,7 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
+from ..curves.crossings import directions_of
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
 
@@ -50,6 +51,7 @@ def highest_point_of(path: tuple[Curve, ...], joints: Floats, period: float) -> 
     first = first_top(joints, period)
     if first is None:
         return None
+    first = _above_a_plate(path, joints, first)
     x, y = (float(c) for c in joints[first])
     count = len(path)
     if first == 0 and y == 0.0:
@@ -73,6 +75,18 @@ def highest_point_of(path: tuple[Curve, ...], joints: Floats, period: float) -> 
             pieces[seam - 1 : seam + 1] = [whole]
             del order[seam]
     return HighestPoint(tuple(pieces), (x, y), tuple(order))
+
+
+def _above_a_plate(path: tuple[Curve, ...], joints: Floats, top: int) -> int:
+    """Return the first joint at the point of a top with the sky on its left: on a plate there is one below it, too."""
+    same = np.flatnonzero(np.all(joints[:-1] == joints[top], axis=1))
+    if len(same) > 1:
+        into, out = directions_of(path)
+        # angles from straight down, from -pi/2 on the left to pi/2 on the right
+        back, on = (np.arctan2(x, -y) for x, y in (-into[same - 1].T, out[same].T))
+        above = same[on >= back]
+        top = int(above[0]) if len(above) else top
+    return top
 
 
 def first_top(vertices: Floats, period: float) -> int | None:

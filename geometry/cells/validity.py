@@ -233,6 +233,9 @@ def _level(pieces: Pieces, vertices: Floats, slack: Floats) -> tuple[float, NDAr
 
 def _cut_at_touching(piece: Curve, level: float, limit: float) -> list[Curve]:
     """Cut a curved piece at its tops of greatest height, because hollows end there."""
+    if piece.end < piece.start:
+        # in one direction of the two, so that coincident faces stay coincident
+        return [part.reversed() for part in reversed(_cut_at_touching(piece.reversed(), level, limit))]
     if not isinstance(piece, Segment):
         for top in piece.turning_points(1):
             x, y = (float(v) for v in piece.point(top))

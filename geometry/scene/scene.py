@@ -7,9 +7,9 @@ columns.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import asin, cos, hypot, pi, sin
+from math import asin, cos, frexp, hypot, ldexp, pi, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +39,8 @@ RUN_CHORDS = 8.0
 OUTLINE_POINTS = 64
 # Number of lines in a hollow from which on it has a tree of boxes.
 TREE_LINES = 96
+# Binary digits of coordinates on the grid of coincident Bezier faces; their coefficients have three more.
+GRID_DIGITS = 50
 # Nominal time of a segment in seconds, and how many times as long it takes on Bezier curves.
 SEGMENT_TIME, BEZIER_FACTOR = 2e-7, 4.0
 
@@ -274,6 +276,28 @@ def _chain_of(pieces: tuple[Curve, ...], vertices: Floats) -> _Chain:
     return _Chain(pieces, vertices, corners_of(pieces), straight_in(pieces))
 
 
+def _with_exact_faces(chains: list[_Chain]) -> list[_Chain]:
+    """Return the chains with coincident Bezier faces on a grid, where the coefficients of both are exact.
+
+    By rounded coefficients the faces would cross, and rays would be caught between them.
+    """
+    curves = {piece for chain in chains for piece in chain.pieces if isinstance(piece, Bezier)}
+    faces = {face: np.array(face.control_points) for face in curves & {curve.reversed() for curve in curves}}
+    if not faces:
+        return chains
+    grid = ldexp(1.0, frexp(max(float(np.abs(points).max()) for points in faces.values()))[1] - GRID_DIGITS)
+    exact: dict[Curve, Curve] = {face: Bezier(list(grid * np.round(points / grid))) for face, points in faces.items()}
+    ends = {face.start: piece.start for face, piece in exact.items()}
+    return [
+        replace(
+            chain,
+            pieces=tuple(exact.get(piece, piece) for piece in chain.pieces),
+            vertices=np.array([ends.get((x, y), (x, y)) for x, y in chain.vertices.tolist()]),
+        )
+        for chain in chains
+    ]
+
+
 class _Tables:
     """The tables of a scene under construction; each hollow adds a block of rows to every one."""
 
@@ -291,7 +315,7 @@ class _Tables:
     def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[float, float]) -> None:
         """Append one hollow, or the whole cell of an open wall."""
         is_closed = len(chains) == 1 and edges != (c.NO_EDGE, c.NO_EDGE)
-        chains = [chain.without_long_arcs() for chain in chains]
+        chains = _with_exact_faces([chain.without_long_arcs() for chain in chains])
         vertices = np.concatenate([chain.vertices for chain in chains])
         size = max(float(np.max(np.ptp(vertices, axis=0))), right - left)
         row = {c.LEFT: left, c.RIGHT: right, c.SIZE: size, c.LEFT_EDGE: edges[0], c.RIGHT_EDGE: edges[1]}

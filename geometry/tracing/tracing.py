@@ -193,7 +193,8 @@ def trace(
     shape = common_shape(x=rays[0], theta=rays[1])
     whole_number("max_collisions", max_collisions, 1)
     # the compiled functions take arrays of one kind: aligned, contiguous and writable
-    full = (array if array.shape == shape else np.broadcast_to(array, shape) for array in rays)
+    # (of a broadcast array without entries numpy warns)
+    full = (array if array.shape == shape and array.size else np.broadcast_to(array, shape).copy() for array in rays)
     given, incoming = (np.require(array, requirements=["A", "C", "W"]).reshape(-1) for array in full)
     starts = given if wall.origin == (0.0, 0.0) else np.empty_like(given)
     _keep_freed_memory(len(starts))

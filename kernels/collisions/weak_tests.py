@@ -24,6 +24,7 @@ from ...core.checks import (
 from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
 from ...core.frames import data_frame
+from ...core.rounding import EPS
 from ..bases.measure import SINE, SINE_SQUARED
 from .collision_law import StateFunction
 
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
 # Two functions of a state, f(y, theta, psi) of the outcome and g(y, theta, psi) of the incoming state.
 Pair = tuple[StateFunction, StateFunction]
+# The rounding of positions in the window, as a fraction of the period, up to which entry points are spread evenly.
+FINEST = 2.0**-10
 # x1, alpha, theta, psi of a state, and the entry point of the limit law.
 DIMENSIONS = 5
 
@@ -139,7 +142,7 @@ def weak_limit(
     wall : Wall
         A wall of segments and arcs, not foreshortened.
     scales : array_like, shape (n,)
-        Values of eps > 0.
+        Values of eps, at least 2^-42 ``window``/``wall.period``.
     pairs : dict of (f, g), optional
         Continuous functions of states, vectorised: f(y, theta, psi), with y = (x1, alpha) of shape (n, 2). By default
         f = g = cos(pi x1/2)^2 cos(pi alpha/2)^2 h for x1 and alpha in (-1, 1), with four functions h of the angles.
@@ -187,6 +190,11 @@ def weak_limit(
     tested = PAIRS if pairs is None else _checked(pairs)
     source = generator(rng)
     spaces = [ConfigurationSpace(wall, disk, float(e)) for e in eps]
+    least = EPS * window / (FINEST * wall.period)
+    if eps.min() < least:
+        raise InputError(
+            f"scales: expected at least {least:.2g}, where positions resolve a period, got {eps.min():.2g}"
+        )
     runs = np.empty((len(eps), repetitions, 2, len(tested)))
     unresolved, doubt = np.zeros(len(eps)), np.zeros((len(eps), len(tested)))
     for i, space in enumerate(spaces):

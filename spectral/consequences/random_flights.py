@@ -232,6 +232,9 @@ def channel_paths(
         raise InputError(f"bend: expected a number greater than the radius {half:g}, got {bend!r}")
     paper = law.in_specular_frame() if law.frame == "specular" else law
     channel = _Channel(half, middle, -1.0 if arrangement == "half-turn" else 1.0)
+    latest = MOST_CROSSINGS * channel.longest / pace
+    if not moments[-1] <= latest:
+        raise InputError(f"times: expected at most {latest:.3g} ({MOST_CROSSINGS} flights), got {moments[-1]:.3g}")
     positions = _simulated(paper, channel, pace * moments, particles, generator(rng))
     return ChannelPaths(frozen(moments), frozen(positions), half, pace, middle)
 
@@ -253,6 +256,11 @@ class _Channel:
     def is_straight(self) -> bool:
         """Whether the walls are lines."""
         return math.isinf(self.bend)
+
+    @property
+    def longest(self) -> float:
+        """The longest flight: in a straight channel at the least angle, in a bent one along the inner circle."""
+        return 2.0 * self.half / SMALLEST if self.is_straight else 4.0 * math.sqrt(self.half) * math.sqrt(self.bend)
 
     def framed(self, angle: Floats, wall: Floats) -> Floats:
         """The angle in the frame of the wall, from that in the channel, and the other way round."""

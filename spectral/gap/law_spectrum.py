@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ...core.checks import Rng, frozen, generator, positive_number, whole_number
+from ...core.checks import Rng, frozen, generator, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.long_runs import TIME_LIMIT
+from ...core.rounding import EPS
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import not_a_law
 from ..bounds.contraction import refuse_unless_self_adjoint
@@ -41,8 +43,8 @@ def spectrum(
     k : int
         Number of eigenvalues; a matrix with fewer rows has fewer.
     tolerance : float, optional
-        Wanted error of every eigenvalue of a law, 1e-4 by default; ``errors`` are the errors reached. If a basis is
-        given, it is the wanted error of the matrix.
+        Wanted error of every eigenvalue of a law, 1e-4 by default and at least 2^-52; ``errors`` are the errors
+        reached. If a basis is given, it is the wanted error of the matrix.
     rng : None, int or numpy.random.Generator
         Source of rays for traced laws.
     time_limit : float
@@ -88,7 +90,7 @@ def spectrum(
     seconds = positive_number("time_limit", time_limit)
     how = dict(discretisation)
     if tolerance is not None:
-        how["tolerance"] = positive_number("tolerance", tolerance)
+        how["tolerance"] = number_between("tolerance", tolerance, EPS, math.inf, closed="low")
     if rng is not None:
         how["rng"] = generator(rng)
     if isinstance(kernel, CollisionLaw):

@@ -10,7 +10,7 @@ from copy import copy
 
 import numpy as np
 import pytest
-from campaigns.judges.ablations import ablations
+from campaigns.cases.ablations import ablations
 from campaigns.speed.exact_rows import ArcRow
 from click.testing import CliRunner
 from matplotlib.figure import Figure

@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from campaigns.judges.public_calls import CALLS, method_calls
+from campaigns.cases.public_calls import CALLS, method_calls
 
 from asperity import geometry as geo
 from asperity import kernels as ker

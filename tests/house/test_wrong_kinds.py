@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from campaigns.cases.public_calls import CALLS, DISK, EDGES, FIRST, LAW, LEFT_OUT, MATRIX, PLAIN, TEETH, is_strict
 from campaigns.faults.odd_arguments import has_nan, leaves
-from campaigns.judges.public_calls import CALLS, DISK, EDGES, FIRST, LAW, LEFT_OUT, MATRIX, PLAIN, TEETH, is_strict
 
 from asperity import geometry as geo
 from asperity import kernels as ker

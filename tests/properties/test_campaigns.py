@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
+import time
+from collections.abc import Generator
+from multiprocessing import connection
 
 import pytest
+from campaigns import engine
 from campaigns.engine import Campaign, Judged, campaigns, faults, refuted, rows
 
 
@@ -44,6 +49,27 @@ def test_a_bound_is_refuted_by_one_case_and_a_half_width_beyond_chance():
     assert refuted(half_width, found) == [] and refuted(half_width, found + CAMPAIGN.judged(1) * 9) == ["errors"]
     ((kind, cases, failing, unknown, held, *_),) = rows(found)
     assert (kind, cases, failing, unknown) == ("errors", 20, 1, 0) and held.startswith("0.950 (")
+
+
+def throw(run):
+    with pytest.raises(KeyError):
+        run.throw(KeyError())
+
+
+@pytest.mark.parametrize("leave", [list, Generator.close, throw])
+def test_the_processes_of_a_run_end_with_it(leave, monkeypatch):
+    processes, begun = [], time.monotonic()
+    started = subprocess.Popen.__init__
+    monkeypatch.setattr(
+        subprocess.Popen, "__init__", lambda self, *a, **k: (processes.append(self), started(self, *a, **k))[1]
+    )
+    # without connections it only waits, as many seconds as the number of the case
+    monkeypatch.setattr(engine, "judged", connection.wait)
+    run = dataclasses.replace(CAMPAIGN, name=()).run([0, 0, 0] if leave is list else [0, 100, 0, 100], 2)
+    next(run)
+    leave(run)
+    assert len(processes) == 2 and all(process.poll() is not None for process in processes)
+    assert time.monotonic() - begun < 60.0
 
 
 def test_a_run_goes_on_from_its_record_and_a_case_without_end_fails_alone(tmp_path, monkeypatch):

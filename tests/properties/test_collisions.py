@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaigns.judges.random_curved_walls import COUNT, random_curved_wall
+from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
 
 from asperity import geometry as geo
 from disk_shapes import BEZIERS, DISK, TOOTHED, UNEQUAL, WALLS, bodies, gear, starts, states

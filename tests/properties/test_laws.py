@@ -45,8 +45,7 @@ def test_probabilities_add_up_to_one_down_to_grazing(law: ker.Law) -> None:
 
 def test_images_and_samples_have_the_shapes_of_their_arguments(law: ker.Law) -> None:
     assert law.sample([], rng=0).shape == (0,)
-    # numpy warns of what a tracer does to no rays
-    assert isinstance(law, ker.WallLaw | ker.MushroomLaw) or law.apply(np.cos, np.empty((3, 0))).shape == (3, 0)
+    assert law.apply(np.cos, np.empty((3, 0))).shape == (3, 0)
     assert law.apply(ker.Legendre(4).evaluate, np.full((2, 3), 1.0)).shape == (2, 3, 4)
     assert law.sample(1.0, rng=0).shape == ()
 

@@ -242,6 +242,7 @@ REFUSED = {
         (lambda: ker.weak_limit(DISK, FLAT, [1e-2], repetitions=1), "repetitions"),
         (lambda: ker.weak_limit(DISK, FLAT, [1e-2], {}), "pairs"),
         (lambda: ker.weak_limit(DISK, FLAT, [[1e-2]]), "scales"),
+        *((lambda e=e: ker.weak_limit(DISK, FLAT, e, rng=0, samples=8), "scales: .*at least") for e in (1e-20, 5e-324)),
         (lambda: ker.weak_limit(DISK, FLAT, 1e-2, rng=0, samples=8).estimate(0, 0, of="disk"), "of: expected"),
         (lambda: ker.limit_study(DISK, FLAT, [1e-3], rng=0, psi=[[1.0]]), "psi"),
     ],
@@ -256,6 +257,7 @@ REFUSED = {
         (lambda: ker.phase_portrait(wedge_record(), "angle"), "'boundary' or 'velocity'"),
         (lambda: spec.channel_paths("lambertian", [1, 2, 3]), "expected a law"),
         (lambda: spec.channel_paths(DIFFUSE, [1, 2]), "increasing positive times"),
+        *((lambda r=r: spec.channel_paths(DIFFUSE, [1, 2, 3], bend=r, speed=1e308), "flights") for r in (3, math.inf)),
         (lambda: spec.channel_paths(DIFFUSE, [1, 2, 3], bend=1.0), "greater than the radius"),
         (lambda: spec.channel_paths(DIFFUSE, [1, 2, 3], arrangement="shifted"), "arrangement"),
         (lambda: paths().limit_variance(), "at least 320"),
@@ -336,6 +338,7 @@ REFUSED = {
     ],
     "spectra": [
         (lambda: spec.spectrum(MIRROR, k=0), "k: expected"),
+        (lambda: spec.spectrum(HG(0.5), tolerance=5e-324), "tolerance"),
         (lambda: spec.spectrum(np.eye(3)), "kernel: expected"),
         (lambda: spec.spectral_gap(DIFFUSE, tolerance=0.0), "tolerance"),
         (lambda: spec.leading_eigenvalues(np.array([[0.0, 1.0], [0.0, 0.0]]), 1), "symmetric"),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaigns.judges.random_curved_walls import random_curved_wall
+from campaigns.cases.random_curved_walls import random_curved_wall
 from campaigns.spectra import verdicts
 from click.testing import CliRunner
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaigns.judges.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
+from campaigns.cases.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 from campaigns.ledger_mutants import Mutant, changes, judged, library, mutants_of, noticed
 
 from asperity.geometry.disk import disk, rolling

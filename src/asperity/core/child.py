@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
@@ -112,14 +112,16 @@ class ChildProcess:
         if process is None:
             return None
         atexit.unregister(self.end)
-        self._pipe.close()
-        if self._owner != os.getpid():
-            return None
-        if kindly:
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(LEAVE_SECONDS)
-        process.kill()
-        return process.wait()
+        with closing(self._pipe):
+            if self._owner != os.getpid():
+                return None
+            if kindly:
+                self._pipe.close()
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(LEAVE_SECONDS)
+            # before its pipe is closed, so that a call in another thread sees the end
+            process.kill()
+            return process.wait()
 
     def __enter__(self) -> ChildProcess:
         return self

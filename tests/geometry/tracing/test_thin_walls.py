@@ -106,6 +106,18 @@ def test_a_plate_whose_faces_cross_by_rounding_is_a_plate_without_thickness():
     assert crossed > 3
 
 
+@pytest.mark.parametrize("degree", [2, 3])
+def test_no_image_of_a_curved_plate_catches_a_ray(degree):
+    rng = np.random.default_rng([7, degree])
+    for _ in range(10):
+        face = geo.Bezier(rng.uniform([0.1, -0.8], [0.9, -0.1], (degree + 1, 2)))
+        floor = geo.Segment((0.0, -0.9), (1.0, -0.9))
+        wall = geo.Wall([floor], islands=[[face, face.reversed()]])
+        x, theta = rng.random(200), np.arccos(1.0 - 2.0 * rng.random(200))
+        for image in (wall, wall.mirrored(), wall.scaled(1.0 / 3.0)):
+            assert geo.trace(image, x * image.period, theta, max_collisions=COLLISIONS).escaped.all()
+
+
 def test_rays_next_to_the_tip_of_a_peak_are_reflected_at_it():
     # 1e-15 to 1e-13 below the tip, where the other side of the peak is closer than rounding
     rng = np.random.default_rng(6)

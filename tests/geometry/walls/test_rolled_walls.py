@@ -82,6 +82,29 @@ def test_a_cell_begins_at_a_top_that_no_plate_covers():
     assert beside.escaped
 
 
+@pytest.mark.parametrize(
+    "plate",
+    [
+        [Segment((0.35, -0.5), (0.6, -0.4)), Segment((0.6, -0.4), (0.7, -0.5))],
+        [Arc((0.5, -0.6), 0.2, 2.8, 0.2)],
+        [Bezier([(0.3, -0.6), (0.45, -0.2), (0.7, -0.3), (0.7, -0.65)])],
+    ],
+    ids=["segments", "arc", "bezier"],
+)
+def test_a_cell_begins_on_the_upper_face_of_a_plate(plate):
+    # its highest point is inside the plate, which the path runs along to the right or to the left
+    ends = [Segment((0, -0.95), plate[0].start), Segment(plate[0].start, (1, -0.95))]
+    wall = geo.Wall([ends[0], *plate, *(piece.reversed() for piece in plate[::-1]), ends[1]])
+    image = wall.mirrored()
+    assert geo.Wall(image.pieces) == image and wall.closes
+    assert (image.hollows[0].left, image.depth) == pytest.approx((1.0 - wall.hollows[0].left, wall.depth))
+    rng = np.random.default_rng(1)
+    x, theta = rng.random(200), np.arccos(1.0 - 2.0 * rng.random(200))
+    there, back = geo.trace(wall, x, theta), geo.trace(image, 1.0 - x, np.pi - theta)
+    assert there.escaped.all() and np.array_equal(there.collisions, back.collisions)
+    assert np.abs(there.theta + back.theta - np.pi).max() < 1e-9
+
+
 def test_pieces_that_the_period_cuts_are_one():
     curve = Bezier([(0, 0), (0.2, -1), (0.9, -0.7), (1, -0.1)])
     for whole in (Segment((0, 0), (3, -4)), Arc((0, 0), (1, 2), 3.0, 0.5), Arc((0, 0), 1e7, -1.6, -1.5999), curve):

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from campaigns.cases.random_hollows import graph_hollow, random_hollow
 from campaigns.judges.interval_marching import exact_row
-from campaigns.judges.random_hollows import graph_hollow, random_hollow
 
 from asperity.geometry.polygons.beams import beams_of
 from asperity.geometry.polygons.compiled.codes import FIRST_WALL, OPENING

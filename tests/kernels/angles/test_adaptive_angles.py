@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from campaigns.cases.random_curved_walls import random_curved_wall
 from campaigns.judges.plain_tracer import trace_plainly
-from campaigns.judges.random_curved_walls import random_curved_wall
 
 from asperity import geometry as geo
 from asperity import kernels as ker

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaigns.cases.random_curved_walls import COUNT
 from campaigns.errors import adaptive
-from campaigns.judges.random_curved_walls import COUNT
 from campaigns.judges.reference_rows import references
 
 # On these two walls a conditional distribution has thousands of pieces; the campaign takes them.

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from campaigns.judges.random_curved_walls import random_curved_wall
+from campaigns.cases.random_curved_walls import random_curved_wall
 
 from asperity import geometry as geo
 from asperity import kernels as ker

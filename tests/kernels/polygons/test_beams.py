@@ -3,9 +3,9 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from campaigns.cases.random_hollows import random_hollow, wall_with
 from campaigns.judges.interval_marching import exact_row
 from campaigns.judges.plain_tracer import PlainTracer
-from campaigns.judges.random_hollows import random_hollow, wall_with
 
 from asperity import geometry as geo
 from asperity import kernels as ker

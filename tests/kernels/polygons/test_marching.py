@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from campaigns.cases.random_hollows import random_hollow, wall_with
 from campaigns.judges.interval_marching import exact_row, exact_rows
-from campaigns.judges.random_hollows import random_hollow, wall_with
 
 from asperity import InputError
 from asperity import geometry as geo

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from campaigns.judges.traced_pairs import chi_square_p
+from campaigns.rays.hollows import chi_square_p
 
 from asperity import geometry as geo
 from asperity import kernels as ker

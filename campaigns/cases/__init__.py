@@ -1,0 +1,1 @@
+"""What campaigns and tests judge: random walls and hollows, calls, scenes without an optimisation, known mutants."""
