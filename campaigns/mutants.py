@@ -52,6 +52,7 @@ TESTS = {
     "kernels/bases/panels.py": ("kernels/matrices/test_bases.py",),
     "kernels/collisions/collision_law.py": (
         "kernels/collisions/test_collision.py",
+        "kernels/collisions/test_collision_algebra.py",
         "properties/test_refusals_kernels.py",
     ),
     "kernels/bases/measure.py": ("kernels/matrices/test_bases.py",),
