@@ -43,15 +43,19 @@ EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
 # The tests of each module, quick ones first, because the first failure ends a run.
 TESTS = {
     "spectral/eigenvalues/completeness.py": ("spectral/test_completeness.py",),
-    "spectral/bounds/enclosure.py": ("spectral/test_enclosure_intervals.py",),
+    "spectral/bounds/enclosure.py": ("spectral/test_enclosure_intervals.py", "properties/test_refusals_kernels.py"),
     "spectral/bounds/separation.py": ("spectral/test_separation.py",),
     "kernels/matrices/defects.py": ("kernels/matrices/test_symmetry.py",),
     "kernels/sampling/counts.py": ("kernels/matrices/test_counting.py",),
-    "kernels/bases/assembly.py": ("kernels/matrices/test_weights_and_bases.py",),
-    "kernels/bases/legendre.py": ("kernels/matrices/test_weights_and_bases.py",),
-    "kernels/bases/panels.py": ("kernels/matrices/test_weights_and_bases.py",),
-    "kernels/collisions/collision_law.py": ("kernels/collisions/test_collision_maps.py",),
-    "kernels/bases/measure.py": ("kernels/matrices/test_weights_and_bases.py",),
+    "kernels/bases/assembly.py": ("kernels/matrices/test_bases.py",),
+    "kernels/bases/legendre.py": ("kernels/matrices/test_bases.py",),
+    "kernels/bases/panels.py": ("kernels/matrices/test_bases.py",),
+    "kernels/collisions/collision_law.py": (
+        "kernels/collisions/test_collision.py",
+        "kernels/collisions/test_collision_algebra.py",
+        "properties/test_refusals_kernels.py",
+    ),
+    "kernels/bases/measure.py": ("kernels/matrices/test_bases.py",),
     "geometry/disk/disk.py": ("geometry/disks/test_disk.py", "properties/test_refusals_geometry.py"),
     "geometry/cells/profile.py": ("geometry/walls/test_profiles.py", "properties/test_refusals_geometry.py"),
 }

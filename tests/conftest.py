@@ -1,7 +1,5 @@
 """What tests share: every wall, law, basis and matrix as a fixture; a test that takes ``wall`` runs on all of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -236,3 +234,24 @@ def matrix(law: ker.Law, basis: ker.Basis) -> ker.KernelMatrix:
 
 
 MATRICES: dict[tuple[int, int], ker.KernelMatrix] = {}
+
+
+# ---- workers -----------------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def workers():
+    """Two workers in threads of this process."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(
+        n_workers=2, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
+    ) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def worker_processes():
+    """Two workers in processes of their own."""
+    pytest.importorskip("distributed")
+    from asperity.core.workers import connected
+
+    with connected(2) as client:
+        yield client

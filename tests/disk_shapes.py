@@ -1,7 +1,5 @@
 """Disks, walls under them, and states of their invariant measures, for all tests of collisions."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

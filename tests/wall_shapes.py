@@ -1,7 +1,5 @@
 """Walls for all tests, by their names: polygons, channels, arcs, Bezier pieces, plates, islands."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 

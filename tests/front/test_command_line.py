@@ -1,27 +1,17 @@
 """The command line: what it prints and writes, and how it refuses."""
 
-from __future__ import annotations
-
 import json
 import os
-import subprocess
-import sys
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from asperity import geometry as geo
-from asperity.cli import main
 from asperity.study import DATA, PICTURES
+from commands import ended, run
 
 FILES = sorted((*PICTURES, *DATA))
-
-
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def refused(*arguments):
@@ -50,18 +40,11 @@ def test_a_study_prints_its_summary_and_writes_its_files(studied):
     assert result.stderr == ""  # no progress bar where there is no terminal
 
 
-def test_a_second_study_does_not_overwrite_the_first_and_says_so_before_the_work(studied, monkeypatch):
-    folder, _ = studied
-    before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    monkeypatch.setattr("asperity.study.study_wall", lambda *_, **__: pytest.fail("the work began"))
-    message = refused("study", "flat", "--bins", 8, "--out", folder)
-    assert "--force" in message and "wall.png" in message
-    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-
-
-def test_one_existing_file_is_enough_to_refuse_and_nothing_else_is_written(tmp_path):
+def test_one_existing_file_is_enough_to_refuse_before_the_work_and_nothing_else_is_written(tmp_path, monkeypatch):
     (tmp_path / "study.json").write_text("mine")
-    assert "study.json" in refused("study", "flat", "--out", tmp_path)
+    monkeypatch.setattr("asperity.study.study_wall", lambda *_, **__: pytest.fail("the work began"))
+    message = refused("study", "flat", "--bins", 8, "--out", tmp_path)
+    assert "--force" in message and "study.json" in message
     assert [path.name for path in tmp_path.iterdir()] == ["study.json"]
     assert (tmp_path / "study.json").read_text() == "mine"
 
@@ -71,11 +54,6 @@ def test_force_replaces_an_earlier_study(tmp_path):
     result = run("study", "flat", "--bins", 8, "--out", tmp_path, "--force")
     assert result.exit_code == 0
     assert json.loads((tmp_path / "study.json").read_text())["wall"]["name"] == "flat"
-
-
-def test_a_study_that_fails_writes_no_file(tmp_path):
-    refused("study", "flat", "--bins", 0, "--out", tmp_path / "new")
-    assert not list(tmp_path.glob("new/*"))
 
 
 def test_json_goes_alone_to_standard_output(tmp_path):
@@ -148,39 +126,10 @@ def test_the_picture_of_the_walls_is_not_overwritten(tmp_path):
     assert run("walls", "--out", picture, "--force").exit_code == 0
 
 
-@pytest.mark.parametrize(
-    ("wall", "words"),
-    [
-        ("focusing-arc", "Did you mean focusing-arcs"),
-        ("nowhere.toml", "neither a named wall nor a file"),
-        ("triangular-teeth:angle=4", "angle"),
-        ("focusing-arcs:half_angle=nan", "half_angle"),
-        ("triangular-teeth:angle=wide", "expected a number, got 'wide'"),
-        ("koch:generations=1.5", "expected a whole number"),
-        ("koch:generation=2", "did you mean generations"),
-        ("flat:angle", "expected name:parameter=value"),
-    ],
-)
+@pytest.mark.parametrize(("wall", "words"), [("focusing-arc", "Did you mean focusing-arcs"), ("flat:angle", "=value")])
 @pytest.mark.parametrize("command", ["study", "gap"])
 def test_a_wall_that_is_none_is_refused_in_one_line(command, wall, words):
     assert words in refused(command, wall)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "words"),
-    [
-        ("wall.toml", "period = [", "not a TOML file"),
-        ("wall.toml", "period = 1.0", "vertices"),
-        ("wall.toml", "period = 1.0\nvertices = [[0, 0], [0.5, 0.5], [1, 0]]", "0.5"),
-        ("profile.txt", "0 1\n1 2 3\n", "line 2"),
-        ("profile.txt", "0 1\n0 2\n", "strictly increasing"),
-        ("profile.txt", "", "0 bytes"),
-    ],
-)
-def test_a_malformed_file_is_refused_with_its_name(tmp_path, name, text, words):
-    (tmp_path / name).write_text(text)
-    message = refused("study", tmp_path / name)
-    assert name in message and words in message
 
 
 @pytest.mark.parametrize(
@@ -230,13 +179,10 @@ def test_every_command_has_help(command):
 
 
 def test_the_module_runs_as_a_program(tmp_path):
-    command = [sys.executable, "-m", "asperity"]
-    shown = subprocess.run(
-        [*command, "study", "flat", "--bins", "8", "--json"], capture_output=True, text=True, cwd=tmp_path
-    )
+    shown = ended("-m", "asperity", "study", "flat", "--bins", "8", "--json", cwd=tmp_path)
     assert shown.returncode == 0 and shown.stderr == ""
     assert json.loads(shown.stdout)["wall"]["name"] == "flat"
-    failed = subprocess.run([*command, "study", "nosuch"], capture_output=True, text=True, cwd=tmp_path)
+    failed = ended("-m", "asperity", "study", "nosuch", cwd=tmp_path)
     assert failed.returncode == 1 and failed.stdout == ""
     assert failed.stderr.startswith("asperity: 'nosuch' is neither") and failed.stderr.count("\n") == 1
 
@@ -282,9 +228,6 @@ def test_a_file_whose_name_is_no_text_is_studied_and_named(tmp_path):
     name = os.fsdecode(b"wall-\xff.toml")
     geo.rectangular_teeth(2.0).save(tmp_path / name)
     for command in (["study", name, "--bins", "4", "--out", "found"], ["gap", name]):
-        done = subprocess.run(
-            [sys.executable, "-m", "asperity", *command], cwd=tmp_path, capture_output=True, check=False,
-            env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2] / "src")},
-        )  # fmt: skip
+        done = ended("-m", "asperity", *command, cwd=tmp_path, errors="replace")
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "found" / "wall.png").exists()

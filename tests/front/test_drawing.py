@@ -1,7 +1,5 @@
 """Pictures say what they show: labels, units, scales, and no gap where there is none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure

@@ -1,8 +1,7 @@
 """The examples run, and what they return is right."""
 
-from __future__ import annotations
-
 import importlib.util
+import re
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -26,23 +25,8 @@ def load(name):
 
 
 def test_every_example_has_a_test():
-    tested = {
-        "billiards",
-        "disk_in_a_strip",
-        "exchange_hollow",
-        "gallery",
-        "gap_study",
-        "least_resistance",
-        "maxwell_or_rough",
-        "measured_profile",
-        "no_slip_or_smooth",
-        "paper_figures",
-        "published_gap",
-        "true_disk",
-        "true_disk_pictures",
-        "wall_for_a_law",
-        "walls_converge",
-    }
+    # the figures of the paper are tested with its objects
+    tested = {"paper_figures", *re.findall(r'load\("(\w+)"\)', Path(__file__).read_text(encoding="utf-8"))}
     assert {path.stem for path in EXAMPLES.glob("*.py")} == tested
 
 
@@ -210,6 +194,17 @@ def test_the_pictures_of_the_page_on_true_disks_are_drawn(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in committed.iterdir()}
     for path in committed.iterdir():
         assert f"true-disk/{path.name}" in page and path.stat().st_size < 150_000
+
+
+@pytest.mark.slow
+def test_the_strip_is_bounded_and_the_wedge_periodic_until_the_walls_are_rough():
+    found = load("disk_in_a_strip").main(disks=10, collisions=300)
+    widths = [value for name, value in found.items() if "width/bound" in name and "arcs" not in name]
+    assert len(widths) == 20 and max(widths) <= 1 + 1e-12
+    assert found["focusing arcs, median width/bound"] > 1.0
+    assert found["no-slip wedge, fraction that stays"] > 0.05
+    assert found["no-slip wedge, displacement in ten collisions"] < 1e-10
+    assert found["rough wedge, fraction that stays"] < found["no-slip wedge, fraction that stays"]
 
 
 @pytest.mark.slow

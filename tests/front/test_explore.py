@@ -1,9 +1,9 @@
 """The model of the page: questions, answers with errors, computations that are dropped, files. No browser is needed."""
 
 import io
+import os
 import time
 import zipfile
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -159,8 +159,6 @@ def refuses():
 
 
 def dies():
-    import os
-
     os._exit(9)
     yield
 
@@ -185,19 +183,16 @@ def background():
     made.drop()
 
 
-def test_results_come_in_order(background):
-    background.ask(two_numbers)
-    assert results(background) == [(None, 1), (None, 2)]
-
-
-def test_errors_come_as_their_message(background):
-    background.ask(refuses)
-    assert results(background) == [("no such wall", None)]
-
-
-def test_a_process_that_dies_is_reported(background):
-    background.ask(dies)
-    assert results(background) == [(GONE, None)]
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [
+        (two_numbers, [(None, 1), (None, 2)]), (refuses, [("no such wall", None)]), (dies, [(GONE, None)]),
+        (one_and_dies, [(None, 1), (GONE, None)]),
+    ],
+)  # fmt: skip
+def test_answers_refusals_and_the_end_of_a_process_come_in_order(background, asked, found):
+    background.ask(asked)
+    assert results(background) == found
 
 
 def test_a_new_question_ends_the_computation_of_the_old_one(background):
@@ -222,12 +217,8 @@ def test_a_computation_without_first_answer_is_dropped_after_some_patience(backg
 # -- files
 
 
-def test_a_saved_wall_is_opened_again():
-    for wall in (TEETH, geo.focusing_arcs(1.0)):
-        assert opened("wall.toml", wall_as_toml(wall)) == wall
-
-
-def test_a_profile_is_opened_with_its_options():
+def test_saved_walls_and_profiles_with_their_options_are_opened():
+    assert opened("wall.toml", wall_as_toml(geo.focusing_arcs(1.0))) == geo.focusing_arcs(1.0)
     text = b"x [um], height [nm]\n0, 0\n1, 100\n2, 50\n"
     wall = opened("profile.csv", text, "seam=step")
     assert (wall.unit, wall.period) == ("um", 2.0)
@@ -320,19 +311,16 @@ def test_a_file_of_60_megabytes_is_read_in_a_process_that_is_ended_and_its_copy_
     assert not Path(folder).exists()
 
 
-def test_a_hundred_thousand_vertices_are_refused_before_any_work(page):
+def test_vertices_and_numbers_beyond_the_limits_are_refused_before_any_work(page):
     x = np.linspace(0.0, 1.0, 100_000)
-    begun = time.process_time()
-    page.wall_figure.vertices.data = {"x": x.tolist(), "y": (-x * (1.0 - x)).tolist()}
-    assert time.process_time() - begun < MESSAGE
-    assert "expected at most 400 vertices" in page.message
-
-
-def test_numbers_past_the_end_of_a_slider_are_refused_before_any_work(page):
-    begun = time.process_time()
-    page.parameters["generations"].value = 10
-    assert time.process_time() - begun < MESSAGE
-    assert "generations: expected 1 to 4, got 10" in page.message
+    vertices = {"x": x.tolist(), "y": (-x * (1.0 - x)).tolist()}
+    for changed, name, value, words in (
+        (page.wall_figure.vertices, "data", vertices, "expected at most 400 vertices"),
+        (page.parameters["generations"], "value", 10, "generations: expected 1 to 4, got 10"),
+    ):
+        begun = time.process_time()
+        setattr(changed, name, value)
+        assert time.process_time() - begun < MESSAGE and words in page.message
 
 
 def test_walls_of_too_many_pieces_are_refused_with_another_command():
@@ -341,39 +329,30 @@ def test_walls_of_too_many_pieces_are_refused_with_another_command():
         next(pictured_and_answered(wall, "long"))
 
 
-def test_after_a_refused_wall_the_answers_of_the_last_one_go_on(page):
-    end = time.monotonic() + 120.0
-    while page.answer is None and time.monotonic() < end:
+def collected(page, until, seconds=300.0):
+    """Collect answers until a condition holds."""
+    end = time.monotonic() + seconds
+    while not until() and time.monotonic() < end:
         page.collect()
         time.sleep(0.02)
+
+
+def test_after_a_refused_wall_the_answers_of_the_last_one_go_on(page):
+    collected(page, lambda: page.answer is not None)
     page.file.filename = "wrong.toml"
     page.file.value = b"period = ["
-    while not page.message and time.monotonic() < end:
-        page.collect()
-        time.sleep(0.02)
-    assert "wrong.toml" in page.message
-    assert page.question.name == "mushrooms"
-    assert page._background.busy
-    while page.answer.stage == "coarse" and time.monotonic() < end:
-        page.collect()
-        time.sleep(0.02)
+    collected(page, lambda: page.message)
+    assert "wrong.toml" in page.message and page.question.name == "mushrooms" and page._background.busy
+    collected(page, lambda: page.answer.stage != "coarse")
     assert "wrong.toml" in page.message
 
 
 def test_another_convention_does_not_lose_the_wall_that_is_awaited(page):
     page.choice.value = "koch"
     page.convention.value = "specular"
-    end = time.monotonic() + 300.0
-    while page.question.convention != "specular" and time.monotonic() < end:
-        page.collect()
-        time.sleep(0.02)
+    collected(page, lambda: page.question.convention == "specular")
     assert (page.question.name, page.question.convention) == ("koch", "specular")
     assert page.choice.value == "koch"
-
-
-def test_a_process_that_dies_after_a_first_answer_is_reported(background):
-    background.ask(one_and_dies)
-    assert results(background) == [(None, 1), (GONE, None)]
 
 
 # -- command line
@@ -393,11 +372,6 @@ def test_a_port_in_use_is_named():
 def test_the_name_and_parameters_of_a_wall_are_told_apart(tmp_path):
     assert _called("focusing-arcs:half_angle=0.9") == ("focusing-arcs", {"half_angle": 0.9})
     assert _called(str(tmp_path / "mine.toml")) == ("mine", {})
-
-
-def test_questions_are_values():
-    question = Question(TEETH, "teeth")
-    assert replace(question, foreshortened=True) != question == Question(TEETH, "teeth")
 
 
 @pytest.mark.parametrize("name", geo.WALLS)

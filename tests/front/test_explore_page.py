@@ -2,12 +2,9 @@
 
 import asyncio
 import http.client
-import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -16,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from asperity import geometry as geo
+from commands import ended, environment, started
 
 pytest.importorskip("panel", reason="the page needs asperity[explore]")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -25,7 +23,6 @@ FLAGS = [
 ]  # fmt: skip
 # Milliseconds; a machine with other work takes long.
 PATIENCE = 60_000
-SOURCE = Path(__file__).resolve().parents[2] / "src"
 # Bytes of memory that a closed tab may leave; without a leak it is about 1,000.
 LEFT = 100_000
 # The pixel of the vertex k, and all vertices, from bokeh's own views.
@@ -48,11 +45,8 @@ class Server:
     """`asperity explore` in a process of its own."""
 
     def __init__(self, *arguments, waits_for="shows the page", browser=None, cwd=None):
-        command = [sys.executable, "-m", "asperity", "explore", *arguments, "--port", "0"]
-        self.process = subprocess.Popen(
-            command if browser else [*command, "--no-browser"], stderr=subprocess.PIPE, text=True, cwd=cwd,
-            env={**os.environ, "PYTHONPATH": str(SOURCE)} | ({"BROWSER": browser} if browser else {}),
-        )  # fmt: skip
+        command, env = ["-m", "asperity", "explore", *arguments, "--port", "0"], environment(BROWSER=browser or "")
+        self.process = started(*command, *([] if browser else ["--no-browser"]), cwd=cwd, env=env)
         self.lines = []
         for line in self.process.stderr:
             self.lines.append(line)
@@ -71,6 +65,13 @@ class Server:
         seconds = time.monotonic() - begun
         return seconds, self.process.stderr.read()
 
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.communicate()
+
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory):
@@ -79,21 +80,8 @@ def out(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def server(out):
-    with subprocess_ended(Server("triangular-teeth:angle=0.9", "--out", str(out))) as made:
+    with Server("triangular-teeth:angle=0.9", "--out", str(out)) as made:
         yield made
-
-
-class subprocess_ended:
-    def __init__(self, server):
-        self.server = server
-
-    def __enter__(self):
-        return self.server
-
-    def __exit__(self, *_):
-        self.server.process.kill()
-        self.server.process.wait()
-        self.server.process.stderr.close()
 
 
 @pytest.fixture(scope="module")
@@ -144,15 +132,24 @@ def drag(tab, k, right, down):
     tab.mouse.up()
 
 
+def wait_until(condition, pause=lambda milliseconds: time.sleep(0.001 * milliseconds)):
+    """Wait for a condition; a tab has a pause of its own, in which its messages come."""
+    end = time.monotonic() + 0.001 * PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        pause(50)
+
+
 def vertices_when(tab, condition):
     """The vertices (x, y) as soon as they meet a condition."""
-    end = time.monotonic() + 0.001 * PATIENCE
-    while True:
-        found = tab.evaluate(VERTEX, 0)
-        if condition(found["x"], found["y"]):
-            return found["x"], found["y"]
-        assert time.monotonic() < end, found
-        tab.wait_for_timeout(100)
+    found = {}
+
+    def met():
+        found.update(tab.evaluate(VERTEX, 0))
+        return condition(found["x"], found["y"])
+
+    wait_until(met, tab.wait_for_timeout)
+    return found["x"], found["y"]
 
 
 def test_the_page_loads_from_this_machine_alone_and_answers(page, server):
@@ -180,10 +177,7 @@ def test_answers_come_while_the_vertex_is_still_held(page):
     for step in range(1, 9):
         page.mouse.move(x + 5 * step, y - 5 * step)
         page.wait_for_timeout(150)
-    end = time.monotonic() + 0.001 * PATIENCE
-    while answers(page) == text:
-        assert time.monotonic() < end
-        page.wait_for_timeout(50)
+    wait_until(lambda: answers(page) != text, page.wait_for_timeout)
     page.mouse.up()
 
 
@@ -237,10 +231,7 @@ def test_the_disk_changes_the_collision(page):
     slider.focus()
     for _ in range(20):
         slider.press("ArrowRight")
-    end = time.monotonic() + 0.001 * PATIENCE
-    while answers(page) == before:
-        assert time.monotonic() < end
-        page.wait_for_timeout(100)
+    wait_until(lambda: answers(page) != before, page.wait_for_timeout)
 
 
 def test_a_wrong_file_is_refused_and_the_next_one_is_shown(page, tmp_path):
@@ -276,7 +267,7 @@ def test_two_tabs_have_their_own_walls(browser, server, page):
 
 
 def test_without_a_folder_the_browser_takes_wall_and_study(browser, tmp_path):
-    with subprocess_ended(Server("triangular-teeth")) as server:
+    with Server("triangular-teeth") as server:
         for tab in opened_tab(browser, server):
             with tab.expect_download() as download:
                 tab.get_by_text("Save the wall").click()
@@ -377,7 +368,7 @@ def test_no_handler_is_reached_with_another_host_origin_method_or_without_the_to
 
 def test_no_address_runs_a_module_or_ends_the_server(tmp_path):
     (tmp_path / "trap.py").write_text(f"open({str(tmp_path / 'sprung')!r}, 'w')\n")
-    with subprocess_ended(Server("flat", cwd=tmp_path)) as server:
+    with Server("flat", cwd=tmp_path) as server:
         for module in ("unittest.__main__", "trap", "antigravity"):
             for address in ADDRESSES:
                 for path in ("/", server.path):
@@ -394,11 +385,8 @@ def test_the_browser_is_given_a_private_file_and_no_token(tmp_path):
         f'#!/bin/sh\necho "$@" > {tmp_path}/part && mv {tmp_path}/part {tmp_path}/asked\n'
     )
     (tmp_path / "browser").chmod(0o700)
-    with subprocess_ended(Server("flat", browser=f"{tmp_path}/browser %s")) as server:
-        end = time.monotonic() + 0.001 * PATIENCE
-        while not (tmp_path / "asked").exists():
-            assert time.monotonic() < end
-            time.sleep(0.05)
+    with Server("flat", browser=f"{tmp_path}/browser %s") as server:
+        wait_until((tmp_path / "asked").exists)
         asked = (tmp_path / "asked").read_text().strip()
         assert server.path.strip("/") not in asked
         file = Path(asked.removeprefix("file://"))
@@ -434,19 +422,16 @@ if __name__ == "__main__":
     tracemalloc.start()
     server.io_loop.run_sync(lambda: open_and_close(server, 2))
     before = tracemalloc.get_traced_memory()[0]
-    server.io_loop.run_sync(lambda: open_and_close(server, 12))
+    server.io_loop.run_sync(lambda: open_and_close(server, 5))
     left = tracemalloc.get_traced_memory()[0] - before
-    print(left // 12, sum(type(thing) is Page for thing in gc.get_objects()))
+    print(left // 5, sum(type(thing) is Page for thing in gc.get_objects()))
 """
 
 
 @pytest.mark.slow
 def test_closed_tabs_leave_no_memory(tmp_path):
     (tmp_path / "tabs.py").write_text(CLOSED_TABS)
-    done = subprocess.run(
-        [sys.executable, "tabs.py"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(SOURCE)}, capture_output=True,
-        text=True, check=True,
-    )  # fmt: skip
+    done = ended("tabs.py", cwd=tmp_path, check=True)
     left, pages = map(int, done.stdout.split())
     # the last one may still be held by the loop of the server
     assert pages <= 1
@@ -465,7 +450,7 @@ def test_only_the_loopback_address_listens(server):
 
 @pytest.mark.parametrize("moment", ["preparing", "shows the page"])
 def test_ctrl_c_ends_it_at_once(moment):
-    with subprocess_ended(Server("flat", waits_for=moment)) as server:
+    with Server("flat", waits_for=moment) as server:
         seconds, text = server.stop()
         assert server.process.returncode == 130
         assert text == "asperity: interrupted\n"
@@ -477,10 +462,7 @@ def test_a_port_in_use_and_a_wrong_wall_end_in_one_line(server):
         (["--port", str(server.port)], f"asperity: port {server.port} is in use"),
         (["no-such-wall"], "asperity: 'no-such-wall' is neither"),
     ):
-        done = subprocess.run(
-            [sys.executable, "-m", "asperity", "explore", "--no-browser", *arguments],
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+        done = ended("-m", "asperity", "explore", "--no-browser", *arguments)
         assert done.returncode == 1
         assert done.stderr.startswith(words)
         assert done.stderr.count("\n") == 1

@@ -1,7 +1,5 @@
 """The extreme cases: the data they rest on, and that they can fail."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

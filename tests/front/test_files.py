@@ -1,33 +1,29 @@
 """Files that others made or damaged are refused in words, and no failure costs a file that was there."""
 
-from __future__ import annotations
-
 import json
 import os
 import pickle
 import resource
 import time
+import tracemalloc
 import zipfile
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 from io import BytesIO
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench import run, standard_set
-from asperity.cli import main
+from asperity.bench import standard_set
+from asperity.bench.run import BenchRun
 from asperity.errors import AccuracyError, FileExistsRefusal, InputError, WallError
-from asperity.estimates import Estimate
 from asperity.study import study_wall
+from commands import run
 
 SAMPLED = ker.discretise(ker.CircularArcLaw(0.1), ker.Bins(200), method="qmc", samples=8192)
 EXACT = ker.discretise(ker.TriangularTeethLaw(0.7), ker.Bins(6))
@@ -42,6 +38,17 @@ def full_disk() -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@contextmanager
+def little_memory() -> Iterator[None]:
+    """At most 16 MB are taken meanwhile."""
+    tracemalloc.start()
+    try:
+        yield
+        assert tracemalloc.get_traced_memory()[1] < 2**24
+    finally:
+        tracemalloc.stop()
 
 
 def names_in(folder: Path) -> list[str]:
@@ -94,8 +101,15 @@ def test_sparse_indices_out_of_range_are_refused_before_compiled_code_uses_them(
         ({"record": {"reversible": "yes"}}, "reversible: expected"),
         ({"record": {"version": 7}}, "version 7"),
         ({"record": {"basis": {"kind": "Legendre", "n": 10**12, "weight": "sin"}}}, "shape"),
+        *(({"record": record}, "is not a kernel matrix") for record in (
+            {"error": [float("nan"), 0.0, "bound", ""]}, {"error": [0.5, 0.0, "bound", ""]}, {"law": 3}, {"law": None},
+            {"law": ["a"]}, {"method": {}}, {"samples": 10**30}, {"unresolved": True}, {"unresolved": "0.0"},
+            {"symmetrised": 1}, {"requested_tolerance": float("nan")}, {"norm_bound": float("inf")},
+            {"metadata": [["a", 1]]}, {"raw_defect": [float("nan"), "a", None]}, {"raw_defect": [0.1, 3, None]},
+            {"replicates": ["fog"]},
+        )),
     ],
-)
+)  # fmt: skip
 def test_a_matrix_that_contradicts_itself_is_refused(tmp_path, changes, words):
     path = tampered(EXACT.save(tmp_path / "kernel.npz"), **changes)
     with pytest.raises(InputError, match=rf"(?s)kernel\.npz.*({words})"):
@@ -122,6 +136,28 @@ def test_members_that_no_matrix_has_are_never_inflated(tmp_path, monkeypatch):
     monkeypatch.setattr(zipfile.ZipFile, "open", counted)
     assert np.array_equal(ker.load_matrix(path).symmetric, EXACT.symmetric)
     assert opened and "bomb.npy" not in opened
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["symmetric", "counts", "basis", "record", "none"])
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA])
+def test_no_member_is_inflated_before_its_header_is_checked(tmp_path, name, method):
+    path = ker.discretise(ker.lambertian(), ker.Bins([0.0, 1.0, np.pi])).save(tmp_path / "kernel.npz")
+    with zipfile.ZipFile(path) as archive:
+        members = {one: archive.read(one) for one in archive.namelist()}
+    bomb = BytesIO()
+    np.save(bomb, np.zeros((2000, 2000)) if name != "record" else np.array("a" * 2 * 10**7))
+    members[f"{name}.npy"] = bomb.getvalue()
+    with zipfile.ZipFile(path, "w", method) as archive:
+        for one, data in members.items():
+            archive.writestr(one, data)
+    del members, bomb
+    with little_memory():
+        if name == "none" and method == zipfile.ZIP_DEFLATED:
+            assert ker.load_matrix(path).size == 2
+        else:
+            with pytest.raises(InputError, match="is not a kernel matrix"):
+                ker.load_matrix(path)
 
 
 def test_an_array_whose_header_promises_more_than_its_data_is_refused(tmp_path):
@@ -182,36 +218,10 @@ def test_crossings_with_far_periods_only_are_found():
         geo.Wall.from_vertices(vertices)
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
-@pytest.mark.parametrize("name", ["wall.toml", "profile.txt", "kernel.npz"])
-def test_a_pipe_is_refused_and_not_waited_for(tmp_path, name):
-    os.mkfifo(tmp_path / name)
-    read = {".toml": geo.load_wall, ".txt": geo.read_profile, ".npz": ker.load_matrix}[Path(name).suffix]
-    with pytest.raises(InputError, match="expected a file"):
-        read(tmp_path / name)
-
-
-@pytest.mark.parametrize("kind", ["pipe", "folder", "device", "loop", "no UTF-8", "deep", "long name"])
-def test_a_report_of_work_is_continued_from_a_text_only(tmp_path, kind):
-    path = tmp_path / "report.json"
-    if kind == "pipe":
-        os.mkfifo(path)
-    elif kind == "folder":
-        path.mkdir()
-    elif kind == "loop":
-        path.symlink_to(path)
-    elif kind in ("no UTF-8", "deep"):
-        path.write_bytes(b"\xff" if kind == "no UTF-8" else b"[" * 100000)
-    path = {"device": Path("/dev/zero"), "long name": tmp_path / ("n" * 300)}.get(kind, path)
-    problem = spec.WorkProblem("a", (spec.ReferenceValue(0.0, 0.0, "by hand"),))
-    with pytest.raises(InputError):
-        spec.work_precision(problem, [spec.WorkMethod("b", float)], [1.0], repeats=1, path=path)
-
-
-@pytest.mark.parametrize("read", [geo.load_wall, geo.read_profile, ker.load_matrix])
-def test_a_name_that_is_too_long_is_refused(tmp_path, read):
-    with pytest.raises(InputError, match="nnn"):
-        read(tmp_path / ("n" * 300))
+@pytest.mark.parametrize("control", [1e15, 1e30, 1e90])
+def test_a_bezier_piece_with_a_far_control_point_takes_little_memory(control):
+    with little_memory(), pytest.raises(WallError, match="rises to"):
+        geo.Wall([geo.Bezier([(0, 0), (0.5, control), (0.6, -1), (1, 0)])])
 
 
 @pytest.mark.parametrize("key", ["a." * 20000 + "x = 1", "[" + "a . " * 20000 + "x]"])
@@ -229,41 +239,27 @@ def test_a_deeply_nested_table_is_refused(read):
         read("[" * 100000)
 
 
-@pytest.mark.parametrize("text", ["a = " + "[" * 5000, "a = " + "{b=" * 5000, "period = " + "9" * 5000])
-def test_toml_beyond_the_parsers_limits_is_refused(tmp_path, text):
-    with pytest.raises(InputError, match=r"wall\.toml: "):
-        geo.load_wall(wall_file(tmp_path, text))
-
-
-def test_a_whole_number_beyond_double_precision_is_refused(tmp_path):
-    with pytest.raises(InputError, match="'period': expected a number below 1e308"):
-        geo.load_wall(wall_file(tmp_path, f"period = 1{'0' * 400}\nvertices = [[0, 0], [1, 0]]"))
-
-
 # nothing is lost
 
 
 # numpy 2.0 leaves the archive open whose writing failed, and Python then warns of it; later versions close it
 @pytest.mark.filterwarnings("ignore:.*ZipFile.__del__:pytest.PytestUnraisableExceptionWarning")
-def test_a_full_disk_leaves_an_old_wall_and_an_old_matrix_as_they_are(tmp_path):
+def test_a_full_disk_leaves_an_old_wall_matrix_and_study_as_they_are(tmp_path):
     geo.flat().save(tmp_path / "wall.toml")
     EXACT.save(tmp_path / "kernel.npz")
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    with full_disk():
-        with pytest.raises(InputError, match="cannot write"):
-            geo.koch(3).save(tmp_path / "wall.toml", overwrite=True)
-        with pytest.raises(InputError, match="cannot write"):
-            SAMPLED.save(tmp_path / "kernel.npz", overwrite=True)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
-def test_a_full_disk_leaves_an_old_study_as_it_is(tmp_path):
     study = study_wall(geo.flat(), bins=4)
-    study.save(tmp_path)
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    with full_disk(), pytest.raises(InputError, match="cannot write"):
-        replace(study, name="another").save(tmp_path, overwrite=True)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    study.save(tmp_path / "study")
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    before = {path: path.read_bytes() for path in files}
+    with full_disk():
+        for save in (
+            lambda: geo.koch(3).save(tmp_path / "wall.toml", overwrite=True),
+            lambda: SAMPLED.save(tmp_path / "kernel.npz", overwrite=True),
+            lambda: replace(study, name="another").save(tmp_path / "study", overwrite=True),
+        ):
+            with pytest.raises(InputError, match="cannot write"):
+                save()
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
 def test_a_replaced_file_keeps_its_permissions_and_links_to_it_hold(tmp_path):
@@ -292,10 +288,6 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
 # asperity bench
 
 
-def bench(*arguments: object) -> object:
-    return CliRunner().invoke(main, ["bench", *map(str, arguments)])
-
-
 @pytest.fixture
 def measured(monkeypatch) -> None:
     """No problem is measured: a run has no reports."""
@@ -306,99 +298,54 @@ def measured(monkeypatch) -> None:
 @pytest.mark.parametrize("name", ["summary.md", "tables.md", "bench.json", "koch.png"])
 def test_bench_replaces_no_file_that_it_did_not_write(tmp_path, name):
     (tmp_path / name).write_text("precious")
-    refused = bench("koch/law", "--out", tmp_path)
+    refused = run("bench", "koch/law", "--out", tmp_path)
     assert refused.exit_code == 1 and name in refused.output and "--force" in refused.output
     assert (tmp_path / name).read_text() == "precious" and names_in(tmp_path) == [name]
 
 
 @pytest.mark.usefixtures("measured")
 def test_bench_goes_on_where_it_was_and_keeps_a_larger_run(tmp_path):
-    assert bench("koch/law", "--out", tmp_path).exit_code == 0
-    assert bench("koch/law", "--out", tmp_path).exit_code == 0
+    assert run("bench", "koch/law", "--out", tmp_path).exit_code == 0
+    assert run("bench", "koch/law", "--out", tmp_path).exit_code == 0
     report = spec.WorkReport.of(
         spec.WorkProblem("koch/moment", spec.ReferenceValue(0.0, 0.0, "by hand")),
         [spec.WorkMethod("a", float)], spec.Machine.here(),
     )  # fmt: skip
-    (tmp_path / "bench.json").write_text(run.BenchRun((report,)).to_json())
-    assert bench("koch/law", "--out", tmp_path).exit_code == 1
-    assert bench("koch", "--out", tmp_path).exit_code == 0
+    (tmp_path / "bench.json").write_text(BenchRun((report,)).to_json())
+    assert run("bench", "koch/law", "--out", tmp_path).exit_code == 1
+    assert run("bench", "koch", "--out", tmp_path).exit_code == 0
 
 
 @pytest.mark.usefixtures("measured")
 def test_bench_with_force_removes_the_rows_of_its_problems_and_no_other_file(tmp_path):
     for name in ("koch-law.json", "koch-moment.json", "mine.json", "summary.md"):
         (tmp_path / name).write_text("{}")
-    assert bench("koch/law", "--out", tmp_path, "--force").exit_code == 0
+    assert run("bench", "koch/law", "--out", tmp_path, "--force").exit_code == 0
     assert names_in(tmp_path) == ["bench.json", "koch-moment.json", "mine.json", "summary.md", "tables.md"]
 
 
 # values
 
 
-def raise_accuracy_error(_: int) -> None:
-    raise AccuracyError("out of reach", 0.25)
-
-
-def test_an_accuracy_error_comes_out_of_a_process_pool():
-    again = pickle.loads(pickle.dumps(AccuracyError("out of reach", 0.25)))
-    assert (str(again), again.defect) == ("out of reach", 0.25)
-    with ProcessPoolExecutor(1, get_context("spawn")) as pool, pytest.raises(AccuracyError, match="out of reach"):
-        list(pool.map(raise_accuracy_error, [0]))
-
-
 def test_every_error_survives_pickling():
-    for error in (WallError("a"), InputError("b"), FileExistsRefusal("c exists")):
+    for error in (WallError("a"), InputError("b"), FileExistsRefusal("c exists"), AccuracyError("out of reach", 0.25)):
         again = pickle.loads(pickle.dumps(error))
         assert type(again) is type(error) and str(again) == str(error)
+    assert again.defect == 0.25
 
 
-def test_the_array_of_a_matrix_is_one_read_only_array():
+def test_the_array_of_a_matrix_is_one_read_only_array_also_from_a_pickle():
     assert EXACT.array is EXACT.array
-    with pytest.raises(ValueError, match="read-only"):
-        EXACT.array[0, 0] = 1.0
+    for array in (EXACT.array, EXACT.symmetric):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = 1.0
+    with pytest.raises(FrozenInstanceError):
+        EXACT.law = "other"
     assert np.asarray(EXACT) is EXACT.array
     assert np.array(EXACT, dtype=np.float32).dtype == np.float32
-
-
-def test_a_matrix_from_a_pickle_is_read_only_too():
     again = pickle.loads(pickle.dumps(EXACT))
     assert np.array_equal(again.array, EXACT.array)
     assert not again.symmetric.flags.writeable and not again.array.flags.writeable
-
-
-@pytest.mark.parametrize(
-    ("given", "name"),
-    [
-        ((1.0, -1.0, "bound", ""), "error"),
-        ((1.0, np.nan, "bound", ""), "error"),
-        ((1.0, 0.1, "guess", ""), "kind"),
-        (("many", 0.1, "bound", ""), "value"),
-        ((10**400, 0.1, "bound", ""), "value"),
-        ((1.0, 0.1, "bound", 3), "method"),
-    ],
-)
-def test_an_estimate_refuses_what_is_no_error(given, name):
-    with pytest.raises(InputError, match=f"^{name}: expected"):
-        Estimate(*given)
-
-
-# what does not fit
-
-
-@pytest.mark.parametrize("basis", [ker.Bins(10**6), ker.Legendre(10**6)], ids=repr)
-def test_a_matrix_that_no_memory_holds_is_refused_with_its_size(basis):
-    for make in (
-        lambda: ker.discretise(ker.lambertian(), basis),
-        lambda: ker.estimate([1.0] * 100, [1.0] * 100, basis),
-    ):
-        with pytest.raises(InputError, match=r"1000000\) takes 8e\+03 GB of memory"):
-            make()
-
-
-def test_a_basis_that_no_memory_holds_is_refused():
-    for make in (lambda: ker.Bins(10**15), lambda: ker.Panels([0.0, np.pi], 10**9)):
-        with pytest.raises(InputError, match="GB of memory"):
-            make()
 
 
 # random numbers
@@ -409,6 +356,9 @@ SAMPLERS = {
         [[0.1, -1.0, 0.2]], rng=rng
     ),
     "discretise": lambda rng: ker.discretise(ker.lambertian(), ker.Bins(2), "monte-carlo", samples=64, rng=rng).array,
+    "discretise, qmc": lambda rng: (
+        ker.discretise(ker.CircularArcLaw(0.5), ker.Bins(4), "qmc", samples=64, rng=rng).array
+    ),
     "exit_times": lambda rng: spec.exit_times(ker.lambertian(), [1.0, 2.0, 4.0], 8, rng).times,
 }
 
@@ -418,7 +368,4 @@ def test_a_seed_and_its_generator_give_the_same_numbers(name):
     sample = SAMPLERS[name]
     assert np.array_equal(sample(5), sample(np.random.default_rng(5)))
     assert not np.array_equal(sample(5), sample(6))
-    assert np.array_equal(sample(None), sample(None)) == (name == "discretise")
-    for wrong in (-1, 0.5, "seed", True, np.random.RandomState(0)):
-        with pytest.raises(InputError, match="rng: expected None, a whole number"):
-            sample(wrong)
+    assert np.array_equal(sample(None), sample(None)) == name.startswith("discretise")

@@ -1,9 +1,6 @@
 """Results in notebooks, in format strings and as data frames."""
 
-from __future__ import annotations
-
 import math
-import subprocess
 import sys
 from decimal import Decimal
 from html.parser import HTMLParser
@@ -19,6 +16,7 @@ from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.estimates import Estimate
 from asperity.study import study_wall
+from commands import ended
 
 LAW = ker.henyey_greenstein(0.5)
 ISLAND = geo.Wall([geo.Segment((0, -1), (1, -1))], islands=[[geo.Arc((0.3, -0.4), (0.1, 0.2), 0, 2 * math.pi)]])
@@ -141,10 +139,13 @@ def test_a_table_of_results_is_a_data_frame(make, columns, rows):
     assert set(columns) <= set(frame.columns) and len(frame) == rows
 
 
-def test_without_pandas_the_message_names_the_extra(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(InputError, match=r"asperity\[studies\]"):
-        spec.spectrum(LAW, k=2).to_frame()
+def test_without_pandas_or_xarray_the_message_names_the_extra(monkeypatch):
+    for library, make in (
+        ("pandas", spec.spectrum(LAW, k=2).to_frame), ("xarray", ker.discretise(LAW, ker.Bins(2)).to_xarray),
+    ):  # fmt: skip
+        monkeypatch.setitem(sys.modules, library, None)
+        with pytest.raises(InputError, match=r"asperity\[studies\]"):
+            make()
 
 
 @pytest.mark.parametrize("frame", ["paper", "specular"])
@@ -179,12 +180,6 @@ def test_a_matrix_without_bins_of_one_angle_is_no_table():
                 make()
 
 
-def test_without_xarray_the_message_of_a_matrix_names_the_extra(monkeypatch):
-    monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match=r"asperity\[studies\]"):
-        ker.discretise(LAW, ker.Bins(2)).to_xarray()
-
-
 def test_pandas_is_loaded_by_to_frame_alone():
     code = "import sys, asperity.spectral as s; s.Spectrum; assert 'pandas' not in sys.modules"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    assert ended("-c", code).returncode == 0

@@ -6,14 +6,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.cli import main
 from asperity.errors import AsperityError, FileExistsRefusal, InputError
 from asperity.kernels.inverse.named_laws import law_from_text
+from commands import run
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
 # Seconds in which any of these must answer.
@@ -24,7 +23,7 @@ PROBLEM = spec.WorkProblem("a", (spec.ReferenceValue(0.0, 0.0, "by hand"),))
 
 def command(*words):
     """What the command line prints, as an error if it failed."""
-    result = CliRunner().invoke(main, [str(word) for word in words])
+    result = run(*words)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     assert result.output.count("\n") == 1 or result.exit_code != 1
@@ -80,10 +79,19 @@ def special(kind, folder):
         return folder / "pipe"
     if kind == "folder":
         return folder
+    if kind == "loop":
+        (folder / "loop").symlink_to(folder / "loop")
+    elif kind in ("no UTF-8", "deep"):
+        (folder / kind).write_bytes(b"\xff" if kind == "no UTF-8" else b"[" * 100_000)
+    if kind in ("loop", "no UTF-8", "deep"):
+        return folder / kind
     return {"long name": folder / ("n" * 300), "no folder": folder / "missing" / "file"}.get(kind, Path(kind))
 
 
-@pytest.mark.parametrize("kind", ["pipe", "folder", "/dev/zero", "/proc/kmsg", "/proc/self/status", "long name"])
+@pytest.mark.parametrize(
+    "kind",
+    ["pipe", "folder", "loop", "no UTF-8", "deep", "/dev/zero", "/proc/kmsg", "/proc/self/status", "long name"],
+)
 @pytest.mark.parametrize("name", READERS)
 def test_what_is_no_file_is_refused_by_every_reader(name, kind, tmp_path):
     path = special(kind, tmp_path)

@@ -1,7 +1,5 @@
 """Error against run time, on synthetic problems whose orders are known."""
 
-from __future__ import annotations
-
 import json
 import time
 
@@ -187,6 +185,8 @@ def test_every_norm_is_measured_of_a_matrix():
     matrix = np.array([[3.0, 0.0], [0.0, -4.0]])
     row = measure(spec.WorkProblem("matrix", reference), spec.WorkMethod("m", lambda n: matrix), 1, 1, 10.0)
     assert dict(row.errors) == {"Frobenius": 5.0, "largest entry": 4.0, "operator": 4.0}
+    shape = spec.WorkMethod("shape", lambda n: np.zeros(3))
+    assert measure(problem(), shape, 1, 1, 1.0).note == "InputError: shape: expected a value of shape (), got (3,)"
 
 
 def test_a_run_goes_on_where_its_file_ends(tmp_path):
@@ -248,28 +248,6 @@ def test_a_kernel_matrix_brings_its_reported_error():
     row = measure(spec.WorkProblem("law", reference), matrix, 1e8, 1, 60.0)
     assert row.errors["Frobenius"] <= row.reported <= 1e-7
     assert row.note == "quadrature"
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: spec.ReferenceValue(np.nan, 0.0, "?"),
-        lambda: spec.ReferenceValue(1.0, -1.0, "?"),
-        lambda: spec.ReferenceValue(1.0, 0.0, ""),
-        lambda: spec.WorkProblem("none", ()),
-        lambda: spec.WorkRow("a", 1, "finished"),
-        lambda: spec.fit_order([1, 2, 3], [1, 0, 1]),
-        lambda: spec.fit_order([1, 2, 3], [1, 1, 1], [1, 1]),
-        lambda: spec.fit_order([1, 2, 3], [1, 1, 1], [1, 1, 0]),
-        lambda: spec.work_precision(problem(), [], [1]),
-        lambda: spec.work_precision(problem(), [DECLARED["trapezoid"]], {"simpson": [1]}),
-        lambda: spec.work_precision(problem(), [DECLARED["trapezoid"]] * 2, [1]),
-        lambda: measure(problem(), spec.WorkMethod("shape", lambda n: np.zeros(3)), 1, 1, 1.0).note.index("!"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(make):
-    with pytest.raises((InputError, ValueError)):
-        make()
 
 
 def test_errors_reported_by_a_random_method_are_a_root_mean_square_as_its_errors_are():

@@ -1,11 +1,7 @@
 """Arguments pass one door: odd arrays, odd operands and odd sources of random numbers end in an answer or an error."""
 
-from __future__ import annotations
-
 import inspect
 import operator
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -16,6 +12,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.checks import generator, numbers
 from asperity.errors import InputError
+from commands import ended
 
 # numpy warns of its class of matrices whenever one is made
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
@@ -35,7 +32,7 @@ NO_SOURCES = {
 
 def in_a_child(code: str) -> str:
     lines = "import numpy as np; from asperity import geometry as geo, kernels as ker\n" + code
-    made = subprocess.run([sys.executable, "-c", lines], capture_output=True, text=True, check=False)
+    made = ended("-c", lines)
     assert made.returncode == 0, f"{made.returncode}: {made.stderr}"
     return made.stdout
 

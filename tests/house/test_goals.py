@@ -1,7 +1,5 @@
 """The table of goals and what it rests on: limits, errors in a time, memory."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from campaigns.speed import goals, throughput

@@ -1,7 +1,5 @@
 """No text and no file is executed: fifteen hostile texts at every place where a text or a file enters."""
 
-from __future__ import annotations
-
 import re
 import sqlite3
 import sys
@@ -12,21 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from click.testing import CliRunner
 
 from asperity import InputError, verify
 from asperity.bench.run import BenchRun
-from asperity.cli import main
 from asperity.core.checkpoints import Checkpoint
 from asperity.explore.files import opened
 from asperity.geometry import load_wall, read_profile, wall_from_text
 from asperity.kernels import load_matrix
 from asperity.kernels.inverse.named_laws import law_from_text
 from asperity.ledger import selected
+from asperity.spectral import SweepTable, WorkReport
 from asperity.spectral.sweeps.named_families import family_and_grid, spectrum_from_text
 from asperity.spectral.sweeps.quantities import quantities_from
-from asperity.spectral.sweeps.table import SweepTable
-from asperity.spectral.work_diagrams.report import WorkReport
+from commands import run
 
 PACKAGE = Path(__file__).parents[2]
 CANARY = "module_that_nothing_should_import"
@@ -96,7 +92,7 @@ def matrix_of_objects(text: str) -> None:
 
 
 def command(*words: str) -> None:
-    found = CliRunner().invoke(main, words)
+    found = run(*words)
     assert isinstance(found.exception, SystemExit) and found.exit_code in (1, 2), (found.output, found.exception)
     raise InputError(found.output)
 

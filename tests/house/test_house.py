@@ -3,10 +3,9 @@
 import ast
 import doctest
 import json
+import os
 import re
 import shutil
-import subprocess
-import sys
 import tarfile
 import tomllib
 import zipfile
@@ -16,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import asperity
+from commands import ended
 
 ROOT = Path(__file__).resolve().parents[2]
 HEAVY = {"numba", "sympy", "ot", "matplotlib", "shapely", "dask", "distributed", "pandas", "xarray", "adaptive"}
@@ -26,14 +26,9 @@ PAGES = [
 ]
 
 
-def run_python(*arguments: str) -> str:
-    """Run a fresh interpreter that imports the same asperity as this one, and return what it prints."""
-    source = str(Path(asperity.__file__).parent.parent)
-    start = f"import sys; sys.path.insert(0, {source!r})\n"
-    command, *rest = arguments
-    done = subprocess.run(
-        [sys.executable, "-c", start + command, *rest], capture_output=True, text=True, timeout=120, check=False
-    )
+def run_python(command: str) -> str:
+    """What a fresh interpreter prints."""
+    done = ended("-c", f"import sys\n{command}")
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -106,12 +101,6 @@ def test_the_lower_bounds_are_the_versions_that_the_tests_are_run_with():
     assert [line for line in lines if "==" in line] == bounds
 
 
-def test_the_module_runs_as_the_command():
-    out = run_python("import runpy; sys.argv[1:] = ['--help']; runpy.run_module('asperity', run_name='__main__')")
-    assert "Usage: python -m asperity" in out
-    assert "study" in out
-
-
 @pytest.mark.parametrize("page", PAGES)
 def test_the_examples_on_the_page_run(page):
     blocks = re.findall(r"^```pycon\n(.*?)^```$", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
@@ -142,9 +131,7 @@ def distributions(tmp_path_factory):
         return anywhere(folder, names) | (written & set(names) if Path(folder) == ROOT else set())
 
     shutil.copytree(ROOT, copy, symlinks=True, ignore=ignore)
-    done = subprocess.run(
-        [sys.executable, "-m", "build", "--no-isolation", str(copy)], capture_output=True, text=True, check=False
-    )
+    done = ended("-m", "build", "--no-isolation", str(copy), env=dict(os.environ))
     assert done.returncode == 0, done.stdout + done.stderr
     (sdist,) = (copy / "dist").glob("*.tar.gz")
     (wheel,) = (copy / "dist").glob("*.whl")
@@ -187,13 +174,6 @@ def test_the_sdist_carries_tests_pages_and_the_rooms_as_real_files(distributions
     wanted |= {f"src/{name}" for name in source_files()}
     assert wanted - members.keys() == set()
     assert all(members[name].isfile() for name in wanted)
-
-
-def test_no_function_bears_the_name_of_its_file():
-    # once the file is imported its name would hide a function that its room exports lazily
-    for room in ("geometry", "kernels", "spectral"):
-        for file in (ROOT / room).rglob("*.py"):
-            assert not re.search(rf"^def {file.stem}\(", file.read_text(encoding="utf-8"), re.MULTILINE), file
 
 
 # Methods that change their object and return None.

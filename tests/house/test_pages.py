@@ -1,7 +1,5 @@
 """Examples and scripts of pages run and are right, and the reference lists all public names."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import re

@@ -1,7 +1,5 @@
 """The table of the paper's objects: each name exists; and the figures of the paper: each is drawn by one call."""
 
-from __future__ import annotations
-
 import doctest
 import importlib.util
 import inspect
@@ -13,7 +11,6 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-import asperity
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
@@ -47,20 +44,12 @@ def test_every_row_has_an_object_a_section_and_a_name():
         assert re.fullmatch(r"`[^`]+`(, `[^`]+`)*", name), row
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_name_of_the_table_exists(name, capsys):
-    if name.startswith("asperity "):
-        with pytest.raises(SystemExit) as left:
-            command([name.split()[1], "--help"])
-        assert left.value.code == 0
-        assert name.split()[1] in capsys.readouterr().out
-        return
-    room, *parts = name.split(".")
-    assert parts[0] in ROOMS[room].__all__
-    found = getattr(ROOMS[room], parts[0])
-    for part in parts[1:]:
-        # fields of dataclasses without default are no attributes of the class
-        assert hasattr(found, part) or part in found.__dataclass_fields__, name
+@pytest.mark.parametrize("name", [name for name in NAMES if name.startswith("asperity ")])
+def test_every_command_of_the_table_exists(name, capsys):
+    with pytest.raises(SystemExit) as left:
+        command([name.split()[1], "--help"])
+    assert left.value.code == 0
+    assert name.split()[1] in capsys.readouterr().out
 
 
 TEETH, DISK = geo.triangular_teeth(math.pi / 2), geo.Disk(1.0, 1 / 3)
@@ -144,11 +133,6 @@ def test_every_object_of_the_table_works(name):
 
 def test_objects_that_work_by_their_examples_have_no_second_check():
     assert set(WORKS) <= set(NAMES)
-
-
-def test_a_name_that_does_not_exist_would_be_found():
-    assert not hasattr(geo.Wall, "no_such_property")
-    assert "no_such_name" not in geo.__all__ and asperity.__version__
 
 
 def test_the_paper_has_eighteen_figures_with_captions():

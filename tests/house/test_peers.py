@@ -1,7 +1,5 @@
 """The peers' environment: made from scratch, and where a peer cannot be had, a row that says so."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from campaigns.speed import peers

@@ -11,7 +11,7 @@ import asperity
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import AsperityError
+from asperity.errors import AsperityError, FileExistsRefusal
 from asperity.estimates import Estimate
 
 ROOT = Path(asperity.__file__).parent
@@ -100,7 +100,7 @@ EXPLAINED = {
     "use discretise() and compose the matrices": "takes a million evaluations",
     "use discretise(law, basis) ** n": "takes a deep power",
     "samples that cover all angles": "no single call",
-    "pass invariant=False": "test_streams.py runs it",
+    "pass invariant=False": "test_pairs.py runs it",
     "write rng={} for a seed": "test_argument_doors.py runs it",
     'pass key="..."': "test_checkpoint_identity.py runs it",
     "chmod go-w": "a command of the shell; test_compilation.py makes such folders",
@@ -185,7 +185,9 @@ def test_the_names_that_are_advised_for_files_are_written(tmp_path):
         with pytest.raises(AsperityError, match="expected a name that ends in") as refused:
             save(tmp_path / name)
         advised = re.search(r"pass '(.*)'", str(refused.value))[1]
-        save(advised)
-        with pytest.raises(AsperityError, match="pass overwrite=True"):
+        Path(advised).write_text("precious")
+        with pytest.raises(FileExistsRefusal, match="pass overwrite=True"):
             save(advised)
+        assert Path(advised).read_text() == "precious"
         save(advised, overwrite=True)
+        assert Path(advised).read_text(errors="replace") != "precious"

@@ -3,8 +3,6 @@
 Constructors and the functions of the first pages answer with an InputError, others also as Python does.
 """
 
-from __future__ import annotations
-
 import contextlib
 import inspect
 import signal

@@ -1,11 +1,7 @@
 """Results have the same bits whatever computes them: waves, boxes, threads, neighbours, workers, stops and restarts."""
 
-from __future__ import annotations
-
 import os
 import sqlite3
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +20,7 @@ from asperity.kernels.billiards import billiard
 from asperity.kernels.sampling import chunks, streams
 from asperity.kernels.sampling.rays import RaySums
 from asperity.spectral.consequences import channel
+from commands import environment, started
 
 ENOUGH = 2_000
 RAYS = 1_000
@@ -142,11 +139,13 @@ def studied(**engine):
     return np.concatenate([found.distance, *(values.ravel() for values in found.errors.values())])
 
 
-def streamed(**engine):
-    rng = np.random.default_rng(0)
-    return ker.estimate_stream(
-        (ker.SINE.sample(2000, rng), ker.SINE.sample(2000, rng)), ker.Bins(40), **engine
-    ).symmetric
+def streamed(basis):
+    def run(**engine):
+        rng = np.random.default_rng(0)
+        pairs = ker.SINE.sample(2000, rng), ker.SINE.sample(2000, rng)
+        return ker.estimate_stream(pairs, basis, **engine).symmetric
+
+    return run
 
 
 def half_diffuse(rng):
@@ -172,7 +171,7 @@ def discretised(method, basis):
 
 # Those that store all sums in one piece, in place of the earlier ones.
 IN_ONE_PIECE = {
-    "estimate_stream": streamed,
+    **{f"estimate_stream {basis!r}": streamed(basis) for basis in (ker.Bins(40), ker.Legendre(5), PANELS)},
     **{f"{method} {basis!r}": discretised(method, basis) for method in ("monte-carlo", "qmc")
        for basis in (ker.Bins(40), ker.Legendre(5), PANELS)},
 }  # fmt: skip
@@ -181,7 +180,7 @@ RUNS = {
 }  # fmt: skip
 # Pages of 4 kB that are left on the disk: for some parts, or too few for the sums.
 LEFT = {"exit_times": 1, "play": 4, "limit_study": 1, "mean_law": 12}
-FILLING = [name for name in RUNS if name in LEFT or "Bins" in name or name == "estimate_stream"]
+FILLING = [name for name in RUNS if name in LEFT or "Bins" in name]
 
 
 def in_small_parts(setattr=setattr):
@@ -212,15 +211,6 @@ def stored(monkeypatch):
 
     monkeypatch.setattr(checkpoints.Checkpoint, "put", counted)
     return keys, stop
-
-
-@pytest.fixture(scope="module")
-def workers():
-    distributed = pytest.importorskip("distributed")
-    with distributed.Client(
-        n_workers=2, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
-    ) as client:
-        yield client
 
 
 @pytest.mark.usefixtures("small_parts")
@@ -262,15 +252,13 @@ own.RUNS[sys.argv[1]](checkpoint="a")
 
 @pytest.mark.skipif(os.name != "posix", reason="processes are ended differently here")
 @pytest.mark.usefixtures("small_parts")
-@pytest.mark.parametrize("name", ["play", "sweep", "qmc Legendre(5)"])
+@pytest.mark.parametrize("name", ["play", "sweep", "qmc Legendre(5)", "estimate_stream Legendre(5)"])
 def test_what_a_killed_process_stored_is_gone_on_with_to_the_same_bits(name, tmp_path, stored):
     keys, _ = stored
     whole = RUNS[name](checkpoint=tmp_path / "whole")
     parts = len(keys)
-    here = Path(__file__).resolve()
-    path = os.pathsep.join([str(here.parent), str(here.parents[2] / "src"), os.environ.get("PYTHONPATH", "")])
-    with subprocess.Popen([sys.executable, "-c", PROGRAM, name], cwd=tmp_path, env={**os.environ, "PYTHONPATH": path},
-                          stdout=subprocess.PIPE, text=True) as process:  # fmt: skip
+    own = environment(Path(__file__).resolve().parent)
+    with started("-c", PROGRAM, name, cwd=tmp_path, env=own) as process:
         for _ in range(4):
             assert process.stdout.readline() == "part\n"
         process.kill()

@@ -1,7 +1,5 @@
 """Every campaign in small: the numbers that it names, in this process, must not refute the library."""
 
-from __future__ import annotations
-
 import dataclasses
 import subprocess
 import time

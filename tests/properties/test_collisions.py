@@ -1,7 +1,5 @@
 """What holds of the collisions of every disk: energy and momenta are kept, and the reversed collision goes back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from campaigns.cases.random_curved_walls import COUNT, random_curved_wall

@@ -1,7 +1,5 @@
 """Properties of every law: mass, balance, mirror images, frames; samples and branches as `apply` says."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

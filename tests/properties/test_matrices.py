@@ -1,7 +1,5 @@
 """Properties of the matrix of every law in every basis: mass, balance, mirror images, frames, all methods alike."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

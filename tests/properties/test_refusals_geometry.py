@@ -1,7 +1,5 @@
 """What geometry, sweeps and long runs refuse, and the words in which they do: one table of calls."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -347,6 +345,15 @@ FILES = [
     ("wall.toml", f"{ARCS}semi_axes = 0.5\nangles = [3.2, 6.2]\nstart = [0, 0]", "missing key 'end'"),
     ("wall.toml", 'period = 1\n[[pieces]]\nkind = "bezier"\ncontrol_points = [[0, 0], [1, 0]]', "3 or 4 points"),
     ("wall.toml", "period = 1\nvertices = [[0, 0], [0.7, -0.5], [0.3, -0.5], [1, 0]]", "piece 0 and piece 2"),
+    ("wall.toml", f"period = 1{'0' * 400}\nvertices = [[0, 0], [1, 0]]", "'period': expected a number below 1e308"),
+    *(("wall.toml", text, r"wall\.toml: ")
+      for text in ("a = " + "[" * 5000, "a = " + "{b=" * 5000, "b = " + "9" * 5000)),
+    *(("wall.toml", f"period = 1.0\nvertices = [[0, 0], {vertex.format(size)}, [1, 0]]",
+       r"finite coordinates of at most 1e\+100")
+      for vertex in ("[0.5, -{}]", "[{}, -0.5]", "[-{}, -1]") for size in (1e101, 1e308)),
+    # no number, and so no undefined height
+    *(("scan.csv", f"0 1\n1 {word}\n2 1\n", r"line 2: expected two numbers|at most 1e\+100")
+      for word in ("1e400", "-1e400", "1_0", "1e308", "0x10", "١")),
     ("wall.toml", b"\xff\xfe\x00", "cannot read it .*utf-8.*; expected a file of text"),
     ("scan.csv", "0 1\n1 2 3\n", "line 2: expected two numbers"),
     ("scan.csv", "x y\nfoo bar\n0 1\n1 2\n", "line 2"),

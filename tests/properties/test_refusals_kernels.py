@@ -1,7 +1,5 @@
 """What laws, bases, matrices and the tools built upon them refuse: the call, and the words that name the argument."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -29,6 +27,7 @@ BODY = ker.PolygonalBody([[(-2.5, -1.5), (-1.0, -1.5), (-2.5, 0.0)]])
 PLATE = [geo.Segment((0.2, -0.1), (0.4, -0.1)), geo.Segment((0.4, -0.1), (0.2, -0.1))]
 ROOM, SEATS = geo.Container.polygon([(0, 0), (9, 0), (9, 6), (0, 6)]), [[2, 3], [6, 3]]
 STEEP = [[1.1, -0.1], [0.0, 1.0]]
+WORK, METHOD = spec.WorkProblem("a", spec.ReferenceValue(1.0, 0.0, "by hand")), spec.WorkMethod("b", float)
 
 
 def matrix(entries: object, basis: ker.Basis) -> ker.KernelMatrix:
@@ -174,12 +173,26 @@ REFUSED = {
         (lambda: ker.TensorBasis((3, 4)), r"as in TensorBasis\(\(Bins\(16\), Bins\(8, weight='sin2'\)\)\)"),
         (lambda: ker.TensorBasis((ker.Bins(3), ker.Bins(3))).measure, "factors"),
         (lambda: ker.Panels.for_wall(FLAT, smallest=2.0), "smallest"),
+        (lambda: ker.Bins(10**15), "GB of memory"),
+        (lambda: ker.Panels([0.0, np.pi], 10**9), "GB of memory"),
     ],
     "matrices": [
         (lambda: ker.KernelMatrix(np.eye(3), ker.Bins(2), EXACT), "expected shape"),
         (lambda: ker.KernelMatrix(np.full((2, 2), np.nan), ker.Bins(2), EXACT), "finite"),
         (lambda: ker.KernelMatrix(np.eye(2), "bins", EXACT), "basis"),
         (lambda: ker.KernelMatrix(np.eye(2), ker.Bins(2), 0.1), "Estimate"),
+        (lambda: ker.KernelMatrix(np.eye(2), ker.Bins(2), Estimate(math.nan, 0.0, "bound", "given")), "^error: expect"),
+        *((lambda name=name, wrong=wrong: ker.KernelMatrix(np.eye(2), ker.Bins(2), EXACT, **{name: wrong}),
+           f"^{name}: expected")
+          for name, wrong in (("law", 3), ("method", None), ("metadata", 3), ("frame", "lab"), ("reversible", "yes"),
+                              ("counts", np.full((2, 2), 0.5)), ("unresolved", math.nan), ("samples", 0.5))),
+        *((lambda given=given: Estimate(*given), f"^{name}: expected") for given, name in (
+            ((1.0, -1.0, "bound", ""), "error"), ((1.0, math.nan, "bound", ""), "error"),
+            ((1.0, 0.1, "guess", ""), "kind"), (("many", 0.1, "bound", ""), "value"),
+            ((10**400, 0.1, "bound", ""), "value"), ((1.0, 0.1, "bound", 3), "method"),
+        )),
+        *((call, r"1000000\) takes 8e\+03 GB of memory") for basis in (ker.Bins(10**6), ker.Legendre(10**6))
+          for call in (lambda basis=basis: ker.discretise(DIFFUSE, basis), estimate([1.0] * 100, [1.0] * 100, basis))),
         (lambda: matrix(np.eye(2), ker.Bins(2)) @ np.ones(3), "expected 2 entries"),
         (lambda: matrix(np.eye(2), ker.Bins(2)) ** -1, "exponent"),
         (lambda: matrix(np.eye(2), ker.Bins(2)) @ matrix(np.eye(3), ker.Bins(3)), "different bases"),
@@ -226,6 +239,15 @@ REFUSED = {
         (stream((np.ones(3), np.ones(4))), "one length"),
     ],
     "collisions": [
+        *((lambda up=up: SMOOTH.sample([[[1.0, -1.0, 0.0]], *[[[1.0, up, 0.0]]] * 2]), r"v2 >= 0 at row \[1, 0\]")
+          for up in (0.0, 1e-300, 2.0)),
+        *((lambda wrong=wrong: SMOOTH.sample(wrong), "shape")
+          for wrong in (3.0, [1.0, -1.0], [[1.0, -1.0, 0.0, 2.0]])),
+        (lambda: ker.CollisionLaw(FLAT, DISK), "law"),
+        (lambda: ker.CollisionLaw(MIRROR, 3), "disk"),
+        (lambda: ker.CollisionLaw(MIRROR.in_specular_frame(), DISK), "paper"),
+        (lambda: ker.CollisionLaw(0.5 * DIFFUSE, DISK), "sum of 1"),
+        (lambda: ker.CollisionLaw.from_wall(MIRROR, DISK), "wall"),
         (lambda: ROUGH @ ker.CollisionLaw(MIRROR, geo.Disk(1.0, 1.0)), "different disks"),
         (lambda: (0.3 * ROUGH).sample([[0.0, -1.0, 0.0]]), "sum of 1"),
         (lambda: -0.5 * ROUGH, "at least 0"),
@@ -342,6 +364,8 @@ REFUSED = {
         (lambda: spec.spectrum(np.eye(3)), "kernel: expected"),
         (lambda: spec.spectral_gap(DIFFUSE, tolerance=0.0), "tolerance"),
         (lambda: spec.leading_eigenvalues(np.array([[0.0, 1.0], [0.0, 0.0]]), 1), "symmetric"),
+        (lambda: spec.enclosures(DIFFUSE, 0), "k: expected"),
+        (lambda: spec.enclosures(np.eye(2), 1), "law: expected"),
         (lambda: spec.enclosures(ARC @ HG(0.5) @ ARC, 2), "no known error"),
         (lambda: spec.enclosures(HG(0.96) @ TEETH @ HG(0.96), 2, tolerance=1e-12), "has a scattering that leaves"),
         *((lambda size=size: spec.curvature_gap_bounds(size), "curvature") for size in (0.0, 1.6, math.nan)),
@@ -353,6 +377,19 @@ REFUSED = {
         (lambda: spec.diffusivity(MIRROR), "infinite"),
         (lambda: spec.diffusivity(DIFFUSE, arrangement="glide"), "arrangement"),
         (lambda: spec.sweep(ker.maxwell, {"diffuse_fraction": [0.5]}, quantities=["diffusivity"]), "eta times 4"),
+    ],
+    "work": [
+        (lambda: spec.ReferenceValue(np.nan, 0.0, "?"), "value: expected finite"),
+        (lambda: spec.ReferenceValue(1.0, -1.0, "?"), "error: expected"),
+        (lambda: spec.ReferenceValue(1.0, 0.0, ""), "source: expected words"),
+        (lambda: spec.WorkProblem("none", ()), "references: expected at least one"),
+        (lambda: spec.WorkRow("a", 1, "finished"), "status: expected"),
+        (lambda: spec.fit_order([1, 2, 3], [1, 0, 1]), "positive numbers"),
+        (lambda: spec.fit_order([1, 2, 3], [1, 1, 1], [1, 1]), "for each of 3 sizes"),
+        (lambda: spec.fit_order([1, 2, 3], [1, 1, 1], [1, 1, 0]), "for each of 3 sizes"),
+        (lambda: spec.work_precision(WORK, [], [1]), "methods: expected at least one"),
+        (lambda: spec.work_precision(WORK, [METHOD], {"simpson": [1]}), "budgets: expected"),
+        (lambda: spec.work_precision(WORK, [METHOD] * 2, [1]), "with different names"),
     ],
 }  # fmt: skip
 NOT_SYMMETRIC = ker.MatrixLaw(np.roll(np.eye(8), 1, axis=1))

@@ -1,7 +1,5 @@
 """Every law with a known spectrum through every tool: matrices, spectra, gaps, mixing times and enclosures."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -3,8 +3,6 @@
 Rays end where other tracers say: one in double-doubles, one in 50 digits, and a plain one with formulas of its own.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

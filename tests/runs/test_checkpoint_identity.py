@@ -1,12 +1,8 @@
-"""What tells computations apart: the content of laws, walls, bases and functions, in every process the same."""
-
-from __future__ import annotations
+"""Checkpoints: what tells computations apart, in every process, and files that were changed or cut off."""
 
 import inspect
 import math
-import os
 import sqlite3
-import subprocess
 import sys
 from functools import partial
 from itertools import combinations
@@ -21,7 +17,9 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.checkpoints import Checkpoint, Stored, content, packed_arrays, unpacked_arrays
 from asperity.core.estimates import Estimate
+from asperity.core.long_runs import all_parts
 from asperity.spectral.sweeps import running
+from commands import ended, environment
 
 SCALE = 0.5
 TABLE = {"low": [0.25, 0.5]}
@@ -160,11 +158,8 @@ def test_the_same_objects_made_again_in_other_processes_have_the_same_contents(t
     assert here == all_contents()
     program = "import test_checkpoint_identity as own; print(' '.join(own.all_contents()))"
     folder = Path(__file__).resolve().parent
-    path = os.pathsep.join([str(folder), str(folder.parents[1] / "src"), os.environ.get("PYTHONPATH", "")])
     for seed in ("1", "2"):
-        environment = {**os.environ, "PYTHONPATH": path, "PYTHONHASHSEED": seed}
-        command = [sys.executable, "-c", program]
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+        done = ended("-c", program, cwd=tmp_path, env=environment(folder, PYTHONHASHSEED=seed), check=True)
         assert done.stdout.split() == here
 
 
@@ -409,3 +404,63 @@ def test_compressed_parts_and_numbers_out_of_range_are_refused():
 def test_a_family_that_refuses_its_walls_is_told_by_its_reasons(tmp_path):
     made = [running._made(ker.maxwell, {"diffuse_fraction": share}, by_name=False) for share in (2.0, 3.0)]
     assert made[0].startswith("refused: ") and made[0] != made[1]
+
+
+def squares(path):
+    return [int(part["square"]) for part in all_parts(lambda k: {"square": k**2}, 3, {}, {"checkpoint": path})]
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "UPDATE parts SET value = NULL", "UPDATE parts SET value = 'a'", "UPDATE parts SET key = 'x' WHERE key = '1'",
+        "UPDATE parts SET digest = 'x'", "INSERT INTO parts SELECT '9', value, digest FROM parts LIMIT 1",
+        "DELETE FROM identity", "UPDATE identity SET value = '{'", "UPDATE identity SET value = NULL",
+        "UPDATE identity SET value = replace(hex(zeroblob(50000)), '0', '[')", "UPDATE identity SET format = NULL",
+        "ALTER TABLE parts DROP COLUMN digest", "ALTER TABLE identity DROP COLUMN value",
+        "CREATE TRIGGER more AFTER INSERT ON parts BEGIN DELETE FROM parts; END",
+        "CREATE VIEW seen AS SELECT * FROM parts", "CREATE TABLE more (a)", "CREATE INDEX more ON parts (value)",
+        "ALTER TABLE parts ADD COLUMN more", "ALTER TABLE identity RENAME COLUMN value TO other",
+        "INSERT INTO identity SELECT * FROM identity",
+    ],
+)  # fmt: skip
+def test_a_checkpoint_that_was_changed_is_refused(tmp_path, statement):
+    squares(tmp_path / "run")
+    with sqlite3.connect(tmp_path / "run") as file:
+        file.execute(statement)
+    file.close()
+    with pytest.raises(InputError, match="run"):
+        squares(tmp_path / "run")
+    if statement.startswith(("CREATE", "ALTER TABLE parts ADD", "ALTER TABLE identity RENAME")):
+        with pytest.raises(InputError, match="run"):
+            Checkpoint(tmp_path / "run", {}, overwrite=True)
+
+
+def test_a_checkpoint_with_any_bit_flipped_gives_the_same_numbers_or_is_refused(tmp_path):
+    path = tmp_path / "run"
+    squares(path)
+    whole, rng, refused = path.read_bytes(), np.random.default_rng(0), 0
+    content = np.flatnonzero(np.frombuffer(whole, np.uint8))
+    for position in rng.choice(content, 200):
+        damaged = bytearray(whole)
+        damaged[position] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        try:
+            assert squares(path) == [0, 1, 4]
+        except InputError:
+            refused += 1
+    assert refused > 100
+
+
+def test_a_checkpoint_that_was_cut_off_is_refused_or_begun_anew(tmp_path):
+    path = tmp_path / "run"
+    squares(path)
+    whole, refused = path.read_bytes(), 0
+    ends = range(1, len(whole), 601)
+    for end in ends:
+        path.write_bytes(whole[:end])
+        try:
+            assert squares(path) == [0, 1, 4]
+        except InputError:
+            refused += 1
+    assert 0.9 * len(ends) < refused

@@ -1,7 +1,5 @@
 """Hilbert-Schmidt norms against closed forms, and reasons where there is none."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ensembles: the errors of means cover the truth, mean laws, and the law of small slopes for random walls."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re
@@ -9,16 +7,15 @@ from functools import partial
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from asperity import AsperityError, Estimate, InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.cli import main
 from asperity.spectral.sweeps.quantities import name_of
 from asperity.spectral.sweeps.row import COLUMNS
 from asperity.spectral.sweeps.statistics import mean_estimate, spread_estimate
+from commands import run
 
 # Of 400 trials 95 % succeed, give or take four standard deviations.
 TRIALS, LEAST, MOST = 400, 0.906, 0.994
@@ -187,10 +184,6 @@ def test_the_frame_has_a_line_for_each_quantity():
 
 # ---- the command line -------------------------------------------------------------------------------------------
 GENTLE = ["ensemble", "gaussian:length=0.3", "--points", 8, "--rms-slope", 0.1, "--walls", 6, "--tolerance", 1e-3]
-
-
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def test_the_command_writes_means_and_all_walls_and_goes_on(tmp_path):

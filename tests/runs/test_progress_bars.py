@@ -1,7 +1,5 @@
 """Progress bars appear on a terminal and in a notebook, after two seconds, and nowhere else."""
 
-from __future__ import annotations
-
 import io
 import multiprocessing
 import sys
@@ -40,25 +38,16 @@ def shown(count=3):
         return not bar.disable
 
 
-def test_a_bar_appears_on_a_terminal_and_names_what_is_done(monkeypatch):
-    terminal = written(monkeypatch, Terminal())
-    shown()
-    assert "work" in terminal.getvalue() and "part" in terminal.getvalue()
-
-
-def test_nothing_appears_in_the_first_two_seconds(monkeypatch):
+def test_a_bar_appears_on_a_terminal_after_two_seconds_and_nowhere_else(monkeypatch):
     terminal = written(monkeypatch, Terminal(), long_runs.SLOW_SECONDS)
     assert shown() and terminal.getvalue() == "" and long_runs.SLOW_SECONDS == 2.0
-
-
-def test_away_from_a_terminal_nothing_appears(monkeypatch):
-    stream = written(monkeypatch, io.StringIO())
-    assert not shown() and stream.getvalue() == ""
-
-
-def test_a_worker_shows_nothing_on_the_terminal_of_its_parent(monkeypatch):
     terminal = written(monkeypatch, Terminal())
+    assert shown() and "work" in terminal.getvalue() and "part" in terminal.getvalue()
+    other = written(monkeypatch, io.StringIO())
+    assert not shown() and other.getvalue() == ""
+    # nor does a worker on the terminal of its parent
     monkeypatch.setattr(multiprocessing, "parent_process", object)
+    terminal = written(monkeypatch, Terminal())
     assert not shown() and terminal.getvalue() == ""
 
 

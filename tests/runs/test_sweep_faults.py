@@ -1,12 +1,8 @@
 """Sweeps on workers, and what is left when a worker, the scheduler, the process or the disk is lost."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal
-import subprocess
-import sys
 import textwrap
 import threading
 import time
@@ -20,6 +16,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.workers import connected, results
 from asperity.spectral.sweeps.named_families import wall_by_name
+from commands import ended, started
 
 distributed = pytest.importorskip("distributed")
 
@@ -31,8 +28,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:.*:DeprecationWarning"),
 ]
 
-SOURCE = Path(__file__).resolve().parents[2] / "src"
-ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join([str(SOURCE), os.environ.get("PYTHONPATH", "")])}
 FRACTIONS = [round(0.04 * k, 2) for k in range(1, 13)]
 GRID = {"diffuse_fraction": FRACTIONS}
 # Seconds after which Ctrl-C must have ended a sweep: an idle machine takes a tenth of one.
@@ -54,13 +49,7 @@ def undisturbed():
     return without_seconds(spec.sweep(ker.maxwell, GRID, [slowly, "gap"]))
 
 
-@pytest.fixture(scope="module")
-def workers():
-    with connected(2) as client:
-        yield client
-
-
-def test_tables_chosen_points_and_traced_walls_do_not_depend_on_the_workers(workers):
+def test_tables_chosen_points_and_traced_walls_do_not_depend_on_the_workers(worker_processes):
     walls = {"wall": ["dispersing-arcs:curvature=0.5", "mushrooms:generations=1"]}
     chosen = {"diffuse_fraction": spec.Between(0.01, 0.9, points=10)}
     for asked in (
@@ -68,11 +57,11 @@ def test_tables_chosen_points_and_traced_walls_do_not_depend_on_the_workers(work
         (ker.maxwell, chosen, slowly),
         (wall_by_name, walls, "resistance", 1e-3),
     ):
-        alone, together = (without_seconds(spec.sweep(*asked, client=client)) for client in (None, workers))
+        alone, together = (without_seconds(spec.sweep(*asked, client=client)) for client in (None, worker_processes))
         assert alone == together
 
 
-def test_a_killed_worker_is_replaced_and_its_points_computed_again(undisturbed, workers, tmp_path):
+def test_a_killed_worker_is_replaced_and_its_points_computed_again(undisturbed, worker_processes, tmp_path):
 
     def murderous(law):
         # the first point to come here ends its worker
@@ -82,7 +71,7 @@ def test_a_killed_worker_is_replaced_and_its_points_computed_again(undisturbed, 
             return Estimate(law.terms[0][0] ** 0.5, 1e-16, "estimate", "slowly")
         os.kill(os.getpid(), signal.SIGKILL)
 
-    table = spec.sweep(ker.maxwell, GRID, murderous, client=workers)
+    table = spec.sweep(ker.maxwell, GRID, murderous, client=worker_processes)
     assert (tmp_path / "done").exists()
     values = [row.value for row in undisturbed if row.quantity == "slowly"]
     assert [row.value for row in table.rows] == values
@@ -96,12 +85,6 @@ def test_a_point_that_ends_every_worker_ends_the_sweep_with_a_message(tmp_path):
 
     with pytest.raises(AsperityError, match="ended every worker"):
         spec.sweep(ker.maxwell, GRID, deadly, client=1, checkpoint=tmp_path / "a")
-
-
-def started(*command, cwd):
-    return subprocess.Popen(
-        [sys.executable, *command], env=ENVIRONMENT, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
 
 
 def test_a_lost_scheduler_ends_the_sweep_which_then_goes_on(undisturbed, tmp_path):
@@ -233,15 +216,14 @@ def test_an_example_that_starts_workers_runs_as_a_script_and_says_what_it_lacks_
     for long, short in shorter.items():
         block = block.replace(long, short)
     (tmp_path / "whole.py").write_text(block)
-    with started("whole.py", cwd=tmp_path) as process:
-        _, err = process.communicate(timeout=600)
-    assert process.returncode == 0, err
+    whole = ended("whole.py", cwd=tmp_path)
+    assert whole.returncode == 0, whole.stderr
     assert list(tmp_path.glob("*.sweep"))
     head, tail = block.split(GUARD)
     (tmp_path / "without.py").write_text(head + textwrap.dedent(tail).replace('.sweep"', '.other"'))
-    with started("without.py", cwd=tmp_path) as process:
-        _, err = process.communicate(timeout=600)
-    assert process.returncode == 1
+    without = ended("without.py", cwd=tmp_path)
+    assert without.returncode == 1
+    err = without.stderr
     last = err.splitlines()[-1]
     assert last.startswith("asperity.errors.InputError: client: each worker reads the script")
     assert GUARD.strip() in last

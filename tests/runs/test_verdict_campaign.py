@@ -1,24 +1,21 @@
 """Verdicts, spectra to a tolerance, powers, and laws that are not self-adjoint: beside `campaigns.spectra.verdicts`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from campaigns.cases.random_curved_walls import random_curved_wall
 from campaigns.spectra import verdicts
-from click.testing import CliRunner
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.cli import main
 from asperity.errors import AccuracyError
 from asperity.spectral.bounds.contraction import self_adjoint_elsewhere
 from asperity.spectral.eigenvalues.spectra import matrix_spectrum
 from asperity.spectral.essential.straight_pieces import straight_part
 from asperity.spectral.gap.refinement import Refinement
+from commands import run
 
 ARC = ker.CircularArcLaw(1.2)
 SKEW = ker.WallLaw(geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0)])]))
@@ -153,7 +150,7 @@ def test_the_contraction_factor_is_the_largest_singular_value_off_the_constants(
 def test_the_command_line_says_so_too(tmp_path):
     path = tmp_path / "skew.toml"
     ARROW.wall.save(path)
-    done = CliRunner().invoke(main, ["gap", str(path), "--specular", "--enclose", "2"])
+    done = run("gap", path, "--specular", "--enclose", 2)
     assert done.exit_code == 0
     assert done.output.startswith("not known to be self-adjoint: 1 - norm on functions of mean 0 0 ")
     assert "is not self-adjoint" in done.output and "enclosures refused" in done.output

@@ -1,9 +1,5 @@
 """Limits on work: samples bound the time, a time limit leads to a larger error, and matrices fit into memory."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -14,6 +10,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.long_runs import OutOfTime, count_time, time_limited
 from asperity.kernels.walls.conditionals import WallConditionals
+from commands import ended
 
 # Peak of a computation over the memory before it, in matrices of 2500 bins (50 MB); 1,000 MB are for the rays.
 PEAK = """
@@ -99,7 +96,5 @@ def test_time_is_counted_only_within_a_limit() -> None:
     ],
 )
 def test_a_matrix_is_computed_in_the_memory_of_eight(law: str, more: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", PEAK.format(law=law, more=more)], check=True, capture_output=True, text=True
-    )
+    done = ended("-c", PEAK.format(law=law, more=more), check=True)
     assert float(done.stdout) < 8.0 + 20.0, "eight matrices, and 1,000 MB for rays and nodes"

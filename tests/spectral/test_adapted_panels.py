@@ -1,7 +1,5 @@
 """Trial functions on adapted panels, and the rows of laws against panels that they rest on."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -92,17 +90,6 @@ def test_enclosures_of_arcs_hold_the_eigenvalues_of_a_second_method(half_angle):
         assert item.low - error <= value <= item.high + error
         # moduli of Galerkin matrices are too small
         assert abs(value) < abs(item.value) + 1e-7
-
-
-# at 1.05 the third eigenvalue by modulus is near the fourth
-@pytest.mark.slow
-@pytest.mark.parametrize("half_angle", [0.05, 0.2, 0.35, 0.5, 0.7, 0.85, 1.0, 1.05, 1.15, 1.3, 1.4, 1.5])
-def test_enclosures_hold_those_of_a_far_finer_run(half_angle):
-    law = ker.CircularArcLaw(half_angle)
-    coarse, fine = (spec.enclosures(law, 3, tolerance=tolerance) for tolerance in (1e-4, 1e-8))
-    for wide, narrow in zip(coarse.items[1:], fine.items[1:], strict=True):
-        assert wide.label == narrow.label == "indexed" and narrow.width < 1e-7
-        assert 0.5 * (narrow.low + narrow.high) in wide
 
 
 def test_the_gap_of_the_arc_is_known_to_a_billionth():

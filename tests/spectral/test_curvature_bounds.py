@@ -1,7 +1,5 @@
 """Bounds of the gap of dispersing arcs from rays that are reflected once, against the gap and against traced rays."""
 
-from __future__ import annotations
-
 import math
 import re
 from fractions import Fraction

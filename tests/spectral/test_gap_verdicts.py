@@ -1,7 +1,5 @@
 """Verdicts on gaps: theorems, edges of the essential spectrum, isolated eigenvalues."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

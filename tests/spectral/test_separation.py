@@ -1,7 +1,5 @@
 """What lies beyond the listed eigenvalues: laws whose whole spectrum is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

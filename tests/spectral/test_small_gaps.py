@@ -1,7 +1,5 @@
 """Gaps of nearly specular walls: digits that no cancellation takes away, essential edges that are 0, verdicts."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import mpmath as mp

@@ -1,21 +1,18 @@
 """The ledger: every check accepts the right formula and refutes the wrong one; the table, its JSON and its page."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import Counter
 from dataclasses import replace
 
 import pytest
-from click.testing import CliRunner
 
 from asperity import InputError
-from asperity.cli import main
 from asperity.ledger import by_reading, row
 from asperity.ledger import index as ledger
 from asperity.ledger.text import latex_of, page_of, table_of
 from asperity.verification import Verdict, agreement
+from commands import run
 
 ROWS = ledger.entries()
 MACHINE = [entry for entry in ROWS if entry.kind != "by reading"]
@@ -66,7 +63,7 @@ def test_ids_select_rows_by_their_beginning():
 
 
 def test_the_table_on_the_command_line():
-    result = CliRunner().invoke(main, ["verify", "S2.16", "S1.04"])
+    result = run("verify", "S2.16", "S1.04")
     assert result.exit_code == 0, result.output
     first, second, total = result.stdout.splitlines()
     assert first.startswith("S1.04  erratum     by reading  not checked")
@@ -75,7 +72,7 @@ def test_the_table_on_the_command_line():
 
 
 def test_json_is_a_list_of_rows():
-    result = CliRunner().invoke(main, ["verify", "S2.02", "S2.17", "--json"])
+    result = run("verify", "S2.02", "S2.17", "--json")
     assert result.exit_code == 0, result.output
     first, second = json.loads(result.stdout)
     assert first["id"] == "S2.02" and first["right"]["answer"] == "agrees" and first["wrong"]["answer"] == "refuted"
@@ -85,13 +82,13 @@ def test_json_is_a_list_of_rows():
 
 def test_latex_runs_no_check(monkeypatch):
     monkeypatch.setattr("asperity.ledger.findings", lambda _: pytest.fail("a check ran"))
-    result = CliRunner().invoke(main, ["verify", "--latex"])
+    result = run("verify", "--latex")
     assert result.exit_code == 0 and result.stdout.count(r"\paragraph{S") == len(ROWS)
     assert result.stdout.strip() == latex_of(ROWS).strip()
 
 
 def test_an_unknown_id_is_refused_in_one_line():
-    result = CliRunner().invoke(main, ["verify", "S99"])
+    result = run("verify", "S99")
     assert result.exit_code == 1 and result.stderr == "asperity: S99: no such entry; ids run from S1.01 to S6.08\n"
 
 
@@ -128,7 +125,7 @@ def double(printed, corrected):
 def test_a_row_is_as_stated_only_if_both_verdicts_are(entry, as_stated, monkeypatch):
     assert entry.run().as_stated is as_stated
     monkeypatch.setattr("asperity.ledger.index.entries", lambda: (entry,))
-    result = CliRunner().invoke(main, ["verify"])
+    result = run("verify")
     assert result.exit_code == (0 if as_stated else 1)
     assert ("NOT AS STATED" in result.stdout) is not as_stated
     assert ("wrong formula:" in result.stdout) is not as_stated

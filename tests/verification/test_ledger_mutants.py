@@ -1,7 +1,5 @@
 """The ledger's checks refuse wrong formulas: a sample of the mutants of `python -m campaigns.ledger_mutants`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from campaigns.cases.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY

@@ -1,7 +1,5 @@
 """Disks whose outgoing states rounding decides: the status says so, and the disks are not lost."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from campaigns.rays.amplified_collisions import SMALL, WALLS, draw, judge

@@ -1,7 +1,5 @@
 """The true disk against walls with Bezier pieces: segments, graphs, the plane law, and the limit of no slip."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

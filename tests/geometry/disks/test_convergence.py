@@ -1,7 +1,5 @@
 """The true disk approaches the limit law of the foreshortened wall, with orders that the theorem allows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The straightened collision: it decouples, and the true disk shadows it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from campaigns.rays import modified_law

@@ -1,7 +1,5 @@
 """Disks in lanes over convex hollows: the same collisions as one by one, whatever the other disks are."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

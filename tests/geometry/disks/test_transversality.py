@@ -1,7 +1,5 @@
 """Bounds on the distance of a collision from the cylinder: they hold, are sharp, and cover nearly all states."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The billiard map: its inverse, its measure, known tables; nested domains against the tracer of walls."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

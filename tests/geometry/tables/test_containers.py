@@ -1,7 +1,5 @@
 """Containers with curved walls: closed forms, an independent tracer, invariance, and what is refused."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Flights that graze walls, or run into corners: one of them costs no other its results."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asperity import geometry as geo
-from asperity import kernels as ker
 from asperity.errors import InputError
 from asperity.geometry.cells import profile as profiles
 
@@ -68,9 +67,6 @@ def test_a_period_has_the_heights_of_the_profile_and_of_its_mirror_image(rows):
     assert np.interp(at - start, vertices[:, 0], vertices[:, 1]) == pytest.approx(
         np.interp(folded, x, height) - height.max(), abs=1e-12
     )
-
-
-# ---- columns of text ---------------------------------------------------------------------------------------------
 
 
 # ---- files of instruments ----------------------------------------------------------------------------------------
@@ -443,14 +439,3 @@ def test_vertices_may_begin_anywhere_and_run_either_way(rows, roll, backwards):
     first = np.interp(at, wall.cell.vertices[:, 0], wall.cell.vertices[:, 1])
     heights = np.concatenate([found.cell.vertices[:-1], np.add(found.cell.vertices, (period, 0))])
     assert any(np.allclose(np.interp(at + shift, *heights.T), first, atol=1e-12) for shift in range(period))
-
-
-def test_the_law_of_rolled_and_reversed_vertices_is_the_same():
-    vertices = np.array([(0, 0), (0.25, -0.5), (0.375, -0.125), (0.75, -0.75), (1, 0)])
-    rolled = np.add(np.concatenate([vertices[2:], np.add(vertices[1:3], (1, 0))]), (5, 2))
-    bins = ker.Bins(16)
-    expected = ker.discretise(ker.WallLaw(geo.Wall.from_vertices(vertices)), bins)
-    for given_vertices in (rolled, rolled[::-1], vertices[::-1], np.subtract(vertices, (3, 0))):
-        found = ker.discretise(ker.WallLaw(geo.Wall.from_vertices(given_vertices)), bins)
-        difference = np.linalg.norm(found.symmetric - expected.symmetric)
-        assert difference <= float(found.error) + float(expected.error) + 1e-12

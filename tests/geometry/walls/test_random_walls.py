@@ -1,7 +1,5 @@
 """Random walls: their heights are normal, with the given correlations, heights and slopes."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Singular points and the largest curvature of walls, against closed forms and a search."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

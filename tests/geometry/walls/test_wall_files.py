@@ -2,34 +2,12 @@
 
 import math
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from asperity import geometry as geo
-from asperity.errors import FileExistsRefusal, InputError
+from asperity.errors import InputError
 
 pi = math.pi
-
-
-@given(st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(1e-12, 2.0)), min_size=1, max_size=6))
-def test_every_float_survives_the_file(tmp_path_factory, steps):
-    x = np.cumsum([0.0, *(s for s, _ in steps), 0.1])
-    wall = geo.Wall.from_vertices(np.column_stack([x, [0.0, *(-d for _, d in steps), 0.0]]))
-    file = tmp_path_factory.mktemp("walls") / "wall.toml"
-    wall.save(file)
-    assert geo.load_wall(file) == wall
-
-
-def test_an_existing_file_is_kept_unless_overwriting_is_asked_for(tmp_path):
-    file = tmp_path / "wall.toml"
-    file.write_text("precious")
-    with pytest.raises(FileExistsRefusal, match="overwrite=True"):
-        geo.flat().save(file)
-    assert file.read_text() == "precious"
-    geo.flat().save(file, overwrite=True)
-    assert geo.load_wall(file) == geo.flat()
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
@@ -41,21 +19,9 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path):
 
 def test_a_wall_may_be_written_by_hand(tmp_path):
     file = tmp_path / "hand.toml"
-    file.write_text(
-        """
-        # a groove and a round notch
-        period = 2
-        [[pieces]]
-        kind = "segment"
-        start = [0, 0]
-        end = [1, 0]
-        [[pieces]]
-        kind = "arc"
-        center = [1.5, 0.0]
-        semi_axes = 0.5
-        angles = [3.141592653589793, 6.283185307179586]
-        """
-    )
+    text = "# a groove and a round notch\nperiod = 2\n[[pieces]]\nkind = 'segment'\nstart = [0, 0]\nend = [1, 0]\n"
+    notch = "[[pieces]]\nkind = 'arc'\ncenter = [1.5, 0.0]\nsemi_axes = 0.5\n"
+    file.write_text(text + notch + "angles = [3.141592653589793, 6.283185307179586]\n")
     wall = geo.load_wall(file)
     assert wall.vertices.tolist() == [[0, 0], [1, 0], [2, 0]]
     assert wall.arc_length == pytest.approx(1 + pi / 2, rel=1e-15)

@@ -1,13 +1,13 @@
-"""Adaptive rows and matrices of curved walls: against closed forms, a plain tracer, and their own symmetry."""
-
-from __future__ import annotations
+"""Adaptive rows and matrices of curved walls, against closed forms, references and a plain tracer."""
 
 import math
 
 import numpy as np
 import pytest
-from campaigns.cases.random_curved_walls import random_curved_wall
+from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
+from campaigns.errors import adaptive
 from campaigns.judges.plain_tracer import trace_plainly
+from campaigns.judges.reference_rows import references
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -210,3 +210,30 @@ def test_errors_of_rectangular_teeth_of_many_depths_hold() -> None:
         ratios.append(float(np.linalg.norm(matrix - exact.symmetric)) / error)
     # the half width of 95 %, and one in twenty beyond it
     assert np.sqrt(np.mean(np.square(ratios))) < 1.0 / 1.96 and max(ratios) < 1.0
+
+
+# On these two walls a conditional distribution has thousands of pieces; the campaign takes them.
+CHAOTIC = (6, 13)
+
+
+def test_the_references_are_those_of_all_walls() -> None:
+    assert [entry["kind"] for entry in references()] == list(range(COUNT))
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+def test_errors_of_expectations_hold_and_are_not_vacuous(tolerance: float) -> None:
+    found = [
+        each
+        for entry in references()
+        if entry["kind"] not in CHAOTIC
+        for each in adaptive.expectations(entry, tolerance)
+    ]
+    # one in a hundred may exceed what was reported
+    assert sum(each.verdict == "fails" for each in found) <= len(found) // 100
+    assert np.median([each.ratio for each in found if each.ratio is not None]) < 100.0
+
+
+@pytest.mark.parametrize("kind", [0, 3, 9, 11])
+def test_errors_of_first_moments_hold(kind: int) -> None:
+    found = [adaptive.first_moment(references()[kind], tolerance, 4_000_000) for tolerance in (1e-3, 1e-5)]
+    assert all(each.verdict == "holds" for each in found) and found[1].claimed < 1e-4

@@ -1,7 +1,5 @@
 """Matrices of composed laws: the algebra against the action on functions, and reported errors against references."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -54,7 +52,7 @@ def test_too_many_words_are_left_as_they_are() -> None:
 
 
 @pytest.mark.parametrize("method", ["auto", "quadrature"])
-def test_scatterings_and_isometries_have_their_eigenvalues(method: ker.Method) -> None:
+def test_scatterings_and_isometries_have_their_eigenvalues(method: str) -> None:
     matrix = ker.discretise(BACK @ HG(0.6) @ MIRROR @ HG(0.5), ker.Legendre(64), method=method)
     distance = np.linalg.norm(matrix.symmetric - np.diag((-0.3) ** np.arange(64.0)))
     assert distance <= float(matrix.error) < 1e-11

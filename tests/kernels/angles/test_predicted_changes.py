@@ -1,7 +1,5 @@
 """Changes of itinerary predicted from neighbouring angles, nested rules on pieces, and the bound of errors of means."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,11 +1,7 @@
 """Disks between rough walls: the no-slip strip and wedge, conservation, and random laws."""
 
-from __future__ import annotations
-
-import importlib.util
 import math
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -132,18 +128,3 @@ def test_the_true_disk_in_a_strip_does_what_its_limit_law_does():
         widths.append(np.log(record.extent()))
     difference = widths[0].mean() - widths[1].mean()
     assert abs(difference) < 4.5 * math.sqrt((widths[0].var() + widths[1].var()) / n)
-
-
-@pytest.mark.slow
-def test_the_example_finds_the_strip_bounded_and_the_wedge_periodic_until_the_walls_are_rough():
-    path = Path(__file__).parents[3] / "docs" / "examples" / "disk_in_a_strip.py"
-    spec = importlib.util.spec_from_file_location("disk_in_a_strip", path)
-    example = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(example)
-    found = example.main(disks=10, collisions=300)
-    widths = [value for name, value in found.items() if "width/bound" in name and "arcs" not in name]
-    assert len(widths) == 20 and max(widths) <= 1 + 1e-12
-    assert found["focusing arcs, median width/bound"] > 1.0
-    assert found["no-slip wedge, fraction that stays"] > 0.05
-    assert found["no-slip wedge, displacement in ten collisions"] < 1e-10
-    assert found["rough wedge, fraction that stays"] < found["no-slip wedge, fraction that stays"]

@@ -1,7 +1,5 @@
 """Paths, phase portraits and animations of disks in containers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib import pyplot

@@ -1,7 +1,5 @@
 """Paths in a channel: flights in Cartesian coordinates, and the variances of both central limit theorems."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

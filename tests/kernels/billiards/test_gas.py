@@ -1,7 +1,5 @@
 """Two rough disks and gases of them: conservation, limits, reversal, equipartition, and errors that cover."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lyapunov exponents: published limits, tables of exponent 0, two close trajectories in 60 digits, and coverage."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath as mp

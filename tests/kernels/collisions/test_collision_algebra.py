@@ -1,8 +1,6 @@
 """The algebra of collision laws: compositions, mixtures, powers, adjoints and matrices, against velocities and closed
 forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

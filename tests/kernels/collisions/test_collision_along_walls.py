@@ -1,16 +1,12 @@
 """Disks in containers whose walls change along their boundary."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
 import numpy as np
-import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import InputError
 
 DISK = geo.Disk(1.0, 0.5)
 
@@ -67,17 +63,3 @@ def test_gases_in_a_container_of_changing_roughness_stay_in_equilibrium():
     counts = np.bincount(((at + np.pi) * 8 / (2 * np.pi)).astype(int) % 8, minlength=8)
     assert np.sum((counts - n / 8) ** 2) / (n / 8) < 29.9  # quantile of chi-square with 7 degrees of freedom, 1 - 1e-4
     assert np.allclose(record.energy[0], record.energy[-1])
-
-
-def test_a_run_with_a_law_along_a_wall_goes_on_from_its_checkpoint(tmp_path):
-    circle = geo.Container.circle(1.0)
-    law = ker.PositionLaw([0.0, 1.0, circle.perimeter], [ker.lambertian(), ker.specular()])
-    along = ker.CollisionAlongWall(law, DISK)
-    one = ker.play(circle, along, [0.0, 0.0], [1.0, 0.3, 0.0], 5, 2, checkpoint=tmp_path / "run")
-    two = ker.play(circle, along, [0.0, 0.0], [1.0, 0.3, 0.0], 5, 2, checkpoint=tmp_path / "run")
-    assert np.array_equal(one.position, two.position)
-    moved = ker.PositionLaw([0.0, 1.5, circle.perimeter], law.laws)
-    with pytest.raises(InputError, match="laws"):
-        ker.play(
-            circle, ker.CollisionAlongWall(moved, DISK), [0, 0], [1.0, 0.3, 0.0], 5, 2, checkpoint=tmp_path / "run"
-        )

@@ -1,7 +1,5 @@
 """Lemma 5.1 as measured numbers: symmetry of the true law, decay with the scale, honest errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

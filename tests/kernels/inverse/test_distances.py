@@ -1,7 +1,5 @@
 """Distances between laws and between matrices, their errors, and the test of difference."""
 
-from __future__ import annotations
-
 import itertools
 from unittest.mock import patch
 
@@ -311,17 +309,6 @@ def test_the_joint_distance_of_an_arc_and_teeth_is_known_to_a_thousandth():
 
 
 # ---- samples -----------------------------------------------------------------------------------------------------
-def test_the_error_of_empirical_distances_holds():
-    law, other = ker.maxwell(0.3), ker.maxwell(0.6)
-    exact = float(ker.distance(*(ker.discretise(each, ker.Bins(16)) for each in (law, other))))
-    outside = 0
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        found = ker.distance(empirical(law, 4000, 16, rng), empirical(other, 3000, 16, rng))
-        outside += abs(found.value - exact) > found.error
-    assert outside == 0
-
-
 def test_the_noise_floor_is_the_mean_distance_of_equal_laws():
     law = ker.maxwell(0.3)
     floors, values = [], []
@@ -354,9 +341,6 @@ def test_different_laws_are_told_apart():
     first, second = empirical(ker.maxwell(0.4), 3000, 8, rng), empirical(ker.maxwell(0.5), 3000, 8, rng)
     found = ker.difference_test(first, second, permutations=199, rng=rng)
     assert found.p_value == pytest.approx(1 / 200) and found.statistic > 1.5 * found.noise_floor
-
-
-# ---- refusals ----------------------------------------------------------------------------------------------------
 
 
 # ---- orders ------------------------------------------------------------------------------------------------------

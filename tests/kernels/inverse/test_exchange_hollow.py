@@ -168,12 +168,6 @@ def test_the_mean_over_an_exchange_is_that_of_its_law():
     assert abs(float(found) - float(ker.resistance(exchange))) < 2.0 * found.error < 1e-2
 
 
-def test_the_wall_is_saved_and_loaded(tmp_path):
-    wall = ker.exchange_hollow(exchange_of(ker.lambertian(), 2), 1e-2).wall
-    wall.save(tmp_path / "wall.toml")
-    assert geo.load_wall(tmp_path / "wall.toml") == wall
-
-
 def test_generations_approach_the_exchange():
     hollow = ker.exchange_hollow(exchange_of(ker.lambertian(), 2), 1e-2)
     first, some, many = (hollow.generations(number, neck=1e-3) for number in (1, 300, 10_000))

@@ -1,7 +1,5 @@
 """Walls that nearly retroreflect: they approach it, each at a distance with an error that holds."""
 
-from __future__ import annotations
-
 import math
 import re
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The recipe "Add a law" of CONTRIBUTING.md: one dataclass with sample and apply, and whatever else the law knows."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

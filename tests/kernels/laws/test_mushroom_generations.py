@@ -1,7 +1,5 @@
 """Generations of mushrooms whose pieces are not listed: against listed ones, in laws, and towards retroreflection."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Walls whose cell changes, laws that depend on the position, the displacement of rays, and the distance of states."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

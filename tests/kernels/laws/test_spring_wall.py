@@ -1,7 +1,5 @@
 """A wall on a spring at a temperature: detailed balance with Maxwell's distribution, and plain mechanics."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

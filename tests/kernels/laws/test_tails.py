@@ -1,7 +1,5 @@
 """Rectangular crevices of any depth: integrals over up to 10^12 periods against expansions derived another way."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath

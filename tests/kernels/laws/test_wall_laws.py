@@ -1,6 +1,4 @@
-"""Laws of walls: which shapes have a closed form, and what traced rays do."""
-
-from __future__ import annotations
+"""Laws of walls: which shapes have a closed form, what traced rays do, and mixtures of hollows."""
 
 import math
 
@@ -10,53 +8,50 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import AccuracyError
-from asperity.kernels import Combination
-from asperity.kernels.bases.measure import SINE
-from asperity.kernels.laws.law import Law, specular
-from asperity.kernels.walls.circular_arc import CircularArcLaw
-from asperity.kernels.walls.rectangular import RectangularTeethLaw
-from asperity.kernels.walls.triangular import TriangularTeethLaw
-from asperity.kernels.walls.wall_law import UNRESOLVED_TOLERANCE, WallLaw
+from asperity.geometry.cells.hollow_shape import side_by_side
+from asperity.kernels.laws.law import Combination
+from asperity.kernels.walls.conditionals import adaptive_conditionals
+from wall_shapes import polygon
 
 
-def same(law: Law | None, expected: Law) -> bool:
+def same(law: ker.Law | None, expected: ker.Law) -> bool:
     theta = np.linspace(0.1, 3.0, 20)
     return law is not None and bool(np.allclose(law.apply(np.cos, theta), expected.apply(np.cos, theta), atol=1e-12))
 
 
 def test_walls_with_a_closed_form_are_recognised_by_their_shape() -> None:
-    assert WallLaw(geo.flat()).closed_form == specular()
-    assert WallLaw(geo.rectangular_teeth(1.5)).closed_form == RectangularTeethLaw(1.5)
+    assert ker.WallLaw(geo.flat()).closed_form == ker.specular()
+    assert ker.WallLaw(geo.rectangular_teeth(1.5)).closed_form == ker.RectangularTeethLaw(1.5)
     for wall, expected in (
-        (geo.triangular_teeth(0.7), TriangularTeethLaw(0.7)),
-        (geo.Wall.from_vertices([(0, 0), (3, -4), (6, 0)]), TriangularTeethLaw(2.0 * math.atan(0.75))),
-        (geo.focusing_arcs(1.2), CircularArcLaw(1.2)),
-        (geo.focusing_arcs(math.pi / 2).scaled(7.0), CircularArcLaw(math.pi / 2)),
-        (geo.focusing_arcs(1e-6), CircularArcLaw(1e-6)),
-        (geo.elliptical_arcs(0.9, geo.Disk()).foreshorten(geo.Disk()), CircularArcLaw(0.9)),
-        (geo.rectangular_teeth(0.8).mirrored(), RectangularTeethLaw(0.8)),
+        (geo.triangular_teeth(0.7), ker.TriangularTeethLaw(0.7)),
+        (geo.Wall.from_vertices([(0, 0), (3, -4), (6, 0)]), ker.TriangularTeethLaw(2.0 * math.atan(0.75))),
+        (geo.focusing_arcs(1.2), ker.CircularArcLaw(1.2)),
+        (geo.focusing_arcs(math.pi / 2).scaled(7.0), ker.CircularArcLaw(math.pi / 2)),
+        (geo.focusing_arcs(1e-6), ker.CircularArcLaw(1e-6)),
+        (geo.elliptical_arcs(0.9, geo.Disk()).foreshorten(geo.Disk()), ker.CircularArcLaw(0.9)),
+        (geo.rectangular_teeth(0.8).mirrored(), ker.RectangularTeethLaw(0.8)),
     ):
-        assert same(WallLaw(wall).closed_form, expected), wall
+        assert same(ker.WallLaw(wall).closed_form, expected), wall
 
 
 def test_foreshortened_teeth_have_the_corrected_parameters() -> None:
     disk = geo.Disk(mass=1.3, inertia=0.5)
     stretch = math.sqrt(1.0 + 1.3 / 0.5)
-    rectangles = WallLaw(geo.rectangular_teeth(0.8).foreshorten(disk)).closed_form
-    assert isinstance(rectangles, RectangularTeethLaw)
+    rectangles = ker.WallLaw(geo.rectangular_teeth(0.8).foreshorten(disk)).closed_form
+    assert isinstance(rectangles, ker.RectangularTeethLaw)
     assert rectangles.height_to_width == pytest.approx(stretch * 0.8, rel=1e-14)
-    triangles = WallLaw(geo.triangular_teeth(0.8).foreshorten(disk)).closed_form
-    assert isinstance(triangles, TriangularTeethLaw)
+    triangles = ker.WallLaw(geo.triangular_teeth(0.8).foreshorten(disk)).closed_form
+    assert isinstance(triangles, ker.TriangularTeethLaw)
     assert triangles.angle == pytest.approx(2.0 * math.atan(math.tan(0.4) / stretch), rel=1e-14)
 
 
 def test_several_hollows_make_a_combination_by_their_widths() -> None:
     wall = geo.Wall.from_vertices([(0, 0), (1, -1), (2, 0), (3, 0), (3, -2), (3.5, -2), (3.5, 0), (4, 0)])
-    law = WallLaw(wall).closed_form
-    assert isinstance(law, Combination)
-    expected = 0.5 * TriangularTeethLaw(math.pi / 2) + 0.25 * RectangularTeethLaw(4.0) + 0.25 * specular()
+    law = ker.WallLaw(wall).closed_form
+    assert isinstance(law, ker.Combination)
+    expected = 0.5 * ker.TriangularTeethLaw(math.pi / 2) + 0.25 * ker.RectangularTeethLaw(4.0) + 0.25 * ker.specular()
     assert same(law, expected)
-    assert np.allclose(WallLaw(wall).branches(1.0)[0].sum(), 1.0)
+    assert np.allclose(ker.WallLaw(wall).branches(1.0)[0].sum(), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -71,30 +66,15 @@ def test_several_hollows_make_a_combination_by_their_widths() -> None:
     ids=["bumps", "skew", "wide crevice", "ellipse", "parabolas"],
 )
 def test_other_walls_have_no_closed_form(wall: geo.Wall) -> None:
-    law = WallLaw(wall)
+    law = ker.WallLaw(wall)
     assert law.closed_form is None
     assert law.is_polygonal is wall.is_polygonal
     if wall.is_polygonal:
         assert law.branches(1.0)[0].sum() == pytest.approx(1.0, abs=1e-14)
 
 
-@pytest.mark.parametrize(
-    "wall", [geo.triangular_teeth(0.7), geo.rectangular_teeth(1.1), geo.focusing_arcs(1.2)], ids=repr
-)
-def test_traced_rays_go_where_the_closed_form_says(wall: geo.Wall) -> None:
-    law = WallLaw(wall)
-    rng = np.random.default_rng(8)
-    x, theta = rng.uniform(0.001, 0.999, 20_000), SINE.sample(20_000, rng)
-    outgoing, escaped = law.reflect_with_status(x, theta)
-    assert escaped.mean() > 1.0 - UNRESOLVED_TOLERANCE
-    error = np.abs(outgoing - law.closed_form.reflect(x, theta))
-    assert np.median(error) < 1e-15
-    # a ray within rounding of a corner or of a change of its hits may go the other way
-    assert np.mean(error[escaped] > 1e-9) < 1e-4
-
-
 def test_rays_that_do_not_escape_are_sent_back_and_reported() -> None:
-    law = WallLaw(geo.triangular_teeth(math.pi / 2))
+    law = ker.WallLaw(geo.triangular_teeth(math.pi / 2))
     # straight into the bottom, and beside it
     outgoing, escaped = law.reflect_with_status([0.5, 0.6], math.pi / 2)
     assert escaped.tolist() == [False, True]
@@ -139,3 +119,97 @@ def test_means_over_resolved_polygons_with_many_pieces_are_exact():
 def test_a_tolerance_of_some_roundings_is_kept():
     law = ker.WallLaw(geo.mushrooms(0.3))
     assert law.conditionals([1.0], tolerance=1e-15).error[0] < 1e-10
+
+
+def arc(left, right, half_angle):
+    radius = 0.5 * (right - left) / math.sin(half_angle)
+    centre = (0.5 * (left + right), radius * math.cos(half_angle))
+    ends = -0.5 * np.pi - half_angle, -0.5 * np.pi + half_angle
+    return [geo.Arc(centre, radius, *ends).pinned((left, 0.0), (right, 0.0))]
+
+
+TRAPEZOID = polygon((0, 0), (0.1, -0.2), (0.2, -0.2), (0.3, 0))
+BEZIER = [geo.Bezier([(0.6, 0), (0.7, -0.3), (0.9, 0)])]
+DOVETAIL = polygon((0, 0), (0.1, 0), (0.02, -0.2), (0.3, -0.2), (0.25, 0), (0.31, 0))
+BOTTLE = [
+    *polygon((0.6, 0), (0.7, 0), (0.7, -0.05), (0.65, -0.05)),
+    geo.Arc((0.75, -0.05), 0.1, np.pi, 2.0 * np.pi),
+    *polygon((0.85, -0.05), (0.8, -0.05), (0.8, 0), (1, 0)),
+]
+WALLS = {
+    "straight, arc and Bezier": [*TRAPEZOID, *arc(0.3, 0.6, 1.0), *BEZIER, *polygon((0.9, 0), (1, 0))],
+    "straight and arcs": [
+        *TRAPEZOID,
+        *arc(0.3, 0.6, 1.0),
+        *arc(0.6, 0.8, 0.4),
+        *polygon((0.8, 0), (0.9, -0.3), (1, 0)),
+    ],
+    "overhanging": [*DOVETAIL, *arc(0.31, 0.6, 1.3), *BOTTLE],
+}
+
+
+@pytest.fixture(params=WALLS)
+def wall(request):
+    return geo.Wall(WALLS[request.param])
+
+
+def test_the_mixture_of_the_hollows_agrees_with_rays_of_the_whole_wall(wall):
+    law, basis = ker.WallLaw(wall), ker.Bins(6)
+    assert isinstance(law.replacement, Combination)
+    found = ker.discretise(law, basis, tolerance=1e-2, samples=2**17)
+    rng = np.random.default_rng(5)
+    x, theta = rng.random(2**18), np.arccos(1.0 - 2.0 * rng.random(2**18))
+    traced = geo.trace(wall, x, theta)
+    pairs = np.histogram2d(theta, traced.theta, bins=[basis.edges, basis.edges])[0] / x.size
+    mass = np.diff(-np.cos(basis.edges)) / 2.0
+    expected = found.symmetric * np.sqrt(mass[:, None] * mass)
+    deviation = np.sqrt(np.maximum(expected * (1.0 - expected), 1e-9) / x.size)
+    assert traced.escaped.mean() > 0.9999
+    assert np.max(np.abs(pairs - expected) / (deviation + float(found.error) * mass.max())) < 4.5
+
+
+def test_each_hollow_alone_is_a_valid_wall_with_the_same_opening(wall):
+    alone = [
+        geo.Wall(side_by_side(wall, [hollow]).pieces, side_by_side(wall, [hollow]).period) for hollow in wall.hollows
+    ]
+    for one, hollow in zip(alone, wall.hollows, strict=True):
+        assert len(one.hollows) == 1 and one.hollows[0].width == pytest.approx(hollow.width, rel=1e-14)
+        assert one.period >= hollow.width * (1.0 - 1e-14)
+
+
+def test_the_hollows_together_have_the_cell_masses_of_quadrature_over_the_whole_wall(wall):
+    law, theta, edges = ker.WallLaw(wall), np.array([0.2, 0.9, 1.7, 2.9]), np.linspace(0.0, np.pi, 8)
+    whole = adaptive_conditionals(wall, theta, 1e-9, 0, edges[1:-1])
+    below = whole.mean(lambda angle: (angle[:, None] < edges).astype(float))
+    found = law.replacement.distribution(theta, edges).cumulative(edges)
+    assert np.all(np.abs(found - below) <= 1e-9 + whole.error[:, None] + 2.0 * whole.unresolved[:, None])
+
+
+def test_a_wall_of_straight_hollows_and_arcs_has_an_exact_law():
+    law = ker.WallLaw(geo.Wall(WALLS["straight and arcs"]))
+    exact = law.exact_law
+    assert law.closed_form is None and isinstance(exact, Combination)
+    assert math.fsum(weight for weight, _ in exact.terms) == pytest.approx(1.0, abs=1e-14)
+    assert {type(part) for _, part in exact.terms} == {ker.PolygonLaw, ker.CircularArcLaw}
+    assert ker.WallLaw(geo.Wall(WALLS["overhanging"])).exact_law is None
+    assert float(ker.discretise(law, ker.Bins(16), tolerance=1e-6).error) < 1e-6
+
+
+def test_walls_of_one_kind_of_hollow_or_without_room_for_their_hollows_stay_whole():
+    caps = [
+        *polygon(
+            (0, 0), (0.4, 0), (0.4, -0.5), (0.1, -0.5), (0.1, -0.7), (0.8, -0.7), (0.8, -0.5), (0.5, -0.5), (0.5, 0)
+        ),
+        *polygon((0.5, 0), (0.75, 0), (0.75, -0.1), (0.65, -0.1)),
+        geo.Arc((0.8, -0.1), 0.15, np.pi, 2.0 * np.pi),
+        *polygon((0.95, -0.1), (0.85, -0.1), (0.85, 0), (1, 0)),
+    ]
+    for whole in (geo.Wall(caps), geo.mushrooms(0.3, 0.5), geo.koch(2), geo.dispersing_arcs(1.0)):
+        assert ker.WallLaw(whole).replacement is None or ker.WallLaw(whole).closed_form is not None
+
+
+def test_the_essential_edge_of_a_mixture_is_at_least_its_straight_fraction():
+    from asperity.spectral.essential.edge import essential_edge
+
+    edge = essential_edge(ker.WallLaw(geo.Wall(WALLS["straight, arc and Bezier"])))
+    assert edge.low >= 0.4 - 1e-12 and edge.high <= 1.0

@@ -1,7 +1,5 @@
 """Matrices from counted pairs: small tables by hand, moments by enumeration, quantiles of known distributions."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -11,8 +9,7 @@ from scipy.sparse import issparse
 from scipy.stats import binom, chi2, gamma, norm, t
 
 from asperity.errors import AccuracyError
-from asperity.kernels import Bins, Legendre, Panels
-from asperity.kernels.bases.basis import Basis
+from asperity.kernels import Basis, Bins, Legendre, Panels
 from asperity.kernels.bases.directions import Directions
 from asperity.kernels.sampling import counts as counting
 from asperity.kernels.sampling.counts import (

@@ -1,7 +1,5 @@
 """Matrices of laws with a density: ranks, eigenvalues, masses between bins, orders, products."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Matrices of laws of isometries, of involutions and of arcs: the numbers of closed forms, frames."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kernel matrices: their algebra and its errors, defects, files, pictures."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 
@@ -11,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity import kernels as ker
-from asperity.errors import FileExistsRefusal, InputError
+from asperity.errors import InputError
 from asperity.estimates import Estimate
 from asperity.kernels.matrices.matrix import frobenius_error
 
@@ -129,30 +127,12 @@ def test_a_tensor_product_acts_on_both_angles() -> None:
     assert np.abs(both.flux.sum() - 1.0) < ROUNDING
 
 
-def test_the_specular_frame_makes_specular_the_identity_and_is_undone_by_itself() -> None:
-    for basis in (ker.Bins(9), ker.Legendre(7), ker.Panels([0.0, 1.0, np.pi - 1.0, np.pi], 2)):
-        matrix = ker.discretise(ker.specular(), basis)
-        turned = matrix.in_specular_frame()
-        assert turned.frame == "specular"
-        assert np.abs(turned.array - np.eye(basis.size)).max() < 1e-12
-        assert np.abs(turned.in_specular_frame().array - matrix.array).max() < 1e-12
-        assert turned.in_specular_frame().frame == "paper"
-
-
 def test_flux_and_weights_are_those_of_the_bins() -> None:
     matrix = ker.discretise(ker.TriangularTeethLaw(1.0), ker.Bins([0.0, 0.5, 1.7, np.pi]))
     assert (
         np.abs(matrix.weights - 0.5 * (np.cos(matrix.basis.edges[:-1]) - np.cos(matrix.basis.edges[1:]))).max() < 1e-15
     )
     assert np.abs(matrix.flux - matrix.weights[:, None] * matrix.array).max() < 1e-15
-
-
-def test_arrays_are_read_only_and_fields_fixed() -> None:
-    matrix = stochastic(3, np.random.default_rng(0))
-    with pytest.raises(ValueError, match="read-only"):
-        matrix.symmetric[0, 0] = 2.0
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        matrix.law = "other"  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
@@ -188,15 +168,9 @@ def test_files_keep_every_field_to_the_last_bit(matrix: ker.KernelMatrix, tmp_pa
     assert repr(loaded) == repr(matrix)
 
 
-def test_a_path_is_used_as_it_stands_and_never_overwritten_unasked(tmp_path: Path) -> None:
-    matrix = stochastic(2, np.random.default_rng(0))
-    path = tmp_path / "kernel.with.dots"
-    matrix.save(path)
+def test_a_path_is_used_as_it_stands(tmp_path: Path) -> None:
+    stochastic(2, np.random.default_rng(0)).save(tmp_path / "kernel.with.dots")
     assert [entry.name for entry in tmp_path.iterdir()] == ["kernel.with.dots"]
-    with pytest.raises(FileExistsRefusal, match="overwrite=True"):
-        matrix.save(path)
-    matrix.save(path, overwrite=True)
-    assert np.array_equal(ker.load_matrix(path).symmetric, matrix.symmetric)
 
 
 def test_other_files_are_refused_by_name(tmp_path: Path) -> None:

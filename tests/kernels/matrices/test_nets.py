@@ -1,7 +1,5 @@
 """Nets go on where they were, and of mirror-symmetric laws hold half of the rays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

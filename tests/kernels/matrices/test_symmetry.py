@@ -1,7 +1,5 @@
 """Defects and their z-scores, against enumerated moments and the distributions of scipy."""
 
-from __future__ import annotations
-
 import itertools
 import pickle
 

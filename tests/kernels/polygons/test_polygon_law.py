@@ -1,18 +1,19 @@
 """Exact laws of polygonal walls: against closed forms, traced rays, and what must hold for every wall."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-from campaigns.rays.hollows import chi_square_p
+from campaigns.judges.precise_triangular import ANGLE, BINS, reference
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.discretisation.isometries import branch_matrix
+from asperity.kernels.discretisation.isometry_tables import table_matrix
 from asperity.kernels.walls.isometry_branches import isometries
+from asperity.kernels.walls.polygon import table_of_beams
 
 EPS = float(np.finfo(np.float64).eps)
 SKEW = [(0, 0), (0.3, -0.5), (1, 0)]
@@ -93,23 +94,6 @@ def test_probabilities_sum_to_one_and_are_linear_in_the_cotangent_between_kinks(
     assert np.abs((1.0 - weight) * fraction[0] + weight * fraction[2] - fraction[1]).max() < 1e-11
 
 
-@pytest.mark.parametrize("name", WALLS)
-@pytest.mark.parametrize("basis", BASES, ids=repr)
-def test_matrices_of_polygons_are_markov_and_reversible(name: str, basis: ker.Basis) -> None:
-    found = ker.discretise(law_of(name), basis)
-    assert found.method == "exact" and found.error.kind == "bound"
-    allowed = min(float(found.error), 1e-11) + 32.0 * EPS * basis.size
-    assert np.linalg.norm(found.symmetric @ basis.constant - basis.constant) < allowed
-    assert np.linalg.norm(found.symmetric - found.symmetric.T) < allowed
-
-
-@pytest.mark.parametrize("name", WALLS)
-def test_traced_rays_follow_the_exact_law(name: str) -> None:
-    wall = geo.Wall.from_vertices(WALLS[name])
-    p_value = chi_square_p(wall, ker.PolygonLaw(wall), 200_000, 12, np.random.default_rng(3))
-    assert 1e-4 < p_value < 1.0 - 1e-4
-
-
 def test_different_hollows_add_up_by_their_widths_and_equal_ones_are_computed_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -170,27 +154,6 @@ def test_polygons_have_no_gap_and_their_walls_are_exact() -> None:
     exact = ker.discretise(wall_law, basis)
     assert exact.method == "exact"
     assert np.linalg.norm(exact.symmetric - ker.discretise(law, basis).symmetric) < 1e-13
-    drawn = law.sample(np.full(20_000, 1.1), np.random.default_rng(4))
-    mean, square = (float(law.apply(lambda a, k=k: np.cos(a) ** k, 1.1)) for k in (1, 2))
-    assert abs(np.cos(drawn).mean() - mean) < 4.0 * math.sqrt((square - mean * mean) / drawn.size)
-
-
-@pytest.mark.parametrize("name", WALLS)
-def test_collision_matrices_are_isometries_of_the_kinetic_metric(name: str) -> None:
-    disk = geo.Disk(mass=1.3, inertia=0.5)
-    law = law_of(name)
-    theta = np.array([0.4, 1.0, 1.9, 2.8])
-    branches = ker.CollisionLaw(law, disk).branches(theta)
-    assert np.allclose(sum(probability for probability, _ in branches), 1.0, atol=1e-13)
-    metric = np.diag([disk.mass, disk.mass, disk.inertia])
-    for _, matrix in branches:
-        assert np.allclose(np.swapaxes(matrix, -1, -2) @ metric @ matrix, metric, atol=1e-13)
-    # the velocity with angle theta goes to the one with the branch's angle
-    for k, angle in enumerate(theta):
-        incoming = -disk.from_angles(angle, 0.5 * math.pi)
-        images = [disk.to_angles(m[k] @ incoming)[0] for p, m in branches if p[k] > 1e-9]
-        listed = law.branches(angle)
-        assert np.allclose(np.sort(images), np.sort(listed[1][listed[0] > 1e-9]), atol=1e-12)
 
 
 def test_signs_from_the_table_are_those_found_by_probing() -> None:
@@ -217,3 +180,34 @@ def test_the_largest_hollow_tells_first_that_beams_do_not_resolve():
     # the tables that are known are used
     known = dict(law._known)
     assert law.isometry_table() is law.isometry_table() and all(law._known[key] is known[key] for key in known)
+
+
+def _closed_form(bins: ker.Bins) -> np.ndarray:
+    return ker.discretise(ker.TriangularTeethLaw(ANGLE), bins).symmetric
+
+
+def _beams(bins: ker.Bins) -> np.ndarray:
+    vertices = geo.triangular_teeth(ANGLE).vertices
+    return table_matrix(table_of_beams(beams_of(vertices)), bins)[0]
+
+
+@pytest.fixture(scope="module")
+def precise() -> np.ndarray:
+    return reference()
+
+
+@pytest.mark.parametrize("made", [_closed_form, _beams], ids=["closed form", "beams"])
+def test_triangular_teeth_on_512_bins_are_right_to_1e_13_as_an_operator(made, precise) -> None:
+    miss = made(ker.Bins(BINS)) - precise
+    # an ulp of an end of one of 2424 masses, as a fraction of a bin: each of them less than 1e-13, together more
+    assert np.abs(miss).max() < 1e-13
+    assert np.linalg.norm(miss, 2) < 1.2e-13
+    assert np.linalg.norm(miss) < float(ker.discretise(ker.TriangularTeethLaw(ANGLE), ker.Bins(BINS)).error)
+
+
+def test_the_40_digits_of_joined_bins_are_those_of_wider_bins(precise) -> None:
+    few = reference(size=16)
+    # the edges of 16 bins are among those of 512, and all bins weigh the same
+    joined = precise.reshape(16, BINS // 16, 16, BINS // 16).sum((1, 3)) * 16 / BINS
+    assert np.abs(few - joined).max() < 1e-14
+    assert np.abs(few - _closed_form(ker.Bins(16))).max() < 1e-14

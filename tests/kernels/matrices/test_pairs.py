@@ -1,13 +1,7 @@
-"""Matrices from streams of pairs: any chunks, sources, stops and restarts give the same bits."""
+"""Matrices from pairs of angles, at once and in streams, of which chunks, sources and stops change no bit."""
 
-from __future__ import annotations
-
-import os
-import subprocess
-import sys
 import tracemalloc
 from contextlib import contextmanager
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -33,12 +27,8 @@ def chunks(theta, image, size):
 
 
 def bits(found):
-    return (
-        found.symmetric.tobytes(),
-        found.error,
-        found.samples,
-        None if found.counts is None else found.counts.tobytes(),
-    )
+    counts = None if found.counts is None else found.counts.tobytes()
+    return found.symmetric.tobytes(), found.error, found.samples, counts
 
 
 @pytest.fixture(autouse=True)
@@ -60,6 +50,15 @@ def test_in_other_bases_it_differs_by_rounding_from_that_of_all_pairs_at_once(ba
     assert float(found.error) == pytest.approx(float(whole.error), rel=1e-10) and len(found.replicates) == 32
 
 
+def in_zarr(path, array, chunks):
+    import zarr
+
+    made = zarr.open(str(path), mode="w", shape=array.shape, chunks=chunks, dtype="f8")
+    made[:] = array
+    return made
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
 @pytest.mark.parametrize("invariant", [False, True])
 @pytest.mark.parametrize("basis", BASES, ids=repr)
 def test_the_bits_depend_neither_on_the_chunks_nor_on_the_source(basis, invariant, tmp_path):
@@ -69,6 +68,8 @@ def test_the_bits_depend_neither_on_the_chunks_nor_on_the_source(basis, invarian
     found = {
         "two arrays": (theta, image), "one array": both, "memmap": np.load(tmp_path / "a.npy", mmap_mode="r"),
         "whole": [(theta, image)], "rows": chunks(theta, image, 1), "odd": chunks(theta, image, 700),
+        "zarr": in_zarr(tmp_path / "both", both, (700, 2)),
+        "zarr, two": tuple(in_zarr(tmp_path / name, part, (333,)) for name, part in (("in", theta), ("out", image))),
     }  # fmt: skip
     import h5py
 
@@ -77,55 +78,6 @@ def test_the_bits_depend_neither_on_the_chunks_nor_on_the_source(basis, invarian
         found |= {"hdf5": file["pairs"], "hdf5, two": (file["in"], file["out"])}
         all_bits = {name: bits(ker.estimate_stream(one, basis, invariant=invariant)) for name, one in found.items()}
     assert len(set(all_bits.values())) == 1
-
-
-@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
-@pytest.mark.parametrize("basis", BASES, ids=repr)
-def test_arrays_of_zarr_give_the_bits_of_numpys_whatever_their_chunks(basis, tmp_path):
-    import zarr
-
-    theta, image = pairs()
-    whole = bits(ker.estimate_stream((theta, image), basis))
-    both = zarr.open(str(tmp_path / "both"), mode="w", shape=(NUMBER, 2), chunks=(700, 2), dtype="f8")
-    both[:] = np.column_stack([theta, image])
-    columns = []
-    for name, column in (("in", theta), ("out", image)):
-        columns.append(zarr.open(str(tmp_path / name), mode="w", shape=(NUMBER,), chunks=(333,), dtype="f8"))
-        columns[-1][:] = column
-    found = [ker.estimate_stream(given, basis, checkpoint=tmp_path / "a") for given in (both, tuple(columns))]
-    assert [bits(one) for one in found] == [whole, whole]
-
-
-@pytest.fixture(scope="module")
-def workers():
-    import distributed
-
-    with distributed.Client(
-        n_workers=2, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
-    ) as client:
-        yield client
-
-
-@pytest.mark.parametrize("invariant", [False, True])
-@pytest.mark.parametrize("basis", BASES, ids=repr)
-def test_the_bits_do_not_depend_on_the_workers(basis, invariant, workers, tmp_path, monkeypatch):
-    given = pairs(invariant=invariant)
-    whole = bits(ker.estimate_stream(given, basis, invariant=invariant))
-    assert bits(ker.estimate_stream(given, basis, invariant=invariant, client=workers)) == whole
-    # a stream that stops after five blocks, while later ones are with the workers, goes on here
-    made, original = [], streams._Sums._merge
-
-    def stops(self, other):
-        made.append(other)
-        if len(made) == 6:
-            raise KeyboardInterrupt
-        original(self, other)
-
-    monkeypatch.setattr(streams._Sums, "_merge", stops)
-    asked = {"basis": basis, "invariant": invariant, "checkpoint": tmp_path / "a"}
-    with pytest.raises(KeyboardInterrupt, match=rf"a has {5 * BLOCK} of them: give the same call"):
-        ker.estimate_stream(chunks(*given, 97), client=workers, **asked)
-    assert bits(ker.estimate_stream(chunks(*given, 301), **asked)) == whole
 
 
 def test_blocks_that_come_early_wait(monkeypatch):
@@ -156,32 +108,40 @@ def test_pairs_that_do_not_follow_the_measure_are_weighted_as_in_estimate(basis)
 
 
 @pytest.mark.parametrize("stop", [1, 6])
+@pytest.mark.parametrize("invariant", [False, True])
 @pytest.mark.parametrize("basis", BASES, ids=repr)
-@pytest.mark.parametrize("source", ["arrays", "chunks"])
-def test_a_stream_that_stopped_goes_on_to_the_same_bits(source, basis, stop, tmp_path, monkeypatch):
-    theta, image = pairs()
+@pytest.mark.parametrize("source", ["arrays", "chunks", "chunks, to workers"])
+def test_a_stream_that_stopped_goes_on_to_the_same_bits(source, basis, invariant, stop, workers, tmp_path, monkeypatch):
+    """With workers it stops while later blocks are with them, and goes on here."""
+    theta, image = pairs(invariant=invariant)
+    distributed = source == "chunks, to workers"
 
     def given(size=97):
         return (theta, image) if source == "arrays" else chunks(theta, image, size)
 
-    whole = bits(ker.estimate_stream(given(), basis))
-    made, original = [], streams._Sums._add
+    asked = {"basis": basis, "invariant": invariant}
+    whole = bits(ker.estimate_stream(given(), **asked))
+    step = "_merge" if distributed else "_add"
+    made, original = [], getattr(streams._Sums, step)
 
     def stops(self, *block):
         made.append(block)
-        if len(made) == stop + 1:
+        if len(made) != stop + 1:
+            return original(self, *block)
+        if not distributed:
             # half a block is in the sums
             original(self, *block)
-            raise KeyboardInterrupt
-        original(self, *block)
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr(streams._Sums, "_add", stops)
+    monkeypatch.setattr(streams._Sums, step, stops)
+    asked["checkpoint"] = tmp_path / "a"
     with pytest.raises(KeyboardInterrupt, match=rf"a has {stop * BLOCK} of them: give the same call"):
-        ker.estimate_stream(given(), basis, checkpoint=tmp_path / "a")
-    again = ker.estimate_stream(given(301), basis, checkpoint=tmp_path / "a")
-    assert bits(again) == whole and len(made) == -(-NUMBER // BLOCK) + 1
-    assert bits(ker.estimate_stream(given(), basis, checkpoint=tmp_path / "a")) == whole
-    assert len(made) == -(-NUMBER // BLOCK) + 1
+        ker.estimate_stream(given(), client=workers if distributed else None, **asked)
+    assert bits(ker.estimate_stream(given(301), **asked)) == whole
+    count = len(made)
+    assert distributed or count == -(-NUMBER // BLOCK) + 1
+    # nothing is left to do
+    assert bits(ker.estimate_stream(given(), **asked)) == whole and len(made) == count
 
 
 def test_other_pairs_are_refused_by_the_checkpoint(tmp_path):
@@ -224,37 +184,62 @@ def test_incoming_angles_that_do_not_follow_the_measure_are_refused_by_default()
         ker.estimate_stream(pairs(invariant=False), ker.Bins(6))
 
 
-RUN = """
-import numpy as np
-from asperity import kernels as ker
-from asperity.kernels.sampling import streams
-streams.BLOCK, streams.STORED_EVERY = 512, 0.0
-rng = np.random.default_rng(4)
-theta = ker.SINE.sample(20_000, rng)
-image = ker.TriangularTeethLaw(1.1).sample(theta, rng)
-def told():
-    for k in range(0, theta.size, 300):
-        print("chunk", flush=True)
-        yield theta[k : k + 300], image[k : k + 300]
-print(ker.estimate_stream(told(), ker.Legendre(5), checkpoint="a").symmetric.tobytes().hex())
-"""
+def test_rows_are_fractions_of_the_counts() -> None:
+    theta, image = pairs(5000, 0)
+    found = ker.estimate(theta, image, ker.Bins(6))
+    expected = np.zeros((6, 6), dtype=int)
+    for one, other in zip(np.floor(3 - 3 * np.cos(theta)), np.floor(3 - 3 * np.cos(image)), strict=True):
+        expected[int(one), int(other)] += 1
+    assert np.array_equal(found.counts, expected)
+    assert np.abs(found.array - expected / expected.sum(axis=1, keepdims=True)).max() < 1e-15
+    assert found.stochastic_defect() < 1e-15 and found.samples == 5000
 
 
-def test_a_killed_process_goes_on_to_the_same_bits(tmp_path):
-    source = str(Path(__file__).resolve().parents[3] / "src")
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([source, os.environ.get("PYTHONPATH", "")])}
-    for name in ("whole", "killed"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "run.py").write_text(RUN)
+def test_whether_the_incoming_angles_follow_the_measure_is_seen() -> None:
+    for invariant in (False, True):
+        found = ker.estimate(*pairs(4000, 0, invariant), ker.Bins(12))
+        assert found.metadata["incoming_angles_follow_measure"] is invariant
 
-    def started(name):
-        return subprocess.Popen(
-            [sys.executable, "run.py"], cwd=tmp_path / name, env=environment, stdout=subprocess.PIPE, text=True
-        )
 
-    with started("killed") as process:
-        for _ in range(20):
-            assert process.stdout.readline() == "chunk\n"
-        process.kill()
-    ends = [started(name).communicate()[0].splitlines()[-1] for name in ("whole", "killed")]
-    assert ends[0] == ends[1] and len(ends[0]) == 2 * 8 * 25
+@pytest.mark.parametrize("invariant", [False, True])
+@pytest.mark.parametrize("symmetrise", [False, True])
+def test_the_z_score_is_that_of_the_raw_pairs_for_any_incoming_angles(invariant: bool, symmetrise: bool) -> None:
+    scores = [
+        ker.estimate(*pairs(3000, seed, invariant), ker.Bins(10), symmetrise).symmetry_defect().z_score
+        for seed in range(60)
+    ]
+    assert abs(np.mean(scores)) < 0.6 and 0.7 < np.std(scores) < 1.3
+
+
+def test_pairs_of_an_irreversible_law_give_a_large_z_score() -> None:
+    rng = np.random.default_rng(3)
+    theta = np.pi * rng.beta(1.2, 1.6, 20_000)
+    fraction = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * rng.random(theta.size), 1.0)
+    found = ker.estimate(theta, ker.SINE.quantile(np.clip(fraction, 1e-12, 1 - 1e-12)), ker.Bins(12), symmetrise=True)
+    assert found.symmetry_defect().z_score > 10.0
+    assert np.abs(found.flux - found.flux.T).max() < 1e-17
+
+
+def test_the_test_of_the_incoming_angles_can_be_overruled() -> None:
+    theta, image = pairs(3000, 1)
+    found = ker.estimate(theta, image, ker.Bins(8), symmetrise=True, invariant=False)
+    plain = ker.estimate(theta, image, ker.Bins(8), symmetrise=True)
+    assert found.metadata["incoming_angles_follow_measure"] is False
+    assert 0.0 < np.abs(found.flux - plain.flux).max() < 0.01
+    assert np.array_equal(found.counts, plain.counts)
+
+
+def test_a_grid_of_angles_with_repeats_is_weighted_by_the_measure_it_stands_for() -> None:
+    rng = np.random.default_rng(5)
+    theta = np.repeat((np.arange(400) + 0.5) * np.pi / 400, 16)
+    found = ker.estimate(theta, LAW.sample(theta, rng), ker.Legendre(5))
+    assert not found.metadata["incoming_angles_follow_measure"]
+    exact = ker.discretise(LAW, ker.Legendre(5))
+    assert np.linalg.norm(found.symmetric - exact.symmetric) < 2.0 * float(found.error)
+    assert found.stochastic_defect() < 1e-14
+
+
+def test_pairs_of_any_shape_are_taken() -> None:
+    theta, image = pairs(600, 2)
+    flat = ker.estimate(theta, image, ker.Bins(4))
+    assert np.array_equal(ker.estimate(theta.reshape(20, 30), image.reshape(20, 30), ker.Bins(4)).array, flat.array)
