@@ -12,7 +12,7 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..scene import columns as c
 from ..scene.tolerances import JOINT_ULPS
-from .double_double.records import WideResults, WideTables
+from .double_double.records import Results, Tables
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -59,11 +59,11 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, c.ARC_COLUMNS)]))
     lines, pairs = _rows(scene.lines, c.LINE_COLUMNS), _rows(scene.pairs, c.PAIR_COLUMNS)
     beziers = np.zeros((1, c.BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
-    tables = WideTables(
+    tables = Tables(
         scene.hollows, scene.joints, lines, pairs, arcs, len(circles), beziers, _free_bands(scene),
         scene.cell, scene.is_open,
     )  # fmt: skip
-    results = WideResults(
+    results = Results(
         np.empty((count, 2)), np.empty((count, 2)), np.empty(count, np.int64), np.empty(count, np.uint8),
         np.empty(count), np.empty(count),
     )  # fmt: skip

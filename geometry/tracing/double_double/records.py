@@ -1,19 +1,20 @@
-"""The named tuples of the tracer in double-double arithmetic; a double-double is a pair (high, low). Without numba."""
+"""The named tuples of the tracer in double-double arithmetic. Without numba."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from numpy import int64, uint8
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
 
-Wide = tuple[float, float]
+if TYPE_CHECKING:
+    from .numbers import DoubleDouble
 
 
-class WideTables(NamedTuple):
-    """The tables of a wall as in `Tables`, except for arcs.
+class Tables(NamedTuple):
+    """The tables of a wall as in `compiled/records`, except for arcs.
 
     ``arcs`` is the table of `refined_arcs`, circles first, then ellipses; ``bands`` are the bands of heights of an open
     wall without pieces.
@@ -31,7 +32,7 @@ class WideTables(NamedTuple):
     is_open: bool
 
 
-class WideResults(NamedTuple):
+class Results(NamedTuple):
     """The arrays that `refined_rays` fills; x and theta have the shape (n, 2), the others (n,)."""
 
     x: Floats
@@ -42,10 +43,10 @@ class WideResults(NamedTuple):
     rounding: Floats
 
 
-class WideScope(NamedTuple):
+class Scope(NamedTuple):
     """The hollow that contains a ray: tables, ends of the opening, scale of lengths, slack, and ranges of pieces."""
 
-    tables: WideTables
+    tables: Tables
     left: float
     right: float
     scale: float
@@ -56,22 +57,22 @@ class WideScope(NamedTuple):
     beziers: tuple[int, int]
 
 
-class WideOwn(NamedTuple):
+class Own(NamedTuple):
     """The start of a segment: piece, parameter on a Bezier piece, length of the last segment that ended on a piece."""
 
     kind: int
     number: int
-    s: Wide
+    s: DoubleDouble
     flown: float
 
 
-class WideHit(NamedTuple):
+class Hit(NamedTuple):
     """The end of a segment: time, piece, and position on it, the fraction of a line or the parameter of a curve."""
 
-    time: Wide
+    time: DoubleDouble
     kind: int
     number: int
-    s: Wide
+    s: DoubleDouble
 
 
 class Sizes(NamedTuple):
