@@ -1,7 +1,7 @@
 """Double-double numbers as a number type of compiled code: an unevaluated sum of two doubles, about 31 digits.
 
 Loads numba. The operators take double-doubles and doubles mixed. A formula that uses only operators, `root`, `scaled`,
-`high`, `cross` and `dot` serves both number types. The error-free transforms are those of Dekker (1971) and Knuth. Sums
+`cross` and `dot` serves both number types. The error-free transforms are those of Dekker (1971) and Knuth. Sums
 and products follow Joldes, Muller & Popescu (2017), with relative errors of at most 3 u^2 for the sum, 7 u^2 for the
 product and 15 u^2 for the quotient, u = 2^-53. No operation may be reassociated: never compile this module with
 ``fastmath``.
@@ -35,7 +35,7 @@ _FACTORIALS = [Fraction(1, math.factorial(n)) for n in range(_TERMS + 1)]
 _INVERSE_FACTORIALS = tuple((float(exact), float(exact - Fraction(float(exact)))) for exact in _FACTORIALS)
 
 # Without wrappers and counts of references, which no operator needs, numba compiles an operator in half the time.
-_OPTIONS = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+_OPTIONS: Any = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
 _compile = jit(linked=True, _nrt=False)
 
 
@@ -77,7 +77,7 @@ def extended(typing, x):
         if x == DOUBLE_DOUBLE:
             return parts[0]
         made = cgutils.create_struct_proxy(DOUBLE_DOUBLE)(context, builder)
-        made.high, made.low = *parts, context.get_constant(types.float64, 0.0)
+        made.high, made.low = parts[0], context.get_constant(types.float64, 0.0)
         return made._getvalue()
 
     return DOUBLE_DOUBLE(x if x == DOUBLE_DOUBLE else types.float64), make
@@ -192,15 +192,6 @@ def root(x):
 @overload(root, jit_options=_OPTIONS)
 def _root(x):
     return (lambda x: square_root(x)) if x == DOUBLE_DOUBLE else lambda x: math.sqrt(x)
-
-
-def high(x):
-    """Return the double next to a number of either type."""
-
-
-@overload(high, jit_options=_OPTIONS)
-def _high(x):
-    return (lambda x: x.high) if x == DOUBLE_DOUBLE else lambda x: x
 
 
 def scaled(factor, x):

@@ -44,7 +44,7 @@ from .numbers import (
     two_product,
     two_sum,
 )
-from .records import Hit, Own, Scope, Sizes
+from .records import Hit, Scope, Sizes
 from .runs import LAST_HITS, crossings, skip_chords
 from .sides import (
     ARC,
@@ -114,14 +114,7 @@ def meets(tables, hit, own, px, py, vx, vy, clearance):
     if height < -slack:
         return False
     piece, start = face_of(tables, hit.kind, hit.number, hit.s), face_of(tables, own.kind, own.number, own.s)
-    return in_front(tables.joints, piece, start, px, py, vx.high, vy.high, Arrival(own.flown, slack, error))
-
-
-@_compile
-def is_beside(joints, index, corner):
-    """-> bool: whether a corner lies on a line or on its free side; a ray that hits the line meets no corner behind."""
-    x0, y0, x1, y1 = line_ends(joints, index)
-    return orientation(x0, y0, x1, y1, joints[corner, c.JOINT_X], joints[corner, c.JOINT_Y]) >= 0.0
+    return in_front(tables.joints, piece, start, px, py, vx.high, vy.high, Arrival(own.time.high, slack, error))
 
 
 @_compile
@@ -199,7 +192,7 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
     """-> (Hit, corner): the first hit on a line, and the time to the first corner in the ray's width, or inf."""
     tables, error = scope.tables, error_of(scope, sizes)
     joints = tables.joints
-    first, end = scope.joints
+    first, end = int(scope.hollow[c.FIRST_JOINT]), int(scope.hollow[c.JOINTS_END])
     nearest, corner = Hit(extended(np.inf), NO_PIECE, -1, extended(0.0)), np.inf
     before = extended(0.0)
     for j in range(first, end):
@@ -228,10 +221,13 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
 @_compile
 def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
     """-> (Hit, graze): the first hit on a curve before ``nearest``, or ``nearest``; time of undecided contact."""
-    tables, slack = scope.tables, scope.slack
+    tables, slack, hollow = scope.tables, scope.slack, scope.hollow
     graze = np.inf
-    for low, high in (scope.circles, scope.ellipses):
-        for k in range(low, high):
+    for before, first, end in (
+        (0, hollow[c.FIRST_CIRCLE], hollow[c.CIRCLES_END]),
+        (tables.first_ellipse, hollow[c.FIRST_ELLIPSE], hollow[c.ELLIPSES_END]),
+    ):
+        for k in range(before + int(first), before + int(end)):
             widest = max(1.0, tables.arcs[k, c.WIDE_STRETCH])
             is_own = own.kind == ARC and own.number == k
             t, undecided, height = arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
@@ -239,8 +235,7 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
             hit, clearance = Hit(t, ARC, k, own.s), (height, slack * widest, error * widest)
             if t < nearest.time and meets(tables, hit, own, px, py, vx, vy, clearance):
                 nearest = hit
-    low, high = scope.beziers
-    for k in range(low, high):
+    for k in range(int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])):
         own_s = own.s if own.kind == BEZIER and own.number == k else extended(-1.0)
         t, s, undecided, near_s = bezier_hit(tables.beziers[k], own_s, px, py, vx, vy, slack, error)
         graze = min(graze, undecided)
@@ -259,7 +254,7 @@ def exit_time(scope, own, hit, px, py, vx, vy):
 
     A piece within rounding of the opening or of a side is hit first.
     """
-    left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
+    left, right, slack, is_open = scope.hollow[c.LEFT], scope.hollow[c.RIGHT], scope.slack, scope.tables.is_open
     time, kind = hit.time, hit.kind
     if vy > 0.0 and own.kind != OPENING and py.high + time.high * vy.high > slack:
         t = -py / vy
@@ -299,15 +294,18 @@ def meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
     A corner at the end of the piece is further away than the hit by at most the width over the sine of incidence.
     """
     joints, error = scope.tables.joints, error_of(scope, sizes)
-    first, end = scope.joints
-    for j in range(first, end):
+    for j in range(int(scope.hollow[c.FIRST_JOINT]), int(scope.hollow[c.JOINTS_END])):
         if joints[j, c.IS_CORNER] > 0.0:
             dx, dy = joints[j, c.JOINT_X] - px, joints[j, c.JOINT_Y] - py
             ahead = dot(dx, dy, vx, vy).high
             width = width_at(scope, sizes, ahead, error)
             met = ahead > 0.0 and (ahead - hit.time.high) * incidence <= 2.0 * width
             met = met and abs(cross(dx, dy, vx, vy).high) <= width
-            if met and (hit.kind != LINE or is_beside(joints, hit.number, j)):
+            if met and hit.kind == LINE:
+                # a ray that hits a line meets no corner behind the line
+                x0, y0, x1, y1 = line_ends(joints, hit.number)
+                met = orientation(x0, y0, x1, y1, joints[j, c.JOINT_X], joints[j, c.JOINT_Y]) >= 0.0
+            if met:
                 return True
     return False
 
@@ -320,7 +318,7 @@ def pass_cells(scope, sizes, py, vx, vy, error):
     """
     cell, scale = scope.tables.cell, scope.scale
     # the two ends of the wall are the same point, and a ray passes a side above this point
-    end = scope.tables.joints[scope.joints[0], c.JOINT_Y]
+    end = scope.tables.joints[int(scope.hollow[c.FIRST_JOINT]), c.JOINT_Y]
     py = extended(end) if py < end else py
     spread = WIDTH_MARGIN * sizes.half_ulp * abs(sizes.a2) + error / scale
     width = WIDTH_MARGIN * sizes.half_ulp * scale * abs(sizes.j2) + error
@@ -344,7 +342,7 @@ def refined_ray(scope, entry, theta, limit, most_segments):
     ``entry`` is a double-double in the hollow. The amplification is the norm of the map's derivative in the units
     (scale, radian).
     """
-    tables, scale = scope.tables, scope.scale
+    tables, scale, left, right = scope.tables, scope.scale, scope.hollow[c.LEFT], scope.hollow[c.RIGHT]
     px, py = entry, extended(0.0)
     sine, cosine = sine_cosine(theta)
     vx, vy = -cosine, -sine
@@ -352,7 +350,7 @@ def refined_ray(scope, entry, theta, limit, most_segments):
     sizes = Sizes(1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, math.ldexp(1.0, exponent - 54))
     norm, nowhere = 1.0, extended(0.0)
     wraps, bounces, steps = 0, 0, 0
-    own = Own(OPENING, -1, extended(-1.0), 0.0)
+    own = Hit(extended(0.0), OPENING, -1, extended(-1.0))
     while True:
         local = local_error(sizes)
         if not local <= LARGEST_ERROR:
@@ -373,17 +371,17 @@ def refined_ray(scope, entry, theta, limit, most_segments):
             return px, nowhere, bounces, CORNER, norm, local
         sizes = after_flight(sizes, hit.time.high / scale)
         if hit.kind == OPENING:
-            x = qx + two_product(float(wraps), scope.right - scope.left)
+            x = qx + two_product(float(wraps), right - left)
             return x, direction_angle(vx, vy), bounces, ESCAPED, amplification_of(sizes), local
         if (bounces >= limit and hit.kind != SIDE) or steps >= most_segments:
             return px, nowhere, bounces, BOUNCE_LIMIT, norm, local
-        flown = own.flown
+        flown = own.time
         if hit.kind == SIDE:
-            px = extended(scope.left if vx > 0.0 else scope.right)
+            px = extended(left if vx > 0.0 else right)
             py, cells, sizes = pass_cells(scope, sizes, qy, vx, vy, error)
             wraps += (1 if vx > 0.0 else -1) * (1 + np.int64(cells))
         else:
-            flown = hit.time.high
+            flown = hit.time
             px, py = qx, qy
             vx, vy = reflected(vx, vy, nx, ny, approach)
             if incidence == 0.0:
@@ -402,24 +400,14 @@ def refined_ray(scope, entry, theta, limit, most_segments):
                     sizes = after_chords(with_new_error(sizes), float(hits), 2.0 * incidence / (bent * scale))
         norm = amplification_of(sizes)
         sizes = with_new_error(sizes)
-        own = Own(hit.kind, hit.number, hit.s if hit.kind == BEZIER else extended(-1.0), flown)
+        own = Hit(flown, hit.kind, hit.number, hit.s if hit.kind == BEZIER else extended(-1.0))
 
 
 @_compile
 def scope_of(tables, h):
     """-> Scope: hollow number h."""
-    hollow, ellipse = tables.hollows[h], tables.first_ellipse
-    return Scope(
-        tables,
-        hollow[c.LEFT],
-        hollow[c.RIGHT],
-        tables.cell + hollow[c.SIZE],
-        JOINT_ULPS * EPS * hollow[c.SIZE],
-        (int(hollow[c.FIRST_JOINT]), int(hollow[c.JOINTS_END])),
-        (int(hollow[c.FIRST_CIRCLE]), int(hollow[c.CIRCLES_END])),
-        (ellipse + int(hollow[c.FIRST_ELLIPSE]), ellipse + int(hollow[c.ELLIPSES_END])),
-        (int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])),
-    )
+    size = tables.hollows[h, c.SIZE]
+    return Scope(tables, tables.hollows[h], tables.cell + size, JOINT_ULPS * EPS * size)
 
 
 @_compile

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from numpy import int64, uint8
-from numpy.typing import NDArray
-
 from ....core.checks import Floats
 
 if TYPE_CHECKING:
@@ -32,42 +29,21 @@ class Tables(NamedTuple):
     is_open: bool
 
 
-class Results(NamedTuple):
-    """The arrays that `refined_rays` fills; x and theta have the shape (n, 2), the others (n,)."""
-
-    x: Floats
-    theta: Floats
-    collisions: NDArray[int64]
-    status: NDArray[uint8]
-    amplification: Floats
-    rounding: Floats
-
-
 class Scope(NamedTuple):
-    """The hollow that contains a ray: tables, ends of the opening, scale of lengths, slack, and ranges of pieces."""
+    """The hollow that contains a ray: tables, row of the hollow, scale of lengths, and slack."""
 
     tables: Tables
-    left: float
-    right: float
+    hollow: Floats
     scale: float
     slack: float
-    joints: tuple[int, int]
-    circles: tuple[int, int]
-    ellipses: tuple[int, int]
-    beziers: tuple[int, int]
-
-
-class Own(NamedTuple):
-    """The start of a segment: piece, parameter on a Bezier piece, length of the last segment that ended on a piece."""
-
-    kind: int
-    number: int
-    s: DoubleDouble
-    flown: float
 
 
 class Hit(NamedTuple):
-    """The end of a segment: time, piece, and position on it, the fraction of a line or the parameter of a curve."""
+    """The end of a segment: time, piece, and position on it, the fraction of a line or the parameter of a curve.
+
+    At the start of a segment: the end of the last one. Then the time is the length of the last segment that ended on a
+    piece, and the position is -1 but on a Bezier piece.
+    """
 
     time: DoubleDouble
     kind: int
