@@ -37,9 +37,9 @@ from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE
 from ...tracing.double_double.numbers import extended
-from ...tracing.double_double.sides import ARC as CURVED
-from ...tracing.double_double.sides import BEZIER as SPLINE
-from ...tracing.double_double.sides import LINE as STRAIGHT
+from ...tracing.double_double.records import ARC as CURVED
+from ...tracing.double_double.records import BEZIER as SPLINE
+from ...tracing.double_double.records import LINE as STRAIGHT
 from ...tracing.double_double.sides import Arrival, Face, in_front_at
 from .graph_table import FIRST_S, LEAST_BEND, MOST_BEND, PIECE, STEEPNESS, THIRD
 from .shapes import height_above, in_frame, parameter_at

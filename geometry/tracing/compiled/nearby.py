@@ -14,9 +14,10 @@ from ...scene.compiled.records import array_of
 from ...scene.tolerances import NEARBY_SLACKS
 from ..double_double.arcs import refined_arcs
 from ..double_double.numbers import extended
-from ..double_double.sides import ARC, Arrival, Face, in_front_at, line_in_front_of_line
-from ..double_double.sides import BEZIER as CURVE
-from ..double_double.sides import LINE as STRAIGHT
+from ..double_double.records import ARC
+from ..double_double.records import BEZIER as CURVE
+from ..double_double.records import LINE as STRAIGHT
+from ..double_double.sides import Arrival, Face, in_front_at, line_in_front_of_line
 from .arcs import arc_time, on_arc
 from .beziers import NO_BEZIER_HIT
 from .lines import first_boxes, line_time, next_leaf

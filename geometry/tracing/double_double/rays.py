@@ -32,34 +32,10 @@ from ...scene import columns as c
 from ...scene.tolerances import JOINT_ULPS
 from .arcs import arc_hit, arc_point
 from .beziers import bezier_hit, bezier_point
-from .numbers import (
-    LOCAL_ERROR,
-    cross,
-    direction_angle,
-    dot,
-    double_double,
-    extended,
-    scaled,
-    sine_cosine,
-    two_product,
-    two_sum,
-)
-from .records import Hit, Scope, Sizes
+from .numbers import LOCAL_ERROR, cross, direction_angle, dot, extended, scaled, sine_cosine, two_product, two_sum
+from .records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit, Scope, Sizes
 from .runs import LAST_HITS, crossings, skip_chords
-from .sides import (
-    ARC,
-    BEZIER,
-    LINE,
-    NO_PIECE,
-    OPENING,
-    SIDE,
-    Arrival,
-    Face,
-    in_front,
-    line_ends,
-    line_frame,
-    orientation,
-)
+from .sides import Arrival, Face, in_front_at, line_ends, line_frame, line_in_front_of_line, orientation
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, UNRESOLVED, UNSETTLED = 0, 1, 2, 3, 4, 5
 # pi - math.pi
@@ -95,8 +71,9 @@ def free_cells(bands, py, vx, vy, cell, width, spread):
 
 
 @_compile
-def face_of(tables, kind, number, s):
-    """-> Face: a piece as an argument of `in_front`."""
+def face_of(tables, hit):
+    """-> Face: the piece of a hit as an argument of `in_front_at`."""
+    _, kind, number, s = hit
     arc, curve = tables.arcs[number if kind == ARC else 0], tables.beziers[number if kind == BEZIER else 0]
     return Face(kind, number, arc, curve, s)
 
@@ -113,8 +90,11 @@ def meets(tables, hit, own, px, py, vx, vy, clearance):
         return height >= -error
     if height < -slack:
         return False
-    piece, start = face_of(tables, hit.kind, hit.number, hit.s), face_of(tables, own.kind, own.number, own.s)
-    return in_front(tables.joints, piece, start, px, py, vx.high, vy.high, Arrival(own.time.high, slack, error))
+    arrival = Arrival(own.time.high, slack, error)
+    if hit.kind == LINE and own.kind == LINE:
+        return line_in_front_of_line(tables.joints, hit.number, own.number, px, py, vx.high, vy.high, arrival)
+    piece, start = face_of(tables, hit), face_of(tables, own)
+    return in_front_at(tables.joints, piece, start, px, py, vx.high, vy.high, arrival)
 
 
 @_compile
@@ -448,8 +428,6 @@ def refined_rays(x, theta, tables, limit, most_segments, results):
             angle = two_sum(math.pi, -theta[i]) + PI_REST
             amplification[i], rounding[i], bounces[i], status[i] = 1.0, LOCAL_ERROR, 1, ESCAPED
             out_x[i, c.HIGH], out_x[i, c.LOW] = x[i], 0.0
-            if is_edge:
-                angle, bounces[i], status[i] = double_double(theta[i] - math.pi, angle.low), 0, CORNER
         else:
             end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
                 scope_of(tables, h), entry, theta[i], limit, most_segments
@@ -457,3 +435,5 @@ def refined_rays(x, theta, tables, limit, most_segments, results):
             end = base + end
             out_x[i, c.HIGH], out_x[i, c.LOW] = end.high, end.low
         out_theta[i, c.HIGH], out_theta[i, c.LOW] = angle.high, angle.low
+        if is_edge:
+            out_theta[i, c.HIGH], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER

@@ -9,6 +9,9 @@ from ....core.checks import Floats
 if TYPE_CHECKING:
     from .numbers import DoubleDouble
 
+# Kinds of pieces.
+NO_PIECE, OPENING, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
+
 
 class Tables(NamedTuple):
     """The tables of a wall as in `compiled/records`, except for arcs.

@@ -29,8 +29,8 @@ from ...scene import columns as c
 from .arcs import arc_height
 from .beziers import bezier_coefficients, bezier_point, cubic, cubic_slope
 from .numbers import DoubleDouble, dot, root, two_product, two_sum
+from .records import ARC, LINE
 
-NO_PIECE, OPENING, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 # Error of a double-double position projected onto a curve, as a fraction of the slack (64 roundings to 16 EPS).
 CURVE_NOISE = 2.0**-48
 # Rounding error of (b - a) x (c - a), relative to the sum of its two products: Shewchuk 1997, ccwerrboundA.
@@ -186,7 +186,7 @@ def came_through(ends, mx, my, px, py, vx, vy, arrival):
 
 @_compile
 def line_in_front_of_line(joints, line, own, px, py, vx, vy, arrival):
-    """-> bool: `in_front` for two lines, by their rows."""
+    """-> bool: `in_front_at` for two lines, by their rows."""
     if height_over_line(joints, own, line, px, py, arrival.blur) <= 0.0:
         return False
     x0, y0, x1, y1 = line_ends(joints, own)
@@ -201,7 +201,10 @@ def line_in_front_of_line(joints, line, own, px, py, vx, vy, arrival):
 
 @_compile
 def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
-    """-> bool: `in_front` for pieces of any kind, by the heights of the position."""
+    """-> bool: whether a ray that has just left the piece ``own`` starts in front of ``piece``, within the slack of it.
+
+    (``px``, ``py``), double-doubles, is the position, within rounding of ``own``. At least one piece is a curve.
+    """
     nx, ny = px, py
     for _ in range(STEPS):
         height, nx, ny = height_over(joints, own, px, py)
@@ -212,14 +215,3 @@ def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
     w = 2.0 * (vx * nx.high + vy * ny.high)
     vx, vy = vx - w * nx.high, vy - w * ny.high
     return not came_through(ends_of(joints, piece), mx.high, my.high, px.high, py.high, vx, vy, arrival)
-
-
-@_compile
-def in_front(joints, piece, own, px, py, vx, vy, arrival):
-    """-> bool: whether a ray that has just left the piece ``own`` starts in front of ``piece``, within the slack of it.
-
-    (``px``, ``py``), double-doubles, is the position, within rounding of ``own``.
-    """
-    if own.kind == LINE and piece.kind == LINE:
-        return line_in_front_of_line(joints, piece.number, own.number, px, py, vx, vy, arrival)
-    return in_front_at(joints, piece, own, px, py, vx, vy, arrival)
