@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from asperity.core.checks import Floats, angles, frozen, number_between, whole_number
 from asperity.geometry.polygons.compiled.codes import FIRST_WALL, OPENING
 from asperity.geometry.polygons.compiled.pieces import offset_of
-from asperity.geometry.polygons.compiled.unfolding import reduced
+from asperity.geometry.polygons.compiled.unfolding import reduced, sine_and_cosine
 from asperity.geometry.polygons.triangulation import triangulated
 from asperity.geometry.tracing.compiled.growing import longer, taller
-from asperity.geometry.tracing.double_double.arithmetic import add
+from asperity.geometry.tracing.double_double.numbers import double_double, extended, scaled
 from asperity.geometry.tracing.threads import interruptibly
 
 # Triangles that a ray may pass for every bounce that it is allowed.
@@ -53,13 +53,12 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
         while low < stop:
             high = stop
             edge, sign, bounces, steps = entrance, 1, 0, 0
-            m_x, m_y, shift, shift_low = sine, -cosine, 0.0, 0.0
-            turn, rest = 0.0, 0.0
+            m_x, m_y, shift, turn = sine, -cosine, extended(0.0), extended(0.0)
             out = count + 1 < max_intervals
             while out:
                 triangle, side = edge // 3, edge % 3
                 apex = triangles[triangle, (side + 2) % 3]
-                value = x[apex] * m_x + y[apex] * m_y + shift_low + shift
+                value = x[apex] * m_x + y[apex] * m_y + shift.low + shift.high
                 if value > low:
                     high = min(high, value)
                     edge = 3 * triangle + ((side + 1) % 3 if sign > 0 else (side + 2) % 3)
@@ -74,14 +73,12 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
                 else:
                     wall = FIRST_WALL - code
                     across = 2.0 * (m_x * walls[wall, 0] + m_y * walls[wall, 1])
-                    shift, shift_low = add((shift, shift_low), (across * walls[wall, 2], 0.0))
-                    turn, rest = add((turn, rest), (2.0 * sign * turn_high[wall], 2.0 * sign * turn_low[wall]))
-                    turn, rest = reduced(turn, rest)
+                    shift = shift + across * walls[wall, 2]
+                    turn = reduced(turn + scaled(2.0 * sign, double_double(turn_high[wall], turn_low[wall])))
                     sign = -sign
                     bounces += 1
                     # m from the sum of all turns, so that its error does not grow
-                    turned, along = math.sin(turn), math.cos(turn)
-                    turned, along = turned + rest * along, along - rest * turned
+                    turned, along = sine_and_cosine(turn)
                     m_x = sine * along - cosine * turned
                     m_y = -sign * (cosine * along + sine * turned)
                 if bounces > max_bounces or steps > STEPS_A_BOUNCE * max_bounces:
@@ -91,7 +88,7 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
             if used == room:
                 room *= 2
                 ends, offsets, tags = longer(ends, room), longer(offsets, room), taller(tags, room)
-            offset = offset_of(float(sign), turn, rest, theta[row]) if out else 0.0
+            offset = offset_of(float(sign), turn, theta[row]) if out else 0.0
             ends[used] = high / stop
             offsets[used] = offset
             tags[used, 0], tags[used, 1] = sign if out else 0, bounces

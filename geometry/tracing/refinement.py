@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..scene import columns as c
 from ..scene.tolerances import JOINT_ULPS
-from .double_double.records import WideResults, WideTables
+from .double_double.records import Tables
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -23,8 +22,7 @@ REFINED_SEGMENTS = 40_000
 _SETTLED, _CORNER, _GRAZING, _BOUNCE_LIMIT = 0, 1, 2, 3
 
 
-@dataclass(frozen=True)
-class RefinedTrace:
+class RefinedTrace(NamedTuple):
     """Rays traced in double-double arithmetic; a double-double is the sum of the two entries of the last axis.
 
     Attributes
@@ -59,17 +57,17 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, c.ARC_COLUMNS)]))
     lines, pairs = _rows(scene.lines, c.LINE_COLUMNS), _rows(scene.pairs, c.PAIR_COLUMNS)
     beziers = np.zeros((1, c.BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
-    tables = WideTables(
+    tables = Tables(
         scene.hollows, scene.joints, lines, pairs, arcs, len(circles), beziers, _free_bands(scene),
         scene.cell, scene.is_open,
     )  # fmt: skip
-    results = WideResults(
+    results = RefinedTrace(
         np.empty((count, 2)), np.empty((count, 2)), np.empty(count, np.int64), np.empty(count, np.uint8),
         np.empty(count), np.empty(count),
     )  # fmt: skip
     starts, angles = np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64)
     refined_rays(starts, angles, tables, max_collisions, REFINED_SEGMENTS, results)
-    return RefinedTrace(*results)
+    return results
 
 
 def retrace(

@@ -36,9 +36,10 @@ from ...tracing.compiled.arcs import near_end, on_arc
 from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE
-from ...tracing.double_double.sides import ARC as CURVED
-from ...tracing.double_double.sides import BEZIER as SPLINE
-from ...tracing.double_double.sides import LINE as STRAIGHT
+from ...tracing.double_double.numbers import extended
+from ...tracing.double_double.records import ARC as CURVED
+from ...tracing.double_double.records import BEZIER as SPLINE
+from ...tracing.double_double.records import LINE as STRAIGHT
 from ...tracing.double_double.sides import Arrival, Face, in_front_at
 from .graph_table import FIRST_S, LEAST_BEND, MOST_BEND, PIECE, STEEPNESS, THIRD
 from .shapes import height_above, in_frame, parameter_at
@@ -299,10 +300,10 @@ def face_at(kind, number, x, y, ground):
     arc = ground.exact_arcs[number if kind == ARC else 0]
     graph = ground.graphs[number if kind == BEZIER else 0]
     if kind != BEZIER:
-        return Face(CURVED if kind == ARC else STRAIGHT, number, arc, arc, (0.0, 0.0))
+        return Face(CURVED if kind == ARC else STRAIGHT, number, arc, arc, extended(0.0))
     along, _ = in_frame(graph, x - graph[c.START_X], y - graph[c.START_Y])
     curve = ground.beziers[int(graph[PIECE])]
-    return Face(SPLINE, number, arc, curve, (graph[FIRST_S] + parameter_at(graph, along), 0.0))
+    return Face(SPLINE, number, arc, curve, extended(graph[FIRST_S] + parameter_at(graph, along)))
 
 
 @inner
@@ -311,7 +312,7 @@ def is_in_front(kind, number, own, x, y, slack, ground):
     # without a test for faces passed from behind on the last path
     start, piece = face_at(own.kind, own.piece, x, y, ground), face_at(kind, number, x, y, ground)
     arrival = Arrival(0.0, slack, slack)
-    return in_front_at(ground.joints, piece, start, (x, 0.0), (y, 0.0), 0.0, 0.0, arrival)
+    return in_front_at(ground.joints, piece, start, extended(x), extended(y), 0.0, 0.0, arrival)
 
 
 @inlined

@@ -45,8 +45,8 @@ def set_frame(frame, polygon, count, unfolding):
         p, s, c = polygon[j, LINE_P], polygon[j, LINE_S], polygon[j, LINE_C]
         frame.along[i] = cosine * s - sine * c
         frame.up[i] = -sign * (sine * s + cosine * c)
-        frame.rest[i] = unfolding.x * s - unfolding.y * c - p
-    size = abs(unfolding.x) + abs(unfolding.y) + 5.0
+        frame.rest[i] = unfolding.x.high * s - unfolding.y.high * c - p
+    size = abs(unfolding.x.high) + abs(unfolding.y.high) + 5.0
     return unfolding.error_x + unfolding.error_y + FUNCTIONAL_ULPS * EPS * size
 
 

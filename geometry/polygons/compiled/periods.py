@@ -15,7 +15,6 @@ import numpy as np
 
 from ....core.rounding import EPS
 from ...tracing.compiled.options import inlined
-from ...tracing.double_double.arithmetic import add
 from .columns import EDGE, LINE_C, LINE_S, TURN
 from .unfolding import STEP_ULPS, Course, unfolded
 
@@ -39,11 +38,17 @@ class Period(NamedTuple):
 
 
 @inlined
+def change_between(first, last):
+    """Return the difference of two nearby double-doubles as a double."""
+    return (last.high - first.high) + (last.low - first.low)
+
+
+@inlined
 def period_between(mark, course):
     """-> Period: the change of the unfolding between two places of a beam at the same edge."""
     first, last = mark.unfolding, course.unfolding
-    x, y = (last.x - first.x) + (last.x_low - first.x_low), (last.y - first.y) + (last.y_low - first.y_low)
-    turn = (last.turn - first.turn) + (last.turn_low - first.turn_low)
+    x, y = change_between(first.x, last.x), change_between(first.y, last.y)
+    turn = change_between(first.turn, last.turn)
     angle, size = abs(turn) + EPS, abs(x) + abs(y)
     doubt = 2.0 * (last.error_x - first.error_x + last.error_y - first.error_y) + (angle + STEP_ULPS * EPS) * size
     most = np.floor(MOST_TURN / angle)
@@ -57,7 +62,7 @@ def lag_of(course, history, reflections):
         slot = (reflections - lag) % MEMORY
         if (
             history.whole[slot, EDGE] == course.edge
-            and abs(history.real[slot, TURN] - course.unfolding.turn) <= NEARLY_PARALLEL
+            and abs(history.real[slot, TURN] - course.unfolding.turn.high) <= NEARLY_PARALLEL
         ):
             return lag
     return 0
@@ -97,10 +102,9 @@ def repeated(mark, course, expected, periods):
     # the translation turns by period.turn in each period, on average by half the angle between the first and the last
     half = 0.5 * (periods + 1.0) * period.turn
     dx, dy = periods * (period.x - half * period.y), periods * (period.y + half * period.x)
-    x, y = add((last.x, last.x_low), (dx, 0.0)), add((last.y, last.y_low), (dy, 0.0))
-    turn = add((last.turn, last.turn_low), (periods * period.turn, 0.0))
     error_x = last.error_x + periods * (last.error_x - mark.unfolding.error_x) + STEP_ULPS * EPS * abs(dx)
     error_y = last.error_y + periods * (last.error_y - mark.unfolding.error_y) + STEP_ULPS * EPS * abs(dy)
     bounces = course.bounces + int(periods) * (course.bounces - mark.bounces)
-    unfolding = unfolded(last.sign, turn[0], turn[1], x[0], x[1], y[0], y[1], error_x, error_y)
+    turn = last.turn + periods * period.turn
+    unfolding = unfolded(last.sign, turn, last.x + dx, last.y + dy, error_x, error_y)
     return Course(course.edge, bounces, unfolding), True

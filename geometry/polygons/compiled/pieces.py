@@ -12,7 +12,7 @@ from ....core.checks import Floats
 from ....core.compilation import jit
 from ...tracing.compiled.options import inlined, linked_allocating
 from ...tracing.compiled.trigonometry import PI, PI_REST
-from ...tracing.double_double.arithmetic import add
+from ...tracing.double_double.numbers import double_double, scaled
 from . import columns as c
 
 _compile = jit()
@@ -26,18 +26,19 @@ class Pieces(NamedTuple):
 
 
 @_compile
-def offset_of(sign, turn, turn_low, middle):
+def offset_of(sign, turn, middle):
     """Return the offset of theta' = sign (theta + pi - turn), modulo 2 pi such that ``middle`` leaves upwards."""
-    offset = add((sign * PI, sign * PI_REST), (-sign * turn, -sign * turn_low))
-    turns = np.rint((sign * middle + offset[0] - 0.5 * PI) / (2.0 * PI))
-    return add(offset, (-2.0 * turns * PI, -2.0 * turns * PI_REST))[0]
+    half_turn = double_double(PI, PI_REST)
+    offset = scaled(sign, half_turn) - scaled(sign, turn)
+    turns = np.rint((sign * middle + offset.high - 0.5 * PI) / (2.0 * PI))
+    return (offset - scaled(2.0 * turns, half_turn)).high
 
 
 @inlined
 def leaving_offset(low, high, unfolding):
     """-> (offset, upwards): of theta' for lines between two angles, and whether their middle leaves upwards."""
     middle = 0.5 * (low + high)
-    offset = offset_of(unfolding.sign, unfolding.turn, unfolding.turn_low, middle)
+    offset = offset_of(unfolding.sign, unfolding.turn, middle)
     return offset, 0.0 <= unfolding.sign * middle + offset <= PI
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ...tracing.compiled.growing import taller
 from ...tracing.compiled.options import inlined, linked_allocating
+from ...tracing.double_double.numbers import double_double
 from . import columns as c
 from .unfolding import Course, unfolded
 
@@ -41,9 +42,9 @@ def put_course(store, beam, course):
     """Write where a beam is."""
     real, whole, isometry = store.real, store.whole, course.unfolding
     whole[beam, c.EDGE], whole[beam, c.SIGN], whole[beam, c.BOUNCES] = course.edge, int(isometry.sign), course.bounces
-    real[beam, c.TURN], real[beam, c.TURN_LOW] = isometry.turn, isometry.turn_low
-    real[beam, c.T_X], real[beam, c.T_X_LOW], real[beam, c.ERROR_X] = isometry.x, isometry.x_low, isometry.error_x
-    real[beam, c.T_Y], real[beam, c.T_Y_LOW], real[beam, c.ERROR_Y] = isometry.y, isometry.y_low, isometry.error_y
+    real[beam, c.TURN], real[beam, c.TURN_LOW] = isometry.turn.high, isometry.turn.low
+    real[beam, c.T_X], real[beam, c.T_X_LOW], real[beam, c.ERROR_X] = isometry.x.high, isometry.x.low, isometry.error_x
+    real[beam, c.T_Y], real[beam, c.T_Y_LOW], real[beam, c.ERROR_Y] = isometry.y.high, isometry.y.low, isometry.error_y
 
 
 @inlined
@@ -64,12 +65,9 @@ def course_of(store, beam):
     real, whole = store.real, store.whole
     isometry = unfolded(
         float(whole[beam, c.SIGN]),
-        real[beam, c.TURN],
-        real[beam, c.TURN_LOW],
-        real[beam, c.T_X],
-        real[beam, c.T_X_LOW],
-        real[beam, c.T_Y],
-        real[beam, c.T_Y_LOW],
+        double_double(real[beam, c.TURN], real[beam, c.TURN_LOW]),
+        double_double(real[beam, c.T_X], real[beam, c.T_X_LOW]),
+        double_double(real[beam, c.T_Y], real[beam, c.T_Y_LOW]),
         real[beam, c.ERROR_X],
         real[beam, c.ERROR_Y],
     )

@@ -13,7 +13,7 @@ from ....core.compilation import jit
 from ....core.rounding import EPS
 from ...tracing.compiled.options import inlined
 from ...tracing.compiled.trigonometry import PI, PI_REST
-from ...tracing.double_double.arithmetic import add
+from ...tracing.double_double.numbers import DoubleDouble, double_double, scaled
 from .codes import FIRST_WALL, OPENING
 
 _compile = jit()
@@ -50,19 +50,15 @@ class Hollow(NamedTuple):
 class Unfolding(NamedTuple):
     """The isometry V -> R V + T that unfolds the hollow, where R reflects first if ``sign`` is -1.
 
-    The angle of R and T are unevaluated sums; ``sine`` and ``cosine`` are those of the angle. The errors bound the
-    rounding of T.
+    ``turn`` is the angle of R, with ``sine`` and ``cosine``; T is (x, y). The errors bound the rounding of T.
     """
 
     sign: float
-    turn: float
-    turn_low: float
+    turn: DoubleDouble
     sine: float
     cosine: float
-    x: float
-    x_low: float
-    y: float
-    y_low: float
+    x: DoubleDouble
+    y: DoubleDouble
     error_x: float
     error_y: float
 
@@ -90,27 +86,25 @@ class Apex(NamedTuple):
 
 
 @_compile
-def reduced(high, low):
-    """Return an angle, given as two doubles, modulo 2 pi in [-pi, pi] within rounding."""
-    turns = np.rint(high / (2.0 * PI))
-    if turns != 0.0:
-        # turns is at most 2, so its products are exact
-        high, low = add((high, low), (-2.0 * turns * PI, -2.0 * turns * PI_REST))
-    return high, low
+def reduced(angle):
+    """Return an angle, a double-double, modulo 2 pi in [-pi, pi] within rounding."""
+    turns = np.rint(angle.high / (2.0 * PI))
+    # turns is at most 2, so its products are exact
+    return angle - scaled(2.0 * turns, double_double(PI, PI_REST)) if turns != 0.0 else angle
 
 
 @inlined
-def sine_and_cosine(high, low):
-    """Return the sine and the cosine of an angle, given as two doubles."""
-    sine, cosine = math.sin(high), math.cos(high)
-    return sine + low * cosine, cosine - low * sine
+def sine_and_cosine(angle):
+    """Return the sine and the cosine, doubles, of an angle, a double-double."""
+    sine, cosine = math.sin(angle.high), math.cos(angle.high)
+    return sine + angle.low * cosine, cosine - angle.low * sine
 
 
 @inlined
-def unfolded(sign, turn, turn_low, x, x_low, y, y_low, error_x, error_y):
+def unfolded(sign, turn, x, y, error_x, error_y):
     """-> Unfolding: with the sine and the cosine of its angle."""
-    sine, cosine = sine_and_cosine(turn, turn_low)
-    return Unfolding(sign, turn, turn_low, sine, cosine, x, x_low, y, y_low, error_x, error_y)
+    sine, cosine = sine_and_cosine(turn)
+    return Unfolding(sign, turn, sine, cosine, x, y, error_x, error_y)
 
 
 @inlined
@@ -121,13 +115,11 @@ def reflected(unfolding, wall, hollow):
     nx, ny = hollow.normal_x[wall], hollow.normal_y[wall]
     xx, xy = unfolding.cosine * nx, -sign * unfolding.sine * ny
     yx, yy = unfolding.sine * nx, sign * unfolding.cosine * ny
-    x, y = add((unfolding.x, unfolding.x_low), (xx + xy, 0.0)), add((unfolding.y, unfolding.y_low), (yx + yy, 0.0))
-    turn = 2.0 * sign * hollow.turn_high[wall], 2.0 * sign * hollow.turn_low[wall]
-    high, low = add((unfolding.turn, unfolding.turn_low), turn)
-    high, low = reduced(high, low)
+    direction = double_double(hollow.turn_high[wall], hollow.turn_low[wall])
+    turn = reduced(unfolding.turn + scaled(2.0 * sign, direction))
     error_x = unfolding.error_x + hollow.slack[wall] + STEP_ULPS * EPS * (abs(xx) + abs(xy))
     error_y = unfolding.error_y + hollow.slack[wall] + STEP_ULPS * EPS * (abs(yx) + abs(yy))
-    return unfolded(-sign, high, low, x[0], x[1], y[0], y[1], error_x, error_y)
+    return unfolded(-sign, turn, unfolding.x + (xx + xy), unfolding.y + (yx + yy), error_x, error_y)
 
 
 @inlined
@@ -152,10 +144,10 @@ def apex_of(course, hollow):
     if isometry.sign < 0.0:
         left, right = right, left
     return Apex(
-        xx + xy + isometry.x,
-        yx + yy + isometry.y,
-        FUNCTIONAL_ULPS * EPS * (abs(xx) + abs(xy) + abs(isometry.x)) + isometry.error_x,
-        FUNCTIONAL_ULPS * EPS * (abs(yx) + abs(yy) + abs(isometry.y)) + isometry.error_y,
+        xx + xy + isometry.x.high,
+        yx + yy + isometry.y.high,
+        FUNCTIONAL_ULPS * EPS * (abs(xx) + abs(xy) + abs(isometry.x.high)) + isometry.error_x,
+        FUNCTIONAL_ULPS * EPS * (abs(yx) + abs(yy) + abs(isometry.y.high)) + isometry.error_y,
         left,
         right,
     )

@@ -13,9 +13,11 @@ from ...scene.boxes import BOXES, CONTENT
 from ...scene.compiled.records import array_of
 from ...scene.tolerances import NEARBY_SLACKS
 from ..double_double.arcs import refined_arcs
-from ..double_double.sides import ARC, Arrival, Face, in_front_at, line_in_front_of_line
-from ..double_double.sides import BEZIER as CURVE
-from ..double_double.sides import LINE as STRAIGHT
+from ..double_double.numbers import extended
+from ..double_double.records import ARC
+from ..double_double.records import BEZIER as CURVE
+from ..double_double.records import LINE as STRAIGHT
+from ..double_double.sides import Arrival, Face, in_front_at, line_in_front_of_line
 from .arcs import arc_time, on_arc
 from .beziers import NO_BEZIER_HIT
 from .lines import first_boxes, line_time, next_leaf
@@ -40,7 +42,7 @@ def face_of(tables, kind, number, s):
         form, arc = ARC, refined_arcs(array_of(arcs)[number : number + 1])[0]
     if kind == BEZIER:
         form, curve = CURVE, array_of(tables.beziers)[number]
-    return Face(form, number, arc, curve, (s, 0.0))
+    return Face(form, number, arc, curve, extended(s))
 
 
 @allocating
@@ -53,7 +55,7 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
         array_of(tables.joints),
         face_of(tables, hit.kind, hit.number, hit.s),
         face_of(tables, own.kind, own.number, own.s),
-        (px, 0.0), (py, 0.0), vx, vy, Arrival(own.flown, slack, slack),
+        extended(px), extended(py), vx, vy, Arrival(own.flown, slack, slack),
     )  # fmt: skip
 
 
@@ -61,7 +63,7 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
 def line_starts_in_front(tables, line, own, px, py, vx, vy, slack):
     """-> bool: `starts_in_front` for a ray that left a line, and another line."""
     arrival = Arrival(own.flown, slack, slack)
-    return line_in_front_of_line(array_of(tables.joints), line, own.number, (px, 0.0), (py, 0.0), vx, vy, arrival)
+    return line_in_front_of_line(array_of(tables.joints), line, own.number, extended(px), extended(py), vx, vy, arrival)
 
 
 @linked

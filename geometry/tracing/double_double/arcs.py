@@ -6,20 +6,7 @@ import numpy as np
 
 from ....core.compilation import jit
 from ...scene import columns as c
-from .arithmetic import (
-    LOCAL_ERROR,
-    add,
-    cross,
-    divide,
-    dot,
-    multiply,
-    negate,
-    sine_cosine,
-    square_root,
-    subtract,
-    two_sum,
-    wide,
-)
+from .numbers import LOCAL_ERROR, cross, dot, double_double, extended, root, scaled, sine_cosine, two_sum
 
 _compile = jit(linked=True, _nrt=False)
 
@@ -30,43 +17,50 @@ def refined_arcs(arcs):
     # at least one row, because `face_of` passes a row also for a wall without arcs
     table = np.zeros((max(1, arcs.shape[0]), c.WIDE_ARC_COLUMNS))
     for k in range(arcs.shape[0]):
-        stretch = arcs[k, c.STRETCH]
-        x0, y0, x1, y1 = arcs[k, c.START_X], arcs[k, c.START_Y], arcs[k, c.END_X], arcs[k, c.END_Y]
-        cx = two_sum(x1, -x0)
-        cy = multiply(wide(stretch), two_sum(y1, -y0))
-        length = square_root(dot(cx, cy, cx, cy))
-        ex, ey = divide(cx, length), divide(cy, length)
-        sine, cosine = sine_cosine(0.5 * arcs[k, c.SPAN])
-        if arcs[k, c.CURVATURE] < 0.0:
-            sine = negate(sine)
+        arc, row = arcs[k], table[k]
+        cx, cy = two_sum(arc[c.END_X], -arc[c.START_X]), arc[c.STRETCH] * two_sum(arc[c.END_Y], -arc[c.START_Y])
+        length = root(dot(cx, cy, cx, cy))
+        ex, ey = cx / length, cy / length
+        sine, cosine = sine_cosine(0.5 * arc[c.SPAN])
+        if arc[c.CURVATURE] < 0.0:
+            sine = -sine
         # n0 = (s ex - c ey, s ey + c ex), kappa = 2 s / length
-        nx = subtract(multiply(sine, ex), multiply(cosine, ey))
-        ny = add(multiply(sine, ey), multiply(cosine, ex))
-        curvature = divide((2.0 * sine[0], 2.0 * sine[1]), length)
-        row = table[k]
-        row[c.START_X], row[c.START_Y] = x0, y0
-        row[c.WIDE_NORMAL_X], row[c.WIDE_NORMAL_X_LOW] = nx
-        row[c.WIDE_NORMAL_Y], row[c.WIDE_NORMAL_Y_LOW] = ny
-        row[c.WIDE_CURVATURE], row[c.WIDE_CURVATURE_LOW] = curvature
-        row[c.WIDE_CHORD_X], row[c.WIDE_CHORD_X_LOW] = ex
-        row[c.WIDE_CHORD_Y], row[c.WIDE_CHORD_Y_LOW] = ey
-        row[c.WIDE_CHORD], row[c.WIDE_CHORD_LOW] = length
-        row[c.IS_SHORT] = 1.0 if arcs[k, c.SHORT_CHORD] > 0.0 else 0.0
-        row[c.WIDE_STRETCH] = stretch
-        row[c.WIDE_SPAN], row[c.WIDE_RUN_SINE] = arcs[k, c.SPAN], arcs[k, c.RUN_SINE]
-        row[c.END_X], row[c.END_Y] = x1, y1
+        nx, ny = sine * ex - cosine * ey, sine * ey + cosine * ex
+        curvature = scaled(2.0, sine) / length
+        row[c.START_X], row[c.START_Y], row[c.END_X], row[c.END_Y] = arc[: c.END_Y + 1]
+        row[c.WIDE_NORMAL_X], row[c.WIDE_NORMAL_X_LOW] = nx.high, nx.low
+        row[c.WIDE_NORMAL_Y], row[c.WIDE_NORMAL_Y_LOW] = ny.high, ny.low
+        row[c.WIDE_CURVATURE], row[c.WIDE_CURVATURE_LOW] = curvature.high, curvature.low
+        row[c.WIDE_CHORD_X], row[c.WIDE_CHORD_X_LOW] = ex.high, ex.low
+        row[c.WIDE_CHORD_Y], row[c.WIDE_CHORD_Y_LOW] = ey.high, ey.low
+        row[c.WIDE_CHORD], row[c.WIDE_CHORD_LOW] = length.high, length.low
+        row[c.IS_SHORT] = 1.0 if arc[c.SHORT_CHORD] > 0.0 else 0.0
+        row[c.WIDE_STRETCH], row[c.WIDE_SPAN], row[c.WIDE_RUN_SINE] = arc[c.STRETCH], arc[c.SPAN], arc[c.RUN_SINE]
     return table
 
 
 @_compile
-def wide_arc(arc):
-    """-> (n0x, n0y, curvature, stretch): double-doubles from a row of `refined_arcs`."""
+def arc_form(arc):
+    """-> (n0x, n0y, curvature): the numbers of F, see `compiled/arcs`, from a row of `refined_arcs`."""
     return (
-        (arc[c.WIDE_NORMAL_X], arc[c.WIDE_NORMAL_X_LOW]),
-        (arc[c.WIDE_NORMAL_Y], arc[c.WIDE_NORMAL_Y_LOW]),
-        (arc[c.WIDE_CURVATURE], arc[c.WIDE_CURVATURE_LOW]),
-        wide(arc[c.WIDE_STRETCH]),
+        double_double(arc[c.WIDE_NORMAL_X], arc[c.WIDE_NORMAL_X_LOW]),
+        double_double(arc[c.WIDE_NORMAL_Y], arc[c.WIDE_NORMAL_Y_LOW]),
+        double_double(arc[c.WIDE_CURVATURE], arc[c.WIDE_CURVATURE_LOW]),
     )
+
+
+@_compile
+def form_value(form, x, y):
+    """-> number: F at a position relative to the first joint."""
+    nx, ny, curvature = form
+    return dot(nx, ny, x, y) - scaled(0.5, curvature * dot(x, y, x, y))
+
+
+@_compile
+def form_gradient(form, x, y):
+    """-> (nx, ny): the gradient of F, on the arc the unit normal."""
+    nx, ny, curvature = form
+    return nx - curvature * x, ny - curvature * y
 
 
 @_compile
@@ -75,45 +69,41 @@ def arc_hit(arc, own, px, py, vx, vy, error):
 
     For ``height`` see `arc_time` in `compiled/arcs`. ``error`` bounds the transversal error of the ray at the arc.
     """
-    nothing = (np.inf, 0.0)
-    n0x, n0y, curvature, stretch = wide_arc(arc)
-    rx, ry = subtract(px, wide(arc[c.START_X])), multiply(stretch, subtract(py, wide(arc[c.START_Y])))
-    wy = multiply(stretch, vy)
-    b = subtract(dot(n0x, n0y, vx, wy), multiply(curvature, dot(rx, ry, vx, wy)))
-    speed2 = dot(vx, wy, vx, wy)
-    bend = multiply(curvature, speed2)
+    nothing = extended(np.inf)
+    form, stretch = arc_form(arc), arc[c.WIDE_STRETCH]
+    n0x, n0y, curvature = form
+    rx, ry, wy = px - arc[c.START_X], stretch * (py - arc[c.START_Y]), stretch * vy
+    b = dot(n0x, n0y, vx, wy) - curvature * dot(rx, ry, vx, wy)
+    bend = curvature * dot(vx, wy, vx, wy)
     undecided = np.inf
     if own:
-        if curvature[0] <= 0.0 or b[0] <= 0.0:
+        if curvature <= 0.0 or b <= 0.0:
             return nothing, undecided, np.inf
-        t = divide((2.0 * b[0], 2.0 * b[1]), bend)
+        t = scaled(2.0, b) / bend
         height = np.inf
     else:
-        r2 = multiply(curvature, dot(rx, ry, rx, ry))
-        f = subtract(dot(n0x, n0y, rx, ry), (0.5 * r2[0], 0.5 * r2[1]))
-        product = multiply(bend, f)
-        d = add(multiply(b, b), (2.0 * product[0], 2.0 * product[1]))
-        if curvature[0] < 0.0 and b[0] < 0.0:
+        f = form_value(form, rx, ry)
+        product = bend * f
+        d = b * b + scaled(2.0, product)
+        if curvature < 0.0 and b < 0.0:
             # d = w^2 - kappa^2 (distance of the line from the centre)^2 w^2; kappa times distance is about 1 at d = 0
-            wide_stretch = max(1.0, arc[c.WIDE_STRETCH]) ** 2
-            noise = 8.0 * LOCAL_ERROR * (b[0] * b[0] + 2.0 * abs(product[0]))
-            if abs(d[0]) <= noise + 4.0 * abs(curvature[0]) * wide_stretch * wide_stretch * error:
-                t = divide((2.0 * f[0], 2.0 * f[1]), negate(b))
-                if t[0] > 0.0 and on_arc(arc, add(rx, multiply(t, vx)), add(ry, multiply(t, wy)), error):
-                    undecided = t[0]
-        if d[0] < 0.0:
+            widest = max(1.0, stretch) ** 2
+            noise = 8.0 * LOCAL_ERROR * (b.high * b.high + 2.0 * abs(product.high))
+            if abs(d.high) <= noise + 4.0 * abs(curvature.high) * widest * widest * error:
+                t = scaled(2.0, f) / -b
+                if t > 0.0 and on_arc(arc, rx + t * vx, ry + t * wy, error):
+                    undecided = t.high
+        if d < 0.0:
             return nothing, undecided, np.inf
-        root = square_root(d)
-        if b[0] >= 0.0:
-            if curvature[0] <= 0.0:
+        if b >= 0.0:
+            if curvature <= 0.0:
                 return nothing, undecided, np.inf
-            t = divide(add(b, root), bend)
+            t = (b + root(d)) / bend
             height = np.inf
         else:
-            t = divide((2.0 * f[0], 2.0 * f[1]), subtract(root, b))
-            height = f[0]
-    slack = error * max(1.0, arc[c.WIDE_STRETCH])
-    if not on_arc(arc, add(rx, multiply(t, vx)), add(ry, multiply(t, wy)), slack):
+            t = scaled(2.0, f) / (root(d) - b)
+            height = f.high
+    if not on_arc(arc, rx + t * vx, ry + t * wy, error * max(1.0, stretch)):
         return nothing, undecided, np.inf
     return t, undecided, height
 
@@ -121,48 +111,39 @@ def arc_hit(arc, own, px, py, vx, vy, error):
 @_compile
 def on_arc(arc, qx, qy, slack):
     """Whether the point q of the full circle, relative to the first joint, is on the arc."""
-    ex, ey = (arc[c.WIDE_CHORD_X], arc[c.WIDE_CHORD_X_LOW]), (arc[c.WIDE_CHORD_Y], arc[c.WIDE_CHORD_Y_LOW])
+    ex = double_double(arc[c.WIDE_CHORD_X], arc[c.WIDE_CHORD_X_LOW])
+    ey = double_double(arc[c.WIDE_CHORD_Y], arc[c.WIDE_CHORD_Y_LOW])
     if arc[c.IS_SHORT] > 0.0:
         along = dot(qx, qy, ex, ey)
-        nx, ny = (
-            arc[c.WIDE_NORMAL_X] - arc[c.WIDE_CURVATURE] * qx[0],
-            arc[c.WIDE_NORMAL_Y] - arc[c.WIDE_CURVATURE] * qy[0],
-        )
-        facing = ny * ex[0] - nx * ey[0]
-        beyond = subtract(along, (arc[c.WIDE_CHORD], arc[c.WIDE_CHORD_LOW]))
-        return -slack <= along[0] and beyond[0] <= slack and facing > 0.0
-    height = cross(ex, ey, qx, qy)[0]
+        nx = arc[c.WIDE_NORMAL_X] - arc[c.WIDE_CURVATURE] * qx.high
+        ny = arc[c.WIDE_NORMAL_Y] - arc[c.WIDE_CURVATURE] * qy.high
+        beyond = along - double_double(arc[c.WIDE_CHORD], arc[c.WIDE_CHORD_LOW])
+        return -slack <= along.high and beyond.high <= slack and ny * ex.high - nx * ey.high > 0.0
+    height = cross(ex, ey, qx, qy).high
     return height <= slack if arc[c.WIDE_CURVATURE] > 0.0 else height >= -slack
 
 
 @_compile
 def arc_height(arc, px, py):
     """-> (height, nx, ny): distance of a position close to an arc, positive on the free side; unit normal."""
-    n0x, n0y, curvature, stretch = wide_arc(arc)
-    qx, qy = subtract(px, wide(arc[c.START_X])), multiply(stretch, subtract(py, wide(arc[c.START_Y])))
-    nx = subtract(n0x, multiply(curvature, qx))
-    ny = multiply(stretch, subtract(n0y, multiply(curvature, qy)))
-    r2 = multiply(curvature, dot(qx, qy, qx, qy))
-    f = subtract(dot(n0x, n0y, qx, qy), (0.5 * r2[0], 0.5 * r2[1]))
-    size = square_root(dot(nx, ny, nx, ny))
-    return divide(f, size), divide(nx, size), divide(ny, size)
+    form, stretch = arc_form(arc), arc[c.WIDE_STRETCH]
+    qx, qy = px - arc[c.START_X], stretch * (py - arc[c.START_Y])
+    nx, ny = form_gradient(form, qx, qy)
+    ny = stretch * ny
+    size = root(dot(nx, ny, nx, ny))
+    return form_value(form, qx, qy) / size, nx / size, ny / size
 
 
 @_compile
 def arc_point(arc, t, px, py, vx, vy):
     """-> (x, y, nx, ny, bent): the position on the arc after the time t, unit normal, and curvature (a double)."""
-    n0x, n0y, curvature, stretch = wide_arc(arc)
-    qx = subtract(add(px, multiply(t, vx)), wide(arc[c.START_X]))
-    qy = multiply(stretch, subtract(add(py, multiply(t, vy)), wide(arc[c.START_Y])))
-    nx, ny = subtract(n0x, multiply(curvature, qx)), subtract(n0y, multiply(curvature, qy))
-    r2 = multiply(curvature, dot(qx, qy, qx, qy))
-    f = subtract(dot(n0x, n0y, qx, qy), (0.5 * r2[0], 0.5 * r2[1]))
-    qx, qy = subtract(qx, multiply(f, nx)), subtract(qy, multiply(f, ny))
-    nx = subtract(n0x, multiply(curvature, qx))
-    ny = multiply(stretch, subtract(n0y, multiply(curvature, qy)))
-    size = square_root(dot(nx, ny, nx, ny))
-    nx, ny = divide(nx, size), divide(ny, size)
-    bent = arc[c.WIDE_CURVATURE] * (ny[0] * ny[0] + (arc[c.WIDE_STRETCH] * nx[0]) ** 2) / size[0]
-    x = add(wide(arc[c.START_X]), qx)
-    y = add(wide(arc[c.START_Y]), divide(qy, stretch) if arc[c.WIDE_STRETCH] != 1.0 else qy)
-    return x, y, nx, ny, bent
+    form, stretch = arc_form(arc), arc[c.WIDE_STRETCH]
+    qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
+    f, (nx, ny) = form_value(form, qx, qy), form_gradient(form, qx, qy)
+    qx, qy = qx - f * nx, qy - f * ny
+    nx, ny = form_gradient(form, qx, qy)
+    ny = stretch * ny
+    size = root(dot(nx, ny, nx, ny))
+    nx, ny = nx / size, ny / size
+    bent = arc[c.WIDE_CURVATURE] * (ny.high * ny.high + (stretch * nx.high) ** 2) / size.high
+    return arc[c.START_X] + qx, arc[c.START_Y] + (qy / stretch if stretch != 1.0 else qy), nx, ny, bent

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ....core.compilation import jit
-from .arithmetic import divide, multiply, sine_cosine, subtract, wide
+from .numbers import sine_cosine
 
 
 @jit()
@@ -16,13 +16,10 @@ def crossings_modulo_two(double_height, theta):
     found = np.empty(theta.size)
     for k in range(theta.size):
         sine, cosine = sine_cosine(theta[k])
-        if cosine[0] < 0.0:
-            cosine = -cosine[0], -cosine[1]
-        pairs = divide(multiply(wide(0.5 * double_height), cosine), sine)
+        pairs = 0.5 * double_height * (-cosine if cosine < 0.0 else cosine) / sine
         # the high part may be an integer with a negative low part
-        whole = math.floor(pairs[0])
-        if whole == pairs[0] and pairs[1] < 0.0:
+        whole = math.floor(pairs.high)
+        if whole == pairs.high and pairs.low < 0.0:
             whole -= 1.0
-        rest = subtract(pairs, wide(whole))
-        found[k] = min(max(2.0 * rest[0], 0.0), 2.0)
+        found[k] = min(max(2.0 * (pairs - whole).high, 0.0), 2.0)
     return found

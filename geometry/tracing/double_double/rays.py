@@ -31,29 +31,13 @@ from ....core.rounding import EPS
 from ...scene import columns as c
 from ...scene.tolerances import JOINT_ULPS
 from .arcs import arc_hit, arc_point
-from .arithmetic import (
-    LOCAL_ERROR,
-    add,
-    cross,
-    direction_angle,
-    divide,
-    dot,
-    multiply,
-    negate,
-    sine_cosine,
-    square_root,
-    subtract,
-    two_product,
-    two_sum,
-    wide,
-)
 from .beziers import bezier_hit, bezier_point
-from .records import Sizes, WideHit, WideOwn, WideScope
+from .numbers import LOCAL_ERROR, cross, direction_angle, dot, extended, scaled, sine_cosine, two_product, two_sum
+from .records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit, Scope, Sizes
 from .runs import LAST_HITS, crossings, skip_chords
-from .sides import Arrival, Face, in_front, line_ends, orientation
+from .sides import Arrival, Face, in_front_at, line_ends, line_frame, line_in_front_of_line, orientation
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, UNRESOLVED, UNSETTLED = 0, 1, 2, 3, 4, 5
-NO_PIECE, OPENING, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 # pi - math.pi
 PI_REST = 1.2246467991473532e-16
 # Factor for the error of the first-order estimate of the width.
@@ -70,31 +54,26 @@ def free_cells(bands, py, vx, vy, cell, width, spread):
     ``bands`` are the heights (low, high) without pieces. The ray's width is at most ``width`` plus ``spread`` times
     the distance. The last cells before the end of a band are not counted.
     """
-    if vx[0] == 0.0 or vy[0] == 0.0:
-        return 0.0, (0.0, 0.0)
+    if vx.high == 0.0 or vy.high == 0.0:
+        return 0.0, extended(0.0)
     for row in range(bands.shape[0]):
         low, high = bands[row, c.BAND_LOW], bands[row, c.BAND_HIGH]
-        if low < py[0] < high:
-            behind, room = py[0] - low, min(high, 0.0) - py[0]
-            if vy[0] < 0.0:
-                behind, room = high - py[0], py[0] - low
-            margin = width + spread * room / abs(vy[0])
-            cells = math.floor((room - margin) * abs(vx[0] / vy[0]) / cell - LAST_HITS)
+        if low < py.high < high:
+            behind, room = py.high - low, min(high, 0.0) - py.high
+            if vy.high < 0.0:
+                behind, room = high - py.high, py.high - low
+            margin = width + spread * room / abs(vy.high)
+            cells = math.floor((room - margin) * abs(vx.high / vy.high) / cell - LAST_HITS)
             # beyond 2^53 not all integers are doubles
             if behind > margin and 0.0 < cells < 2.0**53:
-                return cells, multiply((cell, 0.0), divide(vy, vx if vx[0] > 0.0 else negate(vx)))
-    return 0.0, (0.0, 0.0)
+                return cells, cell * (vy / (vx if vx > 0.0 else -vx))
+    return 0.0, extended(0.0)
 
 
 @_compile
-def earlier(t, time):
-    """-> bool: whether t < time; both may be (inf, 0), whose difference is not a number."""
-    return t[0] < np.inf and (time[0] == np.inf or subtract(t, time)[0] < 0.0)
-
-
-@_compile
-def face_of(tables, kind, number, s):
-    """-> Face: a piece as an argument of `in_front`."""
+def face_of(tables, hit):
+    """-> Face: the piece of a hit as an argument of `in_front_at`."""
+    _, kind, number, s = hit
     arc, curve = tables.arcs[number if kind == ARC else 0], tables.beziers[number if kind == BEZIER else 0]
     return Face(kind, number, arc, curve, s)
 
@@ -111,15 +90,11 @@ def meets(tables, hit, own, px, py, vx, vy, clearance):
         return height >= -error
     if height < -slack:
         return False
-    piece, start = face_of(tables, hit.kind, hit.number, hit.s), face_of(tables, own.kind, own.number, own.s)
-    return in_front(tables.joints, piece, start, px, py, vx[0], vy[0], Arrival(own.flown, slack, error))
-
-
-@_compile
-def is_beside(joints, index, corner):
-    """-> bool: whether a corner lies on a line or on its free side; a ray that hits the line meets no corner behind."""
-    x0, y0, x1, y1 = line_ends(joints, index)
-    return orientation(x0, y0, x1, y1, joints[corner, c.JOINT_X], joints[corner, c.JOINT_Y]) >= 0.0
+    arrival = Arrival(own.time.high, slack, error)
+    if hit.kind == LINE and own.kind == LINE:
+        return line_in_front_of_line(tables.joints, hit.number, own.number, px, py, vx.high, vy.high, arrival)
+    piece, start = face_of(tables, hit), face_of(tables, own)
+    return in_front_at(tables.joints, piece, start, px, py, vx.high, vy.high, arrival)
 
 
 @_compile
@@ -194,30 +169,30 @@ def width_at(scope, sizes, ahead, error):
 
 @_compile
 def nearest_line(scope, own, sizes, px, py, vx, vy):
-    """-> (WideHit, corner): the first hit on a line, and the time to the first corner in the ray's width, or inf."""
+    """-> (Hit, corner): the first hit on a line, and the time to the first corner in the ray's width, or inf."""
     tables, error = scope.tables, error_of(scope, sizes)
     joints = tables.joints
-    first, end = scope.joints
-    nearest, corner = WideHit((np.inf, 0.0), NO_PIECE, -1, (0.0, 0.0)), np.inf
-    before = (0.0, 0.0)
+    first, end = int(scope.hollow[c.FIRST_JOINT]), int(scope.hollow[c.JOINTS_END])
+    nearest, corner = Hit(extended(np.inf), NO_PIECE, -1, extended(0.0)), np.inf
+    before = extended(0.0)
     for j in range(first, end):
-        dx, dy = subtract(wide(joints[j, c.JOINT_X]), px), subtract(wide(joints[j, c.JOINT_Y]), py)
+        dx, dy = joints[j, c.JOINT_X] - px, joints[j, c.JOINT_Y] - py
         after = cross(dx, dy, vx, vy)
         if joints[j, c.IS_CORNER] > 0.0:
-            ahead = dot(dx, dy, vx, vy)[0]
-            if abs(after[0]) <= width_at(scope, sizes, ahead, error) and 0.0 < ahead < corner:
+            ahead = dot(dx, dy, vx, vy).high
+            if abs(after.high) <= width_at(scope, sizes, ahead, error) and 0.0 < ahead < corner:
                 corner = ahead
         starts_here = j > first and joints[j - 1, c.STARTS_LINE] > 0.0
         is_own = own.kind == LINE and own.number == j - 1
-        if starts_here and not is_own and before[0] >= 0.0 >= after[0] and before[0] > after[0]:
-            fraction = divide(before, subtract(before, after))
+        if starts_here and not is_own and before >= 0.0 and after <= 0.0 and before > after:
+            fraction = before / (before - after)
             x0, y0, x1, y1 = line_ends(joints, j - 1)
-            dx = subtract(add(wide(x0), multiply(fraction, two_sum(x1, -x0))), px)
-            dy = subtract(add(wide(y0), multiply(fraction, two_sum(y1, -y0))), py)
+            dx = x0 + fraction * two_sum(x1, -x0) - px
+            dy = y0 + fraction * two_sum(y1, -y0) - py
             t = dot(dx, dy, vx, vy)
-            height = t[0] * (before[0] - after[0]) / tables.lines[j - 1, c.LENGTH]
-            hit = WideHit(t, LINE, j - 1, fraction)
-            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, (height, scope.slack, error)):
+            height = t.high * (before.high - after.high) / tables.lines[j - 1, c.LENGTH]
+            hit = Hit(t, LINE, j - 1, fraction)
+            if t < nearest.time and meets(tables, hit, own, px, py, vx, vy, (height, scope.slack, error)):
                 nearest = hit
         before = after
     return nearest, corner
@@ -225,27 +200,29 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
 
 @_compile
 def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
-    """-> (WideHit, graze): the first hit on a curve before ``nearest``, or ``nearest``; time of undecided contact."""
-    tables, slack = scope.tables, scope.slack
+    """-> (Hit, graze): the first hit on a curve before ``nearest``, or ``nearest``; time of undecided contact."""
+    tables, slack, hollow = scope.tables, scope.slack, scope.hollow
     graze = np.inf
-    for low, high in (scope.circles, scope.ellipses):
-        for k in range(low, high):
+    for before, first, end in (
+        (0, hollow[c.FIRST_CIRCLE], hollow[c.CIRCLES_END]),
+        (tables.first_ellipse, hollow[c.FIRST_ELLIPSE], hollow[c.ELLIPSES_END]),
+    ):
+        for k in range(before + int(first), before + int(end)):
             widest = max(1.0, tables.arcs[k, c.WIDE_STRETCH])
             is_own = own.kind == ARC and own.number == k
             t, undecided, height = arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
             graze = min(graze, undecided)
-            hit, clearance = WideHit(t, ARC, k, own.s), (height, slack * widest, error * widest)
-            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, clearance):
+            hit, clearance = Hit(t, ARC, k, own.s), (height, slack * widest, error * widest)
+            if t < nearest.time and meets(tables, hit, own, px, py, vx, vy, clearance):
                 nearest = hit
-    low, high = scope.beziers
-    for k in range(low, high):
-        own_s = own.s if own.kind == BEZIER and own.number == k else (-1.0, 0.0)
+    for k in range(int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])):
+        own_s = own.s if own.kind == BEZIER and own.number == k else extended(-1.0)
         t, s, undecided, near_s = bezier_hit(tables.beziers[k], own_s, px, py, vx, vy, slack, error)
         graze = min(graze, undecided)
-        if earlier(t, nearest.time):
-            nearest = WideHit(t, BEZIER, k, s)
-        if near_s[0] >= 0.0:
-            hit = WideHit((0.0, 0.0), BEZIER, k, near_s)
+        if t < nearest.time:
+            nearest = Hit(t, BEZIER, k, s)
+        if near_s >= 0.0:
+            hit = Hit(extended(0.0), BEZIER, k, near_s)
             if meets(tables, hit, own, px, py, vx, vy, (0.0, slack, error)):
                 nearest = hit
     return nearest, graze
@@ -253,46 +230,41 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
 
 @_compile
 def exit_time(scope, own, hit, px, py, vx, vy):
-    """-> WideHit: the opening or a side of an open wall if it is met before the hit, else the hit.
+    """-> Hit: the opening or a side of an open wall if it is met before the hit, else the hit.
 
     A piece within rounding of the opening or of a side is hit first.
     """
-    left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
+    left, right, slack, is_open = scope.hollow[c.LEFT], scope.hollow[c.RIGHT], scope.slack, scope.tables.is_open
     time, kind = hit.time, hit.kind
-    if vy[0] > 0.0 and own.kind != OPENING and py[0] + time[0] * vy[0] > slack:
-        t = divide(negate(py), vy)
+    if vy > 0.0 and own.kind != OPENING and py.high + time.high * vy.high > slack:
+        t = -py / vy
         inside = is_open
         if not is_open:
-            c_right = add(multiply(subtract(wide(right), px), vy), multiply(py, vx))
-            c_left = add(multiply(subtract(wide(left), px), vy), multiply(py, vx))
-            inside = c_right[0] >= 0.0 >= c_left[0]
+            inside = (right - px) * vy + py * vx >= 0.0 and (left - px) * vy + py * vx <= 0.0
         if inside:
             time, kind = t, OPENING
-    if is_open and vx[0] != 0.0:
-        t = divide(subtract(wide(right if vx[0] > 0.0 else left), px), vx)
-        beyond = abs(vx[0]) * (time[0] - t[0])
-        if beyond > slack or (kind == OPENING and earlier(t, time)):
+    if is_open and vx.high != 0.0:
+        t = ((right if vx > 0.0 else left) - px) / vx
+        beyond = abs(vx.high) * (time.high - t.high)
+        if beyond > slack or (kind == OPENING and t < time):
             time, kind = t, SIDE
-    if time[0] < 0.0:
-        time = (0.0, 0.0)
-    return WideHit(time, kind, hit.number, hit.s)
+    if time < 0.0:
+        time = extended(0.0)
+    return Hit(time, kind, hit.number, hit.s)
 
 
 @_compile
 def point_of(tables, hit, px, py, vx, vy):
     """-> (qx, qy, nx, ny, bent): the end of a ray segment, the unit normal there, and the curvature (a double)."""
     if hit.kind == LINE:
-        x0, y0, x1, y1 = line_ends(tables.joints, hit.number)
-        ex, ey = two_sum(x1, -x0), two_sum(y1, -y0)
-        size = square_root(dot(ex, ey, ex, ey))
-        nx, ny = negate(divide(ey, size)), divide(ex, size)
-        return add(wide(x0), multiply(hit.s, ex)), add(wide(y0), multiply(hit.s, ey)), nx, ny, 0.0
+        x0, y0, ex, ey, nx, ny = line_frame(tables.joints, hit.number)
+        return x0 + hit.s * ex, y0 + hit.s * ey, nx, ny, 0.0
     if hit.kind == ARC:
         return arc_point(tables.arcs[hit.number], hit.time, px, py, vx, vy)
     if hit.kind == BEZIER:
         return bezier_point(tables.beziers[hit.number], hit.s)
-    nx, ny = (0.0, 0.0) if hit.kind == OPENING else (1.0, 0.0), (1.0, 0.0) if hit.kind == OPENING else (0.0, 0.0)
-    return add(px, multiply(hit.time, vx)), add(py, multiply(hit.time, vy)), nx, ny, 0.0
+    nx, ny = (0.0, 1.0) if hit.kind == OPENING else (1.0, 0.0)
+    return px + hit.time * vx, py + hit.time * vy, extended(nx), extended(ny), 0.0
 
 
 @_compile
@@ -302,15 +274,18 @@ def meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
     A corner at the end of the piece is further away than the hit by at most the width over the sine of incidence.
     """
     joints, error = scope.tables.joints, error_of(scope, sizes)
-    first, end = scope.joints
-    for j in range(first, end):
+    for j in range(int(scope.hollow[c.FIRST_JOINT]), int(scope.hollow[c.JOINTS_END])):
         if joints[j, c.IS_CORNER] > 0.0:
-            dx, dy = subtract(wide(joints[j, c.JOINT_X]), px), subtract(wide(joints[j, c.JOINT_Y]), py)
-            ahead = dot(dx, dy, vx, vy)[0]
+            dx, dy = joints[j, c.JOINT_X] - px, joints[j, c.JOINT_Y] - py
+            ahead = dot(dx, dy, vx, vy).high
             width = width_at(scope, sizes, ahead, error)
-            met = ahead > 0.0 and (ahead - hit.time[0]) * incidence <= 2.0 * width
-            met = met and abs(cross(dx, dy, vx, vy)[0]) <= width
-            if met and (hit.kind != LINE or is_beside(joints, hit.number, j)):
+            met = ahead > 0.0 and (ahead - hit.time.high) * incidence <= 2.0 * width
+            met = met and abs(cross(dx, dy, vx, vy).high) <= width
+            if met and hit.kind == LINE:
+                # a ray that hits a line meets no corner behind the line
+                x0, y0, x1, y1 = line_ends(joints, hit.number)
+                met = orientation(x0, y0, x1, y1, joints[j, c.JOINT_X], joints[j, c.JOINT_Y]) >= 0.0
+            if met:
                 return True
     return False
 
@@ -323,22 +298,21 @@ def pass_cells(scope, sizes, py, vx, vy, error):
     """
     cell, scale = scope.tables.cell, scope.scale
     # the two ends of the wall are the same point, and a ray passes a side above this point
-    end = wide(scope.tables.joints[scope.joints[0], c.JOINT_Y])
-    py = end if subtract(py, end)[0] < 0.0 else py
+    end = scope.tables.joints[int(scope.hollow[c.FIRST_JOINT]), c.JOINT_Y]
+    py = extended(end) if py < end else py
     spread = WIDTH_MARGIN * sizes.half_ulp * abs(sizes.a2) + error / scale
     width = WIDTH_MARGIN * sizes.half_ulp * scale * abs(sizes.j2) + error
     cells, step = free_cells(scope.tables.bands, py, vx, vy, cell, width, spread)
-    return add(py, multiply((cells, 0.0), step)), cells, after_flight(sizes, cells * cell / abs(vx[0]) / scale)
+    return py + cells * step, cells, after_flight(sizes, cells * cell / abs(vx.high) / scale)
 
 
 @_compile
 def reflected(vx, vy, nx, ny, approach):
     """-> (vx, vy): the reflected velocity, normalised by one Newton step."""
-    twice = (2.0 * approach[0], 2.0 * approach[1])
-    vx, vy = subtract(vx, multiply(twice, nx)), subtract(vy, multiply(twice, ny))
-    speed2 = dot(vx, vy, vx, vy)
-    factor = subtract((1.5, 0.0), (0.5 * speed2[0], 0.5 * speed2[1]))
-    return multiply(factor, vx), multiply(factor, vy)
+    twice = scaled(2.0, approach)
+    vx, vy = vx - twice * nx, vy - twice * ny
+    factor = 1.5 - scaled(0.5, dot(vx, vy, vx, vy))
+    return factor * vx, factor * vy
 
 
 @_compile
@@ -348,15 +322,15 @@ def refined_ray(scope, entry, theta, limit, most_segments):
     ``entry`` is a double-double in the hollow. The amplification is the norm of the map's derivative in the units
     (scale, radian).
     """
-    tables, scale = scope.tables, scope.scale
-    px, py = entry, (0.0, 0.0)
+    tables, scale, left, right = scope.tables, scope.scale, scope.hollow[c.LEFT], scope.hollow[c.RIGHT]
+    px, py = entry, extended(0.0)
     sine, cosine = sine_cosine(theta)
-    vx, vy = negate(cosine), negate(sine)
+    vx, vy = -cosine, -sine
     _, exponent = math.frexp(theta)
     sizes = Sizes(1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, math.ldexp(1.0, exponent - 54))
-    norm, nowhere = 1.0, (0.0, 0.0)
+    norm, nowhere = 1.0, extended(0.0)
     wraps, bounces, steps = 0, 0, 0
-    own = WideOwn(OPENING, -1, (-1.0, 0.0), 0.0)
+    own = Hit(extended(0.0), OPENING, -1, extended(-1.0))
     while True:
         local = local_error(sizes)
         if not local <= LARGEST_ERROR:
@@ -366,28 +340,28 @@ def refined_ray(scope, entry, theta, limit, most_segments):
         hit, graze = nearest_curve(scope, own, hit, px, py, vx, vy, error)
         hit = exit_time(scope, own, hit, px, py, vx, vy)
         steps += 1
-        if graze < np.inf and graze <= hit.time[0] + error:
+        if graze < np.inf and graze <= hit.time.high + error:
             return px, nowhere, bounces, GRAZING, norm, local
         if hit.kind == NO_PIECE:
             return px, nowhere, bounces, CORNER if corner < np.inf else UNRESOLVED, norm, local
         qx, qy, nx, ny, bent = point_of(tables, hit, px, py, vx, vy)
         approach = dot(vx, vy, nx, ny)
-        incidence = abs(approach[0])
+        incidence = abs(approach.high)
         if corner < np.inf and meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
             return px, nowhere, bounces, CORNER, norm, local
-        sizes = after_flight(sizes, hit.time[0] / scale)
+        sizes = after_flight(sizes, hit.time.high / scale)
         if hit.kind == OPENING:
-            x = add(qx, two_product(float(wraps), scope.right - scope.left))
+            x = qx + two_product(float(wraps), right - left)
             return x, direction_angle(vx, vy), bounces, ESCAPED, amplification_of(sizes), local
         if (bounces >= limit and hit.kind != SIDE) or steps >= most_segments:
             return px, nowhere, bounces, BOUNCE_LIMIT, norm, local
-        flown = own.flown
+        flown = own.time
         if hit.kind == SIDE:
-            px = wide(scope.left if vx[0] > 0.0 else scope.right)
+            px = extended(left if vx > 0.0 else right)
             py, cells, sizes = pass_cells(scope, sizes, qy, vx, vy, error)
-            wraps += (1 if vx[0] > 0.0 else -1) * (1 + np.int64(cells))
+            wraps += (1 if vx > 0.0 else -1) * (1 + np.int64(cells))
         else:
-            flown = hit.time[0]
+            flown = hit.time
             px, py = qx, qy
             vx, vy = reflected(vx, vy, nx, ny, approach)
             if incidence == 0.0:
@@ -397,7 +371,7 @@ def refined_ray(scope, entry, theta, limit, most_segments):
             if hit.kind == LINE and own.kind == LINE:
                 hits, travel, flight = crossings(tables, hit.number, own.number, py, vx, vy, limit - bounces)
                 bounces += hits
-                py = add(py, travel)
+                py = py + travel
                 sizes = after_flight(sizes, flight / scale)
             if hit.kind == ARC:
                 hits, px, py, vx, vy = skip_chords(tables.arcs[hit.number], px, py, vx, vy, limit - bounces)
@@ -406,24 +380,14 @@ def refined_ray(scope, entry, theta, limit, most_segments):
                     sizes = after_chords(with_new_error(sizes), float(hits), 2.0 * incidence / (bent * scale))
         norm = amplification_of(sizes)
         sizes = with_new_error(sizes)
-        own = WideOwn(hit.kind, hit.number, hit.s if hit.kind == BEZIER else (-1.0, 0.0), flown)
+        own = Hit(flown, hit.kind, hit.number, hit.s if hit.kind == BEZIER else extended(-1.0))
 
 
 @_compile
-def wide_scope(tables, h):
-    """-> WideScope: hollow number h."""
-    hollow, ellipse = tables.hollows[h], tables.first_ellipse
-    return WideScope(
-        tables,
-        hollow[c.LEFT],
-        hollow[c.RIGHT],
-        tables.cell + hollow[c.SIZE],
-        JOINT_ULPS * EPS * hollow[c.SIZE],
-        (int(hollow[c.FIRST_JOINT]), int(hollow[c.JOINTS_END])),
-        (int(hollow[c.FIRST_CIRCLE]), int(hollow[c.CIRCLES_END])),
-        (ellipse + int(hollow[c.FIRST_ELLIPSE]), ellipse + int(hollow[c.ELLIPSES_END])),
-        (int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])),
-    )
+def scope_of(tables, h):
+    """-> Scope: hollow number h."""
+    size = tables.hollows[h, c.SIZE]
+    return Scope(tables, tables.hollows[h], tables.cell + size, JOINT_ULPS * EPS * size)
 
 
 @_compile
@@ -432,16 +396,18 @@ def hollow_at(hollows, entry):
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
-        if subtract(entry, wide(hollows[middle, c.LEFT]))[0] >= 0.0:
+        if entry >= hollows[middle, c.LEFT]:
             low = middle + 1
         else:
             high = middle
     h = low - 1
-    at_left = h >= 0 and subtract(entry, wide(hollows[h, c.LEFT]))[0] == 0.0 and hollows[h, c.LEFT_EDGE] != c.NO_EDGE
-    to_right = subtract(entry, wide(hollows[h, c.RIGHT]))[0] if h >= 0 else 1.0
-    if h < 0 or to_right >= 0.0 or at_left:
+    if h < 0:
+        return -1, False
+    left, right = hollows[h, c.LEFT], hollows[h, c.RIGHT]
+    at_left = entry == left and hollows[h, c.LEFT_EDGE] != c.NO_EDGE
+    if entry >= right or at_left:
         is_left = at_left and hollows[h, c.LEFT_EDGE] == c.CORNER_EDGE
-        is_right = h >= 0 and to_right == 0.0 and hollows[h, c.RIGHT_EDGE] == c.CORNER_EDGE
+        is_right = entry == right and hollows[h, c.RIGHT_EDGE] == c.CORNER_EDGE
         return -1, is_left or is_right
     return h, False
 
@@ -453,25 +419,21 @@ def refined_rays(x, theta, tables, limit, most_segments, results):
     cell = tables.cell
     for i in range(x.shape[0]):
         turns = math.floor(x[i] / cell)
-        base = two_product(turns, cell)
-        entry = subtract(wide(x[i]), base)
-        if entry[0] < 0.0:
+        if x[i] < two_product(turns, cell):
             turns -= 1.0
-            base = two_product(turns, cell)
-            entry = subtract(wide(x[i]), base)
+        base = two_product(turns, cell)
+        entry = x[i] - base
         h, is_edge = hollow_at(tables.hollows, entry)
         if h < 0:
-            amplification[i], rounding[i] = 1.0, LOCAL_ERROR
+            angle = two_sum(math.pi, -theta[i]) + PI_REST
+            amplification[i], rounding[i], bounces[i], status[i] = 1.0, LOCAL_ERROR, 1, ESCAPED
             out_x[i, c.HIGH], out_x[i, c.LOW] = x[i], 0.0
-            mirrored = two_sum(math.pi, -theta[i])
-            out_theta[i, c.HIGH], out_theta[i, c.LOW] = add(mirrored, (PI_REST, 0.0))
-            bounces[i], status[i] = 1, ESCAPED
-            if is_edge:
-                out_theta[i, c.HIGH], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
-            continue
-        scope = wide_scope(tables, h)
-        end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
-            scope, entry, theta[i], limit, most_segments
-        )
-        out_x[i, c.HIGH], out_x[i, c.LOW] = add(base, end)
-        out_theta[i, c.HIGH], out_theta[i, c.LOW] = angle
+        else:
+            end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
+                scope_of(tables, h), entry, theta[i], limit, most_segments
+            )
+            end = base + end
+            out_x[i, c.HIGH], out_x[i, c.LOW] = end.high, end.low
+        out_theta[i, c.HIGH], out_theta[i, c.LOW] = angle.high, angle.low
+        if is_edge:
+            out_theta[i, c.HIGH], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER

@@ -1,19 +1,20 @@
-"""The named tuples of the tracer in double-double arithmetic; a double-double is a pair (high, low). Without numba."""
+"""The named tuples of the tracer in double-double arithmetic. Without numba."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from numpy import int64, uint8
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, NamedTuple
 
 from ....core.checks import Floats
 
-Wide = tuple[float, float]
+if TYPE_CHECKING:
+    from .numbers import DoubleDouble
+
+# Kinds of pieces.
+NO_PIECE, OPENING, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 
 
-class WideTables(NamedTuple):
-    """The tables of a wall as in `Tables`, except for arcs.
+class Tables(NamedTuple):
+    """The tables of a wall as in `compiled/records`, except for arcs.
 
     ``arcs`` is the table of `refined_arcs`, circles first, then ellipses; ``bands`` are the bands of heights of an open
     wall without pieces.
@@ -31,47 +32,26 @@ class WideTables(NamedTuple):
     is_open: bool
 
 
-class WideResults(NamedTuple):
-    """The arrays that `refined_rays` fills; x and theta have the shape (n, 2), the others (n,)."""
+class Scope(NamedTuple):
+    """The hollow that contains a ray: tables, row of the hollow, scale of lengths, and slack."""
 
-    x: Floats
-    theta: Floats
-    collisions: NDArray[int64]
-    status: NDArray[uint8]
-    amplification: Floats
-    rounding: Floats
-
-
-class WideScope(NamedTuple):
-    """The hollow that contains a ray: tables, ends of the opening, scale of lengths, slack, and ranges of pieces."""
-
-    tables: WideTables
-    left: float
-    right: float
+    tables: Tables
+    hollow: Floats
     scale: float
     slack: float
-    joints: tuple[int, int]
-    circles: tuple[int, int]
-    ellipses: tuple[int, int]
-    beziers: tuple[int, int]
 
 
-class WideOwn(NamedTuple):
-    """The start of a segment: piece, parameter on a Bezier piece, length of the last segment that ended on a piece."""
+class Hit(NamedTuple):
+    """The end of a segment: time, piece, and position on it, the fraction of a line or the parameter of a curve.
 
+    At the start of a segment: the end of the last one. Then the time is the length of the last segment that ended on a
+    piece, and the position is -1 but on a Bezier piece.
+    """
+
+    time: DoubleDouble
     kind: int
     number: int
-    s: Wide
-    flown: float
-
-
-class WideHit(NamedTuple):
-    """The end of a segment: time, piece, and position on it, the fraction of a line or the parameter of a curve."""
-
-    time: Wide
-    kind: int
-    number: int
-    s: Wide
+    s: DoubleDouble
 
 
 class Sizes(NamedTuple):

@@ -11,20 +11,8 @@ import numpy as np
 
 from ....core.compilation import jit
 from ...scene import columns as c
-from .arcs import wide_arc
-from .arithmetic import (
-    add,
-    cross,
-    direction_angle,
-    divide,
-    dot,
-    multiply,
-    negate,
-    sine_cosine,
-    subtract,
-    two_sum,
-    wide,
-)
+from .arcs import arc_form, form_gradient
+from .numbers import cross, direction_angle, dot, extended, scaled, sine_cosine, two_sum
 
 # Runs up to this number of hits are traced hit by hit, as a check of `compiled/runs`; so are the last hits of a run.
 LONGEST_FOLLOWED, LAST_HITS = 4096.0, 4.0
@@ -36,7 +24,7 @@ _compile = jit(linked=True, _nrt=False)
 def crossings(tables, index, other, py, vx, vy, most):
     """-> (hits, travel, flight): an even number of hits between two facing vertical sides, travel along y, and time."""
     joints, lines, pairs = tables.joints, tables.lines, tables.pairs
-    travel, flight = (0.0, 0.0), 0.0
+    travel, flight = extended(0.0), 0.0
     if (
         joints[index, c.JOINT_X] != joints[index + 1, c.JOINT_X]
         or joints[other, c.JOINT_X] != joints[other + 1, c.JOINT_X]
@@ -45,22 +33,22 @@ def crossings(tables, index, other, py, vx, vy, most):
     for row in range(int(lines[index, c.FIRST_PAIR]), int(lines[index, c.PAIRS_END])):
         if pairs[row, c.PARTNER] == other:
             gap = two_sum(joints[other, c.JOINT_X], -joints[index, c.JOINT_X])
-            time = divide(gap, vx)
-            step = multiply(time, vy)
+            time = gap / vx
+            step = time * vy
             low, high = min(pairs[row, c.NEAR_Y], pairs[row, c.FAR_Y]), max(pairs[row, c.NEAR_Y], pairs[row, c.FAR_Y])
-            room = high - py[0] if step[0] > 0.0 else py[0] - low
-            count = room / abs(step[0]) - LAST_HITS if step[0] != 0.0 else 0.0
-            if count > LONGEST_FOLLOWED and count < most and time[0] > 0.0:
+            room = high - py.high if step.high > 0.0 else py.high - low
+            count = room / abs(step.high) - LAST_HITS if step.high != 0.0 else 0.0
+            if count > LONGEST_FOLLOWED and count < most and time > 0.0:
                 hits = 2 * np.int64(0.5 * count)
                 # beyond 2^53 hits is no double, and a double-double does not resolve the ray's position
-                return hits, multiply((float(hits), 0.0), step), float(hits) * time[0]
+                return hits, float(hits) * step, float(hits) * time.high
     return 0, travel, flight
 
 
 @_compile
 def turned(x, y, sine, cosine):
     """-> (x, y): a vector turned by an angle."""
-    return subtract(multiply(cosine, x), multiply(sine, y)), add(multiply(sine, x), multiply(cosine, y))
+    return cosine * x - sine * y, sine * x + cosine * y
 
 
 @_compile
@@ -70,30 +58,30 @@ def skip_chords(arc, px, py, vx, vy, most):
     As in `compiled/runs`. With n the normal at the ray, t the tangent and tau the angle of all chords about the centre,
     the ray moves by (2 sin(tau/2) / kappa) (cos(tau/2) t + sin(tau/2) n).
     """
-    n0x, n0y, curvature, _ = wide_arc(arc)
-    qx, qy = subtract(px, wide(arc[c.START_X])), subtract(py, wide(arc[c.START_Y]))
-    nx, ny = subtract(n0x, multiply(curvature, qx)), subtract(n0y, multiply(curvature, qy))
+    form = arc_form(arc)
+    n0x, n0y, curvature = form
+    qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
+    nx, ny = form_gradient(form, qx, qy)
     sine, cosine = dot(vx, vy, nx, ny), cross(vx, vy, nx, ny)
-    if sine[0] <= 0.0 or sine[0] > arc[c.WIDE_RUN_SINE]:
+    if sine <= 0.0 or sine > arc[c.WIDE_RUN_SINE]:
         return 0, px, py, vx, vy
-    forward = cosine[0] > 0.0
-    half_chord = direction_angle(cosine if forward else negate(cosine), sine)
-    phi = 2.0 * math.atan2(dot(qx, qy, n0x, n0y)[0], cross(qx, qy, n0x, n0y)[0])
+    forward = cosine > 0.0
+    half_chord = direction_angle(cosine if forward else -cosine, sine)
+    phi = 2.0 * math.atan2(dot(qx, qy, n0x, n0y).high, cross(qx, qy, n0x, n0y).high)
     if phi < 0.0:
         phi += 2.0 * math.pi
     room = arc[c.WIDE_SPAN] - phi if forward else phi
-    count = 0.5 * room / half_chord[0] - LAST_HITS
+    count = 0.5 * room / half_chord.high - LAST_HITS
     if not LONGEST_FOLLOWED < count < most:
         return 0, px, py, vx, vy
     chords = np.int64(count)
-    half = multiply((float(chords), 0.0), half_chord)
-    high, low = sine_cosine(half[0])
+    half = float(chords) * half_chord
+    first, second = sine_cosine(half.high)
     # the low part of the angle is below an ulp of it, and its square below all errors
-    sine = add(high, multiply((half[1], 0.0), low))
-    cosine = subtract(low, multiply((half[1], 0.0), high))
-    sine = sine if forward else negate(sine)
-    dx, dy = turned(ny, negate(nx), sine, cosine)
-    way = divide((2.0 * sine[0], 2.0 * sine[1]), curvature)
+    sine, cosine = first + half.low * second, second - half.low * first
+    sine = sine if forward else -sine
+    dx, dy = turned(ny, -nx, sine, cosine)
+    shift = scaled(2.0, sine) / curvature
     vx, vy = turned(vx, vy, sine, cosine)
     vx, vy = turned(vx, vy, sine, cosine)
-    return chords, add(px, multiply(way, dx)), add(py, multiply(way, dy)), vx, vy
+    return chords, px + shift * dx, py + shift * dy, vx, vy

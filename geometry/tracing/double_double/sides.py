@@ -27,10 +27,10 @@ from ....core.compilation import jit
 from ....core.rounding import EPS, UNIT_ROUNDOFF
 from ...scene import columns as c
 from .arcs import arc_height
-from .arithmetic import add, divide, dot, multiply, negate, square_root, subtract, two_product, two_sum, wide
 from .beziers import bezier_coefficients, bezier_point, cubic, cubic_slope
+from .numbers import DoubleDouble, dot, root, two_product, two_sum
+from .records import ARC, LINE
 
-LINE, ARC, BEZIER = 3, 4, 5
 # Error of a double-double position projected onto a curve, as a fraction of the slack (64 roundings to 16 EPS).
 CURVE_NOISE = 2.0**-48
 # Rounding error of (b - a) x (c - a), relative to the sum of its two products: Shewchuk 1997, ccwerrboundA.
@@ -53,7 +53,7 @@ class Face(NamedTuple):
     number: int
     arc: Floats
     curve: Floats
-    s: tuple[float, float]
+    s: DoubleDouble
 
 
 class Arrival(NamedTuple):
@@ -80,14 +80,16 @@ def orientation(ax, ay, bx, by, cx, cy):
     right, above = two_sum(cx, -ax), two_sum(cy, -ay)
     # the exact sum of 16 terms as an expansion of non-overlapping numbers, the largest last
     total, count = np.zeros(16), 0
-    for i in range(2):
-        for j in range(2):
-            for term in (*two_product(along[i], above[j]), *two_product(-up[i], right[j])):
-                rest = term
-                for k in range(count):
-                    rest, total[k] = two_sum(rest, total[k])
-                total[count] = rest
-                count += 1
+    for along_part, up_part in ((along.high, up.high), (along.low, up.low)):
+        for right_part, above_part in ((right.high, above.high), (right.low, above.low)):
+            for product in (two_product(along_part, above_part), two_product(-up_part, right_part)):
+                for term in (product.high, product.low):
+                    rest = term
+                    for k in range(count):
+                        exact = two_sum(rest, total[k])
+                        rest, total[k] = exact.high, exact.low
+                    total[count] = rest
+                    count += 1
     value = 0.0
     for k in range(count):
         value += total[k]
@@ -106,13 +108,19 @@ def line_ends(joints, index):
 
 
 @_compile
-def line_height(joints, index, px, py):
-    """-> (height, nx, ny): distance of a position from a line, positive on the free side (left), and unit normal."""
+def line_frame(joints, index):
+    """-> (x0, y0, ex, ey, nx, ny): start of a line, the vector to its end, and the unit normal on the free side."""
     x0, y0, x1, y1 = line_ends(joints, index)
     ex, ey = two_sum(x1, -x0), two_sum(y1, -y0)
-    size = square_root(dot(ex, ey, ex, ey))
-    nx, ny = negate(divide(ey, size)), divide(ex, size)
-    return dot(subtract(px, wide(x0)), subtract(py, wide(y0)), nx, ny), nx, ny
+    size = root(dot(ex, ey, ex, ey))
+    return x0, y0, ex, ey, -(ey / size), ex / size
+
+
+@_compile
+def line_height(joints, index, px, py):
+    """-> (height, nx, ny): distance of a position from a line, positive on the free side (left), and unit normal."""
+    x0, y0, _, _, nx, ny = line_frame(joints, index)
+    return dot(px - x0, py - y0, nx, ny), nx, ny
 
 
 @_compile
@@ -128,22 +136,21 @@ def height_over_line(joints, own, other, px, py, blur):
     if first * last >= 0.0:
         return first + last
     height, nx, ny = line_height(joints, own, px, py)
-    px, py = subtract(px, multiply(height, nx)), subtract(py, multiply(height, ny))
+    px, py = px - height * nx, py - height * ny
     height, _, _ = line_height(joints, other, px, py)
     length = math.hypot(x1 - x0, y1 - y0)
-    return math.hypot(bx - ax, by - ay) * height[0] + blur * abs(last - first) / length
+    return math.hypot(bx - ax, by - ay) * height.high + blur * abs(last - first) / length
 
 
 @_compile
 def bezier_height(curve, s, px, py):
     """-> (height, nx, ny): distance of a position from a Bezier piece near its parameter s, and the unit normal."""
-    ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
+    ax, ay = bezier_coefficients(curve)
     for _ in range(STEPS):
-        tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
-        rx, ry = subtract(px, cubic(ax0, ax1, ax2, ax3, s)), subtract(py, cubic(ay0, ay1, ay2, ay3, s))
-        s = add(s, divide(dot(rx, ry, tx, ty), dot(tx, ty, tx, ty)))
+        tx, ty = cubic_slope(ax, s), cubic_slope(ay, s)
+        s = s + dot(px - cubic(ax, s), py - cubic(ay, s), tx, ty) / dot(tx, ty, tx, ty)
     x, y, nx, ny, _ = bezier_point(curve, s)
-    return dot(subtract(px, x), subtract(py, y), nx, ny), nx, ny
+    return dot(px - x, py - y, nx, ny), nx, ny
 
 
 @_compile
@@ -179,7 +186,7 @@ def came_through(ends, mx, my, px, py, vx, vy, arrival):
 
 @_compile
 def line_in_front_of_line(joints, line, own, px, py, vx, vy, arrival):
-    """-> bool: `in_front` for two lines, by their rows."""
+    """-> bool: `in_front_at` for two lines, by their rows."""
     if height_over_line(joints, own, line, px, py, arrival.blur) <= 0.0:
         return False
     x0, y0, x1, y1 = line_ends(joints, own)
@@ -189,30 +196,22 @@ def line_in_front_of_line(joints, line, own, px, py, vx, vy, arrival):
     x0, y0, x1, y1 = ends
     length = math.hypot(x1 - x0, y1 - y0)
     mx, my = (y0 - y1) / length, (x1 - x0) / length
-    return not came_through(ends, mx, my, px[0], py[0], vx + w * ey, vy - w * ex, arrival)
+    return not came_through(ends, mx, my, px.high, py.high, vx + w * ey, vy - w * ex, arrival)
 
 
 @_compile
 def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
-    """-> bool: `in_front` for pieces of any kind, by the heights of the position."""
+    """-> bool: whether a ray that has just left the piece ``own`` starts in front of ``piece``, within the slack of it.
+
+    (``px``, ``py``), double-doubles, is the position, within rounding of ``own``. At least one piece is a curve.
+    """
     nx, ny = px, py
     for _ in range(STEPS):
         height, nx, ny = height_over(joints, own, px, py)
-        px, py = subtract(px, multiply(height, nx)), subtract(py, multiply(height, ny))
+        px, py = px - height * nx, py - height * ny
     height, mx, my = height_over(joints, piece, px, py)
-    if height[0] + arrival.blur * abs(mx[0] * ny[0] - my[0] * nx[0]) <= CURVE_NOISE * arrival.slack:
+    if height.high + arrival.blur * abs(mx.high * ny.high - my.high * nx.high) <= CURVE_NOISE * arrival.slack:
         return False
-    w = 2.0 * (vx * nx[0] + vy * ny[0])
-    vx, vy = vx - w * nx[0], vy - w * ny[0]
-    return not came_through(ends_of(joints, piece), mx[0], my[0], px[0], py[0], vx, vy, arrival)
-
-
-@_compile
-def in_front(joints, piece, own, px, py, vx, vy, arrival):
-    """-> bool: whether a ray that has just left the piece ``own`` starts in front of ``piece``, within the slack of it.
-
-    (``px``, ``py``), double-doubles, is the position, within rounding of ``own``.
-    """
-    if own.kind == LINE and piece.kind == LINE:
-        return line_in_front_of_line(joints, piece.number, own.number, px, py, vx, vy, arrival)
-    return in_front_at(joints, piece, own, px, py, vx, vy, arrival)
+    w = 2.0 * (vx * nx.high + vy * ny.high)
+    vx, vy = vx - w * nx.high, vy - w * ny.high
+    return not came_through(ends_of(joints, piece), mx.high, my.high, px.high, py.high, vx, vy, arrival)
