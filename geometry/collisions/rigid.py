@@ -186,11 +186,10 @@ def _one_by_one(start: Floats, moving: Floats, constants: Constants, results: Di
 
 def _in_waves(start: Floats, moving: Floats, constants: Constants, results: DiskResults) -> None:
     """Collide a block of disks with a wall whose cell is one convex hollow."""
-    from .compiled.lanes import WORK
-    from .compiled.waves import UNDECIDED, collide_in_waves
+    from .compiled.waves import UNDECIDED, WORK, collide_in_waves
 
     *_, ground = constants
-    collide_in_waves(start, moving, *constants, results, np.zeros(WORK))
+    collide_in_waves(start, moving, *constants, results, *np.zeros((2, WORK)))
     rest = np.flatnonzero(results.status == UNDECIDED)
     if len(rest) and not ground.stop[0]:
         found = results_for(len(rest))

@@ -172,29 +172,35 @@ def line_after(line, t, rotation, motion):
 
 
 @inlined
-def conic_after(conic, t, rotation, turn, motion):
-    """Return F of a conic after the time t, F', F'', and b0 and b1: |F'''| is at most b0 + b1 s up to t + s."""
+def conic_at(conic, t, rotation, turn, motion):
+    """Return F of a conic after the time t, F', F'', and the normal there, up to its length."""
     level, g1, g2, curvature, stretch = conic
     dx, dy, sine, cosine = satellite_after(t, rotation, turn, motion)
     dy *= stretch
     n1, n2 = g1 - curvature * dx, g2 - curvature * dy
     u1, u2 = motion.v1 + motion.omega * cosine, stretch * (motion.v2 + motion.omega * sine)
-    bend = motion.spin * motion.omega
-    f2 = bend * (stretch * n2 * cosine - n1 * sine) - curvature * (u1 * u1 + u2 * u2)
-    widest = max(1.0, stretch)
-    speed = widest * motion.fastest
-    swing, bent = widest * bend * abs(motion.spin), abs(curvature) * speed
+    f2 = motion.spin * motion.omega * (stretch * n2 * cosine - n1 * sine) - curvature * (u1 * u1 + u2 * u2)
+    return level + 0.5 * ((g1 + n1) * dx + (g2 + n2) * dy), n1 * u1 + n2 * u2, f2, n1, n2
+
+
+@inlined
+def conic_after(conic, t, rotation, turn, motion):
+    """Return F of a conic after the time t, F', F'', and b0 and b1: |F'''| is at most b0 + b1 s up to t + s."""
+    f, f1, f2, n1, n2 = conic_at(conic, t, rotation, turn, motion)
+    _, _, _, curvature, stretch = conic
+    bend, widest = motion.spin * motion.omega, max(1.0, stretch)
+    swing, bent = widest * bend * abs(motion.spin), abs(curvature) * (widest * motion.fastest)
     third = swing * (abs(n1) + abs(n2)) + 3.0 * bent * widest * bend
-    return level + 0.5 * ((g1 + n1) * dx + (g2 + n2) * dy), n1 * u1 + n2 * u2, f2, third, swing * bent
+    return f, f1, f2, third, swing * bent
 
 
 @inlined
 def safe_step(f, f1, f2):
     """Return the first positive root of the parabola f + f1 t + f2 t^2/2, f >= 0, or inf; 0 only if f = 0 > f1."""
     disc = f1 * f1 - 2.0 * f2 * f
-    if f1 < 0.0:
-        return 2.0 * f / (math.sqrt(disc) - f1) if disc >= 0.0 else np.inf
-    return (f1 + math.sqrt(disc)) / -f2 if f2 < 0.0 else np.inf
+    falling, root = f1 < 0.0, math.sqrt(disc)
+    step = (2.0 * f if falling else f1 + root) / (root - f1 if falling else -f2)
+    return step if (falling & (disc >= 0.0)) | ((not falling) & (f2 < 0.0)) else np.inf
 
 
 @inlined
