@@ -27,6 +27,7 @@ from .contact import (
     ARC,
     ROOT_FRACTION,
     WIDEST_SLACK,
+    ZERO,
     Motion,
     conic_at,
     flight,
@@ -40,27 +41,24 @@ from .rigid import above_the_wall, neighbour_at, reflect, surface, unit_velocity
 
 # Number of disks in a wave.
 SIZE = 64
-# Columns of both work arrays, those of disks and those of satellites that move below the tops. A satellite begins the
-# search of its contact at the time FROM, from a position relative to the left end of its cell, BASE, and from the piece
-# OWN (-1 for none). The search ends at UNTIL.
-V1, V2, OMEGA, FASTEST, NUMBER, INDEX, UNCERTAIN = (SIZE * k for k in range(7))
-START_X, START_Y, SINE, COSINE, OWN, FROM, UNTIL, BASE = (SIZE * k for k in range(7, 15))
+# Columns of the work arrays of disks and of satellites. The first satellite of a disk, or the one whose contact is
+# sought, is at (X, Y) and touches the piece OWN (-1 for none). Its motion is searched from FROM, inf if it stays above
+# the tops, to UNTIL; BASE is the left end of its cell.
+V1, V2, OMEGA, FASTEST, X, Y, SINE, COSINE, OWN, NUMBER, INDEX, FROM, UNTIL, BASE, UNCERTAIN = range(0, 15 * SIZE, SIZE)
 COPIED = 15
-# Of satellites only: the first piece that is crossed, how and where: MISSED, CLEAR_HIT or UNCLEAR.
-ROOT, SEARCH, CROSSED, HOW, AT_X, AT_Y = (SIZE * k for k in range(15, 21))
-# Of disks only. Satellite 0 touches the piece TOUCHED (-1: none yet) at (X, Y), with the sine SIN of its angle and
-# VERSED = 1 - cos. Satellite BESIDE, if not 0, is below the tops, too, in the cell that begins at SHIFT.
-X, Y, SIN, VERSED, ANGLE, TOUCHED, BESIDE, SHIFT, HEIGHT = (SIZE * k for k in range(15, 24))
-TRAVEL, ROTATION, PASSED, CONTACTS, TWO, DISK = (SIZE * k for k in range(24, 30))
-# The first contact so far, and the satellite CHOSEN that touches the piece HIT (-1 for none) there; PLACE tells whether
-# a satellite is searched for; NORMAL_X and NORMAL_Y are those of the wall.
-END, TIME, TIE, HIT, CHOSEN, HIT_X, HIT_Y, PLACE, NORMAL_X, NORMAL_Y, STATUS = (SIZE * k for k in range(30, 41))
-# Of three satellites: the time from which on it is below the tops (inf for never), and the left end of its cell.
-BELOW_FROM, LEFT_END = SIZE * 41, SIZE * 44
-WORK = SIZE * 47
+# Of satellites: the first root of F and the state of its SEARCH; the first piece that is CROSSED, HOW and where.
+ROOT, SEARCH, CROSSED, HOW, AT_X, AT_Y = range(15 * SIZE, 21 * SIZE, SIZE)
+ENDED, SEARCHING, FOUND = 0.0, 1.0, 2.0
 MISSED, CLEAR_HIT, UNCLEAR = 0.0, 1.0, 2.0
-IDLE, ABOVE, BELOW = 0.0, 1.0, 2.0
-FOUND, UNFINISHED = 1.0, 2.0
+# Of disks: VERSED is 1 - cos of the ANGLE; satellite BESIDE, if not 0, is below the tops, too, in the cell at SHIFT.
+VERSED, ANGLE, BESIDE, SHIFT, HEIGHT, TRAVEL, ROTATION, PASSED, CONTACTS, TWO, DISK = range(15 * SIZE, 26 * SIZE, SIZE)
+# Of their motions: the first contact so far, of the satellite CHOSEN with the piece HIT (-1 for none), and the normal.
+END, TIME, TIE, HIT, CHOSEN, HIT_X, HIT_Y, NORMAL_X, NORMAL_Y, SOUGHT, STATUS = range(26 * SIZE, 37 * SIZE, SIZE)
+UNSOUGHT, ABOVE, BELOW = 0.0, 1.0, 2.0
+GOES_ON, BACK, UNSURE = 0.0, 1.0, 2.0
+# Of three satellites: the time from which on it is below the tops (inf for never), and the left end of its cell.
+BELOW_FROM, LEFT_END = 37 * SIZE, 40 * SIZE
+WORK = 43 * SIZE
 # The polynomials for sine and cosine hold up to pi/4.
 FARTHEST_TURN = 0.75
 # Limit on steps to a root; most are reached in two, and those of arcs passed at a small distance in more.
@@ -85,135 +83,102 @@ def small_turn(angle):
 
 
 @inlined
-def form_of(w, s, line, arc, motion):
-    """-> (leaving, form): whether satellite s touches the piece, and F of the line or conic as in `contact`."""
-    turn, x, y = (w[SINE + s], w[COSINE + s]), w[START_X + s], w[START_Y + s]
-    if line is not None:
-        (x0, y0), _, (g1, g2), _, number = line
-        leaving = w[OWN + s] == number
-        level = g1 * (x - x0) + g2 * (y - y0)
-        return leaving, towards_line(0.0 if leaving else level, g1, g2, turn, motion)
-    if arc is not None:
-        (x0, y0), (nx, ny), curvature, stretch = arc
-        leaving = w[OWN + s] == 0.0
-        rx, ry = x - x0, stretch * (y - y0)
-        g1, g2 = nx - curvature * rx, ny - curvature * ry
-        level = 0.5 * ((nx + g1) * rx + (ny + g2) * ry)
-        return leaving, (0.0 if leaving else level, g1, g2, curvature, stretch)
+def state_after(w, s, t, scale):
+    """-> (State, Motion, turn, rotation) of a satellite after the time t; see `satellite_after`."""
+    omega, turn = w[OMEGA + s], (w[SINE + s], w[COSINE + s])
+    motion = Motion(w[V1 + s], w[V2 + s], omega, scale * omega, 1.0 / scale, w[FASTEST + s])
+    rotation = small_turn(motion.spin * t)
+    return satellite_after(t, rotation, turn, motion), motion, turn, rotation
 
 
 @inlined
-def after(form, line, arc, t, turn, motion):
-    """-> (F, F', F'', b0, b1) after the time t: |F'''| is at most b0 + b1 s up to t + s."""
-    rotation = small_turn(motion.spin * t)
+def after(w, s, line, arc, t, scale):
+    """-> (F, F', F'', b0, b1) of a line or an arc after the time t: |F'''| is at most b0 + b1 s up to t + s."""
+    _, motion, turn, rotation = state_after(w, s, t, scale)
+    x, y, own = w[X + s], w[Y + s], w[OWN + s]
     if line is not None:
-        f, f1, f2 = line_after(form, t, rotation, motion)
+        x0, y0, _, _, g1, g2, _, number = line
+        level = 0.0 if own == number else g1 * (x - x0) + g2 * (y - y0)
+        f, f1, f2 = line_after(towards_line(level, g1, g2, turn, motion), t, rotation, motion)
         return f, f1, f2, motion.spin * motion.spin * abs(motion.omega), 0.0
     if arc is not None:
-        _, _, curvature, stretch = arc
-        f, f1, f2, n1, n2 = conic_at(form, t, rotation, turn, motion)
+        x0, y0, nx, ny, curvature, stretch = arc
+        rx, ry = x - x0, stretch * (y - y0)
+        g1, g2 = nx - curvature * rx, ny - curvature * ry
+        level = 0.0 if own == 0.0 else 0.5 * ((nx + g1) * rx + (ny + g2) * ry)
+        f, f1, f2, n1, n2 = conic_at((level, g1, g2, curvature, stretch), t, rotation, turn, motion)
         bend, widest = motion.spin * motion.omega, max(stretch, 1.0)
         speed, swing = abs(curvature) * widest * motion.fastest, widest * bend * abs(motion.spin)
         return f, f1, f2, swing * (abs(n1) + abs(n2)) + speed * widest * bend * 3.0, swing * speed
 
 
 @inlined
-def motion_of(w, s, scale):
-    """-> (Motion, turn) of a satellite."""
-    omega = w[OMEGA + s]
-    motion = Motion(w[V1 + s], w[V2 + s], omega, scale * omega, 1.0 / scale, w[FASTEST + s])
-    return motion, (w[SINE + s], w[COSINE + s])
-
-
-@inlined
-def step_to_root(values, t, until, live, slack, fraction):
-    """-> (t, live, found, uncertain): a safe step of a satellite, if ``live``, from the `after` at t."""
-    f, f1, f2, third, growth = values
-    ahead = until - t
+def approach(w, s, line, arc, slack, fraction, scale):
+    """Move the ROOT of a satellite by a safe step if it is SEARCHING; then it may be FOUND, or the search has ENDED."""
+    t, state = w[ROOT + s], w[SEARCH + s]
+    f, f1, f2, third, growth = after(w, s, line, arc, t, scale)
+    # behind by the rounding error of the last step
+    behind = (state == SEARCHING) & (f <= 0.0) & (t > w[FROM + s])
+    live = (state == SEARCHING) & (not behind)
+    ahead = w[UNTIL + s] - t
     doubt = (third + growth * ahead) * ahead
     least = f2 - doubt
     step = safe_step(f, f1, least)
     # near a tangency rounding decides between two roots and none
-    uncertain = live & (f1 < 0.0) & (least > 0.0) & (abs(f1 * f1 - 2.0 * least * f) <= least * slack * CLOSE)
+    unclear = live & (f1 < 0.0) & (least > 0.0) & (abs(f1 * f1 - 2.0 * least * f) <= least * slack * CLOSE)
     live = live & (step < ahead)
-    found = live & (doubt * step * step <= slack * fraction)
-    return t + step if live else t, live & (not found), found, uncertain
+    found = (state == FOUND) | behind | (live & (doubt * step * step <= slack * fraction))
+    w[UNCERTAIN + s] = 1.0 if unclear else w[UNCERTAIN + s]
+    w[ROOT + s] = t + step if live else t
+    w[SEARCH + s] = FOUND if found else (SEARCHING if live else ENDED)
 
 
 @inner
-def search(w, m, line, arc, ring, last):
+def search(w, m, line, arc, number, reach, ring):
     """Find the ROOT at which satellites cross a line or an arc, if they do so before UNTIL.
 
-    Satellites too close to the piece at the start are uncertain. SEARCH is 0 if there is no root. ``last`` counts steps.
+    Satellites that start within ``reach`` of the piece are uncertain.
     """
-    slack, scale = ring.slack, ring.scale
-    reach = slack * CLOSE
-    fraction = ROOT_FRACTION
-    if arc is not None:
-        _, _, _, stretch = arc
-        reach, fraction = reach * max(stretch, 1.0), LEAST_FRACTION
+    slack, scale, fraction = ring.slack, ring.scale, LEAST_FRACTION
+    if line is not None:
+        fraction = ROOT_FRACTION
     for s in range(m):
-        t, until = w[FROM + s], w[UNTIL + s]
-        motion, turn = motion_of(w, s, scale)
-        leaving, form = form_of(w, s, line, arc, motion)
-        f, f1, f2, third, growth = after(form, line, arc, t, turn, motion)
-        live = t < until
-        unclear = live & ((leaving & (not f1 > 0.0)) | ((not leaving) & (not f > reach)))
-        ahead = until - t
+        t, leaving = w[FROM + s], w[OWN + s] == number
+        f, f1, f2, third, growth = after(w, s, line, arc, t, scale)
+        ahead = w[UNTIL + s] - t
         least = f2 - (third + growth * ahead) * ahead
-        live = live & (not f + (f1 + (least if least < 0.0 else 0.0) * 0.5 * ahead) * ahead > slack)
-        t, live, found, uncertain = step_to_root((f, f1, f2, third, growth), t, until, live, slack, fraction)
-        unclear = unclear | uncertain
-        values = after(form, line, arc, t, turn, motion)
-        f, _, _, _, _ = values
-        # behind by the rounding error of the last step
-        behind = live & (f <= 0.0)
-        t, live, there, uncertain = step_to_root(values, t, until, live & (not behind), slack, fraction)
-        w[UNCERTAIN + s] = 1.0 if unclear | uncertain else w[UNCERTAIN + s]
+        lowest = f + (f1 + (least if least < 0.0 else 0.0) * 0.5 * ahead) * ahead
+        unclear = (leaving & (not f1 > 0.0)) | ((not leaving) & (not f > reach))
+        w[UNCERTAIN + s] = 1.0 if (ahead > 0.0) & unclear else w[UNCERTAIN + s]
         w[ROOT + s] = t
-        w[SEARCH + s] = UNFINISHED if live else (FOUND if found | behind | there else 0.0)
+        w[SEARCH + s] = SEARCHING if (ahead > 0.0) & (not lowest > slack) else ENDED
+        approach(w, s, line, arc, slack, fraction, scale)
     for s in range(m):
-        if w[SEARCH + s] == UNFINISHED:
-            t, until, live = w[ROOT + s], w[UNTIL + s], True
-            motion, turn = motion_of(w, s, scale)
-            _, form = form_of(w, s, line, arc, motion)
-            w[SEARCH + s] = 0.0
-            for _ in range(last):
-                values = after(form, line, arc, t, turn, motion)
-                f, _, _, _, _ = values
-                found, uncertain = f <= 0.0, False
-                if not found:
-                    t, live, found, uncertain = step_to_root(values, t, until, live, slack, LEAST_FRACTION)
-                if uncertain:
-                    w[UNCERTAIN + s] = 1.0
-                if found or not live:
-                    w[SEARCH + s] = FOUND if found else 0.0
-                    break
-            else:
-                w[UNCERTAIN + s] = 1.0
-            w[ROOT + s] = t
+        approach(w, s, line, arc, slack, fraction, scale)
+    for s in range(m):
+        steps = USUAL_STEPS
+        while w[SEARCH + s] == SEARCHING and steps < STEPS:
+            approach(w, s, line, arc, slack, LEAST_FRACTION, scale)
+            steps += 1
+        if w[SEARCH + s] == SEARCHING:
+            w[UNCERTAIN + s] = 1.0
 
 
 @inner
-def cross(w, m, line, arc, ring, number):
-    """Let satellites cross a piece at ROOT."""
-    slack, scale = ring.slack, ring.scale
-    reach = slack * CLOSE
-    if arc is not None:
-        _, _, _, stretch = arc
-        reach = reach * max(stretch, 1.0)
+def meet(w, m, line, arc, number, widest, ring):
+    """Find where satellites cross a line or an arc first, if they do so before they cross another piece."""
+    reach = ring.slack * CLOSE * widest
+    search(w, m, line, arc, number, reach, ring)
     for s in range(m):
         t, found = w[ROOT + s], w[SEARCH + s] == FOUND
-        motion, turn = motion_of(w, s, scale)
-        _, form = form_of(w, s, line, arc, motion)
-        there = satellite_after(t, small_turn(motion.spin * t), turn, motion)
-        x, y = w[START_X + s] + there.dx, w[START_Y + s] + there.dy
+        there, motion, _, _ = state_after(w, s, t, ring.scale)
+        _, rate, _, _, _ = after(w, s, line, arc, t, ring.scale)
+        x, y = w[X + s] + there.dx, w[Y + s] + there.dy
         # at shallow incidence an error across the piece is a larger error along it
-        _, rate, _, _, _ = after(form, line, arc, t, turn, motion)
         inward, wide = abs(rate), motion.fastest * reach
         clear = -y * inward > wide
         if line is not None:
-            (x0, y0), (edge_x, edge_y), _, length, _ = line
+            x0, y0, edge_x, edge_y, _, _, length, _ = line
             along = ((x - x0) * edge_x + (y - y0) * edge_y) / length
             clear = (along * inward > wide) & ((length - along) * inward > wide)
         how = CLEAR_HIT if clear else (MISSED if y * inward > wide else UNCLEAR)
@@ -226,34 +191,33 @@ def cross(w, m, line, arc, ring, number):
 
 @inner
 def enter(w, m, ring, cell):
-    """Let satellites come below the tops at ROOT: find their cells, and set FROM, inf if they stay above."""
+    """Find when satellites come below the tops, FROM, and in which cell."""
+    search(w, m, (0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, -2.0), None, -2.0, ring.slack * CLOSE, ring)
     for s in range(m):
-        t, found = w[ROOT + s], w[SEARCH + s] == FOUND
-        motion, turn = motion_of(w, s, ring.scale)
-        there = satellite_after(t, small_turn(motion.spin * t), turn, motion)
-        x = w[START_X + s] + there.dx
+        found = w[SEARCH + s] == FOUND
+        there, motion, _, _ = state_after(w, s, w[ROOT + s], ring.scale)
+        x = w[X + s] + there.dx
         base = math.floor(x / cell) * cell
         entry, sinking = x - base, -(motion.v2 + motion.omega * there.sine)
         nearest = entry if entry + entry < cell else cell - entry
         unclear = found & (not nearest * sinking > motion.fastest * ring.slack * CLOSE)
         w[UNCERTAIN + s] = 1.0 if unclear else w[UNCERTAIN + s]
-        w[BASE + s] = base
-        w[START_X + s] = w[START_X + s] - base
-        w[FROM + s] = t if found else np.inf
+        w[X + s], w[BASE + s] = w[X + s] - base, base
+        w[FROM + s] = w[ROOT + s] if found else np.inf
 
 
 @inlined
-def satellite_number(w, i, side):
+def number_of(w, i, side):
     """Return the number of a satellite: 0 for side 0, of the neighbour below the tops or nearer to them for side 1."""
     beside = w[BESIDE + i]
     return side * (beside if beside != 0.0 else (-1.0 if w[OMEGA + i] > 0.0 else 1.0))
 
 
 @inlined
-def satellite_start(w, i, number, ring):
-    """-> (x, y, turn): the satellite of a disk with a number, 0, 1 or -1, as `rigid.satellite_at`."""
+def satellite_of(w, i, number, ring):
+    """-> (x, y, turn): the satellite with a number, 0, 1 or -1, as `rigid.satellite_at`."""
     half_sine, half_cosine = number * ring.half_sine, 1.0 if number == 0.0 else ring.half_cosine
-    return neighbour_at(w[X + i], w[Y + i], (w[SIN + i], 1.0 - w[VERSED + i]), half_sine, half_cosine, ring.scale)
+    return neighbour_at(w[X + i], w[Y + i], (w[SINE + i], w[COSINE + i]), half_sine, half_cosine, ring.scale)
 
 
 @inner
@@ -262,128 +226,120 @@ def begin_motion(w, n, ring):
     for i in range(n):
         v2, height = w[V2 + i], w[HEIGHT + i]
         motion = flight(w[V1 + i], v2, w[OMEGA + i], ring.scale)
-        w[FASTEST + i] = motion.fastest
         slowest = motion.fastest * (1.0 / WIDEST_SLACK)
-        w[TIE + i] = ring.slack / (abs(v2) if abs(v2) > slowest else slowest)
         end = -(height if v2 > 0.0 else height + ring.floor) / v2
-        end = end if end > 0.0 else 0.0
-        limit = FARTHEST_TURN / abs(motion.spin)
-        w[END + i] = end
-        w[TIME + i] = end if end < limit else limit
-        w[HIT + i], w[CHOSEN + i] = -1.0, 0.0
+        end, limit = end if end > 0.0 else 0.0, FARTHEST_TURN / abs(motion.spin)
+        w[FASTEST + i], w[TIE + i] = motion.fastest, ring.slack / (abs(v2) if abs(v2) > slowest else slowest)
+        w[END + i], w[TIME + i] = end, end if end < limit else limit
+        w[HIT + i], w[CHOSEN + i], w[INDEX + i], w[FROM + i] = -1.0, 0.0, float(i), 0.0
         w[UNCERTAIN + i] = 1.0 if (v2 == 0.0) | (abs(w[ANGLE + i]) > FARTHEST_TURN) else 0.0
         w[BELOW_FROM + i], w[BELOW_FROM + SIZE + i], w[BELOW_FROM + 2 * SIZE + i] = np.inf, np.inf, np.inf
 
 
-@inner
-def place_satellites(w, n, side, ring):
-    """Place one satellite of each disk, see `satellite_number`: PLACE tells whether it is, or may come, below the tops."""
-    for i in range(n):
-        number, until = satellite_number(w, i, side), w[TIME + i] + w[TIE + i]
-        beside, touched = w[BESIDE + i], w[TOUCHED + i]
-        below = ((side > 0.0) & (beside != 0.0)) | ((side == 0.0) & (touched >= 0.0))
-        spin = ring.scale * w[OMEGA + i]
-        away = above_the_wall(w[ANGLE + i] + number * ring.spacing, spin, until, ring.reach)
-        x, y, (sine, cosine) = satellite_start(w, i, number, ring)
-        # the path is convex, so it stays above its first tangent
-        rate = w[V2 + i] + w[OMEGA + i] * sine
-        stays = y + (rate if rate < 0.0 else 0.0) * until > ring.slack * CLOSE
-        above = (not below) & ((side == 0.0) | (not away)) & (not stays)
-        base = w[SHIFT + i] if below & (side > 0.0) else 0.0
-        w[START_X + i], w[START_Y + i], w[SINE + i], w[COSINE + i] = x - base, y, sine, cosine
-        w[NUMBER + i], w[UNTIL + i], w[BASE + i], w[FROM + i], w[INDEX + i] = number, until, base, 0.0, float(i)
-        w[OWN + i] = touched if number == 0.0 else -1.0
-        w[PLACE + i] = BELOW if below else (ABOVE if above else IDLE)
-
-
 @inlined
 def move(source, i, target, k, count):
-    """Copy the first columns of a place of a work array."""
+    """Copy the first columns of work arrays from the index i to k."""
     for column in range(count):
         target[column * SIZE + k] = source[column * SIZE + i]
 
 
-@inlined
-def satellites_below(disks, n, satellites, ring, cell):
-    """-> int: put the satellites that are below the tops before the first contact so far into their work array."""
-    m = 0
+@inner
+def collect(disks, n, satellites, side, ring):
+    """-> (int, int): collect one satellite of each disk, see `number_of`, if it is below the tops or may come there.
+
+    The number of those above the tops, which are the first, and of all.
+    """
     for i in range(n):
-        if disks[PLACE + i] == ABOVE:
-            move(disks, i, satellites, m, COPIED)
-            m += 1
-    tops = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), 1.0, -2.0
-    search(satellites, m, tops, None, ring, STEPS - USUAL_STEPS)
-    enter(satellites, m, ring, cell)
-    count, m = m, 0
-    for s in range(count):
-        disks[UNCERTAIN + int(satellites[INDEX + s])] = satellites[UNCERTAIN + s]
-        if satellites[FROM + s] < satellites[UNTIL + s]:
-            move(satellites, s, satellites, m, COPIED)
-            m += 1
-    for i in range(n):
-        if disks[PLACE + i] == BELOW:
-            move(disks, i, satellites, m, COPIED)
-            m += 1
+        number, until = number_of(disks, i, side), disks[TIME + i] + disks[TIE + i]
+        below = ((side > 0.0) & (disks[BESIDE + i] != 0.0)) | ((side == 0.0) & (disks[OWN + i] >= 0.0))
+        angle, spin = disks[ANGLE + i] + number * ring.spacing, ring.scale * disks[OMEGA + i]
+        away = (side != 0.0) & above_the_wall(angle, spin, until, ring.reach)
+        disks[NUMBER + i], disks[UNTIL + i] = number, until
+        disks[BASE + i] = disks[SHIFT + i] if below & (side > 0.0) else 0.0
+        disks[SOUGHT + i] = BELOW if below else (UNSOUGHT if away else ABOVE)
+    above, m = ZERO, ZERO
+    for sought in (ABOVE, BELOW):
+        above = m
+        for i in range(n):
+            if disks[SOUGHT + i] == sought:
+                move(disks, i, satellites, m, COPIED)
+                m += 1
     for s in range(m):
+        number = satellites[NUMBER + s]
+        x, y, (sine, cosine) = satellite_of(satellites, s, number, ring)
+        # the path is convex, so it stays above its first tangent
+        rate = satellites[V2 + s] + satellites[OMEGA + s] * sine
+        stays = y + (rate if rate < 0.0 else 0.0) * satellites[UNTIL + s] > ring.slack * CLOSE
+        satellites[X + s], satellites[Y + s], satellites[SINE + s], satellites[COSINE + s] = (
+            x - satellites[BASE + s],
+            y,
+            sine,
+            cosine,
+        )
+        satellites[OWN + s] = satellites[OWN + s] if number == 0.0 else -1.0
+        satellites[FROM + s] = np.inf if stays else 0.0
         satellites[HOW + s], satellites[CROSSED + s] = MISSED, -1.0
-    return m
+    return above, m
 
 
 @inner
-def compare(disks, satellites, m, place):
+def compare(disks, satellites, m, which):
     """Compare the first contacts of satellites with the first so far."""
     for s in range(m):
-        i, time = int(satellites[INDEX + s]), satellites[UNTIL + s]
-        disks[BELOW_FROM + place * SIZE + i], disks[LEFT_END + place * SIZE + i] = satellites[FROM + s], satellites[BASE + s]
-        uncertain = (satellites[UNCERTAIN + s] > 0.0) | (satellites[HOW + s] == UNCLEAR)
-        if satellites[HOW + s] == CLEAR_HIT:
-            uncertain = uncertain | ((disks[HIT + i] >= 0.0) & (abs(time - disks[TIME + i]) <= disks[TIE + i]))
-            if time < disks[TIME + i]:
-                disks[TIME + i], disks[HIT + i], disks[CHOSEN + i] = time, satellites[CROSSED + s], satellites[NUMBER + s]
-                disks[HIT_X + i], disks[HIT_Y + i] = satellites[AT_X + s], satellites[AT_Y + s]
-        disks[UNCERTAIN + i] = 1.0 if uncertain else 0.0
+        i, time, how = int(satellites[INDEX + s]), satellites[UNTIL + s], satellites[HOW + s]
+        disks[BELOW_FROM + which * SIZE + i] = satellites[FROM + s]
+        disks[LEFT_END + which * SIZE + i] = satellites[BASE + s]
+        tied = (disks[HIT + i] >= 0.0) & (abs(time - disks[TIME + i]) <= disks[TIE + i])
+        if (satellites[UNCERTAIN + s] > 0.0) | (how == UNCLEAR) | ((how == CLEAR_HIT) & tied):
+            disks[UNCERTAIN + i] = 1.0
+        if (how == CLEAR_HIT) & (time < disks[TIME + i]):
+            disks[TIME + i], disks[HIT + i] = time, satellites[CROSSED + s]
+            disks[CHOSEN + i] = satellites[NUMBER + s]
+            disks[HIT_X + i], disks[HIT_Y + i] = satellites[AT_X + s], satellites[AT_Y + s]
+
+
+@inlined
+def still_below(w, i, which, side, found, motion, ring):
+    """-> (beside, shift, left, uncertain): those ``found`` so far, with one satellite at the end of the motion.
+
+    The satellite that is below the tops, besides the one that touches the wall, and the left ends of their cells.
+    """
+    beside, shift, left, uncertain = found
+    time, chosen, number = w[TIME + i], w[CHOSEN + i], number_of(w, i, side)
+    base, since = w[LEFT_END + which * SIZE + i], w[BELOW_FROM + which * SIZE + i]
+    _, y, turn = satellite_of(w, i, number, ring)
+    y = y + satellite_after(time, small_turn(motion.spin * time), turn, motion).dy
+    other = (since < time) & (number != chosen)
+    below = other & (y < 0.0)
+    uncertain = uncertain | (other & (abs(y) <= ring.slack * CLOSE))
+    uncertain = uncertain | (below & ((beside != 0.0) | (abs(chosen - number) > 1.0)))
+    return number - chosen if below else beside, base if below else shift, left if number != chosen else base, uncertain
 
 
 @inner
 def finish_motion(w, n, limit, ring):
-    """Move all disks to the ends of their motions, with the STATUS: 0 for a contact, 1 for a return, 2 for uncertain.
-
-    The satellite, besides the one that touches the wall, that is below the tops becomes BESIDE.
-    """
+    """Move all disks to the ends of their motions, and set STATUS and the satellite BESIDE."""
     for i in range(n):
         time, chosen, hits = w[TIME + i], w[CHOSEN + i], w[HIT + i] >= 0.0
         motion = flight(w[V1 + i], w[V2 + i], w[OMEGA + i], ring.scale)
-        uncertain = (w[UNCERTAIN + i] > 0.0) | (hits & (w[CONTACTS + i] >= limit))
+        angle, until, turn = w[ANGLE + i], time + w[TIE + i], motion.spin * time
+        before = above_the_wall(angle - 2.0 * ring.spacing, motion.spin, until, ring.reach)
+        behind = above_the_wall(angle + 2.0 * ring.spacing, motion.spin, until, ring.reach)
+        uncertain = (w[UNCERTAIN + i] > 0.0) | (not (before & behind)) | (hits & (w[CONTACTS + i] >= limit))
         uncertain = uncertain | ((not hits) & ((time < w[END + i]) | (not motion.v2 > 0.0)))
-        for side in (-2.0, 2.0):
-            other, until = w[ANGLE + i] + ring.spacing * side, time + w[TIE + i]
-            uncertain = uncertain | (not above_the_wall(other, motion.spin, until, ring.reach))
-        turn = motion.spin * time
-        w[TRAVEL + i] = w[TRAVEL + i] + motion.v1 * time
-        w[ROTATION + i] = w[ROTATION + i] + turn
-        w[PASSED + i] = w[PASSED + i] + time
-        beside, shift, left = 0.0, 0.0, 0.0
-        rotation = small_turn(turn)
-        for place in range(3):
-            number = satellite_number(w, i, 0.0 if place == 0 else (1.0 if place == 1 else -1.0))
-            base = w[LEFT_END + place * SIZE + i]
-            left = base if number == chosen else left
-            _, y, turn_there = satellite_start(w, i, number, ring)
-            y = y + satellite_after(time, rotation, turn_there, motion).dy
-            other = (w[BELOW_FROM + place * SIZE + i] < time) & (number != chosen)
-            below = other & (y < 0.0)
-            uncertain = uncertain | (other & (abs(y) <= ring.slack * CLOSE))
-            uncertain = uncertain | (below & ((beside != 0.0) | (abs(chosen - number) > 1.0)))
-            beside, shift = number - chosen if below else beside, base if below else shift
-        w[BESIDE + i], w[SHIFT + i] = beside, shift - left
+        found = 0.0, 0.0, 0.0, uncertain
+        found = still_below(w, i, 0, 0.0, found, motion, ring)
+        found = still_below(w, i, 1, 1.0, found, motion, ring)
+        beside, shift, left, uncertain = still_below(w, i, 2, -1.0, found, motion, ring)
         again = (w[CONTACTS + i] > 0.0) & (chosen != 0.0) & hits
-        w[TWO + i] = 1.0 if again else w[TWO + i]
-        w[CONTACTS + i] = w[CONTACTS + i] + (1.0 if hits else 0.0)
-        angle = w[ANGLE + i] + (chosen * ring.spacing + turn)
-        w[ANGLE + i] = angle
-        w[SIN + i], w[VERSED + i] = small_turn(angle)
-        w[TOUCHED + i] = w[HIT + i]
-        w[STATUS + i] = 2.0 if uncertain else (0.0 if hits else 1.0)
+        angle = angle + (chosen * ring.spacing + turn)
+        sine, versed = small_turn(angle)
+        w[TRAVEL + i], w[ROTATION + i] = w[TRAVEL + i] + motion.v1 * time, w[ROTATION + i] + turn
+        w[PASSED + i], w[CONTACTS + i] = w[PASSED + i] + time, w[CONTACTS + i] + (1.0 if hits else 0.0)
+        w[BESIDE + i], w[SHIFT + i], w[TWO + i] = beside, shift - left, 1.0 if again else w[TWO + i]
+        w[ANGLE + i], w[SINE + i], w[VERSED + i], w[COSINE + i] = angle, sine, versed, 1.0 - versed
+        w[OWN + i] = w[HIT + i]
+        w[STATUS + i] = UNSURE if uncertain else (GOES_ON if hits else BACK)
 
 
 @inner
@@ -391,37 +347,35 @@ def reflect_disks(w, n, disk, ring, ground):
     """Reflect disks at the pieces that their satellites touch."""
     kind = ARC if ground.arcs.shape[0] > 0 else LINE
     for i in range(n):
-        if w[STATUS + i] == 0.0:
-            w[X + i], w[Y + i], w[NORMAL_X + i], w[NORMAL_Y + i] = surface(
-                kind, int(w[TOUCHED + i]), w[HIT_X + i], w[HIT_Y + i], ground
-            )
+        if w[STATUS + i] == GOES_ON:
+            x, y, n1, n2 = surface(kind, int(w[OWN + i]), w[HIT_X + i], w[HIT_Y + i], ground)
+            w[X + i], w[Y + i], w[NORMAL_X + i], w[NORMAL_Y + i] = x, y, n1, n2
     for i in range(n):
-        v1, v2, omega, versed, goes_on = w[V1 + i], w[V2 + i], w[OMEGA + i], w[VERSED + i], w[STATUS + i] == 0.0
-        turn = w[SIN + i], 1.0 - versed
+        v1, v2, omega, turn = w[V1 + i], w[V2 + i], w[OMEGA + i], (w[SINE + i], w[COSINE + i])
         u1, u2, other = reflect(v1, v2, omega, w[NORMAL_X + i], w[NORMAL_Y + i], turn, disk)
-        w[HEIGHT + i] = w[Y + i] - versed / ring.scale
-        w[V1 + i] = u1 if goes_on else v1
-        w[V2 + i] = u2 if goes_on else v2
+        goes_on = w[STATUS + i] == GOES_ON
+        w[V1 + i], w[V2 + i] = u1 if goes_on else v1, u2 if goes_on else v2
         w[OMEGA + i] = other if goes_on else omega
+        w[HEIGHT + i] = w[Y + i] - w[VERSED + i] / ring.scale
 
 
 @inner
 def begin_disk(w, k, i, position, velocity, disk, ring, width):
-    """Put disk i into place k."""
+    """Put disk i at the index k."""
     scale, spacing = ring.scale, ring.spacing
     _, (w[V1 + k], w[V2 + k], w[OMEGA + k]) = unit_velocity(velocity, i, disk)
     entry = (position[i, columns.X1] - math.floor(position[i, columns.X1] / width) * width) / scale
     angle = position[i, columns.ALPHA] - spacing * round(position[i, columns.ALPHA] / spacing)
     sine, versed = turning(angle)
-    w[X + k], w[Y + k], w[SIN + k], w[VERSED + k] = entry + sine / scale, versed / scale, sine, versed
-    w[ANGLE + k], w[TOUCHED + k], w[DISK + k] = angle, -1.0, float(i)
-    w[BESIDE + k], w[SHIFT + k], w[HEIGHT + k], w[TRAVEL + k], w[ROTATION + k] = 0.0, 0.0, 0.0, 0.0, 0.0
-    w[PASSED + k], w[CONTACTS + k], w[TWO + k] = 0.0, 0.0, 0.0
+    w[X + k], w[Y + k], w[SINE + k], w[COSINE + k] = entry + sine / scale, versed / scale, sine, 1.0 - versed
+    w[ANGLE + k], w[OWN + k], w[DISK + k] = angle, -1.0, float(i)
+    for column in (BESIDE, SHIFT, HEIGHT, TRAVEL, ROTATION, PASSED, CONTACTS, TWO):
+        w[column + k] = 0.0
 
 
 @inner
 def end_disk(w, k, i, position, velocity, disk, scale, results):
-    """Store the result of disk i, in place k."""
+    """Store the result of disk i, at the index k."""
     norm, _ = unit_velocity(velocity, i, disk)
     results.position[i, columns.X1] = position[i, columns.X1] + scale * w[TRAVEL + k]
     results.position[i, columns.ALPHA] = position[i, columns.ALPHA] + w[ROTATION + k]
@@ -434,42 +388,36 @@ def end_disk(w, k, i, position, velocity, disk, scale, results):
     results.status[i] = ESCAPED
 
 
-@inlined
-def line_at(joints, lines, k):
-    """Return start, edge, normal, length and number of a line."""
-    return (
-        (joints[k, c.JOINT_X], joints[k, c.JOINT_Y]),
-        (lines[k, c.EDGE_X], lines[k, c.EDGE_Y]),
-        (lines[k, c.LINE_NORMAL_X], lines[k, c.LINE_NORMAL_Y]),
-        lines[k, c.LENGTH],
-        float(k),
-    )
-
-
-@inlined
-def arc_at(arcs):
-    """Return start, normal, curvature and stretch of the arc."""
-    start, normal = (arcs[0, c.START_X], arcs[0, c.START_Y]), (arcs[0, c.NORMAL_X], arcs[0, c.NORMAL_Y])
-    return start, normal, arcs[0, c.CURVATURE], arcs[0, c.STRETCH]
+@inner
+def meet_wall(w, m, ring, ground):
+    """Find where satellites below the tops meet the wall first."""
+    joints, lines, arcs, hollow = ground.joints, ground.lines, ground.arcs, ground.hollows[0]
+    if arcs.shape[0] > 0:
+        start, normal = (arcs[0, c.START_X], arcs[0, c.START_Y]), (arcs[0, c.NORMAL_X], arcs[0, c.NORMAL_Y])
+        stretch = arcs[0, c.STRETCH]
+        meet(w, m, None, (*start, *normal, arcs[0, c.CURVATURE], stretch), 0.0, max(stretch, 1.0), ring)
+    for k in range(int(hollow[c.FIRST_JOINT]), int(hollow[c.JOINTS_END])):
+        if joints[k, c.STARTS_LINE] > 0.0:
+            start, edge = (joints[k, c.JOINT_X], joints[k, c.JOINT_Y]), (lines[k, c.EDGE_X], lines[k, c.EDGE_Y])
+            normal = lines[k, c.LINE_NORMAL_X], lines[k, c.LINE_NORMAL_Y]
+            meet(w, m, (*start, *edge, *normal, lines[k, c.LENGTH], float(k)), None, float(k), 1.0, ring)
 
 
 @inner
 def move_disks(disks, n, satellites, disk, ring, limit, ground):
     """Move all disks of a wave to their next contacts."""
-    joints, lines, arcs, hollow = ground.joints, ground.lines, ground.arcs, ground.hollows[0]
     begin_motion(disks, n, ring)
-    for place in range(3):
-        place_satellites(disks, n, 0.0 if place == 0 else (1.0 if place == 1 else -1.0), ring)
-        m = satellites_below(disks, n, satellites, ring, ground.cell)
-        if arcs.shape[0] > 0:
-            search(satellites, m, None, arc_at(arcs), ring, STEPS - USUAL_STEPS)
-            cross(satellites, m, None, arc_at(arcs), ring, 0.0)
-        else:
-            for k in range(int(hollow[c.FIRST_JOINT]), int(hollow[c.JOINTS_END])):
-                if joints[k, c.STARTS_LINE] > 0.0:
-                    search(satellites, m, line_at(joints, lines, k), None, ring, STEPS - USUAL_STEPS)
-                    cross(satellites, m, line_at(joints, lines, k), None, ring, float(k))
-        compare(disks, satellites, m, place)
+    for which in range(3):
+        above, m = collect(disks, n, satellites, 0.0 if which == 0 else (1.0 if which == 1 else -1.0), ring)
+        enter(satellites, above, ring, ground.cell)
+        for s in range(above - 1, -1, -1):
+            if not satellites[FROM + s] < satellites[UNTIL + s]:
+                if satellites[UNCERTAIN + s] > 0.0:
+                    disks[UNCERTAIN + int(satellites[INDEX + s])] = 1.0
+                m -= 1
+                move(satellites, m, satellites, s, WORK // SIZE)
+        meet_wall(satellites, m, ring, ground)
+        compare(disks, satellites, m, which)
     finish_motion(disks, n, float(limit), ring)
     reflect_disks(disks, n, disk, ring, ground)
 
@@ -485,12 +433,11 @@ def collide_in_waves(position, velocity, disk, ring, limit, ground, results, dis
     while n > 0 and not is_raised(ground.stop):
         move_disks(disks, n, satellites, disk, ring, limit, ground)
         for k in range(n - 1, -1, -1):
-            if disks[STATUS + k] > 0.0:
+            if disks[STATUS + k] != GOES_ON:
                 i = int(disks[DISK + k])
-                if disks[STATUS + k] == 1.0:
+                results.status[i] = UNDECIDED
+                if disks[STATUS + k] == BACK:
                     end_disk(disks, k, i, position, velocity, disk, ring.scale, results)
-                else:
-                    results.status[i] = UNDECIDED
                 if following < position.shape[0]:
                     begin_disk(disks, k, following, position, velocity, disk, ring, width)
                     following += 1
