@@ -40,7 +40,7 @@ from .contact import (
 from .rigid import above_the_wall, neighbour_at, reflect, surface, unit_velocity
 
 # Number of disks in a wave.
-SIZE = 64
+SIZE = 200
 # Columns of the work arrays of disks and of satellites. The first satellite of a disk, or the one whose contact is
 # sought, is at (X, Y) and touches the piece OWN (-1 for none). Its motion is searched from FROM, inf if it stays above
 # the tops, to UNTIL; BASE is the left end of its cell.
