@@ -1,6 +1,6 @@
 """The position of a satellite of the moving disk, and its first contact with a piece of the wall: compiled.
 
-A satellite meets a line, an upright conic or a graph, a part of a Bezier piece, at F = 0, see below and `graphs`.
+A satellite meets a line, an upright conic or a graph, a part of a Bezier piece, at F = 0, see below.
 
 **No root is passed.** On [t, t + ahead] the second derivative of F(D(t)) is at least c = F''(t) - L ahead, where L
 bounds the third derivative. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is
@@ -20,8 +20,9 @@ which is evaluated by products, without cancellation. A line or an upright conic
 
 F(D) = f + g.D - curvature |D|^2/2     (y multiplied by the arc's stretch; curvature 0 for lines),
 
-where f and g are constants at the start of the motion. The tables are those of the planar tracer, see `scene/scene`,
-with circles and ellipses in one table ``arcs``.
+where f and g are constants at the start of the motion. A graph eta = h(xi) over a chord is F = eta - h(xi); the
+acceleration of the satellite and the bounds on h'' bound its F'' below. The tables are those of the planar tracer, see
+`scene/scene`, with circles and ellipses in one table ``arcs``. Loads numba.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ from ...scene import columns as c
 from ...tracing.compiled.arcs import near_end, on_arc
 from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
-from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE
+from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
 from ...tracing.double_double.sides import ARC as CURVED
 from ...tracing.double_double.sides import BEZIER as SPLINE
 from ...tracing.double_double.sides import LINE as STRAIGHT
 from ...tracing.double_double.sides import Arrival, Face, in_front_at
-from .graph_table import FIRST_S, LEAST_BEND, MOST_BEND, PIECE, STEEPNESS, THIRD
-from .shapes import height_above, in_frame, parameter_at
+from . import graph_table as g
+from .shapes import Start, height_above, in_frame, parameter_at
 
 # Angle below which `turning` uses series up to the tenth power; the omitted terms are below 3e-18 of the sum.
 SMALL_TURN = 0.1
@@ -223,11 +224,13 @@ def graph_bounds(sign, graph, motion, xi1, ahead):
 
     ``third`` bounds |F'''|.
     """
-    most, least = (graph[MOST_BEND], graph[LEAST_BEND]) if sign > 0.0 else (-graph[LEAST_BEND], -graph[MOST_BEND])
+    most, least = (
+        (graph[g.MOST_BEND], graph[g.LEAST_BEND]) if sign > 0.0 else (-graph[g.LEAST_BEND], -graph[g.MOST_BEND])
+    )
     pull = abs(motion.spin * motion.omega)
-    inertial = pull * graph[STEEPNESS]
+    inertial = pull * graph[g.STEEPNESS]
     speed = min(motion.fastest, abs(xi1) + pull * ahead)
-    third = speed * (graph[THIRD] * speed * speed + 3.0 * (most - least) * pull) + inertial * abs(motion.spin)
+    third = speed * (graph[g.THIRD] * speed * speed + 3.0 * (most - least) * pull) + inertial * abs(motion.spin)
     return -inertial - most * speed * speed, 2.0 * inertial + (most - least) * speed * speed, third
 
 
@@ -307,8 +310,8 @@ def face_at(kind, number, x, y, ground):
     if kind != BEZIER:
         return Face(CURVED if kind == ARC else STRAIGHT, number, arc, arc, (0.0, 0.0))
     along, _ = in_frame(graph, x - graph[c.START_X], y - graph[c.START_Y])
-    curve = ground.beziers[int(graph[PIECE])]
-    return Face(SPLINE, number, arc, curve, (graph[FIRST_S] + parameter_at(graph, along), 0.0))
+    curve = ground.beziers[int(graph[g.PIECE])]
+    return Face(SPLINE, number, arc, curve, (graph[g.FIRST_S] + parameter_at(graph, along), 0.0))
 
 
 @inner
@@ -419,3 +422,100 @@ def first_on_piece(kind, number, own, path, span, size, ground):
         if code == CLEAR or inward < 0.0:
             sign = -sign
         leaving = True
+
+
+@inlined
+def start_on(number, own, path, ground):
+    """-> (Start, is_own): the start of a path in the frame of a graph, and whether it lies on the graph's formula."""
+    graph = ground.graphs[number]
+    if own.kind == BEZIER and ground.graphs[own.piece, g.PIECE] == graph[g.PIECE]:
+        left = ground.graphs[own.piece]
+        along, _ = in_frame(left, path.x - left[c.START_X], path.y - left[c.START_Y])
+        sigma = parameter_at(left, along) + (left[g.FIRST_S] - graph[g.FIRST_S])
+        if graph[g.LEAST_SIGMA] <= sigma <= graph[g.MOST_SIGMA]:
+            abscissa = sigma * (graph[g.XI1] + sigma * (graph[g.XI2] + sigma * graph[g.XI3]))
+            return Start(abscissa, 0.0, 0.0, sigma), True
+    xi, eta = in_frame(graph, path.x - graph[c.START_X], path.y - graph[c.START_Y])
+    return Start(xi, xi, eta, 0.0), False
+
+
+@compiled
+def first_on_graph(number, own, path, span, size, ground):
+    """-> (t, state, code): first contact in the span of one satellite with the front of one graph, inf if none.
+
+    ``own`` is the piece on which the path starts, if any.
+    """
+    t, end, rotation = span
+    graph, motion, slack = ground.graphs[number], path.motion, path.slack
+    begin, is_own = start_on(number, own, path, ground)
+    form = graph, begin
+    here, rate, _, _, _ = graph_after(form, t, rotation, path)
+    patience = 2.0 * size / motion.fastest
+    reach = slack * graph[g.STEEPNESS]
+    leaving = is_own and t == 0.0
+    if t == 0.0 and own.kind != NO_PIECE and not is_own and abs(here) <= reach:
+        leaving = not is_in_front(BEZIER, number, own, path.x, path.y, reach, ground)
+    sign = 1.0 if here >= 0.0 or (here >= -slack and rate < 0.0) else -1.0
+    if leaving:
+        sign = 1.0 if is_own or rate > 0.0 else -1.0
+    while True:
+        t, rotation, code = next_root(sign, leaving, None, None, form, Span(t, end, rotation), path, patience)
+        state, inward = satellite_after(t, rotation, path.turn, motion), 0.0
+        if t >= end:
+            return np.inf, state, CLEAR
+        if code == BOUNCE_LIMIT:
+            return t, state, code
+        if sign > 0.0:
+            _, inward, _, along, _ = graph_after(form, t, rotation, path)
+            wide = slack * max(1.0, min(motion.fastest / abs(inward), WIDEST_SLACK))
+            if -wide <= along <= graph[g.WIDTH] + wide:
+                return t, state, CORNER if near_end(graph, path.x + state.dx, path.y + state.dy, wide) else code
+        if code == GRAZING:
+            # a tangency beside the part: the search goes on where F is four slacks from 0
+            _, _, bent, _, _ = graph_after(form, t, rotation, path)
+            if sign * bent <= 0.0:
+                return t, state, GRAZING
+            t += math.sqrt(8.0 * slack / (sign * bent))
+            if t >= end:
+                return np.inf, state, CLEAR
+            rotation, leaving = turning(motion.spin * t), False
+            continue
+        if code == CLEAR or inward < 0.0:
+            sign = -sign
+        leaving = True
+
+
+@inlined
+def first_in_hollow(h, own, came_from, path, span, ground):
+    """-> Touch: the first contact of one satellite with the pieces of hollow h.
+
+    The sides of the cell of an open wall count as pieces. ``came_from`` is -1 or 1 if the satellite has just entered
+    through the left or the right side.
+    """
+    hollows, joints, motion = ground.hollows, ground.joints, path.motion
+    t, end, rotation = span
+    kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, c.SIZE]
+    where = satellite_after(t, rotation, path.turn, motion)
+    ranges = (c.FIRST_JOINT, c.JOINTS_END), (c.FIRST_CIRCLE, c.CIRCLES_END), (c.FIRST_ELLIPSE, c.ELLIPSES_END)
+    for first, end_of_range in ranges:
+        tried = LINE if first == c.FIRST_JOINT else ARC
+        for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
+            if tried == ARC or joints[k, c.STARTS_LINE] > 0.0:
+                rest = Span(t, end, rotation)
+                hit, there, unclear = first_on_piece(tried, k, own, path, rest, size, ground)
+                if hit < end:
+                    end, kind, number, code, where = hit, tried, k, unclear, there
+    for k in range(int(hollows[h, c.FIRST_BEZIER]), int(hollows[h, c.BEZIERS_END])):
+        hit, there, unclear = first_on_graph(k, own, path, Span(t, end, rotation), size, ground)
+        if hit < end:
+            end, kind, number, code, where = hit, BEZIER, k, unclear, there
+    if ground.is_open:
+        for side in (-1, 1):
+            edge = hollows[h, c.LEFT] if side < 0 else hollows[h, c.RIGHT]
+            line = towards_line(side * (edge - path.x), -float(side), 0.0, path.turn, motion)
+            rest = Span(t, end, rotation)
+            hit, then, unclear = next_root(1.0, came_from == side, line, None, None, rest, path, np.inf)
+            if hit < end:
+                end, kind, number, code = hit, SIDE, side, unclear
+                where = satellite_after(hit, then, path.turn, motion)
+    return Touch(end if kind != NO_PIECE else np.inf, kind, number, where, code)

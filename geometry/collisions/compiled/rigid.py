@@ -15,7 +15,6 @@ from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.pointers import is_raised
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
-from .columns import ALPHA, OMEGA, V1, V2, X1
 from .contact import (
     CLEAR,
     NO,
@@ -26,15 +25,18 @@ from .contact import (
     Span,
     Touch,
     Touching,
+    first_in_hollow,
     flight,
     next_root,
     satellite_after,
     towards_line,
     turning,
 )
-from .hollows import first_in_hollow
 from .shapes import graph_surface
 
+# Columns of the positions of disks, in units of the radius: x of the centre and angle; and of their velocities.
+X1, ALPHA = 0, 1
+V1, V2, OMEGA = 0, 1, 2
 TOP = 7
 # Limit on the cells that one satellite passes, and on the satellites that pass the lowest point, between two contacts.
 MOST_CELLS = 1_000_000
@@ -392,28 +394,36 @@ def unit_velocity(velocity, i, disk):
     return norm, (velocity[i, V1] / norm, velocity[i, V2] / norm, velocity[i, OMEGA] / norm)
 
 
+@inlined
+def start_of(position, i, width, ring):
+    """-> (entry, angle): where disk i meets the tops in its cell, and the angle of its lowest satellite."""
+    entry = (position[i, X1] - math.floor(position[i, X1] / width) * width) / ring.scale
+    return entry, position[i, ALPHA] - ring.spacing * round(position[i, ALPHA] / ring.spacing)
+
+
+@inlined
+def store(results, i, position, norm, path, velocity, contacts, two, status):
+    """Store the result of disk i; ``path`` is (displacement, rotation, time), the unit of velocities is ``norm``."""
+    travel, rotation, time = path
+    v1, v2, omega = velocity
+    results.position[i, X1], results.position[i, ALPHA] = position[i, X1] + travel, position[i, ALPHA] + rotation
+    results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = norm * v1, norm * v2, norm * omega
+    results.time[i], results.contacts[i] = time / norm, contacts
+    results.two_satellites[i], results.status[i] = two, status
+
+
 @compiled
 def collide_disks(position, velocity, disk, ring, limit, ground, results):
     """Collide a block of disks into ``results``, see `DiskResults`."""
-    scale, spacing = ring.scale, ring.spacing
-    width = scale * ground.cell
+    scale = ring.scale
     for i in range(position.shape[0]):
         if is_raised(ground.stop):
             break
         norm, unit = unit_velocity(velocity, i, disk)
-        entry = (position[i, X1] - math.floor(position[i, X1] / width) * width) / scale
-        angle = position[i, ALPHA] - spacing * round(position[i, ALPHA] / spacing)
-        travel, rotation, time, (v1, v2, omega), results.contacts[i], results.two_satellites[i], results.status[i] = (
-            collide_disk(entry, angle, unit, disk, ring, limit, ground)
-        )
-        results.position[i, X1] = position[i, X1] + scale * travel
-        results.position[i, ALPHA] = position[i, ALPHA] + rotation
-        results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = (
-            norm * v1,
-            norm * v2,
-            norm * omega,
-        )
-        results.time[i] = scale * time / norm
+        entry, angle = start_of(position, i, scale * ground.cell, ring)
+        travel, rotation, time, end, contacts, two, status = collide_disk(entry, angle, unit, disk, ring, limit, ground)
+        path = scale * travel, rotation, scale * time
+        store(results, i, position, norm, path, end, contacts, two, status)
 
 
 @inlined
@@ -467,14 +477,6 @@ def roll_disks(position, velocity, disk, rolling, limit, ground, results):
         norm, unit = unit_velocity(velocity, i, disk)
         entry = (position[i, X1] + position[i, ALPHA]) / scale
         entry -= math.floor(entry / ground.cell) * ground.cell
-        travel, rotation, time, (v1, v2, omega), results.contacts[i], results.status[i] = roll_disk(
-            entry, unit, disk, rolling, limit, ground
-        )
-        results.position[i, X1] = position[i, X1] + scale * travel
-        results.position[i, ALPHA] = position[i, ALPHA] + scale * rotation
-        results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = (
-            norm * v1,
-            norm * v2,
-            norm * omega,
-        )
-        results.time[i] = scale * time / norm
+        travel, rotation, time, end, contacts, status = roll_disk(entry, unit, disk, rolling, limit, ground)
+        path = scale * travel, scale * rotation, scale * time
+        store(results, i, position, norm, path, end, contacts, NO, status)

@@ -16,13 +16,12 @@ import math
 import numpy as np
 
 from ...scene import columns as c
-from ...tracing.compiled.options import compiled, inlined, inner
+from ...tracing.compiled.options import compiled, inlined, linked
 from ...tracing.compiled.pointers import is_raised
 from ...tracing.compiled.rays import ESCAPED
 from ...tracing.compiled.records import LINE
 from ...tracing.compiled.trigonometry import COSINE as C
 from ...tracing.compiled.trigonometry import SINE as S
-from . import columns
 from .contact import (
     ARC,
     ROOT_FRACTION,
@@ -37,7 +36,7 @@ from .contact import (
     towards_line,
     turning,
 )
-from .rigid import above_the_wall, neighbour_at, reflect, surface, unit_velocity
+from .rigid import above_the_wall, neighbour_at, reflect, start_of, store, surface, unit_velocity
 
 # Number of disks in a wave.
 SIZE = 200
@@ -133,7 +132,7 @@ def approach(w, s, line, arc, slack, fraction, scale):
     w[SEARCH + s] = FOUND if found else (SEARCHING if live else ENDED)
 
 
-@inner
+@linked
 def search(w, m, line, arc, number, reach, ring):
     """Find the ROOT at which satellites cross a line or an arc, if they do so before UNTIL.
 
@@ -164,7 +163,7 @@ def search(w, m, line, arc, number, reach, ring):
             w[UNCERTAIN + s] = 1.0
 
 
-@inner
+@linked
 def meet(w, m, line, arc, number, widest, ring):
     """Find where satellites cross a line or an arc first, if they do so before they cross another piece."""
     reach = ring.slack * CLOSE * widest
@@ -189,7 +188,7 @@ def meet(w, m, line, arc, number, widest, ring):
         w[AT_Y + s] = y if found else w[AT_Y + s]
 
 
-@inner
+@linked
 def enter(w, m, ring, cell):
     """Find when satellites come below the tops, FROM, and in which cell."""
     search(w, m, (0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, -2.0), None, -2.0, ring.slack * CLOSE, ring)
@@ -220,7 +219,7 @@ def satellite_of(w, i, number, ring):
     return neighbour_at(w[X + i], w[Y + i], (w[SINE + i], w[COSINE + i]), half_sine, half_cosine, ring.scale)
 
 
-@inner
+@linked
 def begin_motion(w, n, ring):
     """Begin the motion of all disks: find when each ends without a contact."""
     for i in range(n):
@@ -243,7 +242,7 @@ def move(source, i, target, k, count):
         target[column * SIZE + k] = source[column * SIZE + i]
 
 
-@inner
+@linked
 def collect(disks, n, satellites, side, ring):
     """-> (int, int): collect one satellite of each disk, see `number_of`, if it is below the tops or may come there.
 
@@ -282,7 +281,7 @@ def collect(disks, n, satellites, side, ring):
     return above, m
 
 
-@inner
+@linked
 def compare(disks, satellites, m, which):
     """Compare the first contacts of satellites with the first so far."""
     for s in range(m):
@@ -316,7 +315,7 @@ def still_below(w, i, which, side, found, motion, ring):
     return number - chosen if below else beside, base if below else shift, left if number != chosen else base, uncertain
 
 
-@inner
+@linked
 def finish_motion(w, n, limit, ring):
     """Move all disks to the ends of their motions, and set STATUS and the satellite BESIDE."""
     for i in range(n):
@@ -342,7 +341,7 @@ def finish_motion(w, n, limit, ring):
         w[STATUS + i] = UNSURE if uncertain else (GOES_ON if hits else BACK)
 
 
-@inner
+@linked
 def reflect_disks(w, n, disk, ring, ground):
     """Reflect disks at the pieces that their satellites touch."""
     kind = ARC if ground.arcs.shape[0] > 0 else LINE
@@ -359,36 +358,28 @@ def reflect_disks(w, n, disk, ring, ground):
         w[HEIGHT + i] = w[Y + i] - w[VERSED + i] / ring.scale
 
 
-@inner
-def begin_disk(w, k, i, position, velocity, disk, ring, width):
+@inlined
+def begin_disk(w, k, i, position, velocity, disk, ring, ground):
     """Put disk i at the index k."""
-    scale, spacing = ring.scale, ring.spacing
     _, (w[V1 + k], w[V2 + k], w[OMEGA + k]) = unit_velocity(velocity, i, disk)
-    entry = (position[i, columns.X1] - math.floor(position[i, columns.X1] / width) * width) / scale
-    angle = position[i, columns.ALPHA] - spacing * round(position[i, columns.ALPHA] / spacing)
+    entry, angle = start_of(position, i, ring.scale * ground.cell, ring)
     sine, versed = turning(angle)
-    w[X + k], w[Y + k], w[SINE + k], w[COSINE + k] = entry + sine / scale, versed / scale, sine, 1.0 - versed
+    w[X + k], w[Y + k], w[SINE + k], w[COSINE + k] = entry + sine / ring.scale, versed / ring.scale, sine, 1.0 - versed
     w[ANGLE + k], w[OWN + k], w[DISK + k] = angle, -1.0, float(i)
     for column in (BESIDE, SHIFT, HEIGHT, TRAVEL, ROTATION, PASSED, CONTACTS, TWO):
         w[column + k] = 0.0
 
 
-@inner
+@inlined
 def end_disk(w, k, i, position, velocity, disk, scale, results):
     """Store the result of disk i, at the index k."""
     norm, _ = unit_velocity(velocity, i, disk)
-    results.position[i, columns.X1] = position[i, columns.X1] + scale * w[TRAVEL + k]
-    results.position[i, columns.ALPHA] = position[i, columns.ALPHA] + w[ROTATION + k]
-    results.velocity[i, columns.V1] = norm * w[V1 + k]
-    results.velocity[i, columns.V2] = norm * w[V2 + k]
-    results.velocity[i, columns.OMEGA] = norm * w[OMEGA + k]
-    results.time[i] = scale * w[PASSED + k] / norm
-    results.contacts[i] = int(w[CONTACTS + k])
-    results.two_satellites[i] = w[TWO + k] > 0.0
-    results.status[i] = ESCAPED
+    path = scale * w[TRAVEL + k], w[ROTATION + k], scale * w[PASSED + k]
+    end, contacts, two = (w[V1 + k], w[V2 + k], w[OMEGA + k]), int(w[CONTACTS + k]), w[TWO + k] > 0.0
+    store(results, i, position, norm, path, end, contacts, two, ESCAPED)
 
 
-@inner
+@linked
 def meet_wall(w, m, ring, ground):
     """Find where satellites below the tops meet the wall first."""
     joints, lines, arcs, hollow = ground.joints, ground.lines, ground.arcs, ground.hollows[0]
@@ -403,7 +394,7 @@ def meet_wall(w, m, ring, ground):
             meet(w, m, (*start, *edge, *normal, lines[k, c.LENGTH], float(k)), None, float(k), 1.0, ring)
 
 
-@inner
+@linked
 def move_disks(disks, n, satellites, disk, ring, limit, ground):
     """Move all disks of a wave to their next contacts."""
     begin_motion(disks, n, ring)
@@ -425,11 +416,10 @@ def move_disks(disks, n, satellites, disk, ring, limit, ground):
 @compiled
 def collide_in_waves(position, velocity, disk, ring, limit, ground, results, disks, satellites):
     """Collide a block of disks into ``results``, with two work arrays; the others have the status `UNDECIDED`."""
-    width = ring.scale * ground.cell
     following = min(position.shape[0], SIZE)
     n = following
     for k in range(n):
-        begin_disk(disks, k, k, position, velocity, disk, ring, width)
+        begin_disk(disks, k, k, position, velocity, disk, ring, ground)
     while n > 0 and not is_raised(ground.stop):
         move_disks(disks, n, satellites, disk, ring, limit, ground)
         for k in range(n - 1, -1, -1):
@@ -439,7 +429,7 @@ def collide_in_waves(position, velocity, disk, ring, limit, ground, results, dis
                 if disks[STATUS + k] == BACK:
                     end_disk(disks, k, i, position, velocity, disk, ring.scale, results)
                 if following < position.shape[0]:
-                    begin_disk(disks, k, following, position, velocity, disk, ring, width)
+                    begin_disk(disks, k, following, position, velocity, disk, ring, ground)
                     following += 1
                 else:
                     n -= 1
