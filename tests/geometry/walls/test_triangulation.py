@@ -6,7 +6,7 @@ from campaigns.judges.interval_marching import exact_row
 from campaigns.judges.random_hollows import graph_hollow, random_hollow
 
 from asperity.geometry.polygons.beams import beams_of
-from asperity.geometry.polygons.compiled.codes import FIRST_WALL, OPENING
+from asperity.geometry.polygons.compiled.columns import FIRST_WALL, OPENING
 from asperity.geometry.polygons.triangulation import triangulated
 
 AWKWARD = {
