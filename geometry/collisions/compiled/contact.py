@@ -324,23 +324,50 @@ def is_in_front(kind, number, own, x, y, slack, ground):
 
 
 @inlined
-def line_form(number, is_own, path, ground):
-    """-> line: F of a line along a path, see `towards_line`."""
-    joints, lines = ground.joints, ground.lines
-    g1, g2 = lines[number, c.LINE_NORMAL_X], lines[number, c.LINE_NORMAL_Y]
-    level = 0.0 if is_own else g1 * (path.x - joints[number, c.JOINT_X]) + g2 * (path.y - joints[number, c.JOINT_Y])
-    return towards_line(level, g1, g2, path.turn, path.motion)
+def line_form(line, is_own, x, y, turn, motion):
+    """-> line: F of a line along a path from (x, y), see `towards_line`; ``line`` is a point of it and its normal."""
+    x0, y0, g1, g2 = line
+    return towards_line(0.0 if is_own else g1 * (x - x0) + g2 * (y - y0), g1, g2, turn, motion)
 
 
 @inlined
-def conic_form(number, is_own, path, ground):
-    """-> conic: F of an arc along a path, (f, g1, g2, curvature, stretch)."""
-    arcs = ground.arcs
-    curvature, stretch = arcs[number, c.CURVATURE], arcs[number, c.STRETCH]
-    rx, ry = path.x - arcs[number, c.START_X], stretch * (path.y - arcs[number, c.START_Y])
-    g1, g2 = arcs[number, c.NORMAL_X] - curvature * rx, arcs[number, c.NORMAL_Y] - curvature * ry
-    level = 0.0 if is_own else 0.5 * ((arcs[number, c.NORMAL_X] + g1) * rx + (arcs[number, c.NORMAL_Y] + g2) * ry)
-    return level, g1, g2, curvature, stretch
+def conic_form(arc, is_own, x, y):
+    """-> conic: F of an arc along a path from (x, y), (f, g1, g2, curvature, stretch).
+
+    ``arc`` is a point of it, the normal there, curvature and stretch.
+    """
+    x0, y0, n1, n2, curvature, stretch = arc
+    rx, ry = x - x0, stretch * (y - y0)
+    g1, g2 = n1 - curvature * rx, n2 - curvature * ry
+    return 0.0 if is_own else 0.5 * ((n1 + g1) * rx + (n2 + g2) * ry), g1, g2, curvature, stretch
+
+
+@inlined
+def line_of(ground, k):
+    """-> line: the start of a line and its normal."""
+    joints, lines = ground.joints, ground.lines
+    return joints[k, c.JOINT_X], joints[k, c.JOINT_Y], lines[k, c.LINE_NORMAL_X], lines[k, c.LINE_NORMAL_Y]
+
+
+@inlined
+def arc_of(ground, k):
+    """-> arc: the start of an arc, its normal there, curvature and stretch."""
+    arc = ground.arcs[k]
+    x, y, curvature, stretch = arc[c.START_X], arc[c.START_Y], arc[c.CURVATURE], arc[c.STRETCH]
+    return x, y, arc[c.NORMAL_X], arc[c.NORMAL_Y], curvature, stretch
+
+
+@inlined
+def piece_after(kind, line, conic, graph, t, rotation, path):
+    """-> (F, F', F'', abscissa): of a piece of any kind on a path after the time t; the abscissa is that of a graph."""
+    if kind == LINE:
+        f, f1, f2 = line_after(line, t, rotation, path.motion)
+        return f, f1, f2, 0.0
+    if kind == ARC:
+        f, f1, f2, _, _ = conic_at(conic, t, rotation, path.turn, path.motion)
+        return f, f1, f2, 0.0
+    f, f1, f2, along, _ = graph_after(graph, t, rotation, path)
+    return f, f1, f2, along
 
 
 @inlined
@@ -355,8 +382,8 @@ def stays_in_front(line, span, leaving, motion, slack):
 
 
 @inlined
-def where_on_piece(kind, number, path, state, inward, ground):
-    """-> (inside, corner): whether a point of the line or conic of a piece is on it; see `where_on_line`.
+def where_on_piece(kind, number, path, state, inward, along, ground):
+    """-> (inside, corner): whether a point of the continuation of a piece is on it; see `where_on_line`.
 
     At shallow incidence a rounding error across the piece is a larger error along it.
     """
@@ -364,64 +391,12 @@ def where_on_piece(kind, number, path, state, inward, ground):
     wide = path.slack * max(1.0, min(path.motion.fastest / abs(inward), WIDEST_SLACK))
     if kind == LINE:
         return where_on_line(ground.joints, ground.lines, number, x, y, wide)
+    if kind == BEZIER:
+        graph = ground.graphs[number]
+        return -wide <= along <= graph[g.WIDTH] + wide, near_end(graph, x, y, wide)
     arc, stretch = ground.arcs[number], ground.arcs[number, c.STRETCH]
     inside = on_arc(arc, x - arc[c.START_X], stretch * (y - arc[c.START_Y]), wide * max(1.0, stretch))
     return inside, near_end(arc, x, y, wide)
-
-
-@inlined
-def first_on_piece(kind, number, own, path, span, size, ground):
-    """-> (t, state, code): first contact in the span of one satellite with the front of one piece, inf if none.
-
-    ``own`` is the piece on which the path starts, if any.
-    """
-    t, end, rotation = span
-    motion, slack = path.motion, path.slack
-    is_own = own.kind == kind and own.piece == number
-    line, conic, patience = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf
-    if kind == LINE:
-        line = line_form(number, is_own, path, ground)
-        here, rate, _ = line_after(line, t, rotation, motion)
-        reach = slack
-    else:
-        conic = conic_form(number, is_own, path, ground)
-        here, rate, _, _, _ = conic_after(conic, t, rotation, path.turn, motion)
-        reach = slack * max(1.0, ground.arcs[number, c.STRETCH])
-        patience = 2.0 * size / motion.fastest
-    leaving = is_own and t == 0.0
-    if t == 0.0 and own.kind != NO_PIECE and not is_own and abs(here) <= reach:
-        leaving = not is_in_front(kind, number, own, path.x, path.y, reach, ground)
-    if kind == LINE and stays_in_front(line, span, leaving, motion, slack):
-        return np.inf, satellite_after(t, rotation, path.turn, motion), CLEAR
-    sign = 1.0 if here >= 0.0 or (here >= -slack and rate < 0.0) else -1.0
-    if leaving:
-        # the side to which the satellite moves: the front of its own piece, either side of another one
-        sign = 1.0 if is_own or rate > 0.0 else -1.0
-    while True:
-        rest = Span(t, end, rotation)
-        if kind == LINE:
-            t, rotation, code = next_root(sign, leaving, line, None, None, rest, path, patience)
-        else:
-            t, rotation, code = next_root(sign, leaving, None, conic, None, rest, path, patience)
-        state, inward = satellite_after(t, rotation, path.turn, motion), 0.0
-        if t >= end:
-            return np.inf, state, CLEAR
-        if code == BOUNCE_LIMIT:
-            return t, state, code
-        if sign > 0.0:
-            if kind == LINE:
-                _, inward, _ = line_after(line, t, rotation, motion)
-            else:
-                _, inward, _, _, _ = conic_after(conic, t, rotation, path.turn, motion)
-            inside, corner = where_on_piece(kind, number, path, state, inward, ground)
-            if inside:
-                return t, state, CORNER if corner else code
-        if code == GRAZING:
-            # a tangency beside the piece: a line has no other, and the path stays outside a circle
-            return np.inf, state, CLEAR
-        if code == CLEAR or inward < 0.0:
-            sign = -sign
-        leaving = True
 
 
 @inlined
@@ -439,42 +414,64 @@ def start_on(number, own, path, ground):
     return Start(xi, xi, eta, 0.0), False
 
 
-@compiled
-def first_on_graph(number, own, path, span, size, ground):
-    """-> (t, state, code): first contact in the span of one satellite with the front of one graph, inf if none.
+@inlined
+def first_on_piece(kind, number, own, path, span, size, ground):
+    """-> (t, state, code): first contact in the span of one satellite with the front of one piece, inf if none.
 
-    ``own`` is the piece on which the path starts, if any.
+    The kind is LINE, ARC, or BEZIER for a graph. ``own`` is the piece on which the path starts, if any.
     """
     t, end, rotation = span
-    graph, motion, slack = ground.graphs[number], path.motion, path.slack
-    begin, is_own = start_on(number, own, path, ground)
-    form = graph, begin
-    here, rate, _, _, _ = graph_after(form, t, rotation, path)
-    patience = 2.0 * size / motion.fastest
-    reach = slack * graph[g.STEEPNESS]
+    motion, slack = path.motion, path.slack
+    is_own = own.kind == kind and own.piece == number
+    line, conic, patience, reach = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf, slack
+    begin = Start(0.0, 0.0, 0.0, 0.0)
+    if kind == LINE:
+        line = line_form(line_of(ground, number), is_own, path.x, path.y, path.turn, motion)
+    else:
+        patience = 2.0 * size / motion.fastest
+        if kind == ARC:
+            conic = conic_form(arc_of(ground, number), is_own, path.x, path.y)
+            reach = slack * max(1.0, ground.arcs[number, c.STRETCH])
+        else:
+            begin, is_own = start_on(number, own, path, ground)
+            reach = slack * ground.graphs[number, g.STEEPNESS]
+    graph = ground.graphs[number if kind == BEZIER else 0], begin
+    here, rate, _, _ = piece_after(kind, line, conic, graph, t, rotation, path)
     leaving = is_own and t == 0.0
     if t == 0.0 and own.kind != NO_PIECE and not is_own and abs(here) <= reach:
-        leaving = not is_in_front(BEZIER, number, own, path.x, path.y, reach, ground)
+        leaving = not is_in_front(kind, number, own, path.x, path.y, reach, ground)
+    if kind == LINE and stays_in_front(line, span, leaving, motion, slack):
+        return np.inf, satellite_after(t, rotation, path.turn, motion), CLEAR
     sign = 1.0 if here >= 0.0 or (here >= -slack and rate < 0.0) else -1.0
     if leaving:
+        # the side to which the satellite moves: the front of its own piece, either side of another one
         sign = 1.0 if is_own or rate > 0.0 else -1.0
     while True:
-        t, rotation, code = next_root(sign, leaving, None, None, form, Span(t, end, rotation), path, patience)
+        rest = Span(t, end, rotation)
+        if kind == LINE:
+            t, rotation, code = next_root(sign, leaving, line, None, None, rest, path, patience)
+        elif kind == ARC:
+            t, rotation, code = next_root(sign, leaving, None, conic, None, rest, path, patience)
+        else:
+            t, rotation, code = next_root(sign, leaving, None, None, graph, rest, path, patience)
         state, inward = satellite_after(t, rotation, path.turn, motion), 0.0
         if t >= end:
             return np.inf, state, CLEAR
         if code == BOUNCE_LIMIT:
             return t, state, code
+        _, rate, bent, along = piece_after(kind, line, conic, graph, t, rotation, path)
         if sign > 0.0:
-            _, inward, _, along, _ = graph_after(form, t, rotation, path)
-            wide = slack * max(1.0, min(motion.fastest / abs(inward), WIDEST_SLACK))
-            if -wide <= along <= graph[g.WIDTH] + wide:
-                return t, state, CORNER if near_end(graph, path.x + state.dx, path.y + state.dy, wide) else code
+            inward = rate
+            inside, corner = where_on_piece(kind, number, path, state, inward, along, ground)
+            if inside:
+                return t, state, CORNER if corner else code
         if code == GRAZING:
-            # a tangency beside the part: the search goes on where F is four slacks from 0
-            _, _, bent, _, _ = graph_after(form, t, rotation, path)
+            # a tangency beside the piece: a line has no other, and the path stays outside a circle
+            if kind != BEZIER:
+                return np.inf, state, CLEAR
             if sign * bent <= 0.0:
                 return t, state, GRAZING
+            # on a graph the search goes on where F is four slacks from 0
             t += math.sqrt(8.0 * slack / (sign * bent))
             if t >= end:
                 return np.inf, state, CLEAR
@@ -496,19 +493,17 @@ def first_in_hollow(h, own, came_from, path, span, ground):
     t, end, rotation = span
     kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, c.SIZE]
     where = satellite_after(t, rotation, path.turn, motion)
-    ranges = (c.FIRST_JOINT, c.JOINTS_END), (c.FIRST_CIRCLE, c.CIRCLES_END), (c.FIRST_ELLIPSE, c.ELLIPSES_END)
-    for first, end_of_range in ranges:
-        tried = LINE if first == c.FIRST_JOINT else ARC
+    ranges = (
+        (LINE, c.FIRST_JOINT, c.JOINTS_END), (ARC, c.FIRST_CIRCLE, c.CIRCLES_END),
+        (ARC, c.FIRST_ELLIPSE, c.ELLIPSES_END), (BEZIER, c.FIRST_BEZIER, c.BEZIERS_END),
+    )  # fmt: skip
+    for tried, first, end_of_range in ranges:
         for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
-            if tried == ARC or joints[k, c.STARTS_LINE] > 0.0:
+            if tried != LINE or joints[k, c.STARTS_LINE] > 0.0:
                 rest = Span(t, end, rotation)
                 hit, there, unclear = first_on_piece(tried, k, own, path, rest, size, ground)
                 if hit < end:
                     end, kind, number, code, where = hit, tried, k, unclear, there
-    for k in range(int(hollows[h, c.FIRST_BEZIER]), int(hollows[h, c.BEZIERS_END])):
-        hit, there, unclear = first_on_graph(k, own, path, Span(t, end, rotation), size, ground)
-        if hit < end:
-            end, kind, number, code, where = hit, BEZIER, k, unclear, there
     if ground.is_open:
         for side in (-1, 1):
             edge = hollows[h, c.LEFT] if side < 0 else hollows[h, c.RIGHT]

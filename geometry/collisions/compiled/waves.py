@@ -28,12 +28,15 @@ from .contact import (
     WIDEST_SLACK,
     ZERO,
     Motion,
+    arc_of,
     conic_at,
+    conic_form,
     flight,
     line_after,
+    line_form,
+    line_of,
     safe_step,
     satellite_after,
-    towards_line,
     turning,
 )
 from .rigid import above_the_wall, neighbour_at, reflect, start_of, store, surface, unit_velocity
@@ -96,16 +99,12 @@ def after(w, s, line, arc, t, scale):
     _, motion, turn, rotation = state_after(w, s, t, scale)
     x, y, own = w[X + s], w[Y + s], w[OWN + s]
     if line is not None:
-        x0, y0, _, _, g1, g2, _, number = line
-        level = 0.0 if own == number else g1 * (x - x0) + g2 * (y - y0)
-        f, f1, f2 = line_after(towards_line(level, g1, g2, turn, motion), t, rotation, motion)
+        start, _, _, number = line
+        f, f1, f2 = line_after(line_form(start, own == number, x, y, turn, motion), t, rotation, motion)
         return f, f1, f2, motion.spin * motion.spin * abs(motion.omega), 0.0
     if arc is not None:
-        x0, y0, nx, ny, curvature, stretch = arc
-        rx, ry = x - x0, stretch * (y - y0)
-        g1, g2 = nx - curvature * rx, ny - curvature * ry
-        level = 0.0 if own == 0.0 else 0.5 * ((nx + g1) * rx + (ny + g2) * ry)
-        f, f1, f2, n1, n2 = conic_at((level, g1, g2, curvature, stretch), t, rotation, turn, motion)
+        _, _, _, _, curvature, stretch = arc
+        f, f1, f2, n1, n2 = conic_at(conic_form(arc, own == 0.0, x, y), t, rotation, turn, motion)
         bend, widest = motion.spin * motion.omega, max(stretch, 1.0)
         speed, swing = abs(curvature) * widest * motion.fastest, widest * bend * abs(motion.spin)
         return f, f1, f2, swing * (abs(n1) + abs(n2)) + speed * widest * bend * 3.0, swing * speed
@@ -177,7 +176,7 @@ def meet(w, m, line, arc, number, widest, ring):
         inward, wide = abs(rate), motion.fastest * reach
         clear = -y * inward > wide
         if line is not None:
-            x0, y0, edge_x, edge_y, _, _, length, _ = line
+            (x0, y0, _, _), (edge_x, edge_y), length, _ = line
             along = ((x - x0) * edge_x + (y - y0) * edge_y) / length
             clear = (along * inward > wide) & ((length - along) * inward > wide)
         how = CLEAR_HIT if clear else (MISSED if y * inward > wide else UNCLEAR)
@@ -191,7 +190,7 @@ def meet(w, m, line, arc, number, widest, ring):
 @linked
 def enter(w, m, ring, cell):
     """Find when satellites come below the tops, FROM, and in which cell."""
-    search(w, m, (0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, -2.0), None, -2.0, ring.slack * CLOSE, ring)
+    search(w, m, ((0.0, 0.0, 0.0, 1.0), (1.0, 0.0), 1.0, -2.0), None, -2.0, ring.slack * CLOSE, ring)
     for s in range(m):
         found = w[SEARCH + s] == FOUND
         there, motion, _, _ = state_after(w, s, w[ROOT + s], ring.scale)
@@ -269,12 +268,8 @@ def collect(disks, n, satellites, side, ring):
         # the path is convex, so it stays above its first tangent
         rate = satellites[V2 + s] + satellites[OMEGA + s] * sine
         stays = y + (rate if rate < 0.0 else 0.0) * satellites[UNTIL + s] > ring.slack * CLOSE
-        satellites[X + s], satellites[Y + s], satellites[SINE + s], satellites[COSINE + s] = (
-            x - satellites[BASE + s],
-            y,
-            sine,
-            cosine,
-        )
+        satellites[X + s], satellites[Y + s] = x - satellites[BASE + s], y
+        satellites[SINE + s], satellites[COSINE + s] = sine, cosine
         satellites[OWN + s] = satellites[OWN + s] if number == 0.0 else -1.0
         satellites[FROM + s] = np.inf if stays else 0.0
         satellites[HOW + s], satellites[CROSSED + s] = MISSED, -1.0
@@ -382,16 +377,13 @@ def end_disk(w, k, i, position, velocity, disk, scale, results):
 @linked
 def meet_wall(w, m, ring, ground):
     """Find where satellites below the tops meet the wall first."""
-    joints, lines, arcs, hollow = ground.joints, ground.lines, ground.arcs, ground.hollows[0]
-    if arcs.shape[0] > 0:
-        start, normal = (arcs[0, c.START_X], arcs[0, c.START_Y]), (arcs[0, c.NORMAL_X], arcs[0, c.NORMAL_Y])
-        stretch = arcs[0, c.STRETCH]
-        meet(w, m, None, (*start, *normal, arcs[0, c.CURVATURE], stretch), 0.0, max(stretch, 1.0), ring)
+    lines, hollow = ground.lines, ground.hollows[0]
+    if ground.arcs.shape[0] > 0:
+        meet(w, m, None, arc_of(ground, 0), 0.0, max(ground.arcs[0, c.STRETCH], 1.0), ring)
     for k in range(int(hollow[c.FIRST_JOINT]), int(hollow[c.JOINTS_END])):
-        if joints[k, c.STARTS_LINE] > 0.0:
-            start, edge = (joints[k, c.JOINT_X], joints[k, c.JOINT_Y]), (lines[k, c.EDGE_X], lines[k, c.EDGE_Y])
-            normal = lines[k, c.LINE_NORMAL_X], lines[k, c.LINE_NORMAL_Y]
-            meet(w, m, (*start, *edge, *normal, lines[k, c.LENGTH], float(k)), None, float(k), 1.0, ring)
+        if ground.joints[k, c.STARTS_LINE] > 0.0:
+            edge = lines[k, c.EDGE_X], lines[k, c.EDGE_Y]
+            meet(w, m, (line_of(ground, k), edge, lines[k, c.LENGTH], float(k)), None, float(k), 1.0, ring)
 
 
 @linked
