@@ -25,8 +25,10 @@ from .contact import (
     Span,
     Touch,
     Touching,
+    arc_of,
     first_in_hollow,
     flight,
+    line_of,
     next_root,
     satellite_after,
     towards_line,
@@ -150,28 +152,37 @@ def first_contact(own, base, path, t, end, ground):
 
 
 @inlined
+def on_line(k, x, y, ground):
+    """Return the point (x, y) projected onto a line, and the unit normal towards the free side."""
+    joints, lines = ground.joints, ground.lines
+    x0, y0, n1, n2 = line_of(ground, k)
+    ex, ey, length = lines[k, c.EDGE_X], lines[k, c.EDGE_Y], lines[k, c.LENGTH]
+    fraction = ((x - x0) * ex + (y - y0) * ey) / (length * length)
+    if fraction > 0.5:
+        # from the nearer end
+        x0, y0, fraction = joints[k + 1, c.JOINT_X], joints[k + 1, c.JOINT_Y], fraction - 1.0
+    return x0 + fraction * ex, y0 + fraction * ey, n1, n2
+
+
+@inlined
+def on_conic(k, x, y, ground):
+    """Return the point (x, y) projected onto an arc, and the unit normal towards the free side."""
+    x0, y0, n1, n2, curvature, stretch = arc_of(ground, k)
+    qx, qy = x - x0, stretch * (y - y0)
+    m1, m2 = n1 - curvature * qx, n2 - curvature * qy
+    f = 0.5 * ((n1 + m1) * qx + (n2 + m2) * qy)
+    qx, qy = qx - f * m1, qy - f * m2
+    m1, m2 = n1 - curvature * qx, stretch * (n2 - curvature * qy)
+    norm = 1.0 / math.sqrt(m1 * m1 + m2 * m2)
+    return x0 + qx, y0 + qy / stretch, m1 * norm, m2 * norm
+
+
+@inlined
 def surface(kind, index, x, y, ground):
     """Return the point (x, y) projected onto the piece that is hit, and the unit normal towards the free side."""
-    joints, lines, arcs = ground.joints, ground.lines, ground.arcs
     if kind == BEZIER:
         return graph_surface(ground.graphs[index], x, y)
-    if kind == LINE:
-        n1, n2 = lines[index, c.LINE_NORMAL_X], lines[index, c.LINE_NORMAL_Y]
-        ex, ey, length = lines[index, c.EDGE_X], lines[index, c.EDGE_Y], lines[index, c.LENGTH]
-        fraction = ((x - joints[index, c.JOINT_X]) * ex + (y - joints[index, c.JOINT_Y]) * ey) / (length * length)
-        near = index if fraction <= 0.5 else index + 1
-        if near != index:
-            fraction -= 1.0
-        return joints[near, c.JOINT_X] + fraction * ex, joints[near, c.JOINT_Y] + fraction * ey, n1, n2
-    curvature, stretch = arcs[index, c.CURVATURE], arcs[index, c.STRETCH]
-    qx, qy = x - arcs[index, c.START_X], stretch * (y - arcs[index, c.START_Y])
-    n1, n2 = arcs[index, c.NORMAL_X] - curvature * qx, arcs[index, c.NORMAL_Y] - curvature * qy
-    f = 0.5 * ((arcs[index, c.NORMAL_X] + n1) * qx + (arcs[index, c.NORMAL_Y] + n2) * qy)
-    qx -= f * n1
-    qy -= f * n2
-    n1, n2 = arcs[index, c.NORMAL_X] - curvature * qx, stretch * (arcs[index, c.NORMAL_Y] - curvature * qy)
-    norm = 1.0 / math.sqrt(n1 * n1 + n2 * n2)
-    return arcs[index, c.START_X] + qx, arcs[index, c.START_Y] + qy / stretch, n1 * norm, n2 * norm
+    return on_line(index, x, y, ground) if kind == LINE else on_conic(index, x, y, ground)
 
 
 @inlined

@@ -19,11 +19,9 @@ from ...scene import columns as c
 from ...tracing.compiled.options import compiled, inlined, linked
 from ...tracing.compiled.pointers import is_raised
 from ...tracing.compiled.rays import ESCAPED
-from ...tracing.compiled.records import LINE
 from ...tracing.compiled.trigonometry import COSINE as C
 from ...tracing.compiled.trigonometry import SINE as S
 from .contact import (
-    ARC,
     ROOT_FRACTION,
     WIDEST_SLACK,
     ZERO,
@@ -39,10 +37,14 @@ from .contact import (
     satellite_after,
     turning,
 )
-from .rigid import above_the_wall, neighbour_at, reflect, start_of, store, surface, unit_velocity
+from .rigid import above_the_wall, neighbour_at, on_conic, on_line, reflect, start_of, store, unit_velocity
 
-# Number of disks in a wave.
-SIZE = 200
+# Number of disks in a wave, and most numbers of a vector. Loops over satellites compute whole vectors, whose last
+# satellites may not exist, so a column has room for one vector more. Columns at distances of powers of 2 are slow.
+WAVE, VECTOR = 200, 8
+SIZE = WAVE + VECTOR
+# All bits of an index within a column.
+POSITIVE = 2**10 - 1
 # Columns of the work arrays of disks and of satellites. The first satellite of a disk, or the one whose contact is
 # sought, is at (X, Y) and touches the piece OWN (-1 for none). Its motion is searched from FROM, inf if it stays above
 # the tops, to UNTIL; BASE is the left end of its cell.
@@ -131,6 +133,12 @@ def approach(w, s, line, arc, slack, fraction, scale):
     w[SEARCH + s] = FOUND if found else (SEARCHING if live else ENDED)
 
 
+@inlined
+def filled(m):
+    """Return a number of satellites, with those that fill up the last vector."""
+    return (m + VECTOR - 1) & -VECTOR
+
+
 @linked
 def search(w, m, line, arc, number, reach, ring):
     """Find the ROOT at which satellites cross a line or an arc, if they do so before UNTIL.
@@ -140,7 +148,7 @@ def search(w, m, line, arc, number, reach, ring):
     slack, scale, fraction = ring.slack, ring.scale, LEAST_FRACTION
     if line is not None:
         fraction = ROOT_FRACTION
-    for s in range(m):
+    for s in range(filled(m)):
         t, leaving = w[FROM + s], w[OWN + s] == number
         f, f1, f2, third, growth = after(w, s, line, arc, t, scale)
         ahead = w[UNTIL + s] - t
@@ -151,7 +159,7 @@ def search(w, m, line, arc, number, reach, ring):
         w[ROOT + s] = t
         w[SEARCH + s] = SEARCHING if (ahead > 0.0) & (not lowest > slack) else ENDED
         approach(w, s, line, arc, slack, fraction, scale)
-    for s in range(m):
+    for s in range(filled(m)):
         approach(w, s, line, arc, slack, fraction, scale)
     for s in range(m):
         steps = USUAL_STEPS
@@ -167,7 +175,7 @@ def meet(w, m, line, arc, number, widest, ring):
     """Find where satellites cross a line or an arc first, if they do so before they cross another piece."""
     reach = ring.slack * CLOSE * widest
     search(w, m, line, arc, number, reach, ring)
-    for s in range(m):
+    for s in range(filled(m)):
         t, found = w[ROOT + s], w[SEARCH + s] == FOUND
         there, motion, _, _ = state_after(w, s, t, ring.scale)
         _, rate, _, _, _ = after(w, s, line, arc, t, ring.scale)
@@ -191,7 +199,7 @@ def meet(w, m, line, arc, number, widest, ring):
 def enter(w, m, ring, cell):
     """Find when satellites come below the tops, FROM, and in which cell."""
     search(w, m, ((0.0, 0.0, 0.0, 1.0), (1.0, 0.0), 1.0, -2.0), None, -2.0, ring.slack * CLOSE, ring)
-    for s in range(m):
+    for s in range(filled(m)):
         found = w[SEARCH + s] == FOUND
         there, motion, _, _ = state_after(w, s, w[ROOT + s], ring.scale)
         x = w[X + s] + there.dx
@@ -237,6 +245,8 @@ def begin_motion(w, n, ring):
 @inlined
 def move(source, i, target, k, count):
     """Copy the first columns of work arrays from the index i to k."""
+    # so the compiler knows that no index counts from the end
+    i, k = i & POSITIVE, k & POSITIVE
     for column in range(count):
         target[column * SIZE + k] = source[column * SIZE + i]
 
@@ -245,7 +255,7 @@ def move(source, i, target, k, count):
 def collect(disks, n, satellites, side, ring):
     """-> (int, int): collect one satellite of each disk, see `number_of`, if it is below the tops or may come there.
 
-    The number of those above the tops, which are the first, and of all.
+    The number of those above the tops, which are the first and fill up vectors, and of all.
     """
     for i in range(n):
         number, until = number_of(disks, i, side), disks[TIME + i] + disks[TIE + i]
@@ -257,12 +267,12 @@ def collect(disks, n, satellites, side, ring):
         disks[SOUGHT + i] = BELOW if below else (UNSOUGHT if away else ABOVE)
     above, m = ZERO, ZERO
     for sought in (ABOVE, BELOW):
-        above = m
+        above, m = m, filled(m)
         for i in range(n):
             if disks[SOUGHT + i] == sought:
                 move(disks, i, satellites, m, COPIED)
                 m += 1
-    for s in range(m):
+    for s in range(filled(m)):
         number = satellites[NUMBER + s]
         x, y, (sine, cosine) = satellite_of(satellites, s, number, ring)
         # the path is convex, so it stays above its first tangent
@@ -280,7 +290,7 @@ def collect(disks, n, satellites, side, ring):
 def compare(disks, satellites, m, which):
     """Compare the first contacts of satellites with the first so far."""
     for s in range(m):
-        i, time, how = int(satellites[INDEX + s]), satellites[UNTIL + s], satellites[HOW + s]
+        i, time, how = int(satellites[INDEX + s]) & POSITIVE, satellites[UNTIL + s], satellites[HOW + s]
         disks[BELOW_FROM + which * SIZE + i] = satellites[FROM + s]
         disks[LEFT_END + which * SIZE + i] = satellites[BASE + s]
         tied = (disks[HIT + i] >= 0.0) & (abs(time - disks[TIME + i]) <= disks[TIE + i])
@@ -339,10 +349,11 @@ def finish_motion(w, n, limit, ring):
 @linked
 def reflect_disks(w, n, disk, ring, ground):
     """Reflect disks at the pieces that their satellites touch."""
-    kind = ARC if ground.arcs.shape[0] > 0 else LINE
+    is_arc = ground.arcs.shape[0] > 0
     for i in range(n):
         if w[STATUS + i] == GOES_ON:
-            x, y, n1, n2 = surface(kind, int(w[OWN + i]), w[HIT_X + i], w[HIT_Y + i], ground)
+            k, x, y = int(w[OWN + i]), w[HIT_X + i], w[HIT_Y + i]
+            x, y, n1, n2 = on_conic(k, x, y, ground) if is_arc else on_line(k, x, y, ground)
             w[X + i], w[Y + i], w[NORMAL_X + i], w[NORMAL_Y + i] = x, y, n1, n2
     for i in range(n):
         v1, v2, omega, turn = w[V1 + i], w[V2 + i], w[OMEGA + i], (w[SINE + i], w[COSINE + i])
@@ -393,12 +404,12 @@ def move_disks(disks, n, satellites, disk, ring, limit, ground):
     for which in range(3):
         above, m = collect(disks, n, satellites, 0.0 if which == 0 else (1.0 if which == 1 else -1.0), ring)
         enter(satellites, above, ring, ground.cell)
-        for s in range(above - 1, -1, -1):
-            if not satellites[FROM + s] < satellites[UNTIL + s]:
-                if satellites[UNCERTAIN + s] > 0.0:
+        for s in range(filled(above) - 1, -1, -1):
+            if s >= above or not satellites[FROM + s] < satellites[UNTIL + s]:
+                if s < above and satellites[UNCERTAIN + s] > 0.0:
                     disks[UNCERTAIN + int(satellites[INDEX + s])] = 1.0
                 m -= 1
-                move(satellites, m, satellites, s, WORK // SIZE)
+                move(satellites, m, satellites, s, COPIED)
         meet_wall(satellites, m, ring, ground)
         compare(disks, satellites, m, which)
     finish_motion(disks, n, float(limit), ring)
@@ -408,7 +419,7 @@ def move_disks(disks, n, satellites, disk, ring, limit, ground):
 @compiled
 def collide_in_waves(position, velocity, disk, ring, limit, ground, results, disks, satellites):
     """Collide a block of disks into ``results``, with two work arrays; the others have the status `UNDECIDED`."""
-    following = min(position.shape[0], SIZE)
+    following = min(position.shape[0], WAVE)
     n = following
     for k in range(n):
         begin_disk(disks, k, k, position, velocity, disk, ring, ground)
