@@ -11,13 +11,12 @@ from ...core.checks import Floats, positive_number, whole_number
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk
-from ..tracing.threads import in_blocks
 from ..tracing.tracing import MAX_COLLISIONS
 from ..walls.wall import Wall
 from .amplification import DiskCounts
 from .configuration_space import ConfigurationSpace
-from .records import DiskResults, Rolling, ground_of, largest_bend, mass_fractions, position_rounding, results_for
-from .rigid import at_the_tops, check_kinds, checked_states, collide, from_the_tops, marked
+from .records import DiskResults, Rolling, ground_of, largest_bend, mass_fractions, position_rounding
+from .rigid import check_kinds, checked_states, collide, from_height_0, marked
 
 # Newton steps on a convex function: at worst a step halves the error, near the root it squares the error.
 LANDING_STEPS = 80
@@ -106,20 +105,12 @@ def collide_cylinder(
     ground, masses = ground_of(wall.scene), mass_fractions(disk)
     rolling = Rolling(eps, wall.cell.depth, position_rounding(wall.scene, 0.0))
 
-    def collided(at: Floats, moving: Floats) -> DiskResults:
-        start, results = at_the_tops(wall, eps, at, moving), results_for(len(at))
+    def run(start: Floats, moving: Floats, results: DiskResults) -> None:
+        roll_disks(start, moving, masses, rolling, max_contacts, ground, results)
 
-        def run(part: slice) -> None:
-            roll_disks(start[part], moving[part], masses, rolling, max_contacts, ground, results.part(part))
-
-        in_blocks(run, len(at), threads, stop=ground.stop)
-        from_the_tops(wall, eps, at, start, moving, results)
-        return results
-
+    collided = from_height_0(run, wall, eps, ground, threads)
     bend = largest_bend(ground) * (wall.period + wall.depth)
     results = marked(collided, (at, moving), disk, bend, (eps, eps))
-    for array in results:
-        array.setflags(write=False)
     return CylinderCollision(results.position, results.velocity, results.time, results.contacts, results.status)
 
 

@@ -21,6 +21,9 @@ from .records import DiskResults, Ground, Ring, ground_of, is_convex, largest_be
 
 # Mass fractions, satellites, limit on contacts, wall.
 Constants = tuple[tuple[float, float], Ring, int, Ground]
+# Functions of positions and velocities.
+Block = Callable[[Floats, Floats, DiskResults], None]
+Collide = Callable[[Floats, Floats], DiskResults]
 
 
 @dataclass(frozen=True)
@@ -136,31 +139,34 @@ def collide(
     constants = mass_fractions(disk), ring, max_contacts, ground
     collide_block = _in_waves if is_convex(ground) else _one_by_one
 
+    def run(start: Floats, moving: Floats, results: DiskResults) -> None:
+        collide_block(start, moving, constants, results)
+
+    collided = from_height_0(run, wall, eps, ground, threads)
+    bend = (largest_bend(ground) + eps) * (wall.period + wall.depth)
+    return RigidCollision(*marked(collided, (at, moving), disk, bend, (eps, ring.reach)))
+
+
+def from_height_0(run: Block, wall: Wall, scale: float, ground: Ground, threads: int | None) -> Collide:
+    """Return the function of disks at x2 = 0 from that of a block of disks at the level of the highest points."""
+
     def collided(at: Floats, moving: Floats) -> DiskResults:
-        start, results = at_the_tops(wall, eps, at, moving), results_for(len(at))
+        start, results = at_the_tops(wall, scale, at, moving), results_for(len(at))
 
-        def run(part: slice) -> None:
-            collide_block(start[part], moving[part], constants, results.part(part))
+        def run_part(part: slice) -> None:
+            run(start[part], moving[part], results.part(part))
 
-        in_blocks(run, len(at), threads, stop=ground.stop)
-        from_the_tops(wall, eps, at, start, moving, results)
+        in_blocks(run_part, len(at), threads, stop=ground.stop)
+        from_the_tops(wall, scale, at, start, moving, results)
         return results
 
-    bend = (largest_bend(ground) + eps) * (wall.period + wall.depth)
-    results = marked(collided, (at, moving), disk, bend, (eps, ring.reach))
-    for array in results:
-        array.setflags(write=False)
-    return RigidCollision(*results)
+    return collided
 
 
 def marked(
-    collided: Callable[[Floats, Floats], DiskResults],
-    states: tuple[Floats, Floats],
-    disk: Disk,
-    bend: float,
-    sizes: tuple[float, float],
+    collided: Collide, states: tuple[Floats, Floats], disk: Disk, bend: float, sizes: tuple[float, float]
 ) -> DiskResults:
-    """Return the results of disks from ``states``, amplified ones marked.
+    """Return the results of disks from ``states``, read-only, amplified ones marked.
 
     ``bend`` is that of `fewest_contacts`; ``sizes`` are those of x1 and alpha for rounding errors.
     """
@@ -174,6 +180,8 @@ def marked(
 
     ends = results.position, results.velocity
     mark_amplified(again, states, ends, results.status, doubtful, (np.array(sizes), masses))
+    for array in results:
+        array.setflags(write=False)
     return results
 
 
@@ -186,11 +194,10 @@ def _one_by_one(start: Floats, moving: Floats, constants: Constants, results: Di
 
 def _in_waves(start: Floats, moving: Floats, constants: Constants, results: DiskResults) -> None:
     """Collide a block of disks with a wall whose cell is one convex hollow."""
-    from .compiled.lanes import WORK
-    from .compiled.waves import UNDECIDED, collide_in_waves
+    from .compiled.waves import UNDECIDED, WORK, collide_in_waves
 
     *_, ground = constants
-    collide_in_waves(start, moving, *constants, results, np.zeros(WORK))
+    collide_in_waves(start, moving, *constants, results, *np.zeros((2, WORK)))
     rest = np.flatnonzero(results.status == UNDECIDED)
     if len(rest) and not ground.stop[0]:
         found = results_for(len(rest))

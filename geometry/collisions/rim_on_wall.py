@@ -110,10 +110,7 @@ def collide_rim(
         return results
 
     bend = eps * (wall.period + wall.depth) * (1.0 + largest_bend_of(body))
-    results = marked(collided, (at, moving), body.disk, bend, (eps, body.spacing))
-    for array in results:
-        array.setflags(write=False)
-    return RigidCollision(*results)
+    return RigidCollision(*marked(collided, (at, moving), body.disk, bend, (eps, body.spacing)))
 
 
 class _AboveWall:

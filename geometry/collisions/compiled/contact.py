@@ -1,6 +1,6 @@
 """The position of a satellite of the moving disk, and its first contact with a piece of the wall: compiled.
 
-A satellite meets a line, an upright conic or a graph, a part of a Bezier piece, at F = 0, see below and `graphs`.
+A satellite meets a line, an upright conic or a graph, a part of a Bezier piece, at F = 0, see below.
 
 **No root is passed.** On [t, t + ahead] the second derivative of F(D(t)) is at least c = F''(t) - L ahead, where L
 bounds the third derivative. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is
@@ -20,8 +20,9 @@ which is evaluated by products, without cancellation. A line or an upright conic
 
 F(D) = f + g.D - curvature |D|^2/2     (y multiplied by the arc's stretch; curvature 0 for lines),
 
-where f and g are constants at the start of the motion. The tables are those of the planar tracer, see `scene/scene`,
-with circles and ellipses in one table ``arcs``.
+where f and g are constants at the start of the motion. A graph eta = h(xi) over a chord is F = eta - h(xi); the
+acceleration of the satellite and the bounds on h'' bound its F'' below. The tables are those of the planar tracer, see
+`scene/scene`, with circles and ellipses in one table ``arcs``. Loads numba.
 """
 
 from __future__ import annotations
@@ -35,14 +36,14 @@ from ...scene import columns as c
 from ...tracing.compiled.arcs import near_end, on_arc
 from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
-from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE
+from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
 from ...tracing.double_double.numbers import extended
 from ...tracing.double_double.records import ARC as CURVED
 from ...tracing.double_double.records import BEZIER as SPLINE
 from ...tracing.double_double.records import LINE as STRAIGHT
 from ...tracing.double_double.sides import Arrival, Face, in_front_at
-from .graph_table import FIRST_S, LEAST_BEND, MOST_BEND, PIECE, STEEPNESS, THIRD
-from .shapes import height_above, in_frame, parameter_at
+from . import graph_table as g
+from .shapes import Start, height_above, in_frame, parameter_at
 
 # Angle below which `turning` uses series up to the tenth power; the omitted terms are below 3e-18 of the sum.
 SMALL_TURN = 0.1
@@ -173,29 +174,35 @@ def line_after(line, t, rotation, motion):
 
 
 @inlined
-def conic_after(conic, t, rotation, turn, motion):
-    """Return F of a conic after the time t, F', F'', and b0 and b1: |F'''| is at most b0 + b1 s up to t + s."""
+def conic_at(conic, t, rotation, turn, motion):
+    """Return F of a conic after the time t, F', F'', and the normal there, up to its length."""
     level, g1, g2, curvature, stretch = conic
     dx, dy, sine, cosine = satellite_after(t, rotation, turn, motion)
     dy *= stretch
     n1, n2 = g1 - curvature * dx, g2 - curvature * dy
     u1, u2 = motion.v1 + motion.omega * cosine, stretch * (motion.v2 + motion.omega * sine)
-    bend = motion.spin * motion.omega
-    f2 = bend * (stretch * n2 * cosine - n1 * sine) - curvature * (u1 * u1 + u2 * u2)
-    widest = max(1.0, stretch)
-    speed = widest * motion.fastest
-    swing, bent = widest * bend * abs(motion.spin), abs(curvature) * speed
+    f2 = motion.spin * motion.omega * (stretch * n2 * cosine - n1 * sine) - curvature * (u1 * u1 + u2 * u2)
+    return level + 0.5 * ((g1 + n1) * dx + (g2 + n2) * dy), n1 * u1 + n2 * u2, f2, n1, n2
+
+
+@inlined
+def conic_after(conic, t, rotation, turn, motion):
+    """Return F of a conic after the time t, F', F'', and b0 and b1: |F'''| is at most b0 + b1 s up to t + s."""
+    f, f1, f2, n1, n2 = conic_at(conic, t, rotation, turn, motion)
+    _, _, _, curvature, stretch = conic
+    bend, widest = motion.spin * motion.omega, max(1.0, stretch)
+    swing, bent = widest * bend * abs(motion.spin), abs(curvature) * (widest * motion.fastest)
     third = swing * (abs(n1) + abs(n2)) + 3.0 * bent * widest * bend
-    return level + 0.5 * ((g1 + n1) * dx + (g2 + n2) * dy), n1 * u1 + n2 * u2, f2, third, swing * bent
+    return f, f1, f2, third, swing * bent
 
 
 @inlined
 def safe_step(f, f1, f2):
     """Return the first positive root of the parabola f + f1 t + f2 t^2/2, f >= 0, or inf; 0 only if f = 0 > f1."""
     disc = f1 * f1 - 2.0 * f2 * f
-    if f1 < 0.0:
-        return 2.0 * f / (math.sqrt(disc) - f1) if disc >= 0.0 else np.inf
-    return (f1 + math.sqrt(disc)) / -f2 if f2 < 0.0 else np.inf
+    falling, root = f1 < 0.0, math.sqrt(disc)
+    step = (2.0 * f if falling else f1 + root) / (root - f1 if falling else -f2)
+    return step if (falling & (disc >= 0.0)) | ((not falling) & (f2 < 0.0)) else np.inf
 
 
 @inlined
@@ -218,11 +225,13 @@ def graph_bounds(sign, graph, motion, xi1, ahead):
 
     ``third`` bounds |F'''|.
     """
-    most, least = (graph[MOST_BEND], graph[LEAST_BEND]) if sign > 0.0 else (-graph[LEAST_BEND], -graph[MOST_BEND])
+    most, least = (
+        (graph[g.MOST_BEND], graph[g.LEAST_BEND]) if sign > 0.0 else (-graph[g.LEAST_BEND], -graph[g.MOST_BEND])
+    )
     pull = abs(motion.spin * motion.omega)
-    inertial = pull * graph[STEEPNESS]
+    inertial = pull * graph[g.STEEPNESS]
     speed = min(motion.fastest, abs(xi1) + pull * ahead)
-    third = speed * (graph[THIRD] * speed * speed + 3.0 * (most - least) * pull) + inertial * abs(motion.spin)
+    third = speed * (graph[g.THIRD] * speed * speed + 3.0 * (most - least) * pull) + inertial * abs(motion.spin)
     return -inertial - most * speed * speed, 2.0 * inertial + (most - least) * speed * speed, third
 
 
@@ -302,8 +311,8 @@ def face_at(kind, number, x, y, ground):
     if kind != BEZIER:
         return Face(CURVED if kind == ARC else STRAIGHT, number, arc, arc, extended(0.0))
     along, _ = in_frame(graph, x - graph[c.START_X], y - graph[c.START_Y])
-    curve = ground.beziers[int(graph[PIECE])]
-    return Face(SPLINE, number, arc, curve, extended(graph[FIRST_S] + parameter_at(graph, along)))
+    curve = ground.beziers[int(graph[g.PIECE])]
+    return Face(SPLINE, number, arc, curve, extended(graph[g.FIRST_S] + parameter_at(graph, along)))
 
 
 @inner
@@ -316,23 +325,50 @@ def is_in_front(kind, number, own, x, y, slack, ground):
 
 
 @inlined
-def line_form(number, is_own, path, ground):
-    """-> line: F of a line along a path, see `towards_line`."""
-    joints, lines = ground.joints, ground.lines
-    g1, g2 = lines[number, c.LINE_NORMAL_X], lines[number, c.LINE_NORMAL_Y]
-    level = 0.0 if is_own else g1 * (path.x - joints[number, c.JOINT_X]) + g2 * (path.y - joints[number, c.JOINT_Y])
-    return towards_line(level, g1, g2, path.turn, path.motion)
+def line_form(line, is_own, x, y, turn, motion):
+    """-> line: F of a line along a path from (x, y), see `towards_line`; ``line`` is a point of it and its normal."""
+    x0, y0, g1, g2 = line
+    return towards_line(0.0 if is_own else g1 * (x - x0) + g2 * (y - y0), g1, g2, turn, motion)
 
 
 @inlined
-def conic_form(number, is_own, path, ground):
-    """-> conic: F of an arc along a path, (f, g1, g2, curvature, stretch)."""
-    arcs = ground.arcs
-    curvature, stretch = arcs[number, c.CURVATURE], arcs[number, c.STRETCH]
-    rx, ry = path.x - arcs[number, c.START_X], stretch * (path.y - arcs[number, c.START_Y])
-    g1, g2 = arcs[number, c.NORMAL_X] - curvature * rx, arcs[number, c.NORMAL_Y] - curvature * ry
-    level = 0.0 if is_own else 0.5 * ((arcs[number, c.NORMAL_X] + g1) * rx + (arcs[number, c.NORMAL_Y] + g2) * ry)
-    return level, g1, g2, curvature, stretch
+def conic_form(arc, is_own, x, y):
+    """-> conic: F of an arc along a path from (x, y), (f, g1, g2, curvature, stretch).
+
+    ``arc`` is a point of it, the normal there, curvature and stretch.
+    """
+    x0, y0, n1, n2, curvature, stretch = arc
+    rx, ry = x - x0, stretch * (y - y0)
+    g1, g2 = n1 - curvature * rx, n2 - curvature * ry
+    return 0.0 if is_own else 0.5 * ((n1 + g1) * rx + (n2 + g2) * ry), g1, g2, curvature, stretch
+
+
+@inlined
+def line_of(ground, k):
+    """-> line: the start of a line and its normal."""
+    joints, lines = ground.joints, ground.lines
+    return joints[k, c.JOINT_X], joints[k, c.JOINT_Y], lines[k, c.LINE_NORMAL_X], lines[k, c.LINE_NORMAL_Y]
+
+
+@inlined
+def arc_of(ground, k):
+    """-> arc: the start of an arc, its normal there, curvature and stretch."""
+    arc = ground.arcs[k]
+    x, y, curvature, stretch = arc[c.START_X], arc[c.START_Y], arc[c.CURVATURE], arc[c.STRETCH]
+    return x, y, arc[c.NORMAL_X], arc[c.NORMAL_Y], curvature, stretch
+
+
+@inlined
+def piece_after(kind, line, conic, graph, t, rotation, path):
+    """-> (F, F', F'', abscissa): of a piece of any kind on a path after the time t; the abscissa is that of a graph."""
+    if kind == LINE:
+        f, f1, f2 = line_after(line, t, rotation, path.motion)
+        return f, f1, f2, 0.0
+    if kind == ARC:
+        f, f1, f2, _, _ = conic_at(conic, t, rotation, path.turn, path.motion)
+        return f, f1, f2, 0.0
+    f, f1, f2, along, _ = graph_after(graph, t, rotation, path)
+    return f, f1, f2, along
 
 
 @inlined
@@ -347,8 +383,8 @@ def stays_in_front(line, span, leaving, motion, slack):
 
 
 @inlined
-def where_on_piece(kind, number, path, state, inward, ground):
-    """-> (inside, corner): whether a point of the line or conic of a piece is on it; see `where_on_line`.
+def where_on_piece(kind, number, path, state, inward, along, ground):
+    """-> (inside, corner): whether a point of the continuation of a piece is on it; see `where_on_line`.
 
     At shallow incidence a rounding error across the piece is a larger error along it.
     """
@@ -356,30 +392,52 @@ def where_on_piece(kind, number, path, state, inward, ground):
     wide = path.slack * max(1.0, min(path.motion.fastest / abs(inward), WIDEST_SLACK))
     if kind == LINE:
         return where_on_line(ground.joints, ground.lines, number, x, y, wide)
+    if kind == BEZIER:
+        graph = ground.graphs[number]
+        return -wide <= along <= graph[g.WIDTH] + wide, near_end(graph, x, y, wide)
     arc, stretch = ground.arcs[number], ground.arcs[number, c.STRETCH]
     inside = on_arc(arc, x - arc[c.START_X], stretch * (y - arc[c.START_Y]), wide * max(1.0, stretch))
     return inside, near_end(arc, x, y, wide)
 
 
 @inlined
+def start_on(number, own, path, ground):
+    """-> (Start, is_own): the start of a path in the frame of a graph, and whether it lies on the graph's formula."""
+    graph = ground.graphs[number]
+    if own.kind == BEZIER and ground.graphs[own.piece, g.PIECE] == graph[g.PIECE]:
+        left = ground.graphs[own.piece]
+        along, _ = in_frame(left, path.x - left[c.START_X], path.y - left[c.START_Y])
+        sigma = parameter_at(left, along) + (left[g.FIRST_S] - graph[g.FIRST_S])
+        if graph[g.LEAST_SIGMA] <= sigma <= graph[g.MOST_SIGMA]:
+            abscissa = sigma * (graph[g.XI1] + sigma * (graph[g.XI2] + sigma * graph[g.XI3]))
+            return Start(abscissa, 0.0, 0.0, sigma), True
+    xi, eta = in_frame(graph, path.x - graph[c.START_X], path.y - graph[c.START_Y])
+    return Start(xi, xi, eta, 0.0), False
+
+
+@inlined
 def first_on_piece(kind, number, own, path, span, size, ground):
     """-> (t, state, code): first contact in the span of one satellite with the front of one piece, inf if none.
 
-    ``own`` is the piece on which the path starts, if any.
+    The kind is LINE, ARC, or BEZIER for a graph. ``own`` is the piece on which the path starts, if any.
     """
     t, end, rotation = span
     motion, slack = path.motion, path.slack
     is_own = own.kind == kind and own.piece == number
-    line, conic, patience = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf
+    line, conic, patience, reach = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf, slack
+    begin = Start(0.0, 0.0, 0.0, 0.0)
     if kind == LINE:
-        line = line_form(number, is_own, path, ground)
-        here, rate, _ = line_after(line, t, rotation, motion)
-        reach = slack
+        line = line_form(line_of(ground, number), is_own, path.x, path.y, path.turn, motion)
     else:
-        conic = conic_form(number, is_own, path, ground)
-        here, rate, _, _, _ = conic_after(conic, t, rotation, path.turn, motion)
-        reach = slack * max(1.0, ground.arcs[number, c.STRETCH])
         patience = 2.0 * size / motion.fastest
+        if kind == ARC:
+            conic = conic_form(arc_of(ground, number), is_own, path.x, path.y)
+            reach = slack * max(1.0, ground.arcs[number, c.STRETCH])
+        else:
+            begin, is_own = start_on(number, own, path, ground)
+            reach = slack * ground.graphs[number, g.STEEPNESS]
+    graph = ground.graphs[number if kind == BEZIER else 0], begin
+    here, rate, _, _ = piece_after(kind, line, conic, graph, t, rotation, path)
     leaving = is_own and t == 0.0
     if t == 0.0 and own.kind != NO_PIECE and not is_own and abs(here) <= reach:
         leaving = not is_in_front(kind, number, own, path.x, path.y, reach, ground)
@@ -393,24 +451,67 @@ def first_on_piece(kind, number, own, path, span, size, ground):
         rest = Span(t, end, rotation)
         if kind == LINE:
             t, rotation, code = next_root(sign, leaving, line, None, None, rest, path, patience)
-        else:
+        elif kind == ARC:
             t, rotation, code = next_root(sign, leaving, None, conic, None, rest, path, patience)
+        else:
+            t, rotation, code = next_root(sign, leaving, None, None, graph, rest, path, patience)
         state, inward = satellite_after(t, rotation, path.turn, motion), 0.0
         if t >= end:
             return np.inf, state, CLEAR
         if code == BOUNCE_LIMIT:
             return t, state, code
+        _, rate, bent, along = piece_after(kind, line, conic, graph, t, rotation, path)
         if sign > 0.0:
-            if kind == LINE:
-                _, inward, _ = line_after(line, t, rotation, motion)
-            else:
-                _, inward, _, _, _ = conic_after(conic, t, rotation, path.turn, motion)
-            inside, corner = where_on_piece(kind, number, path, state, inward, ground)
+            inward = rate
+            inside, corner = where_on_piece(kind, number, path, state, inward, along, ground)
             if inside:
                 return t, state, CORNER if corner else code
         if code == GRAZING:
             # a tangency beside the piece: a line has no other, and the path stays outside a circle
-            return np.inf, state, CLEAR
+            if kind != BEZIER:
+                return np.inf, state, CLEAR
+            if sign * bent <= 0.0:
+                return t, state, GRAZING
+            # on a graph the search goes on where F is four slacks from 0
+            t += math.sqrt(8.0 * slack / (sign * bent))
+            if t >= end:
+                return np.inf, state, CLEAR
+            rotation, leaving = turning(motion.spin * t), False
+            continue
         if code == CLEAR or inward < 0.0:
             sign = -sign
         leaving = True
+
+
+@inlined
+def first_in_hollow(h, own, came_from, path, span, ground):
+    """-> Touch: the first contact of one satellite with the pieces of hollow h.
+
+    The sides of the cell of an open wall count as pieces. ``came_from`` is -1 or 1 if the satellite has just entered
+    through the left or the right side.
+    """
+    hollows, joints, motion = ground.hollows, ground.joints, path.motion
+    t, end, rotation = span
+    kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, c.SIZE]
+    where = satellite_after(t, rotation, path.turn, motion)
+    ranges = (
+        (LINE, c.FIRST_JOINT, c.JOINTS_END), (ARC, c.FIRST_CIRCLE, c.CIRCLES_END),
+        (ARC, c.FIRST_ELLIPSE, c.ELLIPSES_END), (BEZIER, c.FIRST_BEZIER, c.BEZIERS_END),
+    )  # fmt: skip
+    for tried, first, end_of_range in ranges:
+        for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
+            if tried != LINE or joints[k, c.STARTS_LINE] > 0.0:
+                rest = Span(t, end, rotation)
+                hit, there, unclear = first_on_piece(tried, k, own, path, rest, size, ground)
+                if hit < end:
+                    end, kind, number, code, where = hit, tried, k, unclear, there
+    if ground.is_open:
+        for side in (-1, 1):
+            edge = hollows[h, c.LEFT] if side < 0 else hollows[h, c.RIGHT]
+            line = towards_line(side * (edge - path.x), -float(side), 0.0, path.turn, motion)
+            rest = Span(t, end, rotation)
+            hit, then, unclear = next_root(1.0, came_from == side, line, None, None, rest, path, np.inf)
+            if hit < end:
+                end, kind, number, code = hit, SIDE, side, unclear
+                where = satellite_after(hit, then, path.turn, motion)
+    return Touch(end if kind != NO_PIECE else np.inf, kind, number, where, code)

@@ -15,7 +15,6 @@ from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.pointers import is_raised
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
-from .columns import ALPHA, OMEGA, V1, V2, X1
 from .contact import (
     CLEAR,
     NO,
@@ -26,15 +25,20 @@ from .contact import (
     Span,
     Touch,
     Touching,
+    arc_of,
+    first_in_hollow,
     flight,
+    line_of,
     next_root,
     satellite_after,
     towards_line,
     turning,
 )
-from .hollows import first_in_hollow
 from .shapes import graph_surface
 
+# Columns of the positions of disks, in units of the radius: x of the centre and angle; and of their velocities.
+X1, ALPHA = 0, 1
+V1, V2, OMEGA = 0, 1, 2
 TOP = 7
 # Limit on the cells that one satellite passes, and on the satellites that pass the lowest point, between two contacts.
 MOST_CELLS = 1_000_000
@@ -148,45 +152,69 @@ def first_contact(own, base, path, t, end, ground):
 
 
 @inlined
+def on_line(k, x, y, ground):
+    """Return the point (x, y) projected onto a line, and the unit normal towards the free side."""
+    joints, lines = ground.joints, ground.lines
+    x0, y0, n1, n2 = line_of(ground, k)
+    ex, ey, length = lines[k, c.EDGE_X], lines[k, c.EDGE_Y], lines[k, c.LENGTH]
+    fraction = ((x - x0) * ex + (y - y0) * ey) / (length * length)
+    if fraction > 0.5:
+        # from the nearer end
+        x0, y0, fraction = joints[k + 1, c.JOINT_X], joints[k + 1, c.JOINT_Y], fraction - 1.0
+    return x0 + fraction * ex, y0 + fraction * ey, n1, n2
+
+
+@inlined
+def on_conic(k, x, y, ground):
+    """Return the point (x, y) projected onto an arc, and the unit normal towards the free side."""
+    x0, y0, n1, n2, curvature, stretch = arc_of(ground, k)
+    qx, qy = x - x0, stretch * (y - y0)
+    m1, m2 = n1 - curvature * qx, n2 - curvature * qy
+    f = 0.5 * ((n1 + m1) * qx + (n2 + m2) * qy)
+    qx, qy = qx - f * m1, qy - f * m2
+    m1, m2 = n1 - curvature * qx, stretch * (n2 - curvature * qy)
+    norm = 1.0 / math.sqrt(m1 * m1 + m2 * m2)
+    return x0 + qx, y0 + qy / stretch, m1 * norm, m2 * norm
+
+
+@inlined
 def surface(kind, index, x, y, ground):
     """Return the point (x, y) projected onto the piece that is hit, and the unit normal towards the free side."""
-    joints, lines, arcs = ground.joints, ground.lines, ground.arcs
     if kind == BEZIER:
         return graph_surface(ground.graphs[index], x, y)
-    if kind == LINE:
-        n1, n2 = lines[index, c.LINE_NORMAL_X], lines[index, c.LINE_NORMAL_Y]
-        ex, ey, length = lines[index, c.EDGE_X], lines[index, c.EDGE_Y], lines[index, c.LENGTH]
-        fraction = ((x - joints[index, c.JOINT_X]) * ex + (y - joints[index, c.JOINT_Y]) * ey) / (length * length)
-        near = index if fraction <= 0.5 else index + 1
-        if near != index:
-            fraction -= 1.0
-        return joints[near, c.JOINT_X] + fraction * ex, joints[near, c.JOINT_Y] + fraction * ey, n1, n2
-    curvature, stretch = arcs[index, c.CURVATURE], arcs[index, c.STRETCH]
-    qx, qy = x - arcs[index, c.START_X], stretch * (y - arcs[index, c.START_Y])
-    n1, n2 = arcs[index, c.NORMAL_X] - curvature * qx, arcs[index, c.NORMAL_Y] - curvature * qy
-    f = 0.5 * ((arcs[index, c.NORMAL_X] + n1) * qx + (arcs[index, c.NORMAL_Y] + n2) * qy)
-    qx -= f * n1
-    qy -= f * n2
-    n1, n2 = arcs[index, c.NORMAL_X] - curvature * qx, stretch * (arcs[index, c.NORMAL_Y] - curvature * qy)
-    norm = 1.0 / math.sqrt(n1 * n1 + n2 * n2)
-    return arcs[index, c.START_X] + qx, arcs[index, c.START_Y] + qy / stretch, n1 * norm, n2 * norm
+    return on_line(index, x, y, ground) if kind == LINE else on_conic(index, x, y, ground)
+
+
+@inlined
+def neighbour_at(x, y, turn, half_sine, half_cosine, scale):
+    """Return the position and (sine, cosine) of the satellite at an angle from the one at (x, y), by its half.
+
+    The position is computed from a chord, without cancellation of numbers of the size of the disk.
+    """
+    sine, cosine = turn
+    across = 2.0 * half_sine * (cosine * half_cosine - sine * half_sine)
+    upward = 2.0 * half_sine * (sine * half_cosine + cosine * half_sine)
+    return x + across / scale, y + upward / scale, (sine + across, cosine - upward)
 
 
 @inlined
 def satellite_at(x, y, turn, j, ring):
     """Return the position and (sine, cosine) of the j-th satellite after the one at (x, y) and ``turn``.
 
-    The position is computed from a chord, without cancellation of numbers of the disk's size. For neighbours, by far
-    the most frequent case, no sine is computed.
+    For neighbours, by far the most frequent case, no sine is computed.
     """
     half_sine, half_cosine = j * ring.half_sine, ring.half_cosine
     if abs(j) != 1:
         half = 0.5 * j * ring.spacing
         half_sine, half_cosine = math.sin(half), math.cos(half)
-    sine, cosine = turn
-    across = 2.0 * half_sine * (cosine * half_cosine - sine * half_sine)
-    upward = 2.0 * half_sine * (sine * half_cosine + cosine * half_sine)
-    return x + across / ring.scale, y + upward / ring.scale, (sine + across, cosine - upward)
+    return neighbour_at(x, y, turn, half_sine, half_cosine, ring.scale)
+
+
+@inlined
+def above_the_wall(angle, spin, until, reach):
+    """Whether a satellite at an angle from the lowest point is out of reach of the wall up to a time."""
+    beyond = abs(angle) - reach
+    return (beyond > 0.0) & ((angle * spin >= 0.0) | (beyond >= abs(spin) * until))
 
 
 @inlined
@@ -377,28 +405,36 @@ def unit_velocity(velocity, i, disk):
     return norm, (velocity[i, V1] / norm, velocity[i, V2] / norm, velocity[i, OMEGA] / norm)
 
 
+@inlined
+def start_of(position, i, width, ring):
+    """-> (entry, angle): where disk i meets the tops in its cell, and the angle of its lowest satellite."""
+    entry = (position[i, X1] - math.floor(position[i, X1] / width) * width) / ring.scale
+    return entry, position[i, ALPHA] - ring.spacing * round(position[i, ALPHA] / ring.spacing)
+
+
+@inlined
+def store(results, i, position, norm, path, velocity, contacts, two, status):
+    """Store the result of disk i; ``path`` is (displacement, rotation, time), the unit of velocities is ``norm``."""
+    travel, rotation, time = path
+    v1, v2, omega = velocity
+    results.position[i, X1], results.position[i, ALPHA] = position[i, X1] + travel, position[i, ALPHA] + rotation
+    results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = norm * v1, norm * v2, norm * omega
+    results.time[i], results.contacts[i] = time / norm, contacts
+    results.two_satellites[i], results.status[i] = two, status
+
+
 @compiled
 def collide_disks(position, velocity, disk, ring, limit, ground, results):
     """Collide a block of disks into ``results``, see `DiskResults`."""
-    scale, spacing = ring.scale, ring.spacing
-    width = scale * ground.cell
+    scale = ring.scale
     for i in range(position.shape[0]):
         if is_raised(ground.stop):
             break
         norm, unit = unit_velocity(velocity, i, disk)
-        entry = (position[i, X1] - math.floor(position[i, X1] / width) * width) / scale
-        angle = position[i, ALPHA] - spacing * round(position[i, ALPHA] / spacing)
-        travel, rotation, time, (v1, v2, omega), results.contacts[i], results.two_satellites[i], results.status[i] = (
-            collide_disk(entry, angle, unit, disk, ring, limit, ground)
-        )
-        results.position[i, X1] = position[i, X1] + scale * travel
-        results.position[i, ALPHA] = position[i, ALPHA] + rotation
-        results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = (
-            norm * v1,
-            norm * v2,
-            norm * omega,
-        )
-        results.time[i] = scale * time / norm
+        entry, angle = start_of(position, i, scale * ground.cell, ring)
+        travel, rotation, time, end, contacts, two, status = collide_disk(entry, angle, unit, disk, ring, limit, ground)
+        path = scale * travel, rotation, scale * time
+        store(results, i, position, norm, path, end, contacts, two, status)
 
 
 @inlined
@@ -452,14 +488,6 @@ def roll_disks(position, velocity, disk, rolling, limit, ground, results):
         norm, unit = unit_velocity(velocity, i, disk)
         entry = (position[i, X1] + position[i, ALPHA]) / scale
         entry -= math.floor(entry / ground.cell) * ground.cell
-        travel, rotation, time, (v1, v2, omega), results.contacts[i], results.status[i] = roll_disk(
-            entry, unit, disk, rolling, limit, ground
-        )
-        results.position[i, X1] = position[i, X1] + scale * travel
-        results.position[i, ALPHA] = position[i, ALPHA] + scale * rotation
-        results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = (
-            norm * v1,
-            norm * v2,
-            norm * omega,
-        )
-        results.time[i] = scale * time / norm
+        travel, rotation, time, end, contacts, status = roll_disk(entry, unit, disk, rolling, limit, ground)
+        path = scale * travel, scale * rotation, scale * time
+        store(results, i, position, norm, path, end, contacts, NO, status)

@@ -6,20 +6,9 @@ import math
 from typing import NamedTuple
 
 from ....core.rounding import EPS
-from ...scene.columns import START_X, START_Y
+from ...scene import columns as c
 from ...tracing.compiled.options import inlined
-from .graph_table import (
-    ALONG_X,
-    ALONG_Y,
-    ETA1,
-    ETA2,
-    ETA3,
-    LEAST_SIGMA,
-    MOST_SIGMA,
-    XI1,
-    XI2,
-    XI3,
-)
+from . import graph_table as g
 
 # Limit on Newton steps for the parameter at an abscissa; a bisection would need 53.
 NEWTON_STEPS = 60
@@ -41,8 +30,8 @@ class Start(NamedTuple):
 @inlined
 def parameter_at(graph, xi):
     """-> sigma: the parameter of the graph at an abscissa, at most the ends of its formula."""
-    low, high = graph[LEAST_SIGMA], graph[MOST_SIGMA]
-    x1, x2, x3 = graph[XI1], graph[XI2], graph[XI3]
+    low, high = graph[g.LEAST_SIGMA], graph[g.MOST_SIGMA]
+    x1, x2, x3 = graph[g.XI1], graph[g.XI2], graph[g.XI3]
     if xi <= low * (x1 + low * (x2 + low * x3)):
         return low
     if xi >= high * (x1 + high * (x2 + high * x3)):
@@ -70,11 +59,11 @@ def parameter_at(graph, xi):
 def shape_at(graph, xi):
     """-> (sigma, slope, bend): parameter, h' and h'' at an abscissa; h'' is 0 where the graph is continued."""
     sigma = parameter_at(graph, xi)
-    xi1 = graph[XI1] + sigma * (2.0 * graph[XI2] + 3.0 * sigma * graph[XI3])
-    eta1 = graph[ETA1] + sigma * (2.0 * graph[ETA2] + 3.0 * sigma * graph[ETA3])
-    xi2, eta2 = 2.0 * graph[XI2] + 6.0 * sigma * graph[XI3], 2.0 * graph[ETA2] + 6.0 * sigma * graph[ETA3]
+    xi1 = graph[g.XI1] + sigma * (2.0 * graph[g.XI2] + 3.0 * sigma * graph[g.XI3])
+    eta1 = graph[g.ETA1] + sigma * (2.0 * graph[g.ETA2] + 3.0 * sigma * graph[g.ETA3])
+    xi2, eta2 = 2.0 * graph[g.XI2] + 6.0 * sigma * graph[g.XI3], 2.0 * graph[g.ETA2] + 6.0 * sigma * graph[g.ETA3]
     slope = eta1 / xi1
-    if sigma <= graph[LEAST_SIGMA] or sigma >= graph[MOST_SIGMA]:
+    if sigma <= graph[g.LEAST_SIGMA] or sigma >= graph[g.MOST_SIGMA]:
         return sigma, slope, 0.0
     return sigma, slope, (eta2 - slope * xi2) / (xi1 * xi1)
 
@@ -86,30 +75,30 @@ def height_above(graph, begin, d_xi, d_eta):
     # h(xi) - h(xi0) by divided differences, which do not cancel
     first = begin.sigma
     both, squares = sigma + first, sigma * (sigma + first) + first * first
-    run = (sigma - first) * (graph[XI1] + graph[XI2] * both + graph[XI3] * squares)
-    rise = (sigma - first) * (graph[ETA1] + graph[ETA2] * both + graph[ETA3] * squares)
+    run = (sigma - first) * (graph[g.XI1] + graph[g.XI2] * both + graph[g.XI3] * squares)
+    rise = (sigma - first) * (graph[g.ETA1] + graph[g.ETA2] * both + graph[g.ETA3] * squares)
     return begin.eta + d_eta - rise - slope * (begin.xi + d_xi - run), slope, bend
 
 
 @inlined
 def in_frame(graph, x, y):
     """-> (xi, eta): the components of a vector along the chord and to its left."""
-    ux, uy = graph[ALONG_X], graph[ALONG_Y]
+    ux, uy = graph[g.ALONG_X], graph[g.ALONG_Y]
     return ux * x + uy * y, ux * y - uy * x
 
 
 @inlined
 def graph_surface(graph, x, y):
     """-> (x, y, n1, n2): the point projected onto the graph, and the unit normal towards the free side."""
-    xi, eta = in_frame(graph, x - graph[START_X], y - graph[START_Y])
+    xi, eta = in_frame(graph, x - graph[c.START_X], y - graph[c.START_Y])
     f, slope, _ = height_above(graph, Start(xi, xi, eta, 0.0), 0.0, 0.0)
     square = 1.0 + slope * slope
     # along the normal (-slope, 1)
     xi, eta = xi + f * slope / square, eta - f / square
-    ux, uy, norm = graph[ALONG_X], graph[ALONG_Y], 1.0 / math.sqrt(square)
+    ux, uy, norm = graph[g.ALONG_X], graph[g.ALONG_Y], 1.0 / math.sqrt(square)
     return (
-        graph[START_X] + ux * xi - uy * eta,
-        graph[START_Y] + uy * xi + ux * eta,
+        graph[c.START_X] + ux * xi - uy * eta,
+        graph[c.START_Y] + uy * xi + ux * eta,
         (-slope * ux - uy) * norm,
         (ux - slope * uy) * norm,
     )

@@ -1,12 +1,11 @@
-"""Disks in lanes over convex hollows: the same collisions as one by one, whatever the other disks are."""
+"""Disks in waves over convex hollows: the same collisions as one by one, whatever the other disks are."""
 
 import numpy as np
 import pytest
 
 from asperity import geometry as geo
 from asperity.geometry.collisions import rigid
-from asperity.geometry.collisions.compiled.lanes import WORK
-from asperity.geometry.collisions.compiled.waves import UNDECIDED, collide_in_waves
+from asperity.geometry.collisions.compiled.waves import UNDECIDED, WORK, collide_in_waves
 from asperity.geometry.collisions.records import ground_of, is_convex, mass_fractions, results_for, ring_of
 from asperity.geometry.disk.satellites import Satellites
 from asperity.geometry.tracing.tracing import MAX_COLLISIONS
@@ -40,13 +39,13 @@ def constants_for(wall, scale, limit=MAX_COLLISIONS):
 
 def in_waves_alone(wall, scale, position, velocity, limit=MAX_COLLISIONS):
     results = results_for(len(position))
-    collide_in_waves(position, velocity, *constants_for(wall, scale, limit), results, np.zeros(WORK))
+    collide_in_waves(position, velocity, *constants_for(wall, scale, limit), results, *np.zeros((2, WORK)))
     return results
 
 
 @pytest.mark.parametrize("scale", [1e-1, 1e-2, 1e-3, 1e-6])
 @pytest.mark.parametrize("name", CONVEX)
-def test_disks_in_lanes_collide_as_one_by_one(name, scale):
+def test_disks_in_waves_collide_as_one_by_one(name, scale):
     wall = CONVEX[name]
     position, velocity = states(wall, scale, 2000, seed=8)
     found, expected = in_waves_alone(wall, scale, position, velocity), results_for(2000)
