@@ -10,8 +10,8 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.core.checks import Floats, angles, frozen, number_between, whole_number
-from asperity.geometry.polygons.compiled.codes import FIRST_WALL, OPENING
-from asperity.geometry.polygons.compiled.pieces import offset_of
+from asperity.geometry.polygons.compiled.columns import FIRST_WALL, OPENING
+from asperity.geometry.polygons.compiled.polygon import offset_of
 from asperity.geometry.polygons.compiled.unfolding import reduced, sine_and_cosine
 from asperity.geometry.polygons.triangulation import triangulated
 from asperity.geometry.tracing.compiled.growing import longer, taller

@@ -240,7 +240,7 @@ class _Beams:
 
         What becomes of a beam does not depend on other beams, so parts may run on any number of threads.
         """
-        from .compiled.splitting import LEAVES, STEPS, divide
+        from .compiled.division import LEAVES, STEPS, divide
 
         store = _together(self._take(threshold))
         rule = threshold, most_splits // parts, max(most_steps // parts, 1)
@@ -265,7 +265,7 @@ class _Beams:
 
     def rest(self) -> _Pieces:
         """Remove all beams that wait; return their pieces."""
-        from .compiled.pieces import pieces_of
+        from .compiled.polygon import pieces_of
 
         rest = [pieces_of(store, self._hollow.width) for store in self._take(-np.inf)]
         return _columns([row for row, _ in rest], [tag for _, tag in rest])

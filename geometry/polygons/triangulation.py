@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import InputError, WallError
 from ...core.rounding import UNIT_ROUNDOFF
-from .compiled.codes import FIRST_WALL, OPENING
+from .compiled.columns import FIRST_WALL, OPENING
 from .predicates import ExactPoints
 
 Integers = NDArray[np.int64]

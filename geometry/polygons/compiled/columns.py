@@ -45,3 +45,8 @@ TAG_LEAF = 0  # number of the beam
 TAG_SIGN = 1
 TAG_BOUNCES = 2
 TAG_COLUMNS = 3
+
+# Codes in `Triangulation.beyond`: of edges at the opening or at a wall. Numbers >= 0 are edges of other triangles; a
+# wall edge e has the code FIRST_WALL - e.
+OPENING = -1
+FIRST_WALL = -2

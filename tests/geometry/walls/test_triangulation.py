@@ -6,7 +6,7 @@ from campaigns.cases.random_hollows import graph_hollow, random_hollow
 from campaigns.judges.interval_marching import exact_row
 
 from asperity.geometry.polygons.beams import beams_of
-from asperity.geometry.polygons.compiled.codes import FIRST_WALL, OPENING
+from asperity.geometry.polygons.compiled.columns import FIRST_WALL, OPENING
 from asperity.geometry.polygons.triangulation import triangulated
 
 AWKWARD = {

@@ -12,7 +12,7 @@ from asperity import kernels as ker
 from asperity.geometry.cells.hollow_shape import distinct_hollows
 from asperity.geometry.polygons import beams as beam_module
 from asperity.geometry.polygons.beams import beams_of
-from asperity.geometry.polygons.compiled import splitting
+from asperity.geometry.polygons.compiled import division
 from asperity.kernels.discretisation.isometry_tables import table_matrix
 from asperity.kernels.walls.polygon import table_of_beams
 
@@ -248,8 +248,8 @@ def test_half_of_the_rays_keep_their_error_where_the_mirror_image_departs(seed, 
 
 
 def test_polygons_of_few_sides_are_resolved_by_one_call(monkeypatch):
-    calls, divide = [], splitting.divide
-    monkeypatch.setattr(splitting, "divide", lambda *given: calls.append(given) or divide(*given))
+    calls, divide = [], division.divide
+    monkeypatch.setattr(division, "divide", lambda *given: calls.append(given) or divide(*given))
     for seed in (2, 3, 6, 8):
         calls.clear()
         assert beams_of(random_hollow(seed)).unresolved == 0.0 and len(calls) == 1

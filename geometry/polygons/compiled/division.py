@@ -1,4 +1,4 @@
-"""The compiled functions that split beams at the vertices of a triangulated hollow. Loads numba."""
+"""Beams on their way through the triangles of a hollow, and their division at vertices: compiled. Loads numba."""
 
 from __future__ import annotations
 
@@ -10,12 +10,23 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.compilation import jit
 from ...tracing.compiled.growing import taller
-from ...tracing.compiled.options import inlined, inner
-from .columns import COUNT
-from .frames import LANES
-from .lines import clip, cut_rounding, polygon_flux
-from .passing import GOES_ON, LEFT, SPLIT, STOPPED, Desk, new_desk, passed
-from .pieces import Pieces, leaving_offset, new_pieces, put_pieces, set_angles
+from ...tracing.compiled.options import inlined, inner, linked_allocating
+from .columns import COUNT, VERTEX_COLUMNS
+from .polygon import (
+    GROUP,
+    Frame,
+    Pieces,
+    clip,
+    cut_rounding,
+    leaving_offset,
+    new_pieces,
+    polygon_flux,
+    put_pieces,
+    set_angles,
+    set_frame,
+    side_of,
+    signs_of,
+)
 from .store import (
     Rank,
     Store,
@@ -23,12 +34,113 @@ from .store import (
     has_room,
     new_store,
     put_beam,
+    put_course,
     rank_of,
     take_polygon,
     trimmed,
     with_room,
 )
-from .unfolding import apex_of, crossed
+from .unfolding import (
+    MEMORY,
+    Course,
+    apex_of,
+    crossed,
+    lag_of,
+    period_between,
+    periods_without_split,
+    repeated,
+    set_drift,
+)
+
+# What becomes of a beam: it is split, has left the hollow, is left for later, or is divided next.
+SPLIT, LEFT, STOPPED, GOES_ON = range(4)
+
+
+class Desk(NamedTuple):
+    """Work space for one beam: its polygon, functionals, their frame, and its last places.
+
+    ``parts``, ``sizes`` and ``fluxes`` are those of its two parts, ``angles`` and ``cuts`` those of its vertices, see
+    `polygon`.
+    """
+
+    polygon: Floats
+    parts: Floats
+    sizes: NDArray[np.int64]
+    fluxes: Floats
+    values: Floats
+    angles: Floats
+    cuts: Floats
+    frame: Frame
+    history: Store
+
+
+@linked_allocating
+def new_desk(wide):
+    """-> Desk: for polygons of up to ``wide`` vertices."""
+    frame = Frame(np.empty(wide), np.empty(wide), np.empty(wide), np.empty(wide), np.empty(wide))
+    return Desk(
+        np.empty((wide, VERTEX_COLUMNS)),
+        np.empty((2, wide, VERTEX_COLUMNS)),
+        np.empty(2, np.int64),
+        np.empty(2),
+        np.empty(wide),
+        np.empty(wide),
+        np.empty(wide),
+        frame,
+        new_store(1, MEMORY),
+    )
+
+
+@inlined
+def passed(course, desk, count, flux, hollow, most_steps):
+    """-> (Course, fate, steps, rounding): move a beam to the triangle whose apex splits it.
+
+    Then ``desk.values`` are the apex's functionals. ``rounding`` bounds the flux that is doubtful by rounding. The fate
+    is SPLIT, LEFT, or STOPPED at the limit of steps.
+    A beam that comes to an edge for the second time, with a translated unfolding, measures the next period, and skips
+    as many as it can.
+    """
+    polygon, frame, history = desk.polygon, desk.frame, desk.history
+    mark, period, most, due, reflections = course, period_between(course, course), 0.0, 0, 0
+    put_course(history, 0, course)
+    rounding, doubt = 0.0, set_frame(frame, polygon, count, course.unfolding)
+    for step in range(most_steps):
+        edge = course.edge
+        side = side_of(frame, count, hollow.apex_x[edge], hollow.apex_y[edge], doubt)
+        if side == 0:
+            signs = signs_of(polygon, count, apex_of(course, hollow), desk.values)
+            if signs.positive and signs.negative:
+                return course, SPLIT, step + 1, rounding
+            rounding += signs.rounding
+            if not signs.positive and not signs.negative:
+                rounding += abs(flux)
+            side = -1 if signs.negative else 1
+        if most >= 1.0:
+            most = min(most, periods_without_split(frame, count, side, doubt, period))
+        way = 2 * edge + ((side < 0) != (course.unfolding.sign < 0.0))
+        code = hollow.behind[way]
+        if code >= 0:
+            course = Course(code, course.bounces, course.unfolding)
+            continue
+        course, left = crossed(hollow.exits[way], course, hollow)
+        if left:
+            return course, LEFT, step + 1, rounding
+        reflections += 1
+        if reflections == due:
+            if most >= 1.0 and course.edge == mark.edge:
+                course, repeats = repeated(mark, course, period, most)
+                reflections = 0 if repeats else reflections
+            most, due = 0.0, 0
+        if due == 0:
+            lag = lag_of(course, history, reflections)
+            if lag > 0:
+                period = period_between(course_of(history, (reflections - lag) % MEMORY), course)
+                mark, due, most = course, reflections + lag, period.most
+                set_drift(frame, polygon, count, period)
+        put_course(history, reflections % MEMORY, course)
+        doubt = set_frame(frame, polygon, count, course.unfolding)
+    return course, STOPPED, most_steps, rounding
+
 
 _compile = jit()
 _linked = jit(linked=True)
@@ -149,7 +261,7 @@ def is_roomy(tables):
         has_room(tables.rest, counts[RESTING], most)
         and has_room(tables.stack, counts[WAITING], most)
         and counts[PIECES] + 2 * most <= tables.pieces.rows.shape[0]
-        and most + LANES <= tables.desk.values.shape[0]
+        and most + GROUP <= tables.desk.values.shape[0]
     )
 
 
@@ -161,8 +273,8 @@ def roomier(tables):
     size = counts[PIECES] + 2 * most
     if size > pieces.rows.shape[0]:
         pieces = Pieces(taller(pieces.rows, 2 * size), taller(pieces.tags, 2 * size))
-    if most + LANES > desk.values.shape[0]:
-        desk = new_desk(2 * (most + LANES))
+    if most + GROUP > desk.values.shape[0]:
+        desk = new_desk(2 * (most + GROUP))
     rest, stack = with_room(tables.rest, counts[RESTING], most), with_room(tables.stack, counts[WAITING], most)
     return Tables(rest, stack, pieces, desk, counts, tables.rounding)
 
@@ -181,7 +293,7 @@ def divide(hollow, store, begin, stride, threshold, most_splits, most_steps):
         counts[WIDEST] = max(counts[WIDEST], store.whole[beam, COUNT])
     size = ROOM + 2 * (store.whole.shape[0] // stride)
     rest, stack = new_store(4 * size, size), new_store(4 * ROOM, ROOM)
-    tables = Tables(rest, stack, new_pieces(2 * size), new_desk(4 * LANES), counts, np.zeros(1))
+    tables = Tables(rest, stack, new_pieces(2 * size), new_desk(4 * GROUP), counts, np.zeros(1))
     while not work(tables, hollow, store, stride, threshold, (most_splits, most_steps)):
         tables = roomier(tables)
     used, pieces = counts[PIECES], tables.pieces
