@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from ...scene.columns import START_X, START_Y
-from ...tracing.compiled.arcs import near_end
 from ...tracing.compiled.options import compiled, inlined
+from ...tracing.compiled.pieces import near_end
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, GRAZING
 from ...tracing.compiled.records import BEZIER, NO_PIECE
 from .contact import CLEAR, WIDEST_SLACK, Span, graph_after, is_in_front, next_root, satellite_after, turning

@@ -73,7 +73,7 @@ def wide_arc(arc):
 def arc_hit(arc, own, px, py, vx, vy, error):
     """-> (t, undecided, height): time to the front of one arc, or inf; time of an undecided contact, or inf.
 
-    For ``height`` see `arc_time` in `compiled/arcs`. ``error`` bounds the transversal error of the ray at the arc.
+    For ``height`` see `arc_time` in `compiled/pieces`. ``error`` bounds the transversal error of the ray at the arc.
     """
     nothing = (np.inf, 0.0)
     n0x, n0y, curvature, stretch = wide_arc(arc)

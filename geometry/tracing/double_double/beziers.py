@@ -126,7 +126,7 @@ def extrema(a1, a2, a3):
 def is_close_by(coefficients, s, t, vx, vy, size, slack):
     """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start.
 
-    A hit behind the start is not if the start lies beyond an end of the piece, see `compiled/beziers`.
+    A hit behind the start is not if the start lies beyond an end of the piece, see `compiled/pieces`.
     """
     _, _, ax1, ay1, ax2, ay2, ax3, ay3 = coefficients
     tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
