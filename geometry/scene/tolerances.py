@@ -8,7 +8,7 @@ from ...core.rounding import EPS
 # positions have a few rounding errors of one ulp of the size each.
 JOINT_ULPS = 16.0
 # Error, in eps times the size of the terms, below which a tangent hit and a miss are not distinguished. Each of B and F
-# in D = B^2 + 2 kappa |v|^2 F has about eight rounding errors of its terms, see `arcs.tangent_error`; so has g of a
+# in D = B^2 + 2 kappa |v|^2 F has about eight rounding errors of its terms, see `pieces.tangent_error`; so has g of a
 # Bezier piece at its extrema and at its ends.
 TANGENT_ULPS = 16.0
 # Largest angle, radians, between the tangents at a smooth joint. Both pieces then reflect a ray at the joint alike,

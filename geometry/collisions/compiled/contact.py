@@ -33,8 +33,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...scene import columns as c
-from ...tracing.compiled.arcs import near_end, on_arc
 from ...tracing.compiled.options import compiled, inlined, inner
+from ...tracing.compiled.pieces import near_end, on_arc
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
 from ...tracing.double_double.numbers import extended

@@ -17,18 +17,17 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ...scene import columns as c
 from ...scene.scene import NO_TABLES
-from .lanes import WALKS, WAVE, WORK
-from .lines import NATURAL
 from .options import compiled, inlined, inner
 from .pointers import Late, address_at, call_at
 from .rays import TOP_CORNER, last_hollow, opening_at, tables_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 from .waves import cross_simple
+from .work import LISTS, NATURAL, WORK
 
 # Status of a ray to be traced hit by hit.
 UNDECIDED = 255
 ESCAPED = 0
-RAYS = WAVE
+RAYS = 512
 # Rows of `Room.numbers`: the left ends of the cells of rays, and the numbers of hollows before them.
 BASES, PLACES = 6, 4
 # Number of hollows up to which their left ends are compared with many rays at once, without a search for each ray.
@@ -46,7 +45,7 @@ class Room(NamedTuple):
 
     Then the numbers of the rays of one hollow; linked lists of the rays of each hollow in a block, and of those that
     meet none, of which ``heads`` is the first ray (-1 for none), ``others`` the next; the hollows that rays meet; and
-    the work space of waves, and of their rays in trees of boxes.
+    the work space of waves.
     """
 
     numbers: Floats
@@ -55,7 +54,7 @@ class Room(NamedTuple):
     met: NDArray[np.int64]
     heads: NDArray[np.int64]
     waves: Floats
-    walks: NDArray[np.int64]
+    lists: NDArray[np.int64]
 
 
 def _aligned(count: int) -> Floats:
@@ -70,9 +69,8 @@ def room_for(hollows: Floats, block: int) -> Room:
     rays, others, met = np.empty((3, block), np.int64)
     # rays near one of many Bezier pieces are gathered in a second part
     parts = 2 if np.any(hollows[:, c.BEZIERS_END] > hollows[:, c.FIRST_BEZIER]) else 1
-    walks = np.empty(WALKS if np.any(hollows[:, c.TREE_LEVELS] > 0.0) else 0, np.int64)
     heads = np.full(len(hollows) + 1, -1)
-    return Room(np.empty((7, block)), rays, others, met, heads, _aligned(parts * WORK), walks)
+    return Room(np.empty((7, block)), rays, others, met, heads, _aligned(parts * WORK), np.empty(LISTS, np.int64))
 
 
 @inner
@@ -217,7 +215,7 @@ def cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings):
         for j in range(entry.shape[0]):
             hits[j] = 0.0
     else:
-        call_at(address, None, (tables, h, limit, entry, angle, hits, room.waves, room.walks))
+        call_at(address, None, (tables, h, limit, entry, angle, hits, room.waves, room.lists))
 
 
 @inlined

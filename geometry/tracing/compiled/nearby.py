@@ -18,12 +18,11 @@ from ..double_double.records import ARC
 from ..double_double.records import BEZIER as CURVE
 from ..double_double.records import LINE as STRAIGHT
 from ..double_double.sides import Arrival, Face, in_front_at, line_in_front_of_line
-from .arcs import arc_time, on_arc
-from .beziers import NO_BEZIER_HIT
-from .lines import first_boxes, line_time, next_leaf
 from .options import allocating, inner, linked, linked_allocating
+from .pieces import NO_BEZIER_HIT, arc_time, line_at, line_hit, line_sides, on_arc
 from .pointers import address_at, call_at
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
+from .tree import first_boxes, next_leaf
 
 # A value of `Hit.doubt`: the side of the piece on which the ray starts is not resolved.
 DOUBTFUL = 2
@@ -69,12 +68,11 @@ def line_starts_in_front(tables, line, own, px, py, vx, vy, slack):
 @linked
 def line_nearby(tables, j, px, py, vx, vy, slack):
     """-> (t, fraction, is_clear): time to a line close by, or inf; whether the line is certainly ahead."""
-    joints = tables.joints
-    c_before = (joints[j, c.JOINT_X] - px) * vy - (joints[j, c.JOINT_Y] - py) * vx
-    c_after = (joints[j + 1, c.JOINT_X] - px) * vy - (joints[j + 1, c.JOINT_Y] - py) * vx
-    if joints[j, c.STARTS_LINE] > 0.0 and c_before >= 0.0 >= c_after and c_before > c_after:
-        t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
-        height, reach = t * (c_before - c_after), slack * tables.lines[j, c.LENGTH]
+    line = line_at(tables, j)
+    before, after = line_sides(line, px, py, vx, vy)
+    if tables.joints[j, c.STARTS_LINE] > 0.0 and before >= 0.0 >= after and before > after:
+        t, fraction, _, _ = line_hit(line, before, after, px, py, vx, vy)
+        height, reach = t * (before - after), slack * line.length
         if abs(t) <= NEARBY_SLACKS * slack and height >= -reach:
             return t, fraction, height > reach
     return np.inf, 0.0, False

@@ -3,7 +3,7 @@
 One compiled version serves all walls: a table is empty if the wall has no such piece. The formulas are numerically
 stable, and no epsilon decides which piece is hit:
 
-* For hits on lines, arcs and Bezier pieces see `lines`, `arcs` and `beziers`.
+* For hits on lines, arcs and Bezier pieces see `pieces`.
 * A piece within rounding of the ray's start is hit only if the start lies in front of it by the exact positions of the
   joints, see `sides`. So the opposite face of a plate of zero thickness or of a sharp peak is not hit.
 * After each bounce the hit point is projected onto its piece, and the velocity is renormalised.
@@ -22,15 +22,33 @@ from ...scene.compiled.records import ROW, Typed, place_of
 from ...scene.records import Record
 from ...scene.scene import NO_TABLES
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
-from .arcs import arc_incidence, arc_reflect, arc_time, may_touch_arc, near_end, on_arc_after
-from .beziers import NO_BEZIER_HIT, bend_number, bezier_reflect, bezier_tangent, nearest_bezier
-from .lanes import LEAST_FRACTION
-from .lines import NO_LINE_HIT, nearest_line, nearest_line_in_boxes
 from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined, inner
+from .pieces import (
+    LEAST_FRACTION,
+    NO_BEZIER_HIT,
+    arc_incidence,
+    arc_point,
+    arc_time,
+    bend_number,
+    bezier_normal,
+    bezier_point,
+    bezier_tangent,
+    line_at,
+    line_point,
+    may_touch_arc,
+    mirror,
+    near_end,
+    nearest_bezier,
+    nearest_line,
+    on_arc_after,
+    opening_met,
+    with_length_one,
+)
 from .pointers import Late, address_at, address_of, call_at, is_raised
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_DETAILS, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots, Tree
 from .runs import skip_chords, skip_crossings
+from .tree import NO_LINE_HIT, nearest_line_in_boxes
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 
 # In place of a hollow's number: a flat top, and a corner at an end of an opening.
@@ -201,9 +219,8 @@ def exit_time(scope, own, px, py, vx, vy, time):
     left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
     kind = NO_PIECE
     if vy > 0.0:
-        c_right, c_left = (right - px) * vy + py * vx, (left - px) * vy + py * vx
-        t = max(-py / vy, 0.0)
-        if (c_right >= 0.0 >= c_left or is_open) and own.kind != OPENING and (time - t) * vy > slack:
+        t, is_met = opening_met(left, right, px, py, vx, vy)
+        if (is_met or is_open) and own.kind != OPENING and (time - t) * vy > slack:
             time, kind = t, OPENING
     if is_open and vx != 0.0:
         t = ((right if vx > 0.0 else left) - px) / vx
@@ -229,19 +246,15 @@ def meets_corner(scope, hit, corner, px, py, vx, vy):
 @inlined
 def line_reflect(scope, hit, own, vx, vy):
     """-> (px, py, vx, vy, at_corner): the ray after its reflection on a line, and whether it is at a corner."""
-    joints, lines, line = scope.tables.joints, scope.tables.lines, hit.number
-    near = line if hit.s >= 0.0 else line + 1
-    px, py = (
-        joints[near, c.JOINT_X] + hit.s * lines[line, c.EDGE_X],
-        joints[near, c.JOINT_Y] + hit.s * lines[line, c.EDGE_Y],
-    )
+    line = line_at(scope.tables, hit.number)
+    px, py = line_point(line, hit.s)
     # a first hit near an end of the opening is as accurate as the ray, at any distance from that corner
-    room = (
-        LEAST_FRACTION * lines[line, c.LENGTH] if own.bounces == 0 and joints[near, c.JOINT_Y] == 0.0 else scope.slack
-    )
-    at_corner = abs(hit.s) * lines[line, c.LENGTH] <= room and joints[near, c.IS_CORNER] > 0.0
-    w = 2.0 * (vx * lines[line, c.LINE_NORMAL_X] + vy * lines[line, c.LINE_NORMAL_Y])
-    return px, py, vx - w * lines[line, c.LINE_NORMAL_X], vy - w * lines[line, c.LINE_NORMAL_Y], at_corner
+    at_opening = own.bounces == 0 and (line.y0 if hit.s >= 0.0 else line.y1) == 0.0
+    room = LEAST_FRACTION * line.length if at_opening else scope.slack
+    near = hit.number if hit.s >= 0.0 else hit.number + 1
+    at_corner = abs(hit.s) * line.length <= room and scope.tables.joints[near, c.IS_CORNER] > 0.0
+    vx, vy = mirror(vx, vy, line.normal_x, line.normal_y)
+    return px, py, vx, vy, at_corner
 
 
 @inlined
@@ -256,10 +269,12 @@ def reflect(scope, hit, own, px, py, vx, vy):
     else:
         if hit.kind == BEZIER:
             curve = tables.beziers[hit.number]
-            px, py, wx, wy = bezier_reflect(curve, hit.s, vx, vy)
+            px, py = bezier_point(curve, hit.s)
+            nx, ny = bezier_normal(curve, hit.s)
         else:
             curve = arc_of(tables, hit.kind, hit.number)
-            px, py, wx, wy = arc_reflect(curve, hit.time, px, py, vx, vy, curve[c.STRETCH])
+            px, py, nx, ny = arc_point(curve, hit.time, px, py, vx, vy, curve[c.STRETCH])
+        wx, wy = mirror(vx, vy, nx, ny)
         at_corner = near_end(curve, px, py, scope.slack)
     if at_corner:
         return px, py, vx, vy, True
@@ -362,9 +377,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
                 flown = 0.0 if hits > 0 else flown
             if labelled:
                 label = HASH_FACTOR * label + np.uint64(hits)
-        # one Newton step on |v| = 1, so that rounding errors of speed and position do not amplify each other
-        scale = 1.5 - 0.5 * (vx * vx + vy * vy)
-        vx, vy = scale * vx, scale * vy
+        vx, vy = with_length_one(vx, vy)
         bounces += 1
         before = own.number if own.kind == LINE else -1
         own = Own(hit.kind, hit.number, hit.s if hit.kind == BEZIER else -1.0, flown, before, bounces)

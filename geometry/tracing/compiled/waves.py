@@ -1,79 +1,71 @@
 """Rays through hollows of lines, circles and Bezier pieces in waves: all rays that are inside hit their next piece.
 
-Eight rays are computed at once, with every number as by `rays`, so a ray has the same result by both, to the last bit.
-A ray for which rounding, a corner or a run of hits would matter has no result here. Loads numba.
+Every piece in turn meets all rays, in a loop without branches over the columns of a work array, see `work`, which the
+compiler turns into vector instructions. The formulas are those of the loop over one ray, in `pieces`, so a ray has the
+same result by both, to the last bit. A ray for which rounding, a corner or a run of hits would matter has no result
+here. Loads numba.
+
+In these loops the compiler does not know the number of rays, conditions are joined by & and |, and numbers are chosen
+by `where`; else it would not use vectors.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from ....core.rounding import EPS
 from ...scene import columns as c
-from ...scene.boxes import BOXES
-from ...scene.tolerances import NEARBY_SLACKS
-from .beziers import gather_near, meet_cubic, meet_parabola
-from .lanes import (
-    AT_CORNER,
-    BEFORE,
-    BEFORE_RUN,
-    BEZIER_NUMBERS,
-    BOUNCES,
-    CIRCLE_NUMBERS,
-    DOUBT,
-    FACE_X,
-    FACE_Y,
-    FOUND,
-    FRACTION,
-    HIT_S,
-    HIT_X,
-    HIT_Y,
-    NEAREST,
-    NO_LINE,
-    NO_PIECE,
-    OUT_ANGLE,
-    OUT_BOUNCES,
-    OUT_RAY,
-    OUT_VX,
-    OUT_VY,
-    OUT_X,
-    OWN,
-    PIECE,
-    PX,
-    PY,
-    RAY,
-    TIME,
-    UNCERTAIN,
-    VX,
-    VY,
-    WAVE,
-    WORK,
-    advance,
-    before_runs,
-    clear_hits,
-    first_bit,
-    hits_at,
-    hits_on_arcs,
-    keep_hits,
-    meet_circle,
-    meet_corner,
-    meet_line,
-    no_arcs,
-    no_hits,
-)
-from .lines import nearest_lines_in_boxes
+from ...scene.tolerances import NEARBY, NEARBY_SLACKS, TANGENT_ULPS
+from . import work as w
 from .options import inlined, inner, linked
+from .pieces import (
+    ROOT_STEPS,
+    arc_point,
+    arc_root,
+    arc_terms,
+    beyond_end,
+    bezier_normal,
+    bezier_point,
+    bezier_sides,
+    bezier_slope,
+    bezier_time,
+    bezier_value,
+    end_side,
+    extrema,
+    is_faced,
+    is_falling,
+    is_nearly_tangent,
+    line_at,
+    line_hit,
+    line_sides,
+    meets_circle,
+    mirror,
+    near_end,
+    opening_met,
+    own_hit,
+    own_point,
+    own_roots,
+    own_terms,
+    quadratic_root,
+    root_start,
+    root_step,
+    side,
+    side_spread,
+    where,
+    with_length_one,
+)
 from .rays import scope_of
 from .runs import skip_chords, skip_crossings
+from .tree import search_boxes
 from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
+from .work import NATURAL
 
 # In place of the slots of late functions, which waves do not call.
 NO_SLOTS = np.int64(0)
 # Waves after the entry of the last ray, after which the rays that are left are traced one by one.
 MOST_WAVES = 64
-# Rays of a wave up to which the next rays come in.
-FEW = WAVE // 2
-# Number of Bezier pieces in a hollow from which on it is faster to gather the rays near each of them.
-MANY_BEZIERS = 6
 # Hits after which a ray is traced by itself: rays that stay long would keep the next ones out.
 MOST_HITS = 2**8
 # Above one by more than all rounding errors of the sine of incidence.
@@ -81,234 +73,459 @@ RUN_MARGIN = 1.0 + 2.0**-40
 
 
 @inlined
+def numbers_of(curve):
+    """-> tuple: the numbers of a curve, read before a loop over rays; an arc has other names for these columns."""
+    return (
+        curve[c.START_X], curve[c.START_Y], curve[c.END_X], curve[c.END_Y], curve[c.START_CORNER], curve[c.END_CORNER],
+        curve[c.X1], curve[c.Y1], curve[c.X2], curve[c.Y2], curve[c.X3], curve[c.Y3],
+        curve[c.MIDDLE_X], curve[c.MIDDLE_Y], curve[c.REACH],
+    )  # fmt: skip
+
+
+@inlined
+def ray_at(work, i):
+    """-> (px, py, vx, vy): the position and the velocity of ray i."""
+    return work[w.PX + i], work[w.PY + i], work[w.VX + i], work[w.VY + i]
+
+
+@inlined
+def kept(work, place):
+    """-> float: the number in a column, which is not negative, in a choice whether to keep it.
+
+    The compiler does not know that: else it would write the other number with a mask, slow on many processors.
+    """
+    return abs(work[place])
+
+
+@inlined
+def keep(work, i, time, number):
+    """Keep a hit of ray i, inf for none, if it is nearer than those before."""
+    best, piece = kept(work, w.TIME + i), kept(work, w.PIECE + i)
+    work[w.TIME + i], work[w.PIECE + i] = where(time < best, time, best), where(time < best, number, piece)
+
+
+@inlined
+def keep_root(work, i, time, number, s):
+    """Keep a hit of ray i on a Bezier piece, with its parameter."""
+    old = kept(work, w.HIT_S + i)
+    work[w.HIT_S + i] = where(time < work[w.TIME + i], s, old)
+    keep(work, i, time, number)
+
+
+@linked
+def list_rays(work, lists, count, column, low, high, found):
+    """-> int: list rays that have a number from low to high in a column, after ``found`` others; the new length."""
+    listed = 0
+    for i in range(count):
+        listed += np.int64((work[column + i] >= low) & (work[column + i] <= high))
+    for i in range(count if listed > 0 else 0):
+        # written in any case, counted if true
+        lists[w.PLACES + found] = i
+        found += np.int64((work[column + i] >= low) & (work[column + i] <= high))
+    return found
+
+
+@linked
+def meet_corner(work, count, x, y, slack):
+    """Let rays that meet a corner be uncertain."""
+    for i in range(count):
+        px, py, vx, vy = ray_at(work, i)
+        at_entry = work[w.OWN + i] == w.OPENING
+        is_met = (abs(side(x, y, px, py, vx, vy)) <= slack) & is_faced(x - px, y - py, at_entry, vx, vy, slack)
+        work[w.UNCERTAIN + i] += where(is_met, 1.0, 0.0)
+
+
+@linked
+def meet_line(work, count, line, number, corner_slack, close):
+    """Find the hits of rays on a line that are nearer, and rays that meet the corner at its start.
+
+    The slack is negative if there is no corner; a hit before the time ``close`` is uncertain.
+    """
+    for i in range(count):
+        px, py, vx, vy = ray_at(work, i)
+        own = work[w.OWN + i]
+        before, after = line_sides(line, px, py, vx, vy)
+        is_ahead = is_faced(line.x0 - px, line.y0 - py, own == w.OPENING, vx, vy, corner_slack)
+        is_met = (before >= 0.0) & (after <= 0.0) & (before > after) & (own != number)
+        t, _, _, _ = line_hit(line, before, after, px, py, vx, vy)
+        is_uncertain = (is_ahead & (abs(before) <= corner_slack)) | (is_met & (abs(t) <= close))
+        work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
+        keep(work, i, where(is_met & (t > close), t, np.inf), number)
+
+
+@linked
+def meet_arc(work, count, arc, number, close):
+    """Find the hits of rays on a circular arc that are nearer; a hit before the time ``close`` is uncertain."""
+    # bounds of B of rays that meet the front, from elsewhere and from the arc itself
+    most, least = where(arc[c.CURVATURE] > 0.0, np.inf, 0.0), where(arc[c.CURVATURE] > 0.0, 0.0, np.inf)
+    for i in range(count):
+        px, py, vx, vy = ray_at(work, i)
+        is_own, is_other = work[w.OWN + i] == number, work[w.OWN + i] != number
+        b, f, d, speed2 = arc_terms(arc, px, py, vx, vy, 1.0)
+        from_afar = is_other & (d >= 0.0) & (b < most)
+        t = arc_root(arc, is_own, b, f, math.sqrt(d), speed2)
+        is_uncertain = (is_other & is_nearly_tangent(arc, b, d, speed2)) | (from_afar & (abs(t) <= close))
+        work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
+        # at grazing incidence rounding moves the point along the arc by more than the slack
+        on_arc = beyond_end(arc, px + t * vx - arc[c.START_X], py + t * vy - arc[c.START_Y]) <= close
+        is_met = from_afar | (is_own & (b > least))
+        keep(work, i, where(is_met & on_arc & (t >= 0.0), t, np.inf), number)
+
+
+@linked
+def meet_parabola(work, count, curve, number):
+    """Find the hits of rays on a quadratic Bezier piece that are nearer; see `find_fall` and `find_own_root`."""
+    for i in range(count):
+        px, py, vx, vy = ray_at(work, i)
+        is_own, is_other = work[w.OWN + i] == number, work[w.OWN + i] != number
+        a0, a1, a2, _ = bezier_sides(curve, px, py, vx, vy)
+        spread, last = side_spread(curve, px, py, vx, vy), end_side(curve, px, py, vx, vy)
+        turn, own_s = a1 / (-2.0 * a2), work[w.BEFORE + i]
+        value, room = bezier_value(a0, a1, a2, 0.0, turn), (TANGENT_ULPS * EPS) * spread
+        is_inside = (turn > 0.0) & (turn < 1.0)
+        touches = (abs(a0) <= room) | (abs(last) <= room) | (is_inside & (abs(value) <= room))
+        falls = is_falling(a0, where(is_inside, value, last)) | (is_inside & is_falling(value, last))
+        sigma = bezier_slope(a1, a2, 0.0, own_s) / -a2
+        own_root, is_front = own_point((a0, a1, a2, 0.0), own_s, sigma)
+        s = where(is_own, own_root, quadratic_root(a0, a1, a2))
+        t = bezier_time(curve, s, px, py, vx, vy)
+        is_near = is_other & meets_circle(curve, px, py, vx, vy, work[w.TIME + i])
+        is_uncertain = is_near & (touches | (falls & (abs(t) <= NEARBY * spread)))
+        work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
+        t = where(((is_own & is_front) | (is_near & falls)) & (t > 0.0), t, np.inf)
+        keep_root(work, i, t, number, s)
+
+
+@linked
+def mark_near(work, count, curve, number):
+    """Mark rays that meet the circle about a Bezier piece, on which they do not start."""
+    for i in range(count):
+        px, py, vx, vy = ray_at(work, i)
+        is_near = meets_circle(curve, px, py, vx, vy, work[w.TIME + i]) & (work[w.OWN + i] != number)
+        work[w.NEAR + i] = where(is_near, 1.0, 0.0)
+
+
+@inlined
+def gather(work, lists, count, some):
+    """Copy the rays that are listed to another work array."""
+    for j in range(count):
+        i = lists[w.PLACES + j] & NATURAL
+        some[w.PX + j], some[w.PY + j], some[w.VX + j], some[w.VY + j] = ray_at(work, i)
+        some[w.OWN + j], some[w.BEFORE + j] = work[w.OWN + i], work[w.BEFORE + i]
+        some[w.UNCERTAIN + j] = 0.0
+
+
+@inlined
+def scatter(work, lists, count, some, number):
+    """Keep the hits of the rays that are listed, on one Bezier piece."""
+    for j in range(count):
+        i = lists[w.PLACES + j] & NATURAL
+        work[w.UNCERTAIN + i] += some[w.UNCERTAIN + j]
+        keep_root(work, i, some[w.TIME + j], number, some[w.ROOT + j])
+
+
+@linked
+def find_fall(some, count, curve, turn):
+    """-> int: find the part of a cubic piece on which g falls through zero; how many rays have two such parts.
+
+    At turn 0 the first part is taken, at turn 1 the last. A ray's line that passes an end of the piece, or touches it
+    at an extremum of g, within rounding is uncertain.
+    """
+    both = 0
+    for j in range(count):
+        px, py, vx, vy = ray_at(some, j)
+        a0, a1, a2, a3 = bezier_sides(curve, px, py, vx, vy)
+        last, room = end_side(curve, px, py, vx, vy), (TANGENT_ULPS * EPS) * side_spread(curve, px, py, vx, vy)
+        low, high = extrema(a1, a2, a3)
+        value_low, value_high = bezier_value(a0, a1, a2, a3, low), bezier_value(a0, a1, a2, a3, high)
+        has_low, has_high = (low > 0.0) & (low < 1.0), (high > 0.0) & (high < 1.0)
+        touches = (abs(a0) <= room) | (abs(last) <= room)
+        touches = touches | (has_low & (abs(value_low) <= room)) | (has_high & (abs(value_high) <= room))
+        some[w.UNCERTAIN + j] += where(touches, 1.0, 0.0)
+        low, value_low = where(has_low, low, 0.0), where(has_low, value_low, a0)
+        high, value_high = where(has_high, high, 1.0), where(has_high, value_high, last)
+        first, third = is_falling(a0, value_low), is_falling(value_high, last)
+        middle = is_falling(value_low, value_high)
+        both += np.int64(first & third)
+        first, middle = first & (turn == 0), middle & (turn == 0)
+        falls = first | middle | third
+        some[w.FALLS + j] = some[w.SOUGHT + j] = where(falls, 1.0, 0.0)
+        some[w.LOW + j] = where(first, 0.0, where(middle, low, high))
+        some[w.HIGH + j] = where(first, low, where(middle, high, 1.0))
+        some[w.VALUE_LOW + j] = where(first, a0, where(middle, value_low, value_high))
+        some[w.VALUE_HIGH + j] = where(first, value_low, where(middle, value_high, last))
+    return both
+
+
+@linked
+def start_roots(some, count, curve):
+    """Begin the search of the roots of g."""
+    for j in range(count):
+        px, py, vx, vy = ray_at(some, j)
+        a0, a1, a2, a3 = bezier_sides(curve, px, py, vx, vy)
+        ends = some[w.LOW + j], some[w.HIGH + j], some[w.VALUE_LOW + j], some[w.VALUE_HIGH + j]
+        some[w.ROOT + j] = root_start(a0, a1, a2, a3, *ends)
+
+
+@linked
+def improve_roots(some, count, curve):
+    """-> int: one step to each root that is still sought; how many are."""
+    more = 0
+    for j in range(count):
+        px, py, vx, vy = ray_at(some, j)
+        a0, a1, a2, a3 = bezier_sides(curve, px, py, vx, vy)
+        old, low, high = kept(some, w.ROOT + j), kept(some, w.LOW + j), kept(some, w.HIGH + j)
+        s, low, high, is_last = root_step(a0, a1, a2, a3, old, low, high)
+        is_sought = some[w.SOUGHT + j] > 0.0
+        some[w.ROOT + j] = where(is_sought, s, old)
+        some[w.LOW + j], some[w.HIGH + j] = low, high
+        some[w.SOUGHT + j] = where(is_sought & (not is_last), 1.0, 0.0)
+        more += np.int64(is_sought & (not is_last))
+    return more
+
+
+@linked
+def find_own_root(some, count, curve):
+    """Find the front hits of rays that start on a Bezier piece themselves."""
+    for j in range(count):
+        px, py, vx, vy = ray_at(some, j)
+        g, own_s = bezier_sides(curve, px, py, vx, vy), some[w.BEFORE + j]
+        b0, b1, b2, disc, error = own_terms(curve, g, own_s)
+        one, other = own_roots(b0, b1, b2, disc)
+        t, s = own_hit(curve, g, own_s, one, px, py, vx, vy)
+        other_t, other_s = own_hit(curve, g, own_s, other, px, py, vx, vy)
+        is_uncertain = (abs(disc) <= error) & (b2 != 0.0)
+        some[w.UNCERTAIN + j] += where(is_uncertain, 1.0, 0.0)
+        some[w.ROOT + j], t = where(other_t < t, other_s, s), where(other_t < t, other_t, t)
+        some[w.FALLS + j] = where((disc >= 0.0) & (t < np.inf), 1.0, 0.0)
+
+
+@linked
+def time_roots(some, count, curve, number):
+    """Compute the times of the hits at the roots, inf for those that are none."""
+    for j in range(count):
+        px, py, vx, vy = ray_at(some, j)
+        t, is_met = bezier_time(curve, some[w.ROOT + j], px, py, vx, vy), some[w.FALLS + j] > 0.0
+        is_close = (some[w.OWN + j] != number) & (abs(t) <= NEARBY * side_spread(curve, px, py, vx, vy))
+        some[w.UNCERTAIN + j] += where(is_met & is_close, 1.0, 0.0)
+        some[w.TIME + j] = where(is_met & (t > 0.0), t, np.inf)
+
+
+@linked
+def meet_cubic(work, lists, count, curve, number, some):
+    """Find the hits of rays on a cubic piece that are nearer; the rays near the piece are gathered in ``some``."""
+    mark_near(work, count, curve, number)
+    others = list_rays(work, lists, count, w.NEAR, 1.0, 1.0, 0)
+    end = list_rays(work, lists, count, w.OWN, number, number, others)
+    if end == 0:
+        return
+    gather(work, lists, end, some)
+    find_own_root(some[others:], end - others, curve)
+    for turn in range(2):
+        if find_fall(some, others, curve, turn) == 0 and turn > 0:
+            break
+        start_roots(some, others, curve)
+        steps = ROOT_STEPS
+        while steps > 0 and improve_roots(some, others, curve) > 0:
+            steps -= 1
+        time_roots(some, end, curve, number)
+        scatter(work, lists, end, some, number)
+
+
+@inlined
+def meet_lines(scope, work, count):
+    """Find the nearest hits of rays on the lines of a hollow, and the corners that rays meet."""
+    tables, slack = scope.tables, scope.slack
+    joints = tables.joints
+    for j in range(scope.joints[0], scope.joints[1]):
+        corner_slack = slack if joints[j, c.IS_CORNER] > 0.0 else -1.0
+        if joints[j, c.STARTS_LINE] > 0.0:
+            meet_line(work, count, line_at(tables, j), w.LINES + j, corner_slack, NEARBY_SLACKS * slack)
+        elif corner_slack > 0.0:
+            meet_corner(work, count, joints[j, c.JOINT_X], joints[j, c.JOINT_Y], slack)
+
+
+@inlined
+def meet_pieces(scope, work, lists, count):
+    """Find the nearest hits of all rays on the pieces of a hollow."""
+    tables, close = scope.tables, NEARBY_SLACKS * scope.slack
+    for k in range(scope.circles[0], scope.circles[1]):
+        meet_arc(work, count, numbers_of(tables.circles[k]), w.CIRCLES + k, close)
+    for k in range(scope.beziers[0], scope.beziers[1]):
+        curve, number = numbers_of(tables.beziers[k]), w.BEZIERS + k
+        if curve[c.X3] == 0.0 and curve[c.Y3] == 0.0:
+            meet_parabola(work, count, curve, number)
+        else:
+            meet_cubic(work, lists, count, curve, number, work[w.WORK :])
+    if scope.has_tree:
+        search_boxes(scope, work, lists, count)
+    else:
+        meet_lines(scope, work, count)
+
+
+@inlined
+def keep_point(work, i, x, y, nx, ny, at_corner, may_run):
+    """Keep the point and the unit normal of the hit of ray i, and what the hit needs."""
+    work[w.HIT_X + i], work[w.HIT_Y + i], work[w.HIT_NX + i], work[w.HIT_NY + i] = x, y, nx, ny
+    work[w.NEED + i] = where(at_corner, w.AT_CORNER, where(may_run, w.BEFORE_RUN, 0.0))
+
+
+@inlined
+def place_hits(scope, work, lists, count):
+    """Compute the points at which rays meet their pieces, kind by kind, so that the processor guesses no branch.
+
+    A hit of an arc within rounding of its end, as this is at grazing incidence, is as at a corner.
+    """
+    tables, slack = scope.tables, scope.slack
+    joints, room = tables.joints, 2.0 * NEARBY_SLACKS * slack
+    for k in range(list_rays(work, lists, count, w.PIECE, w.LINES, np.inf, 0)):
+        i = lists[w.PLACES + k] & NATURAL
+        j, (px, py, vx, vy) = int(work[w.PIECE + i] - w.LINES) & NATURAL, ray_at(work, i)
+        line = line_at(tables, j)
+        before, after = line_sides(line, px, py, vx, vy)
+        _, fraction, x, y = line_hit(line, before, after, px, py, vx, vy)
+        is_corner = where(fraction < 0.0, joints[j + 1, c.IS_CORNER], joints[j, c.IS_CORNER]) > 0.0
+        may_run = (work[w.BEFORE + i] == w.LINES + j) & (tables.lines[j, c.PAIRS_END] > 0.0)
+        at_corner = is_corner & (abs(fraction) * line.length <= slack)
+        keep_point(work, i, x, y, line.normal_x, line.normal_y, at_corner, may_run)
+    if scope.circles[0] < scope.circles[1]:
+        for k in range(list_rays(work, lists, count, w.PIECE, w.CIRCLES, w.BEZIERS - 1.0, 0)):
+            i = lists[w.PLACES + k] & NATURAL
+            arc, (px, py, vx, vy) = tables.circles[int(work[w.PIECE + i] - w.CIRCLES)], ray_at(work, i)
+            x, y, nx, ny = arc_point(arc, work[w.TIME + i], px, py, vx, vy, 1.0)
+            dx, dy, ex, ey = x - arc[c.START_X], y - arc[c.START_Y], x - arc[c.END_X], y - arc[c.END_Y]
+            at_end = (dx * dx + dy * dy <= room * room) | (ex * ex + ey * ey <= room * room)
+            sine = RUN_MARGIN * arc[c.RUN_SINE]
+            keep_point(work, i, x, y, nx, ny, at_end, (sine > 0.0) & (abs(vx * nx + vy * ny) <= sine))
+    if scope.beziers[0] < scope.beziers[1]:
+        for k in range(list_rays(work, lists, count, w.PIECE, w.BEZIERS, w.LINES - 1.0, 0)):
+            i = lists[w.PLACES + k] & NATURAL
+            curve, s = tables.beziers[int(work[w.PIECE + i] - w.BEZIERS)], work[w.HIT_S + i]
+            (x, y), (nx, ny) = bezier_point(curve, s), bezier_normal(curve, s)
+            keep_point(work, i, x, y, nx, ny, near_end(curve, x, y, slack), False)
+
+
+@inlined
 def begins_run(tables, work, i, slack, limit):
     """-> bool: whether ray i of a wave makes a run of hits after its hit, which is computed in one step elsewhere."""
-    px, py, vx, vy = work[HIT_X + i], work[HIT_Y + i], work[VX + i], work[VY + i]
-    nx, ny = work[FACE_X + i], work[FACE_Y + i]
-    w = 2.0 * (vx * nx + vy * ny)
-    vx, vy = vx - w * nx, vy - w * ny
-    piece, most = int(work[PIECE + i]), np.int64(limit - work[BOUNCES + i] - 1)
-    if piece < 0:
-        _, _, _, _, hits = skip_chords(tables.circles[int(CIRCLE_NUMBERS) - piece], px, py, vx, vy, most)
+    px, py, nx, ny = work[w.HIT_X + i], work[w.HIT_Y + i], work[w.HIT_NX + i], work[w.HIT_NY + i]
+    vx, vy = mirror(work[w.VX + i], work[w.VY + i], nx, ny)
+    piece, most = work[w.PIECE + i], np.int64(limit - work[w.BOUNCES + i] - 1)
+    if piece < w.LINES:
+        _, _, _, _, hits = skip_chords(tables.circles[int(piece - w.CIRCLES)], px, py, vx, vy, most)
         return hits > 0
-    for row in range(int(tables.lines[piece, c.FIRST_PAIR]), int(tables.lines[piece, c.PAIRS_END])):
-        if tables.pairs[row, c.PARTNER] == work[OWN + i]:
+    line = int(piece - w.LINES)
+    for row in range(int(tables.lines[line, c.FIRST_PAIR]), int(tables.lines[line, c.PAIRS_END])):
+        if w.LINES + tables.pairs[row, c.PARTNER] == work[w.OWN + i]:
             _, _, _, _, hits = skip_crossings(tables.pairs[row], (nx, ny), px, py, vx, vy, slack, most)
             return hits > 0
     return False
 
 
 @inlined
-def corner_slack(is_corner, slack):
-    """-> float: the slack at a joint, negative if it is no corner."""
-    return slack if is_corner > 0.0 else -1.0
-
-
-@inlined
-def meet_boxes(scope, work, walks, count):
-    """Find the nearest hits of all rays of a wave on the lines in the boxes along them, where those are nearer."""
-    joints, lines = scope.tables.joints, scope.tables.lines
-    nearest_lines_in_boxes(scope, work, walks, count)
-    for i in range(count):
-        if work[NEAREST + i] < work[TIME + i]:
-            line, fraction = walks[FOUND + i], work[FRACTION + i]
-            near = line if fraction >= 0.0 else line + 1
-            work[TIME + i], work[PIECE + i] = work[NEAREST + i], line
-            work[HIT_X + i] = joints[near, c.JOINT_X] + fraction * lines[line, c.EDGE_X]
-            work[HIT_Y + i] = joints[near, c.JOINT_Y] + fraction * lines[line, c.EDGE_Y]
-            work[FACE_X + i], work[FACE_Y + i] = lines[line, c.LINE_NORMAL_X], lines[line, c.LINE_NORMAL_Y]
-            may_run = work[BEFORE + i] == line and lines[line, c.PAIRS_END] > 0.0
-            at_corner = abs(fraction) * lines[line, c.LENGTH] <= scope.slack and joints[near, c.IS_CORNER] > 0.0
-            work[UNCERTAIN + i] = AT_CORNER if at_corner else (BEFORE_RUN if may_run else 0.0)
-
-
-@inlined
-def has_many_beziers(hollow):
-    """-> bool: whether rays of a hollow are gathered for each Bezier piece; circles come before, in the same order."""
-    many = hollow[c.BEZIERS_END] - hollow[c.FIRST_BEZIER] >= MANY_BEZIERS
-    return many and hollow[c.CIRCLES_END] == hollow[c.FIRST_CIRCLE]
+def clear_hit(work, i):
+    """Begin the search of the nearest hit of ray i."""
+    work[w.TIME + i], work[w.PIECE + i], work[w.UNCERTAIN + i], work[w.NEED + i] = np.inf, w.NO_HIT, 0.0, 0.0
 
 
 @linked
-def meet_bezier(beziers, k, slack, work, first):
-    """Find the nearest hits of eight rays on Bezier piece k."""
-    curve = beziers[k]
-    slacks = corner_slack(curve[c.START_CORNER], slack), corner_slack(curve[c.END_CORNER], slack)
-    if curve[c.X3] == 0.0 and curve[c.Y3] == 0.0:
-        meet_parabola(work, first, beziers, k, slacks, BEZIER_NUMBERS - k)
-    else:
-        meet_cubic(work, first, beziers, k, slacks, BEZIER_NUMBERS - k)
+def reflect_rays(work, count, opening, slack, limit):
+    """Let rays leave through the opening, or reflect them at their hits; uncertain ones are given up, with no hits."""
+    left, right = opening
+    for i in range(count):
+        px, py, vx, vy = ray_at(work, i)
+        time, own, piece, bounces = work[w.TIME + i], work[w.OWN + i], work[w.PIECE + i], work[w.BOUNCES + i]
+        t, leaves = opening_met(left, right, px, py, vx, vy)
+        is_certain = work[w.UNCERTAIN + i] == 0.0
+        leaves = leaves & ((time - t) * vy > slack)
+        stays = is_certain & (not leaves) & (work[w.NEED + i] == 0.0) & (time < np.inf) & (bounces < limit)
+        wx, wy = mirror(vx, vy, work[w.HIT_NX + i], work[w.HIT_NY + i])
+        wx, wy = with_length_one(wx, wy)
+        before = where(own >= w.LINES, own, w.OPENING)
+        work[w.GONE + i] = where(stays, 0.0, 1.0)
+        work[w.PX + i], work[w.PY + i] = where(stays, work[w.HIT_X + i], px + t * vx), work[w.HIT_Y + i]
+        work[w.VX + i], work[w.VY + i], work[w.OLD_VX + i], work[w.OLD_VY + i] = wx, wy, vx, vy
+        work[w.OWN + i] = piece
+        work[w.BEFORE + i] = where(piece >= w.LINES, before, work[w.HIT_S + i])
+        work[w.BOUNCES + i] = where(stays, bounces + 1.0, where(is_certain & leaves, bounces, 0.0))
+        clear_hit(work, i)
 
 
-@inlined
-def meet_gathered(scope, work, count):
-    """Find the nearest hits of all rays of a wave on many Bezier pieces; those that are near a piece are gathered."""
-    hollow, beziers, slack = scope.hollow, scope.tables.beziers, scope.slack
-    some = work[WORK:]
-    for first in range(0, count, BOXES):
-        clear_hits(work, first)
-    for k in range(int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])):
-        number, chosen = BEZIER_NUMBERS - k, 0
-        for first in range(0, count, BOXES):
-            chosen += gather_near(work, first, count, beziers, k, number, WORK + chosen)
-        for j in range(chosen):
-            i = int(some[RAY + j])
-            for column in (PX, PY, VX, VY, OWN, BEFORE, TIME):
-                some[column + j] = work[column + i]
-            some[DOUBT + j] = 0.0
-        for j in range(chosen, chosen + BOXES):
-            # no rays, which meet nothing
-            some[TIME + j], some[OWN + j] = -np.inf, NO_PIECE
-        for first in range(0, chosen, BOXES):
-            meet_bezier(beziers, k, slack, some, first)
-        for j in range(chosen):
-            i = int(some[RAY + j])
-            if some[DOUBT + j] != 0.0:
-                work[DOUBT + i] = 1.0
-            if some[TIME + j] < work[TIME + i]:
-                for column in (TIME, PIECE, HIT_X, HIT_Y, FACE_X, FACE_Y, UNCERTAIN, HIT_S):
-                    work[column + i] = some[column + j]
+@linked
+def end_rays(work, lists, count, entry, angle, hits):
+    """Store the results of the rays in the list: no hits for those that are given up."""
+    for k in range(count):
+        i = lists[w.PLACES + k] & NATURAL
+        work[w.END_VX + k], work[w.END_VY + k] = work[w.OLD_VX + i], work[w.OLD_VY + i]
+    for k in range(count):
+        gone = direction_angle(work[w.END_VX + k], work[w.END_VY + k])
+        work[w.END_ANGLE + k] = gone if gone < LAST_ANGLE else LAST_ANGLE
+    for k in range(count):
+        i = lists[w.PLACES + k] & NATURAL
+        j = int(work[w.RAY + i]) & NATURAL
+        entry[j], angle[j], hits[j] = work[w.PX + i], work[w.END_ANGLE + k], work[w.BOUNCES + i]
 
 
-@inlined
-def meet_arcs(scope, work, first):
-    """-> HITS: the nearest hits of eight rays on the circular arcs of a hollow."""
-    circles, close, arcs = scope.tables.circles, NEARBY_SLACKS * scope.slack, no_arcs()
-    for k in range(int(scope.hollow[c.FIRST_CIRCLE]), int(scope.hollow[c.CIRCLES_END])):
-        arc = circles[k]
-        arcs = meet_circle(
-            work, first, arcs, (arc[c.START_X], arc[c.START_Y], arc[c.END_X], arc[c.END_Y]),
-            (arc[c.NORMAL_X], arc[c.NORMAL_Y]), arc[c.CURVATURE],
-            (arc[c.CHORD_X], arc[c.CHORD_Y], arc[c.SHORT_CHORD]), RUN_MARGIN * arc[c.RUN_SINE],
-            close, CIRCLE_NUMBERS - k,
-        )  # fmt: skip
-    return hits_on_arcs(work, first, arcs, close)
-
-
-@inlined
-def meet_lines(scope, work, first, hits):
-    """-> HITS: the nearest hits of eight rays, also on the lines of a hollow; rays that meet corners are doubted."""
-    joints, lines, hollow, slack = scope.tables.joints, scope.tables.lines, scope.hollow, scope.slack
-    for j in range(int(hollow[c.FIRST_JOINT]), int(hollow[c.JOINTS_END])):
-        x, y, at_joint = joints[j, c.JOINT_X], joints[j, c.JOINT_Y], corner_slack(joints[j, c.IS_CORNER], slack)
-        if joints[j, c.STARTS_LINE] > 0.0:
-            end = joints[j + 1, c.JOINT_X], joints[j + 1, c.JOINT_Y], corner_slack(joints[j + 1, c.IS_CORNER], slack)
-            hits = meet_line(
-                work, first, hits, (x, y, at_joint), end, (lines[j, c.EDGE_X], lines[j, c.EDGE_Y]),
-                (lines[j, c.LINE_NORMAL_X], lines[j, c.LINE_NORMAL_Y]), lines[j, c.LENGTH], NEARBY_SLACKS * slack,
-                (float(j), float(j) if lines[j, c.PAIRS_END] > 0.0 else NO_LINE),
-            )  # fmt: skip
-        elif at_joint > 0.0:
-            meet_corner(work, first, x, y, slack)
-    return hits
-
-
-@inlined
-def meet_pieces(scope, work, first, is_gathered):
-    """Find the nearest hits of eight rays on the pieces of a hollow; without Bezier pieces after `meet_gathered`.
-
-    The lines of a tree of boxes are left to `meet_boxes`.
-    """
-    hollow = scope.hollow
-    arcs, curves = hollow[c.CIRCLES_END] - hollow[c.FIRST_CIRCLE], hollow[c.BEZIERS_END] - hollow[c.FIRST_BEZIER]
-    has_arcs, has_curves = arcs > 0.0, curves > 0.0
-    # the chain of a hollow has one joint more than pieces
-    has_lines = not scope.has_tree and hollow[c.JOINTS_END] - hollow[c.FIRST_JOINT] - 1.0 > arcs + curves
-    if not is_gathered:
-        clear_hits(work, first)
-    hits = meet_arcs(scope, work, first) if has_arcs else no_hits()
-    if has_curves:
-        if has_arcs:
-            keep_hits(work, first, hits)
-        if not is_gathered:
-            for k in range(int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])):
-                meet_bezier(scope.tables.beziers, k, scope.slack, work, first)
-        if has_lines:
-            hits = hits_at(work, first)
-    if not scope.has_tree:
-        hits = meet_lines(scope, work, first, hits)
-    if has_lines or (has_arcs and not has_curves):
-        keep_hits(work, first, hits)
-
-
-@inlined
-def begin_rays(work, following, entry, angle, opening):
-    """Put rays, numbered from ``following``, into the wave whose work space begins at the first free place.
+@linked
+def begin_rays(work, lists, count, following, entry, angle, opening):
+    """Put rays, numbered from ``following``, into the places in the list.
 
     A ray at an end of the opening has no result here: it begins with too many hits.
     """
     left, right = opening
-    for i in range(entry.shape[0]):
-        sine, cosine = sine_cosine(angle[i])
-        work[PX + i], work[PY + i], work[VX + i], work[VY + i] = entry[i], 0.0, -cosine, -sine
-        work[OWN + i], work[BEFORE + i], work[RAY + i] = NO_PIECE, NO_PIECE, following + i
-        work[BOUNCES + i] = 0.0 if left < entry[i] < right else MOST_HITS + 1.0
+    for k in range(count):
+        sine, cosine = sine_cosine(angle[following + k])
+        work[w.END_VX + k], work[w.END_VY + k] = -cosine, -sine
+    for k in range(count):
+        i, j = lists[w.PLACES + k] & NATURAL, following + k
+        work[w.PX + i], work[w.PY + i] = entry[j], 0.0
+        work[w.VX + i], work[w.VY + i] = work[w.END_VX + k], work[w.END_VY + k]
+        work[w.OWN + i], work[w.RAY + i] = w.OPENING, float(j)
+        work[w.BOUNCES + i] = where((left < entry[j]) & (entry[j] < right), 0.0, MOST_HITS + 1.0)
 
 
 @inlined
-def end_rays(work, left, entry, angle, hits):
-    """Store the results of the rays that have left."""
-    for i in range(left):
-        gone = direction_angle(work[OUT_VX + i], work[OUT_VY + i])
-        work[OUT_ANGLE + i] = gone if gone < LAST_ANGLE else LAST_ANGLE
-    for i in range(left):
-        j = int(work[OUT_RAY + i])
-        entry[j], angle[j], hits[j] = work[OUT_X + i], work[OUT_ANGLE + i], work[OUT_BOUNCES + i]
-
-
-@inlined
-def next_hits(tables, scope, work, walks, count, left, limit):
-    """-> (kept, gone): numbers of the rays of a wave that go on after their next hit, and that leave.
-
-    Before, ``count`` rays were in the wave and ``left`` had left.
-    """
-    slack, opening, most = scope.slack, (scope.left, scope.right), float(min(limit, MOST_HITS))
-    kept, gone = 0, 0
-    is_gathered = has_many_beziers(scope.hollow)
-    if is_gathered:
-        meet_gathered(scope, work, count)
-    for first in range(0, count, BOXES):
-        meet_pieces(scope, work, first, is_gathered)
-    if scope.has_tree:
-        meet_boxes(scope, work, walks, count)
-    for first in range(0, count, BOXES):
-        mask = before_runs(work, first)
-        while mask != 0:
-            i = first + first_bit(mask)
-            mask &= mask - 1
-            if i < count and not begins_run(tables, work, i, slack, limit):
-                work[UNCERTAIN + i] = 0.0
-        found = advance(work, first, count, kept, left + gone, opening, slack, most)
-        kept += found & 255
-        gone += found >> 8
-    return kept, gone
+def close_ranks(work, lists, first, end, count):
+    """-> int: the number of rays of a wave after the last rays have taken the places from ``first`` on in the list."""
+    for k in range(end - 1, first - 1, -1):
+        i = lists[w.PLACES + k] & NATURAL
+        count -= 1
+        for column in (w.PX, w.PY, w.VX, w.VY, w.OWN, w.BEFORE, w.BOUNCES, w.RAY):
+            work[column + i] = work[column + count]
+    return count
 
 
 @inner
-def cross_simple(tables, h, limit, entry, angle, hits, work, walks):
+def cross_simple(tables, h, limit, entry, angle, hits, work, lists):
     """Reflect rays by a hollow of lines, circles and Bezier pieces, with results as in `closed_forms.cross_arc`.
 
-    The rays go through the hollow in waves: all rays that are inside hit their next piece, eight at once. The next rays
-    take the places of those that have left. Rays with more than ``limit`` or `MOST_HITS` hits, or with runs of hits,
-    have no result.
+    The rays go through the hollow in waves: all rays that are inside hit their next piece. The next rays take the
+    places of those that have left. Rays with more than ``limit`` or `MOST_HITS` hits, or with runs of hits, have no
+    result.
     """
     scope = scope_of(tables, h, NO_SLOTS)
+    opening, slack, most = (scope.left, scope.right), scope.slack, float(min(limit, MOST_HITS))
     rays = entry.shape[0]
     for i in range(rays):
         hits[i] = 0.0
-    count, left, following, waves = 0, 0, 0, 0
-    while waves < MOST_WAVES:
-        if following < rays and count <= FEW:
-            end = min(following + WAVE - count, rays)
-            begin_rays(work[count:], following, entry[following:end], angle[following:end], (scope.left, scope.right))
-            count, following = count + end - following, end
-        if count == 0:
-            break
-        if following == rays:
-            waves += 1
-        if left + count > WAVE:
-            end_rays(work, left, entry, angle, hits)
-            left = 0
-        count, gone = next_hits(tables, scope, work, walks, count, left, limit)
-        left += gone
-    end_rays(work, left, entry, angle, hits)
+    count = following = min(rays, w.WAVE)
+    for i in range(count):
+        lists[w.PLACES + i], work[w.BEFORE + i], work[w.HIT_S + i] = i, 0.0, 0.0
+        clear_hit(work, i)
+    begin_rays(work, lists, count, 0, entry, angle, opening)
+    waves = 0
+    while count > 0 and waves < MOST_WAVES:
+        waves += np.int64(following == rays)
+        meet_pieces(scope, work, lists, count)
+        place_hits(scope, work, lists, count)
+        for k in range(list_rays(work, lists, count, w.NEED, w.BEFORE_RUN, w.BEFORE_RUN, 0)):
+            i = lists[w.PLACES + k] & NATURAL
+            if not begins_run(tables, work, i, slack, limit):
+                work[w.NEED + i] = 0.0
+        reflect_rays(work, count, opening, slack, most)
+        done = list_rays(work, lists, count, w.GONE, 1.0, 1.0, 0)
+        end_rays(work, lists, done, entry, angle, hits)
+        fresh = min(done, rays - following)
+        begin_rays(work, lists, fresh, following, entry, angle, opening)
+        following += fresh
+        count = close_ranks(work, lists, fresh, done, count)

@@ -67,7 +67,7 @@ def form_gradient(form, x, y):
 def arc_hit(arc, own, px, py, vx, vy, error):
     """-> (t, undecided, height): time to the front of one arc, or inf; time of an undecided contact, or inf.
 
-    For ``height`` see `arc_time` in `compiled/arcs`. ``error`` bounds the transversal error of the ray at the arc.
+    For ``height`` see `arc_time` in `compiled/pieces`. ``error`` bounds the transversal error of the ray at the arc.
     """
     nothing = extended(np.inf)
     form, stretch = arc_form(arc), arc[c.WIDE_STRETCH]

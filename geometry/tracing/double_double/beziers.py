@@ -128,7 +128,7 @@ def extrema(g):
 def is_close_by(coefficients, s, t, vx, vy, size, slack):
     """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start.
 
-    A hit behind the start is not if the start lies beyond an end of the piece, see `compiled/beziers`.
+    A hit behind the start is not if the start lies beyond an end of the piece, see `compiled/pieces`.
     """
     ax, ay = coefficients
     tx, ty = cubic_slope(ax, s), cubic_slope(ay, s)

@@ -13,8 +13,7 @@ from campaigns.judges.precise_tracer import trace_precisely
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.scene.columns import PARTNER, TREE_LEVELS
-from asperity.geometry.scene.scene import NO_TABLES
-from asperity.geometry.tracing.compiled.lines import is_ahead
+from asperity.geometry.tracing.compiled.pieces import is_ahead
 from asperity.geometry.tracing.refinement import REFINED_SEGMENTS, refined_trace
 
 EPS = np.finfo(float).eps
@@ -108,11 +107,9 @@ def test_flagged_rays_with_long_runs_along_an_arc_are_traced_in_one_step_too():
 
 
 def test_a_line_a_slack_away_is_met_without_a_second_test():
-    tables = NO_TABLES._replace(joints=np.zeros((2, 4)), lines=np.array([[1.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0]]))
-
     def ahead(t):
         # the height t (c_before - c_after) / length, with close = 1 and slack = 1e-3
-        return is_ahead.py_func(tables, 0, (0.5, -0.5), t, 1.0, 1e-3)
+        return is_ahead.py_func(t, 1.0, 2.0, 1.0, 1e-3)
 
     assert [ahead(t) for t in (1.5, 0.5, 2.1e-3, 1.9e-3, -0.5)] == [True, True, True, False, False]
 

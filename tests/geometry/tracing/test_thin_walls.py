@@ -10,11 +10,11 @@ import pytest
 from campaigns.judges.precise_tracer import trace_precisely
 from campaigns.rays.aimed_rays import COLLISIONS, AimedRays
 from campaigns.rays.thin_polygons import POLYGONS, follow_plainly, judge_plainly, random_polygon, rays_beside_corners
+from numba import njit
 
 from asperity import geometry as geo
 from asperity.geometry.polygons.predicates import ExactPoints
-from asperity.geometry.scene.scene import NO_TABLES
-from asperity.geometry.tracing.compiled.lines import line_time
+from asperity.geometry.tracing.compiled.pieces import Line, line_hit
 from asperity.geometry.tracing.double_double.sides import orientation
 from asperity.geometry.tracing.refinement import refined_trace
 
@@ -52,10 +52,9 @@ def test_the_segment_before_a_run_does_not_count_as_the_one_that_ends_it():
 
 
 def test_a_line_that_is_met_at_its_end_is_not_met_at_its_start():
-    joints, lines = np.array([[0.0, -1.0], [2.0, -1.0]]), np.array([[2.0, 0.0]])
-    tables = NO_TABLES._replace(joints=joints, lines=lines)
-    time, fraction = line_time.py_func(tables, 0, (2.0, 0.0), 2.0, 0.0, 0.0, -1.0)
-    assert time == 1.0 and fraction < 0.0
+    line = Line(0.0, -1.0, 2.0, -1.0, 2.0, 0.0, 0.0, 1.0, 2.0)
+    time, fraction, x, y = njit(line_hit.py_func)(line, 2.0, 0.0, 2.0, 0.0, 0.0, -1.0)
+    assert (time, x, y) == (1.0, 2.0, -1.0) and fraction < 0.0
 
 
 @pytest.mark.parametrize("theta", [1e-4, 1e-6, np.pi - 1e-7, 1e-9])

@@ -1,19 +1,55 @@
-"""Rays in waves, eight at once: how many are left to the loop, and when waves pay; their bits are a property."""
+"""Rays in waves: vectors compute them; how many are left to the loop; when waves pay. Their bits are a property."""
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
+from llvmlite import binding
+from numba import njit, types
 
 from asperity import geometry as geo
 from asperity.geometry.scene.columns import FORM_COLUMNS
 from asperity.geometry.tracing import tracing
-from asperity.geometry.tracing.compiled import closed_forms
+from asperity.geometry.tracing.compiled import closed_forms, pieces, waves
 from asperity.geometry.tracing.compiled.pointers import Late
 from asperity.geometry.tracing.compiled.trigonometry import mirrored
 from asperity.geometry.tracing.threads import new_flag
 
 RAYS = 5_000
+
+
+NUMBER, COUNT = types.float64, types.int64
+WORK, LISTS = types.Array(NUMBER, 1, "C"), types.Array(COUNT, 1, "C")
+PAIR, CURVE, LINE = types.UniTuple(NUMBER, 2), types.UniTuple(NUMBER, 15), types.NamedUniTuple(NUMBER, 9, pieces.Line)
+LOOPS = {
+    waves.meet_corner: (WORK, COUNT, NUMBER, NUMBER, NUMBER),
+    waves.meet_line: (WORK, COUNT, LINE, NUMBER, NUMBER, NUMBER),
+    waves.meet_arc: (WORK, COUNT, CURVE, NUMBER, NUMBER),
+    waves.meet_parabola: (WORK, COUNT, CURVE, NUMBER),
+    waves.mark_near: (WORK, COUNT, CURVE, NUMBER),
+    waves.find_own_root: (WORK, COUNT, CURVE),
+    waves.find_fall: (WORK, COUNT, CURVE, COUNT),
+    waves.start_roots: (WORK, COUNT, CURVE),
+    waves.improve_roots: (WORK, COUNT, CURVE),
+    waves.time_roots: (WORK, COUNT, CURVE, NUMBER),
+    waves.reflect_rays: (WORK, COUNT, PAIR, NUMBER, NUMBER),
+    waves.begin_rays: (WORK, LISTS, COUNT, COUNT, WORK, WORK, PAIR),
+    waves.end_rays: (WORK, LISTS, COUNT, WORK, WORK, WORK),
+}
+
+
+@pytest.mark.skipif(not binding.get_host_cpu_features().get("avx2"), reason="names of instructions of AVX2 and AVX-512")
+@pytest.mark.parametrize("loop", LOOPS, ids=lambda loop: loop.__name__)
+def test_loops_over_rays_use_vectors_and_write_without_masks(loop):
+    compiled = njit(error_model="numpy")(loop.py_func)
+    compiled.compile(LOOPS[loop])
+    (code,) = compiled.inspect_asm().values()
+    vectors = len(re.findall(r"v(?:add|sub|mul|div|sqrt)pd.*%[yz]mm", code))
+    # the last rays, fewer than fit into a vector, take the same operations one by one, some in up to three copies
+    assert 4 * vectors > len(re.findall(r"v(?:add|sub|mul|div|sqrt)sd", code)) > 0
+    assert "vmaskmov" not in code
 
 
 def rays(wall):

@@ -1,0 +1,336 @@
+"""The first hit of a ray on the lines of a hollow with many: a search in a tree of boxes, for one ray and for a wave.
+
+Loads numba. A ray is tested against the eight boxes, or the eight lines, in a row of the tree at once, in a vector of
+eight numbers, because the compiler does not vectorise such short loops. Comparisons with NaN, as in an empty place, are
+false.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from ...scene import columns as c
+from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, OTHER_X, OTHER_Y, PARENT
+from ...scene.sky import MOST_LINES, SKY_ROOM
+from ...scene.tolerances import NEARBY_SLACKS
+from . import work as w
+from .options import inlined, inner
+from .pieces import Line, is_ahead, joint_side, line_at, line_hit, line_sides, side, where
+from .work import NATURAL
+
+# No hit on a line, for `nearest_line`.
+NO_LINE_HIT = np.inf, -1, 0.0, np.inf, False
+# Mask of all boxes of a row.
+ALL_BOXES = (1 << BOXES) - 1
+WORD, NUMBER, BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
+
+
+def _operation(name: str, *how: str) -> Any:
+    return lambda one, other: Vector(one.builder, getattr(one.builder, name)(*how, one.value, other.value))
+
+
+class Vector:
+    """Eight numbers or truth values in compiled code, with the operations of arithmetic."""
+
+    kind = ir.VectorType(NUMBER, BOXES)
+    __add__, __sub__, __mul__ = _operation("fadd"), _operation("fsub"), _operation("fmul")
+    __and__, __or__ = _operation("and_"), _operation("or_")
+    __le__, __ge__, __gt__ = (_operation("fcmp_ordered", how) for how in ("<=", ">=", ">"))
+
+    def __init__(self, builder: Any, value: Any) -> None:
+        self.builder, self.value = builder, value
+
+    def __abs__(self) -> Vector:
+        name, kind = f"llvm.fabs.v{BOXES}f64", ir.FunctionType(self.kind, [self.kind])
+        function = self.builder.module.declare_intrinsic(name, (), kind)
+        return Vector(self.builder, self.builder.call(function, [self.value]))
+
+    def mask(self) -> Any:
+        """Return the truth values as bits of a whole number."""
+        return self.builder.zext(self.builder.bitcast(self.value, ir.IntType(BOXES)), WORD)
+
+
+def _vectors(builder: Any, row: Any, *numbers: Any) -> list[Vector]:
+    """Return the four vectors of a row of a tree, and eight times each of some numbers."""
+    vectors = []
+    for column in (ANCHOR_X, ANCHOR_Y, OTHER_X, OTHER_Y):
+        place = builder.bitcast(builder.gep(row, [WORD(column)]), Vector.kind.as_pointer())
+        vectors.append(builder.load(place, align=8))
+    for number in numbers:
+        one = builder.insert_element(ir.Constant(Vector.kind, ir.Undefined), number, ir.IntType(32)(0))
+        places = ir.Constant(ir.VectorType(ir.IntType(32), BOXES), [0] * BOXES)
+        vectors.append(builder.shuffle_vector(one, one, places))
+    return [Vector(builder, vector) for vector in vectors]
+
+
+@intrinsic
+def boxes_met(typing, row, px, py, vx, vy, least, most):
+    """-> int: mask of the boxes in a row of a tree that a ray meets between the times ``least`` and ``most``.
+
+    Bit k tells about box k.
+    """
+
+    def met(context, builder, signature, values):
+        x, y, width, height, px, py, vx, vy, least, most = _vectors(builder, *values)
+        # of the middle: its distance from the ray's line and its position along it; and those of the box about it
+        middle, along = abs(side.py_func(x, y, px, py, vx, vy)), (x - px) * vx + (y - py) * vy
+        reach, length = width * abs(vy) + height * abs(vx), width * abs(vx) + height * abs(vy)
+        return ((middle <= reach) & (along + length >= least) & (along - length <= most)).mask()
+
+    return types.int64(row, *[types.float64] * 6), met
+
+
+@intrinsic
+def lines_met(typing, row, px, py, vx, vy, slack):
+    """-> int: mask of the lines in a row of a tree that a ray's line crosses from their free side.
+
+    Bits 8 to 15 tell whether an end of the line is within the slack of the ray's line.
+    """
+
+    def met(context, builder, signature, values):
+        x0, y0, x1, y1, px, py, vx, vy, slack = _vectors(builder, *values)
+        before, after, zero = side.py_func(x0, y0, px, py, vx, vy), side.py_func(x1, y1, px, py, vx, vy), px - px
+        crossed = (before >= zero) & (zero >= after) & (before > after)
+        at_end = (abs(before) <= slack) | (abs(after) <= slack)
+        return builder.or_(crossed.mask(), builder.shl(at_end.mask(), WORD(BOXES)))
+
+    return types.int64(row, *[types.float64] * 5), met
+
+
+@intrinsic
+def first_bit(typing, mask):
+    """-> int: the number of the lowest bit of a mask that is not 0."""
+
+    def count(context, builder, signature, values):
+        return builder.cttz(values[0], BIT(1))
+
+    return types.int64(types.int64), count
+
+
+@intrinsic
+def last_bit(typing, mask):
+    """-> int: the number of the highest bit of a mask that is not 0."""
+
+    def count(context, builder, signature, values):
+        return builder.sub(WORD(63), builder.ctlz(values[0], BIT(1)))
+
+    return types.int64(types.int64), count
+
+
+@inlined
+def first_boxes(scope, px, py, vx, vy, least, most):
+    """-> search: before the first leaf that a ray meets between two times.
+
+    A search is the row of a node and its level, from 1 above the leaves; the mask of the boxes in the node still to
+    visit; and eight bits for each level, those masks of the nodes above.
+    """
+    root, levels = int(scope.hollow[c.TREE_ROOT]), int(scope.hollow[c.TREE_LEVELS])
+    return root, levels - 1, boxes_met(scope.tables.boxes[root], px, py, vx, vy, least, most), np.int64(0)
+
+
+@inlined
+def next_leaf(scope, search, forward, px, py, vx, vy, least, most):
+    """-> (leaf, search): the row of the next leaf that a ray meets between two times, -1 after the last one.
+
+    Boxes are visited in the order of the wall, or against it if not ``forward``.
+    """
+    boxes, top = scope.tables.boxes, int(scope.hollow[c.TREE_LEVELS]) - 1
+    node, level, mask, waiting = search
+    while True:
+        if mask == 0:
+            if level == top:
+                return -1, (node, level, mask, waiting)
+            node = int(boxes[node, PARENT])
+            level += 1
+            mask = waiting >> (BOXES * level) & ALL_BOXES
+            if mask != 0:
+                mask &= boxes_met(boxes[node], px, py, vx, vy, least, most)
+            continue
+        box = first_bit(mask) if forward else last_bit(mask)
+        mask ^= 1 << box
+        row = int(boxes[node, CONTENT]) + box
+        if level == 1:
+            return row, (node, level, mask, waiting)
+        place = BOXES * level
+        waiting = (waiting & ~(ALL_BOXES << place)) | (mask << place)
+        node = row
+        level -= 1
+        mask = boxes_met(boxes[node], px, py, vx, vy, least, most)
+
+
+@inlined
+def corner_at_ends(joints, first, at_end, at_entry, px, py, vx, vy, slack):
+    """-> float: the least time to a corner at an end of the lines of a leaf that a mask tells, inf if there is none."""
+    time = np.inf
+    while at_end != 0:
+        j = first + first_bit(at_end)
+        at_end &= at_end - 1
+        _, ahead = joint_side(joints, j, at_entry, px, py, vx, vy, slack)
+        time = min(time, ahead)
+        if joints[j, c.STARTS_LINE] > 0.0:
+            _, ahead = joint_side(joints, j + 1, at_entry, px, py, vx, vy, slack)
+            time = min(time, ahead)
+    return time
+
+
+@inner
+def nearest_line_in_boxes(tree, own_line, bounces, px, py, vx, vy, time):
+    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the boxes along the ray.
+
+    ``own_line`` is the line that the ray leaves after so many bounces, or -1.
+    """
+    tables, slack = tree.tables, tree.slack
+    boxes, close, most = tables.boxes, NEARBY_SLACKS * slack, time + 2.0 * slack
+    best, found, best_fraction = np.inf, -1, 0.0
+    corner_time, nearby = np.inf, False
+    search = first_boxes(tree, px, py, vx, vy, -close, most)
+    while True:
+        leaf, search = next_leaf(tree, search, vx > 0.0, px, py, vx, vy, -close, most)
+        if leaf < 0:
+            return best, found, best_fraction, corner_time, nearby
+        met, first = lines_met(boxes[leaf], px, py, vx, vy, slack), int(boxes[leaf, CONTENT])
+        at_end, met = met >> BOXES, met & ALL_BOXES
+        if at_end != 0:
+            ahead = corner_at_ends(tables.joints, first, at_end, bounces == 0, px, py, vx, vy, slack)
+            corner_time = min(corner_time, ahead)
+        while met != 0:
+            j = first + first_bit(met)
+            met &= met - 1
+            if j == own_line:
+                continue
+            line = line_at(tables, j)
+            before, after = line_sides(line, px, py, vx, vy)
+            t, fraction, _, _ = line_hit(line, before, after, px, py, vx, vy)
+            # of two lines at equal distance the first along the wall is hit, as without boxes
+            if is_ahead(t, before - after, line.length, close, slack):
+                if t < best or (t == best and j < found):
+                    best, found, best_fraction = t, j, fraction
+                    most = min(best, time) + 2.0 * slack
+            elif t >= -close:
+                nearby = True
+
+
+@inlined
+def escapes(tables, own, room, px, py, vx, vy):
+    """-> bool: whether a ray that starts on line ``own`` certainly meets no piece; see `scene/sky`.
+
+    ``room`` is the distance from the ends of the line from which on this is known.
+    """
+    joints, lines, j = tables.joints, tables.lines, own
+    x0, y0 = abs(joints[j, c.JOINT_X] - px), abs(joints[j, c.JOINT_Y] - py)
+    x1, y1 = abs(joints[j + 1, c.JOINT_X] - px), abs(joints[j + 1, c.JOINT_Y] - py)
+    is_inside = (max(x0, y0) > room) & (max(x1, y1) > room)
+    is_free = (vx < lines[j, c.SKY_RIGHT] * vy) & (-vx < lines[j, c.SKY_LEFT] * vy)
+    return is_inside & is_free
+
+
+@inlined
+def begin_searches(scope, work, lists, count):
+    """-> int: the number of rays of a wave that begin at the root of the tree; the other ones meet no line."""
+    root, top, room = int(scope.hollow[c.TREE_ROOT]), int(scope.hollow[c.TREE_LEVELS]) - 1, SKY_ROOM * scope.slack
+    first, end = scope.joints
+    nodes, may_escape = 0, end - first <= MOST_LINES + 1
+    for i in range(count):
+        lists[w.ROW + i], lists[w.LEVEL + i], lists[w.WAITING + i] = root, top, ALL_BOXES << BOXES * top
+        lists[w.AT_NODES + nodes] = i
+        nodes += 1
+        if may_escape and work[w.OWN + i] >= w.LINES:
+            px, py, vx, vy = work[w.PX + i], work[w.PY + i], work[w.VX + i], work[w.VY + i]
+            nodes -= np.int64(escapes(scope.tables, int(work[w.OWN + i] - w.LINES) & NATURAL, room, px, py, vx, vy))
+    return nodes
+
+
+@inlined
+def step_on(boxes, work, lists, i, waiting, nodes, leaves):
+    """-> (nodes, leaves): numbers of rays at nodes and at leaves, with ray i at its next one if there is one.
+
+    The search is that of `next_leaf`, one step at a time, and without branches, which the processor could not predict.
+    ``waiting`` are the boxes still to visit, eight bits for each level.
+    """
+    row, level = lists[w.ROW + i] & NATURAL, lists[w.LEVEL + i]
+    place = BOXES * level
+    mask = waiting >> place & ALL_BOXES
+    up = np.int64(mask == 0)
+    box = first_bit(mask | up) if work[w.VX + i] > 0.0 else last_bit(mask | up)
+    to_leaf = np.int64(level == 1) & ~up
+    down = 1 - up - to_leaf
+    # the node above, or the box; bit 0 stands for no box
+    following = int(boxes[row, PARENT if up != 0 else CONTENT]) + box
+    waiting ^= (1 - up) << (place + box)
+    lists[w.WAITING + i] = waiting | (down * ALL_BOXES) << (place - BOXES)
+    lists[w.LEVEL + i] = level + up - down
+    lists[w.ROW + i] = row if to_leaf != 0 else following
+    lists[w.LEAF + i] = following
+    # written in any case, counted if true
+    lists[w.AT_NODES + nodes] = lists[w.AT_LEAVES + leaves] = i
+    return nodes + (down | (up & np.int64(waiting != 0))), leaves + to_leaf
+
+
+@inlined
+def line_of_leaf(boxes, leaf, place):
+    """-> Line: a line of a leaf, for its time only; the row of the leaf is at hand, those of other tables are not."""
+    x0, y0, x1, y1 = (
+        boxes[leaf, ANCHOR_X + place], boxes[leaf, ANCHOR_Y + place], boxes[leaf, OTHER_X + place],
+        boxes[leaf, OTHER_Y + place],
+    )  # fmt: skip
+    return Line(x0, y0, x1, y1, x1 - x0, y1 - y0, 0.0, 0.0, 0.0)
+
+
+@inlined
+def meet_leaf(scope, work, lists, i):
+    """Find the nearest hit of ray i of a wave on the lines of its leaf, if that is nearer."""
+    tables, slack, leaf = scope.tables, scope.slack, lists[w.LEAF + i] & NATURAL
+    px, py, vx, vy = work[w.PX + i], work[w.PY + i], work[w.VX + i], work[w.VY + i]
+    first, own, close = (
+        int(tables.boxes[leaf, CONTENT]) & NATURAL,
+        int(work[w.OWN + i] - w.LINES),
+        NEARBY_SLACKS * slack,
+    )
+    met = lines_met(tables.boxes[leaf], px, py, vx, vy, slack)
+    at_end, met = met >> BOXES, met & ALL_BOXES
+    if at_end != 0:
+        at_entry = work[w.BOUNCES + i] == 0.0
+        if corner_at_ends(tables.joints, first, at_end, at_entry, px, py, vx, vy, slack) < np.inf:
+            work[w.UNCERTAIN + i] = 1.0
+    while met != 0:
+        place = first_bit(met)
+        met &= met - 1
+        j, line, best = first + place, line_of_leaf(tables.boxes, leaf, place), work[w.TIME + i]
+        before, after = line_sides(line, px, py, vx, vy)
+        t, _, _, _ = line_hit(line, before, after, px, py, vx, vy)
+        is_other = j != own
+        work[w.UNCERTAIN + i] += where(is_other & (abs(t) <= close), 1.0, 0.0)
+        # of two lines at equal distance the first along the wall is hit, as without boxes
+        number, piece = w.LINES + j, work[w.PIECE + i]
+        is_nearer = is_other & (t > close) & ((t < best) | ((t == best) & (number < piece)))
+        work[w.TIME + i], work[w.PIECE + i] = where(is_nearer, t, best), where(is_nearer, number, piece)
+
+
+@inlined
+def search_boxes(scope, work, lists, count):
+    """Find the first lines that all rays of a wave meet, as `nearest_line_in_boxes`, where these are nearer.
+
+    All rays take a step in turn, so that the processor works on some while it waits for the others.
+    """
+    boxes, close = scope.tables.boxes, NEARBY_SLACKS * scope.slack
+    nodes, leaves = begin_searches(scope, work, lists, count), 0
+    while nodes + leaves > 0:
+        rays, leaves = leaves, 0
+        for k in range(rays):
+            i = lists[w.AT_LEAVES + k] & NATURAL
+            meet_leaf(scope, work, lists, i)
+            nodes, leaves = step_on(boxes, work, lists, i, lists[w.WAITING + i], nodes, leaves)
+        rays, nodes = nodes, 0
+        for k in range(rays):
+            i = lists[w.AT_NODES + k] & NATURAL
+            px, py, vx, vy = work[w.PX + i], work[w.PY + i], work[w.VX + i], work[w.VY + i]
+            met = boxes_met(
+                boxes[lists[w.ROW + i] & NATURAL], px, py, vx, vy, -close, work[w.TIME + i] + 2.0 * scope.slack
+            )
+            others = ~((ALL_BOXES ^ met) << BOXES * lists[w.LEVEL + i])
+            nodes, leaves = step_on(boxes, work, lists, i, lists[w.WAITING + i] & others, nodes, leaves)
