@@ -3,7 +3,6 @@
 import ast
 import importlib.util
 import logging
-import operator
 import os
 import pty
 import shutil
@@ -13,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numba import types
 from numba.core import config
 
 import asperity
@@ -204,74 +202,25 @@ def test_a_linked_function_is_a_part_of_its_callers_and_its_errors_reach_python(
         root(4.0)
 
 
-def test_the_type_of_an_operator_is_inferred_once_in_a_process(monkeypatch, nothing_stored):
-    asked = []
-    infer = types.Function.get_call_type
-    # the process may know all of them
-    monkeypatch.setattr(compilation._Typing, "known", {})
-    monkeypatch.setattr(types.Function, "get_call_type", lambda self, *given: asked.append(self) or infer(self, *given))
-
-    @compilation.jit()
-    def power(x):
-        return x * x * x * x * x * x * x * x if x > 1.0 or x < 0.0 else x * x * x if x > 0.5 else x
-
-    assert power(2.0) == 256.0
-    assert [function.typing_key for function in asked].count(operator.mul) == 1
-
-
-@pytest.fixture
-def nothing_stored(monkeypatch, tmp_path):
-    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
-
-
 def polygon_area():
     @compilation.jit(linked=True)
     def cross(points, i, j):
         return points[i, 0] * points[j, 1] - points[i, 1] * points[j, 0]
 
-    @compilation.jit()
+    @compilation.jit(_nrt=False)
     def area(points):
         total = 0.0
         for i in range(points.shape[0]):
             total += cross(points, i, i - 1) if i > 0 else cross(points, 0, points.shape[0] - 1)
         return abs(total) / 2
 
-    return area(np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 3.0]]))
+    return area(np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 3.0]])), area.targetoptions
 
 
-def test_this_version_of_numba_has_the_methods_that_are_replaced(monkeypatch, nothing_stored):
-    translated = []
-    translate = compilation._Lower._called
-    monkeypatch.setattr(
-        compilation._Lower, "_called", lambda self, *given: translated.append(given) or translate(self, *given)
-    )
-    assert compilation.knows_numba() and polygon_area() == 6.0 and len(translated) > 10
-
-
-@pytest.mark.parametrize("part", compilation.PARTS, ids=lambda part: part[1])
-def test_with_another_version_of_numba_none_of_its_methods_is_replaced(part, monkeypatch, nothing_stored):
-    compilation.knows_numba.cache_clear()
-    try:
-        with monkeypatch.context() as changed:
-            changed.setitem(compilation.PARTS, part, "self other")
-            assert not compilation.knows_numba()
-        monkeypatch.setattr(compilation._Lower, "_called", None)
-        monkeypatch.setattr(compilation._Lower, "alloca_lltype", None)
-        assert polygon_area() == 6.0
-    finally:
-        compilation.knows_numba.cache_clear()
-
-
-def test_functions_with_equal_options_share_them():
-    @compilation.jit()
-    def first(x):
-        return x + 1.0
-
-    @compilation.jit()
-    def second(x):
-        return x - 1.0
-
-    first(1.0)
-    known = len(compilation._Same.known)
-    second(1.0)
-    assert len(compilation._Same.known) == known
+def test_options_that_numba_does_not_have_are_left_out(monkeypatch, tmp_path):
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    found, options = polygon_area()
+    assert found == 6.0 and options["_nrt"] is False
+    monkeypatch.setattr(compilation, "has_option", lambda name: False)
+    found, options = polygon_area()
+    assert found == 6.0 and not compilation.UNDOCUMENTED & set(options)
