@@ -175,7 +175,7 @@ def trace(
     for a wall of few lines, circles and Bezier pieces, and 0.2 us for a profile of 300 points or 32 Bezier pieces; up
     to four times as much for few rays. About 0.6 us for 10^5 lines; 70 ns and more for ellipses.
     The first call in a process loads the compiled functions (about 1 s); the first call on a machine compiles them
-    once for all walls (2 to 5 s of processor time, then cached).
+    once for all walls (about 5 s of processor time, then cached).
 
     Examples
     --------
