@@ -49,25 +49,30 @@ class RefinedTrace(NamedTuple):
 
 def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 2**62) -> RefinedTrace:
     """Trace rays (two one-dimensional arrays) in double-double arithmetic from the start."""
-    from .double_double.arcs import refined_arcs
     from .double_double.rays import refined_rays
 
     count = len(x)
-    circles = _rows(scene.circles, c.ARC_COLUMNS)
-    arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, c.ARC_COLUMNS)]))
-    lines, pairs = _rows(scene.lines, c.LINE_COLUMNS), _rows(scene.pairs, c.PAIR_COLUMNS)
-    beziers = np.zeros((1, c.BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
-    tables = Tables(
-        scene.hollows, scene.joints, lines, pairs, arcs, len(circles), beziers, _free_bands(scene),
-        scene.cell, scene.is_open,
-    )  # fmt: skip
     results = RefinedTrace(
         np.empty((count, 2)), np.empty((count, 2)), np.empty(count, np.int64), np.empty(count, np.uint8),
         np.empty(count), np.empty(count),
     )  # fmt: skip
     starts, angles = np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64)
-    refined_rays(starts, angles, tables, max_collisions, REFINED_SEGMENTS, results)
+    refined_rays(starts, angles, tables_of(scene), max_collisions, REFINED_SEGMENTS, results)
     return results
+
+
+def tables_of(scene: Scene) -> Tables:
+    """Return the tables of a wall for double-double arithmetic."""
+    from .double_double.arcs import refined_arcs
+
+    circles = _rows(scene.circles, c.ARC_COLUMNS)
+    arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, c.ARC_COLUMNS)]))
+    lines, pairs = _rows(scene.lines, c.LINE_COLUMNS), _rows(scene.pairs, c.PAIR_COLUMNS)
+    beziers = np.zeros((1, c.BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
+    return Tables(
+        scene.hollows, scene.joints, lines, pairs, arcs, len(circles), beziers, _free_bands(scene),
+        scene.cell, scene.is_open,
+    )  # fmt: skip
 
 
 def retrace(

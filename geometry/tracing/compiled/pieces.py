@@ -20,13 +20,22 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
 from ....core.rounding import EPS
 from ...scene import columns as c
 from ...scene.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
 from ..double_double.beziers import curve_size
+from ..double_double.formulas import (
+    arc_normal,
+    arc_root,
+    arc_terms,
+    back_on_arc,
+    bezier_sides,
+    bezier_time,
+    cubic,
+    quadratic_roots,
+    where,
+)
 from .options import inlined, inner
 from .records import LINE
 
@@ -41,34 +50,6 @@ NO_BEZIER_HIT = np.inf, -1, 0.0, np.inf, -1.0
 # Size, in eps times that of its products, from which on g is not 0: twice that of a contact. Each value of g has about
 # eight rounding errors.
 NO_ZERO_ULPS = 2.0 * TANGENT_ULPS
-
-
-@intrinsic
-def where(typing, condition, yes, no):
-    """-> float: one of two numbers, both of which are computed, without a branch.
-
-    A conditional expression is a branch at first. The compiler would join those of one condition, and then write to the
-    columns of a wave with a mask, which is slow on many processors, or not vectorise at all.
-    """
-
-    def select(context, builder, signature, values):
-        return builder.select(*values)
-
-    return types.float64(types.boolean, types.float64, types.float64), select
-
-
-@inlined
-def mirror(vx, vy, nx, ny):
-    """-> (vx, vy): the velocity after the reflection on a piece with a unit normal."""
-    w = 2.0 * (vx * nx + vy * ny)
-    return vx - w * nx, vy - w * ny
-
-
-@inlined
-def with_length_one(vx, vy):
-    """-> (vx, vy): one Newton step on |v| = 1, so that errors of speed and position do not amplify each other."""
-    scale = 1.5 - 0.5 * (vx * vx + vy * vy)
-    return scale * vx, scale * vy
 
 
 @inlined
@@ -197,23 +178,9 @@ def nearest_line(scope, own, px, py, vx, vy, time):
 
 
 @inlined
-def arc_terms(arc, px, py, vx, vy, stretch):
-    """-> (b, f, d, speed2): the numbers B, F, D and |v|^2 of a ray."""
-    rx, ry, wy = px - arc[c.START_X], stretch * (py - arc[c.START_Y]), stretch * vy
-    curvature = arc[c.CURVATURE]
-    b = arc[c.NORMAL_X] * vx + arc[c.NORMAL_Y] * wy - curvature * (rx * vx + ry * wy)
-    speed2 = vx * vx + wy * wy
-    f = arc[c.NORMAL_X] * rx + arc[c.NORMAL_Y] * ry - 0.5 * curvature * (rx * rx + ry * ry)
-    return b, f, b * b + 2.0 * curvature * speed2 * f, speed2
-
-
-@inlined
-def arc_root(arc, is_own, b, f, root, speed2):
-    """-> float: time to the front of an arc, of a ray that meets it; ``root`` is that of D."""
-    # only of a focusing arc
-    far = b >= where(arc[c.CURVATURE] > 0.0, 0.0, np.inf)
-    top = where(is_own, 2.0 * b, where(far, b + root, 2.0 * f))
-    return top / where(is_own | far, arc[c.CURVATURE] * speed2, root - b)
+def arc_form(arc):
+    """-> (n0x, n0y, curvature): the numbers of F."""
+    return arc[c.NORMAL_X], arc[c.NORMAL_Y], arc[c.CURVATURE]
 
 
 @inlined
@@ -223,21 +190,20 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
     ``tangent`` is 1 if hit and miss are not distinguished. For a hit close by, ``height`` is about the distance of the
     start in front of the arc, in coordinates with a circular arc; inf for a hit on the far side of a focusing arc.
     """
-    curvature = arc[c.CURVATURE]
-    b, f, d, speed2 = arc_terms(arc, px, py, vx, vy, stretch)
+    form, curvature = arc_form(arc), arc[c.CURVATURE]
+    rx, ry = px - arc[c.START_X], stretch * (py - arc[c.START_Y])
+    b, f, d, speed2 = arc_terms(form, rx, ry, vx, stretch * vy)
     if own:
         if curvature <= 0.0 or b <= 0.0:
             return np.inf, 0, np.inf
-        return arc_root(arc, own, b, f, 0.0, speed2), 0, np.inf
+        return arc_root(form, own, b, f, 0.0, speed2), 0, np.inf
     tangent = 0
-    if is_nearly_tangent(arc, b, d, speed2):
-        rx, ry = px - arc[c.START_X], stretch * (py - arc[c.START_Y])
-        if abs(d) <= tangent_error(arc, b, rx, ry, speed2):
-            tangent = 1
-            d = 0.0
+    if is_nearly_tangent(arc, b, d, speed2) and abs(d) <= tangent_error(arc, b, rx, ry, speed2):
+        tangent = 1
+        d = 0.0
     if d < 0.0 or (b >= 0.0 and curvature <= 0.0):
         return np.inf, 0, np.inf
-    return arc_root(arc, own, b, f, math.sqrt(d), speed2), tangent, np.inf if b >= 0.0 else f
+    return arc_root(form, own, b, f, math.sqrt(d), speed2), tangent, np.inf if b >= 0.0 else f
 
 
 @inlined
@@ -273,7 +239,7 @@ def beyond_end(arc, qx, qy):
     """
     # up to a half angle of pi/4: by the position along the chord, on the arc's side of the circle
     along, short = qx * arc[c.CHORD_X] + qy * arc[c.CHORD_Y], arc[c.SHORT_CHORD]
-    nx, ny = arc[c.NORMAL_X] - arc[c.CURVATURE] * qx, arc[c.NORMAL_Y] - arc[c.CURVATURE] * qy
+    nx, ny = arc_normal(arc_form(arc), 1.0, qx, qy)
     facing = ny * arc[c.CHORD_X] - nx * arc[c.CHORD_Y]
     beyond = where(-along > along - short, -along, along - short)
     # larger half angles: by the side of the chord; the arc curves away from its free side exactly if it is focusing
@@ -306,8 +272,7 @@ def may_touch_arc(arc, t, px, py, vx, vy, stretch, slack):
     The hits that rounding does not distinguish from a tangent one lie up to sqrt(D) / (kappa |v|) beside it.
     """
     rx, ry, wy = px - arc[c.START_X], stretch * (py - arc[c.START_Y]), stretch * vy
-    b = arc[c.NORMAL_X] * vx + arc[c.NORMAL_Y] * wy - arc[c.CURVATURE] * (rx * vx + ry * wy)
-    speed2 = vx * vx + wy * wy
+    b, _, _, speed2 = arc_terms(arc_form(arc), rx, ry, vx, wy)
     reach = math.sqrt(tangent_error(arc, b, rx, ry, speed2) / speed2) / abs(arc[c.CURVATURE])
     return on_arc(arc, rx + t * vx, ry + t * wy, slack * max(1.0, stretch) + reach)
 
@@ -324,11 +289,8 @@ def near_end(curve, px, py, slack):
 def arc_point(arc, t, px, py, vx, vy, stretch):
     """-> (x, y, nx, ny): the position on the arc after the time t, and the unit normal there."""
     qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
-    nx, ny = arc[c.NORMAL_X] - arc[c.CURVATURE] * qx, arc[c.NORMAL_Y] - arc[c.CURVATURE] * qy
-    f = arc[c.NORMAL_X] * qx + arc[c.NORMAL_Y] * qy - 0.5 * arc[c.CURVATURE] * (qx * qx + qy * qy)
-    # one Newton step on F puts the point back on the arc
-    qx, qy = qx - f * nx, qy - f * ny
-    nx, ny = arc[c.NORMAL_X] - arc[c.CURVATURE] * qx, stretch * (arc[c.NORMAL_Y] - arc[c.CURVATURE] * qy)
+    qx, qy = back_on_arc(arc_form(arc), qx, qy)
+    nx, ny = arc_normal(arc_form(arc), stretch, qx, qy)
     scale = 1.0 / math.sqrt(nx * nx + ny * ny)
     return arc[c.START_X] + qx, arc[c.START_Y] + qy / stretch, nx * scale, ny * scale
 
@@ -337,14 +299,8 @@ def arc_point(arc, t, px, py, vx, vy, stretch):
 def arc_incidence(arc, t, px, py, vx, vy, stretch):
     """-> float: sine of the angle between the velocity and the arc after the time t."""
     qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
-    nx, ny = arc[c.NORMAL_X] - arc[c.CURVATURE] * qx, stretch * (arc[c.NORMAL_Y] - arc[c.CURVATURE] * qy)
+    nx, ny = arc_normal(arc_form(arc), stretch, qx, qy)
     return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)
-
-
-@inlined
-def bezier_value(a0, a1, a2, a3, s):
-    """-> float: the cubic with these coefficients at s."""
-    return ((a3 * s + a2) * s + a1) * s + a0
 
 
 @inlined
@@ -367,17 +323,6 @@ def squeezed(s):
     """-> float: the nearest number in [0, 1]; 0 for NaN."""
     s = where(s > 0.0, s, 0.0)
     return where(s < 1.0, s, 1.0)
-
-
-@inlined
-def bezier_sides(curve, px, py, vx, vy):
-    """-> (a0, a1, a2, a3): the coefficients of g."""
-    return (
-        side(curve[c.START_X], curve[c.START_Y], px, py, vx, vy),
-        curve[c.X1] * vy - curve[c.Y1] * vx,
-        curve[c.X2] * vy - curve[c.Y2] * vx,
-        curve[c.X3] * vy - curve[c.Y3] * vx,
-    )
 
 
 @inlined
@@ -408,10 +353,19 @@ def meets_circle(curve, px, py, vx, vy, time):
 
 
 @inlined
+def bezier_coefficients(curve):
+    """-> (ax, ay): the coefficients of both coordinates."""
+    return (
+        (curve[c.START_X], curve[c.X1], curve[c.X2], curve[c.X3]),
+        (curve[c.START_Y], curve[c.Y1], curve[c.Y2], curve[c.Y3]),
+    )
+
+
+@inlined
 def bezier_point(curve, s):
     """-> (x, y): b(s)."""
-    x = bezier_value(curve[c.START_X], curve[c.X1], curve[c.X2], curve[c.X3], s)
-    return x, bezier_value(curve[c.START_Y], curve[c.Y1], curve[c.Y2], curve[c.Y3], s)
+    ax, ay = bezier_coefficients(curve)
+    return cubic(ax, s), cubic(ay, s)
 
 
 @inlined
@@ -423,12 +377,13 @@ def bezier_normal(curve, s):
 
 
 @inlined
-def root_step(a0, a1, a2, a3, s, low, high):
+def root_step(g, s, low, high):
     """-> (s, low, high, is_last): a safeguarded Halley step to the root between low and high at which a cubic falls.
 
     It is the last one if the next step would be below one rounding error.
     """
-    value, slope = bezier_value(a0, a1, a2, a3, s), bezier_slope(a1, a2, a3, s)
+    _, a1, a2, a3 = g
+    value, slope = cubic(g, s), bezier_slope(a1, a2, a3, s)
     bend = 3.0 * a3 * s + a2
     low, high = where(value > 0.0, s, low), where(value < 0.0, s, high)
     step = s - value * slope / (slope * slope - value * bend)
@@ -441,20 +396,20 @@ def root_step(a0, a1, a2, a3, s, low, high):
 
 
 @inlined
-def root_start(a0, a1, a2, a3, low, high, value_low, value_high):
+def root_start(g, low, high, value_low, value_high):
     """-> float: the root of the quadratic with the same values as a cubic at low, at high and in the middle."""
     span = high - low
-    middle = bezier_value(a0, a1, a2, a3, low + 0.5 * span)
+    middle = cubic(g, low + 0.5 * span)
     rise, bend = 4.0 * middle - 3.0 * value_low - value_high, 2.0 * (value_low + value_high) - 4.0 * middle
     return low + span * quadratic_root(value_low, rise, bend)
 
 
 @inlined
-def falling_root(a0, a1, a2, a3, low, high, value_low, value_high):
+def falling_root(g, low, high, value_low, value_high):
     """-> float: the root of a cubic that falls from >= 0 at low to <= 0 at high."""
-    s = root_start(a0, a1, a2, a3, low, high, value_low, value_high)
+    s = root_start(g, low, high, value_low, value_high)
     for _ in range(ROOT_STEPS):
-        s, low, high, is_last = root_step(a0, a1, a2, a3, s, low, high)
+        s, low, high, is_last = root_step(g, s, low, high)
         if is_last:
             break
     return s
@@ -463,16 +418,8 @@ def falling_root(a0, a1, a2, a3, low, high, value_low, value_high):
 @inlined
 def bezier_tangent(curve, s):
     """-> (tx, ty): b'(s)."""
-    return bezier_slope(curve[c.X1], curve[c.X2], curve[c.X3], s), bezier_slope(
-        curve[c.Y1], curve[c.Y2], curve[c.Y3], s
-    )
-
-
-@inlined
-def bezier_time(curve, s, px, py, vx, vy):
-    """-> float: the distance along the ray to the point s of the curve."""
-    x, y = bezier_point(curve, s)
-    return (x - px) * vx + (y - py) * vy
+    x = bezier_slope(curve[c.X1], curve[c.X2], curve[c.X3], s)
+    return x, bezier_slope(curve[c.Y1], curve[c.Y2], curve[c.Y3], s)
 
 
 @inlined
@@ -485,7 +432,7 @@ def contact_time(curve, bend, s, px, py, vx, vy):
     tx, ty = bezier_tangent(curve, s)
     if bend * (tx * vx + ty * vy) <= 0.0:
         return np.inf
-    return bezier_time(curve, s, px, py, vx, vy)
+    return bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
 
 
 @inlined
@@ -501,7 +448,7 @@ def joint_contact_time(curve, g, s, px, py, vx, vy, room):
     is_steep = abs(bezier_slope(a1, a2, a3, s)) > SMOOTH_JOINT * (abs(tx) + abs(ty)) + room
     if is_steep or curve[c.START_CORNER if s == 0.0 else c.END_CORNER] > 0.0:
         return np.inf
-    return bezier_time(curve, s, px, py, vx, vy)
+    return bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
 
 
 @inlined
@@ -519,14 +466,6 @@ def own_terms(curve, g, own_s):
 
 
 @inlined
-def own_roots(b0, b1, b2, disc):
-    """-> (first, second): the roots of b2 sigma^2 + b1 sigma + b0; inf or NaN where there is none."""
-    root = math.sqrt(disc)
-    q = -0.5 * (b1 + (where(b1 >= 0.0, root, -root)))
-    return q / b2, b0 / q
-
-
-@inlined
 def own_point(g, own_s, sigma):
     """-> (s, is_front): the point own_s + sigma, and whether it is on the piece and a ray may hit it from its front."""
     _, a1, a2, a3 = g
@@ -540,7 +479,7 @@ def own_point(g, own_s, sigma):
 def own_hit(curve, g, own_s, sigma, px, py, vx, vy):
     """-> (t, s): time to the point own_s + sigma of the piece on which a ray started, inf if it is no front hit."""
     s, is_front = own_point(g, own_s, sigma)
-    t = bezier_time(curve, s, px, py, vx, vy)
+    t = bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
     return where(is_front & (t > 0.0), t, np.inf), s
 
 
@@ -559,7 +498,7 @@ def hit_from_own(curve, g, own_s, px, py, vx, vy, slack):
                 return t, s, 1
     if disc < 0.0:
         return np.inf, 0.0, 0
-    first, second = own_roots(b0, b1, b2, disc)
+    first, second = quadratic_roots(b0, b1, b2, disc)
     t, s = own_hit(curve, g, own_s, second, px, py, vx, vy)
     if b2 != 0.0:
         other_t, other_s = own_hit(curve, g, own_s, first, px, py, vx, vy)
@@ -629,7 +568,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
                 if touches and t < best_t:
                     best_t, best_s, tangent = t, 1.0, 1
         else:
-            value_high = bezier_value(a0, a1, a2, a3, high)
+            value_high = cubic(g, high)
             if abs(value_high) <= room:
                 t = contact_time(curve, 6.0 * a3 * high + 2.0 * a2, high, px, py, vx, vy)
                 touches = t > slack and t < np.inf
@@ -640,8 +579,8 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
             if curve[c.X3] == 0.0 and curve[c.Y3] == 0.0:
                 s = quadratic_root(a0, a1, a2)
             else:
-                s = falling_root(a0, a1, a2, a3, low, high, value_low, value_high)
-            t = bezier_time(curve, s, px, py, vx, vy)
+                s = falling_root(g, low, high, value_low, value_high)
+            t = bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
             if t < best_t:
                 if is_close_by(curve, s, t, vx, vy, spread, slack):
                     near_s = s
@@ -658,7 +597,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
     ``tangent`` is 1 if hit and miss are not distinguished. ``own_s`` is below 0 if the ray does not start on the piece.
     A hit within the slack of the start is not counted: ``near_s`` is its parameter, -1 if there is none.
     """
-    g = bezier_sides(curve, px, py, vx, vy)
+    g = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
     if own_s >= 0.0:
         t, s, tangent = hit_from_own(curve, g, own_s, px, py, vx, vy, slack)
         return t, s, tangent, -1.0

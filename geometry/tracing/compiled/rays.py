@@ -22,11 +22,13 @@ from ...scene.compiled.records import ROW, Typed, place_of
 from ...scene.records import Record
 from ...scene.scene import NO_TABLES
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
+from ..double_double.formulas import arc_normal, mirror, with_length_one
 from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined, inner
 from .pieces import (
     LEAST_FRACTION,
     NO_BEZIER_HIT,
+    arc_form,
     arc_incidence,
     arc_point,
     arc_time,
@@ -37,13 +39,11 @@ from .pieces import (
     line_at,
     line_point,
     may_touch_arc,
-    mirror,
     near_end,
     nearest_bezier,
     nearest_line,
     on_arc_after,
     opening_met,
-    with_length_one,
 )
 from .pointers import Late, address_at, address_of, call_at, is_raised
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_DETAILS, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots, Tree
@@ -287,7 +287,7 @@ def may_run(tables, hit, own, px, py, vx, vy):
     if hit.kind == CIRCLE:
         arc = tables.circles[hit.number]
         qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
-        nx, ny = arc[c.NORMAL_X] - arc[c.CURVATURE] * qx, arc[c.NORMAL_Y] - arc[c.CURVATURE] * qy
+        nx, ny = arc_normal(arc_form(arc), 1.0, qx, qy)
         return vx * nx + vy * ny <= arc[c.RUN_SINE]
     # the ray came from this line, hit the other one, and came back
     came_back = hit.kind == LINE and own.kind == LINE and own.before == hit.number

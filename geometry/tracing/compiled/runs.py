@@ -11,7 +11,9 @@ import math
 import numpy as np
 
 from ...scene import columns as c
+from ..double_double.formulas import arc_normal
 from .options import linked
+from .pieces import arc_form
 
 # Least number of hits in a run, which costs about one arctangent and three sines; not tuned.
 SHORTEST_RUN = 4.0
@@ -26,7 +28,7 @@ END_SLACKS = 2.0
 def skip_chords(arc, px, py, vx, vy, most):
     """-> (px, py, vx, vy, chords): move a ray along a circular arc by all whole chords of its run, up to ``most``."""
     qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
-    nx, ny = arc[c.NORMAL_X] - arc[c.CURVATURE] * qx, arc[c.NORMAL_Y] - arc[c.CURVATURE] * qy
+    nx, ny = arc_normal(arc_form(arc), 1.0, qx, qy)
     sine = vx * nx + vy * ny
     # the free side, and so the normal n, is on the left of the tangent in the direction of travel
     cosine = vx * ny - vy * nx

@@ -18,9 +18,10 @@ from ...scene import columns as c
 from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, OTHER_X, OTHER_Y, PARENT
 from ...scene.sky import MOST_LINES, SKY_ROOM
 from ...scene.tolerances import NEARBY_SLACKS
+from ..double_double.formulas import where
 from . import work as w
 from .options import inlined, inner
-from .pieces import Line, is_ahead, joint_side, line_at, line_hit, line_sides, side, where
+from .pieces import Line, is_ahead, joint_side, line_at, line_hit, line_sides, side
 from .work import NATURAL
 
 # No hit on a line, for `nearest_line`.

@@ -18,20 +18,28 @@ import numpy as np
 from ....core.rounding import EPS
 from ...scene import columns as c
 from ...scene.tolerances import NEARBY, NEARBY_SLACKS, TANGENT_ULPS
+from ..double_double.formulas import (
+    arc_root,
+    arc_terms,
+    bezier_sides,
+    bezier_time,
+    cubic,
+    mirror,
+    quadratic_roots,
+    where,
+    with_length_one,
+)
 from . import work as w
 from .options import inlined, inner, linked
 from .pieces import (
     ROOT_STEPS,
+    arc_form,
     arc_point,
-    arc_root,
-    arc_terms,
     beyond_end,
+    bezier_coefficients,
     bezier_normal,
     bezier_point,
-    bezier_sides,
     bezier_slope,
-    bezier_time,
-    bezier_value,
     end_side,
     extrema,
     is_faced,
@@ -41,20 +49,16 @@ from .pieces import (
     line_hit,
     line_sides,
     meets_circle,
-    mirror,
     near_end,
     opening_met,
     own_hit,
     own_point,
-    own_roots,
     own_terms,
     quadratic_root,
     root_start,
     root_step,
     side,
     side_spread,
-    where,
-    with_length_one,
 )
 from .rays import scope_of
 from .runs import skip_chords, skip_crossings
@@ -156,14 +160,15 @@ def meet_line(work, count, line, number, corner_slack, close):
 @linked
 def meet_arc(work, count, arc, number, close):
     """Find the hits of rays on a circular arc that are nearer; a hit before the time ``close`` is uncertain."""
+    form = arc_form(arc)
     # bounds of B of rays that meet the front, from elsewhere and from the arc itself
     most, least = where(arc[c.CURVATURE] > 0.0, np.inf, 0.0), where(arc[c.CURVATURE] > 0.0, 0.0, np.inf)
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         is_own, is_other = work[w.OWN + i] == number, work[w.OWN + i] != number
-        b, f, d, speed2 = arc_terms(arc, px, py, vx, vy, 1.0)
+        b, f, d, speed2 = arc_terms(form, px - arc[c.START_X], py - arc[c.START_Y], vx, vy)
         from_afar = is_other & (d >= 0.0) & (b < most)
-        t = arc_root(arc, is_own, b, f, math.sqrt(d), speed2)
+        t = arc_root(form, is_own, b, f, math.sqrt(d), speed2)
         is_uncertain = (is_other & is_nearly_tangent(arc, b, d, speed2)) | (from_afar & (abs(t) <= close))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
         # at grazing incidence rounding moves the point along the arc by more than the slack
@@ -178,17 +183,17 @@ def meet_parabola(work, count, curve, number):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         is_own, is_other = work[w.OWN + i] == number, work[w.OWN + i] != number
-        a0, a1, a2, _ = bezier_sides(curve, px, py, vx, vy)
+        a0, a1, a2, _ = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
         spread, last = side_spread(curve, px, py, vx, vy), end_side(curve, px, py, vx, vy)
         turn, own_s = a1 / (-2.0 * a2), work[w.BEFORE + i]
-        value, room = bezier_value(a0, a1, a2, 0.0, turn), (TANGENT_ULPS * EPS) * spread
+        value, room = cubic((a0, a1, a2, 0.0), turn), (TANGENT_ULPS * EPS) * spread
         is_inside = (turn > 0.0) & (turn < 1.0)
         touches = (abs(a0) <= room) | (abs(last) <= room) | (is_inside & (abs(value) <= room))
         falls = is_falling(a0, where(is_inside, value, last)) | (is_inside & is_falling(value, last))
         sigma = bezier_slope(a1, a2, 0.0, own_s) / -a2
         own_root, is_front = own_point((a0, a1, a2, 0.0), own_s, sigma)
         s = where(is_own, own_root, quadratic_root(a0, a1, a2))
-        t = bezier_time(curve, s, px, py, vx, vy)
+        t = bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
         is_near = is_other & meets_circle(curve, px, py, vx, vy, work[w.TIME + i])
         is_uncertain = is_near & (touches | (falls & (abs(t) <= NEARBY * spread)))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
@@ -234,10 +239,11 @@ def find_fall(some, count, curve, turn):
     both = 0
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        a0, a1, a2, a3 = bezier_sides(curve, px, py, vx, vy)
+        g = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
+        a0, a1, a2, a3 = g
         last, room = end_side(curve, px, py, vx, vy), (TANGENT_ULPS * EPS) * side_spread(curve, px, py, vx, vy)
         low, high = extrema(a1, a2, a3)
-        value_low, value_high = bezier_value(a0, a1, a2, a3, low), bezier_value(a0, a1, a2, a3, high)
+        value_low, value_high = cubic(g, low), cubic(g, high)
         has_low, has_high = (low > 0.0) & (low < 1.0), (high > 0.0) & (high < 1.0)
         touches = (abs(a0) <= room) | (abs(last) <= room)
         touches = touches | (has_low & (abs(value_low) <= room)) | (has_high & (abs(value_high) <= room))
@@ -262,9 +268,9 @@ def start_roots(some, count, curve):
     """Begin the search of the roots of g."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        a0, a1, a2, a3 = bezier_sides(curve, px, py, vx, vy)
+        g = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
         ends = some[w.LOW + j], some[w.HIGH + j], some[w.VALUE_LOW + j], some[w.VALUE_HIGH + j]
-        some[w.ROOT + j] = root_start(a0, a1, a2, a3, *ends)
+        some[w.ROOT + j] = root_start(g, *ends)
 
 
 @linked
@@ -273,9 +279,9 @@ def improve_roots(some, count, curve):
     more = 0
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        a0, a1, a2, a3 = bezier_sides(curve, px, py, vx, vy)
+        g = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
         old, low, high = kept(some, w.ROOT + j), kept(some, w.LOW + j), kept(some, w.HIGH + j)
-        s, low, high, is_last = root_step(a0, a1, a2, a3, old, low, high)
+        s, low, high, is_last = root_step(g, old, low, high)
         is_sought = some[w.SOUGHT + j] > 0.0
         some[w.ROOT + j] = where(is_sought, s, old)
         some[w.LOW + j], some[w.HIGH + j] = low, high
@@ -289,9 +295,9 @@ def find_own_root(some, count, curve):
     """Find the front hits of rays that start on a Bezier piece themselves."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g, own_s = bezier_sides(curve, px, py, vx, vy), some[w.BEFORE + j]
+        g, own_s = bezier_sides(bezier_coefficients(curve), px, py, vx, vy), some[w.BEFORE + j]
         b0, b1, b2, disc, error = own_terms(curve, g, own_s)
-        one, other = own_roots(b0, b1, b2, disc)
+        one, other = quadratic_roots(b0, b1, b2, disc)
         t, s = own_hit(curve, g, own_s, one, px, py, vx, vy)
         other_t, other_s = own_hit(curve, g, own_s, other, px, py, vx, vy)
         is_uncertain = (abs(disc) <= error) & (b2 != 0.0)
@@ -305,7 +311,7 @@ def time_roots(some, count, curve, number):
     """Compute the times of the hits at the roots, inf for those that are none."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        t, is_met = bezier_time(curve, some[w.ROOT + j], px, py, vx, vy), some[w.FALLS + j] > 0.0
+        t, is_met = bezier_time(bezier_coefficients(curve), some[w.ROOT + j], px, py, vx, vy), some[w.FALLS + j] > 0.0
         is_close = (some[w.OWN + j] != number) & (abs(t) <= NEARBY * side_spread(curve, px, py, vx, vy))
         some[w.UNCERTAIN + j] += where(is_met & is_close, 1.0, 0.0)
         some[w.TIME + j] = where(is_met & (t > 0.0), t, np.inf)

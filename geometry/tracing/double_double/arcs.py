@@ -6,6 +6,7 @@ import numpy as np
 
 from ....core.compilation import jit
 from ...scene import columns as c
+from .formulas import arc_normal, arc_root, arc_terms, back_on_arc, form_value
 from .numbers import LOCAL_ERROR, cross, dot, double_double, extended, root, scaled, sine_cosine, two_sum
 
 _compile = jit(linked=True, _nrt=False)
@@ -50,62 +51,30 @@ def arc_form(arc):
 
 
 @_compile
-def form_value(form, x, y):
-    """-> number: F at a position relative to the first joint."""
-    nx, ny, curvature = form
-    return dot(nx, ny, x, y) - scaled(0.5, curvature * dot(x, y, x, y))
-
-
-@_compile
-def form_gradient(form, x, y):
-    """-> (nx, ny): the gradient of F, on the arc the unit normal."""
-    nx, ny, curvature = form
-    return nx - curvature * x, ny - curvature * y
-
-
-@_compile
 def arc_hit(arc, own, px, py, vx, vy, error):
     """-> (t, undecided, height): time to the front of one arc, or inf; time of an undecided contact, or inf.
 
     For ``height`` see `arc_time` in `compiled/pieces`. ``error`` bounds the transversal error of the ray at the arc.
     """
-    nothing = extended(np.inf)
-    form, stretch = arc_form(arc), arc[c.WIDE_STRETCH]
-    n0x, n0y, curvature = form
+    form, stretch, undecided = arc_form(arc), arc[c.WIDE_STRETCH], np.inf
     rx, ry, wy = px - arc[c.START_X], stretch * (py - arc[c.START_Y]), stretch * vy
-    b = dot(n0x, n0y, vx, wy) - curvature * dot(rx, ry, vx, wy)
-    bend = curvature * dot(vx, wy, vx, wy)
-    undecided = np.inf
-    if own:
-        if curvature <= 0.0 or b <= 0.0:
-            return nothing, undecided, np.inf
-        t = scaled(2.0, b) / bend
-        height = np.inf
-    else:
-        f = form_value(form, rx, ry)
-        product = bend * f
-        d = b * b + scaled(2.0, product)
-        if curvature < 0.0 and b < 0.0:
-            # d = w^2 - kappa^2 (distance of the line from the centre)^2 w^2; kappa times distance is about 1 at d = 0
-            widest = max(1.0, stretch) ** 2
-            noise = 8.0 * LOCAL_ERROR * (b.high * b.high + 2.0 * abs(product.high))
-            if abs(d.high) <= noise + 4.0 * abs(curvature.high) * widest * widest * error:
-                t = scaled(2.0, f) / -b
-                if t > 0.0 and on_arc(arc, rx + t * vx, ry + t * wy, error):
-                    undecided = t.high
-        if d < 0.0:
-            return nothing, undecided, np.inf
-        if b >= 0.0:
-            if curvature <= 0.0:
-                return nothing, undecided, np.inf
-            t = (b + root(d)) / bend
-            height = np.inf
-        else:
-            t = scaled(2.0, f) / (root(d) - b)
-            height = f.high
+    b, f, d, speed2 = arc_terms(form, rx, ry, vx, wy)
+    _, _, curvature = form
+    if not own and curvature < 0.0 and b < 0.0:
+        # d = w^2 - kappa^2 (distance of the line from the centre)^2 w^2; kappa times distance is about 1 at d = 0
+        widest = max(1.0, stretch) ** 2
+        noise = 8.0 * LOCAL_ERROR * (b.high * b.high + 2.0 * abs((curvature * speed2 * f).high))
+        if abs(d.high) <= noise + 4.0 * abs(curvature.high) * widest * widest * error:
+            t = arc_root(form, own, b, f, extended(0.0), speed2)
+            if t > 0.0 and on_arc(arc, rx + t * vx, ry + t * wy, error):
+                undecided = t.high
+    far = own or b >= 0.0
+    if (far and curvature <= 0.0) or (own and b <= 0.0) or (not own and d < 0.0):
+        return extended(np.inf), undecided, np.inf
+    t = arc_root(form, own, b, f, root(d), speed2)
     if not on_arc(arc, rx + t * vx, ry + t * wy, error * max(1.0, stretch)):
-        return nothing, undecided, np.inf
-    return t, undecided, height
+        return extended(np.inf), undecided, np.inf
+    return t, undecided, np.inf if far else f.high
 
 
 @_compile
@@ -128,8 +97,7 @@ def arc_height(arc, px, py):
     """-> (height, nx, ny): distance of a position close to an arc, positive on the free side; unit normal."""
     form, stretch = arc_form(arc), arc[c.WIDE_STRETCH]
     qx, qy = px - arc[c.START_X], stretch * (py - arc[c.START_Y])
-    nx, ny = form_gradient(form, qx, qy)
-    ny = stretch * ny
+    nx, ny = arc_normal(form, stretch, qx, qy)
     size = root(dot(nx, ny, nx, ny))
     return form_value(form, qx, qy) / size, nx / size, ny / size
 
@@ -139,10 +107,8 @@ def arc_point(arc, t, px, py, vx, vy):
     """-> (x, y, nx, ny, bent): the position on the arc after the time t, unit normal, and curvature (a double)."""
     form, stretch = arc_form(arc), arc[c.WIDE_STRETCH]
     qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
-    f, (nx, ny) = form_value(form, qx, qy), form_gradient(form, qx, qy)
-    qx, qy = qx - f * nx, qy - f * ny
-    nx, ny = form_gradient(form, qx, qy)
-    ny = stretch * ny
+    qx, qy = back_on_arc(form, qx, qy)
+    nx, ny = arc_normal(form, stretch, qx, qy)
     size = root(dot(nx, ny, nx, ny))
     nx, ny = nx / size, ny / size
     bent = arc[c.WIDE_CURVATURE] * (ny.high * ny.high + (stretch * nx.high) ** 2) / size.high

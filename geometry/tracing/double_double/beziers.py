@@ -9,19 +9,13 @@ import numpy as np
 from ....core.compilation import jit
 from ...scene import columns as c
 from ...scene.tolerances import NEARBY
+from .formulas import bezier_sides, bezier_time, cubic, quadratic_roots
 from .numbers import LOCAL_ERROR, cross, dot, extended, root, scaled
 
 # Limit on bisections, more than the search for neighbouring doubles needs.
 ROOT_STEPS = 200
 
 _compile = jit(linked=True, _nrt=False)
-
-
-@_compile
-def cubic(a, s):
-    """Return the cubic with the coefficients a at s."""
-    a0, a1, a2, a3 = a
-    return ((a3 * s + a2) * s + a1) * s + a0
 
 
 @_compile
@@ -74,13 +68,6 @@ def bezier_coefficients(curve):
 
 
 @_compile
-def bezier_time(coefficients, s, px, py, vx, vy):
-    """-> double-double: the distance along the ray to the point s of a curve."""
-    ax, ay = coefficients
-    return dot(cubic(ax, s) - px, cubic(ay, s) - py, vx, vy)
-
-
-@_compile
 def hit_from_own(coefficients, g, own_s, px, py, vx, vy):
     """-> (t, s): first front hit on the Bezier piece that the ray has just left at ``own_s``; inf if none.
 
@@ -92,11 +79,8 @@ def hit_from_own(coefficients, g, own_s, px, py, vx, vy):
     disc = b1 * b1 - scaled(4.0, a3 * b0)
     if disc < 0.0:
         return best_t, best_s
-    q = scaled(-0.5, b1 + (root(disc) if b1 >= 0.0 else -root(disc)))
-    for bottom, top in ((a3, q), (q, b0)):
-        if bottom.high == 0.0:
-            continue
-        s = own_s + top / bottom
+    for sigma in quadratic_roots(b0, b1, a3, disc):
+        s = own_s + sigma
         if s.high >= -LOCAL_ERROR and (s - 1.0).high <= LOCAL_ERROR:
             t = bezier_time(coefficients, s, px, py, vx, vy)
             if cubic_slope(g, s) <= 0.0 and 0.0 < t < best_t:
@@ -146,13 +130,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
     the start, which is not counted, or -1. ``error`` bounds the transversal error of the ray.
     """
     coefficients = bezier_coefficients(curve)
-    (ax0, ax1, ax2, ax3), (ay0, ay1, ay2, ay3) = coefficients
-    g = (
-        cross(ax0 - px, ay0 - py, vx, vy),
-        cross(ax1, ay1, vx, vy),
-        cross(ax2, ay2, vx, vy),
-        cross(ax3, ay3, vx, vy),
-    )
+    g = bezier_sides(coefficients, px, py, vx, vy)
     best_t, best_s, undecided, near_s = extended(np.inf), extended(0.0), np.inf, extended(-1.0)
     if own_s >= 0.0:
         best_t, best_s = hit_from_own(coefficients, g, own_s, px, py, vx, vy)
@@ -192,7 +170,8 @@ def bezier_point(curve, s):
     ax, ay = bezier_coefficients(curve)
     tx, ty = cubic_slope(ax, s), cubic_slope(ay, s)
     size = root(dot(tx, ty, tx, ty))
-    bx, by = 2.0 * ax[2].high + 6.0 * ax[3].high * s.high, 2.0 * ay[2].high + 6.0 * ay[3].high * s.high
+    (_, _, ax2, ax3), (_, _, ay2, ay3) = ax, ay
+    bx, by = 2.0 * ax2.high + 6.0 * ax3.high * s.high, 2.0 * ay2.high + 6.0 * ay3.high * s.high
     bent = (tx.high * by - ty.high * bx) / size.high**3
     return cubic(ax, s), cubic(ay, s), -(ty / size), tx / size, bent
 

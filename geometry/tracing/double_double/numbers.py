@@ -1,10 +1,10 @@
 """Double-double numbers as a number type of compiled code: an unevaluated sum of two doubles, about 31 digits.
 
 Loads numba. The operators take double-doubles and doubles mixed. A formula that uses only operators, `root`, `scaled`,
-`cross` and `dot` serves both number types. The error-free transforms are those of Dekker (1971) and Knuth. Sums
-and products follow Joldes, Muller & Popescu (2017), with relative errors of at most 3 u^2 for the sum, 7 u^2 for the
-product and 15 u^2 for the quotient, u = 2^-53. No operation may be reassociated: never compile this module with
-``fastmath``.
+`cross` and `dot` serves both number types, see `formulas`. The error-free transforms are those of Dekker (1971) and
+Knuth. Sums and products follow Joldes, Muller & Popescu (2017), with relative errors of at most 3 u^2 for the sum,
+7 u^2 for the product and 15 u^2 for the quotient, u = 2^-53. No operation may be reassociated: never compile this
+module with ``fastmath``.
 """
 
 from __future__ import annotations

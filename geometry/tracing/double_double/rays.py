@@ -32,7 +32,8 @@ from ...scene import columns as c
 from ...scene.tolerances import JOINT_ULPS
 from .arcs import arc_hit, arc_point
 from .beziers import bezier_hit, bezier_point
-from .numbers import LOCAL_ERROR, cross, direction_angle, dot, extended, scaled, sine_cosine, two_product, two_sum
+from .formulas import mirror, with_length_one
+from .numbers import LOCAL_ERROR, cross, direction_angle, dot, extended, sine_cosine, two_product, two_sum
 from .records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit, Scope, Sizes
 from .runs import LAST_HITS, crossings, skip_chords
 from .sides import Arrival, Face, in_front_at, line_ends, line_frame, line_in_front_of_line, orientation
@@ -307,15 +308,6 @@ def pass_cells(scope, sizes, py, vx, vy, error):
 
 
 @_compile
-def reflected(vx, vy, nx, ny, approach):
-    """-> (vx, vy): the reflected velocity, normalised by one Newton step."""
-    twice = scaled(2.0, approach)
-    vx, vy = vx - twice * nx, vy - twice * ny
-    factor = 1.5 - scaled(0.5, dot(vx, vy, vx, vy))
-    return factor * vx, factor * vy
-
-
-@_compile
 def refined_ray(scope, entry, theta, limit, most_segments):
     """-> (x, angle, bounces, status, amplification, rounding): trace one ray; x and angle are double-doubles.
 
@@ -345,8 +337,7 @@ def refined_ray(scope, entry, theta, limit, most_segments):
         if hit.kind == NO_PIECE:
             return px, nowhere, bounces, CORNER if corner < np.inf else UNRESOLVED, norm, local
         qx, qy, nx, ny, bent = point_of(tables, hit, px, py, vx, vy)
-        approach = dot(vx, vy, nx, ny)
-        incidence = abs(approach.high)
+        incidence = abs(dot(vx, vy, nx, ny).high)
         if corner < np.inf and meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
             return px, nowhere, bounces, CORNER, norm, local
         sizes = after_flight(sizes, hit.time.high / scale)
@@ -363,7 +354,8 @@ def refined_ray(scope, entry, theta, limit, most_segments):
         else:
             flown = hit.time
             px, py = qx, qy
-            vx, vy = reflected(vx, vy, nx, ny, approach)
+            vx, vy = mirror(vx, vy, nx, ny)
+            vx, vy = with_length_one(vx, vy)
             if incidence == 0.0:
                 return px, nowhere, bounces, GRAZING, norm, local
             sizes = after_reflection(sizes, 2.0 * bent * scale / incidence)

@@ -11,7 +11,8 @@ import numpy as np
 
 from ....core.compilation import jit
 from ...scene import columns as c
-from .arcs import arc_form, form_gradient
+from .arcs import arc_form
+from .formulas import arc_normal
 from .numbers import cross, direction_angle, dot, extended, scaled, sine_cosine, two_sum
 
 # Runs up to this number of hits are traced hit by hit, as a check of `compiled/runs`; so are the last hits of a run.
@@ -61,7 +62,7 @@ def skip_chords(arc, px, py, vx, vy, most):
     form = arc_form(arc)
     n0x, n0y, curvature = form
     qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
-    nx, ny = form_gradient(form, qx, qy)
+    nx, ny = arc_normal(form, 1.0, qx, qy)
     sine, cosine = dot(vx, vy, nx, ny), cross(vx, vy, nx, ny)
     if sine <= 0.0 or sine > arc[c.WIDE_RUN_SINE]:
         return 0, px, py, vx, vy

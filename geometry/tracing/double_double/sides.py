@@ -27,7 +27,8 @@ from ....core.compilation import jit
 from ....core.rounding import EPS, UNIT_ROUNDOFF
 from ...scene import columns as c
 from .arcs import arc_height
-from .beziers import bezier_coefficients, bezier_point, cubic, cubic_slope
+from .beziers import bezier_coefficients, bezier_point, cubic_slope
+from .formulas import cubic
 from .numbers import DoubleDouble, dot, root, two_product, two_sum
 from .records import ARC, LINE
 
