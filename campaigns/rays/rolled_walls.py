@@ -264,6 +264,9 @@ def judge_spike(number: int) -> Iterator[Judged]:
 
 CAMPAIGNS = (
     Campaign("rolled-walls", "Does the start of the period matter?", draw, judge, WALLS, range(28)),
-    Campaign("rolled-matrices", "Are matrices of rolled walls those of the wall?", draw, judge_matrices, WALLS, [0, 3, 6, 15, 16]),
+    Campaign(
+        "rolled-matrices", "Are matrices of rolled walls those of the wall?", draw, judge_matrices, WALLS,
+        [0, 3, 6, 15, 16],
+    ),
     Campaign("spikes", "Are plates accepted and slits refused?", int, judge_spike, SPIKES, range(120)),
-)
+)  # fmt: skip

@@ -107,23 +107,23 @@ REACH = 14  # its radius, with a margin of NEARBY_MARGIN times the extent of the
 BEZIER_COLUMNS = 15
 
 # Arcs in double-double arithmetic, made by `refined_arcs`: the ends, then numbers in two parts.
-WIDE_NORMAL_X = 4  # unit normal at the start
-WIDE_NORMAL_X_LOW = 5
-WIDE_NORMAL_Y = 6
-WIDE_NORMAL_Y_LOW = 7
-WIDE_CURVATURE = 8
-WIDE_CURVATURE_LOW = 9
-WIDE_CHORD_X = 10  # unit vector from the start to the end
-WIDE_CHORD_X_LOW = 11
-WIDE_CHORD_Y = 12
-WIDE_CHORD_Y_LOW = 13
-WIDE_CHORD = 14  # length of the chord
-WIDE_CHORD_LOW = 15
+REFINED_NORMAL_X = 4  # unit normal at the start
+REFINED_NORMAL_X_LOW = 5
+REFINED_NORMAL_Y = 6
+REFINED_NORMAL_Y_LOW = 7
+REFINED_CURVATURE = 8
+REFINED_CURVATURE_LOW = 9
+REFINED_CHORD_X = 10  # unit vector from the start to the end
+REFINED_CHORD_X_LOW = 11
+REFINED_CHORD_Y = 12
+REFINED_CHORD_Y_LOW = 13
+REFINED_CHORD = 14  # length of the chord
+REFINED_CHORD_LOW = 15
 IS_SHORT = 16  # 1 if the position along the chord decides whether a point is on the arc
-WIDE_STRETCH = 17  # a double
-WIDE_SPAN = 18  # angle of the arc, a double
-WIDE_RUN_SINE = 19  # RUN_SINE of the arc
-WIDE_ARC_COLUMNS = 20
+REFINED_STRETCH = 17  # a double
+REFINED_SPAN = 18  # angle of the arc, a double
+REFINED_RUN_SINE = 19  # RUN_SINE of the arc
+REFINED_ARC_COLUMNS = 20
 
 # closed: one row for each hollow, see `closed_forms`.
 FORM = 0  # NO_FORM, WEDGE or CIRCULAR

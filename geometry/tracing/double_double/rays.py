@@ -209,7 +209,7 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
         (tables.first_ellipse, hollow[c.FIRST_ELLIPSE], hollow[c.ELLIPSES_END]),
     ):
         for k in range(before + int(first), before + int(end)):
-            widest = max(1.0, tables.arcs[k, c.WIDE_STRETCH])
+            widest = max(1.0, tables.arcs[k, c.REFINED_STRETCH])
             is_own = own.kind == ARC and own.number == k
             t, undecided, height = arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
             graze = min(graze, undecided)
