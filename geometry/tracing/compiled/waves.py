@@ -326,7 +326,7 @@ def meet_cubic(work, lists, count, curve, number, some):
     end = list_rays(work, lists, count, w.OWN, number, number, others)
     if end == 0:
         return
-    gather(work, lists, end, some, w.RAY_COLUMNS)
+    gather(work, lists, end, some, w.STARTS)
     some[w.UNCERTAIN : w.UNCERTAIN + end] = 0.0
     find_own_root(some[others:], end - others, curve)
     for turn in range(2):
@@ -391,22 +391,14 @@ def place_on_arc(some, count, arc, slack):
         keep_point(some, j, x, y, nx, ny, at_end, (sine > 0.0) & (abs(vx * nx + vy * ny) <= sine))
 
 
-@linked
-def place_on_bezier(some, count, curve, slack):
-    """Compute the points at which rays meet a Bezier piece."""
-    for j in range(count):
-        (x, y), (nx, ny) = bezier_point(curve, some[w.HIT_S + j]), bezier_normal(curve, some[w.HIT_S + j])
-        keep_point(some, j, x, y, nx, ny, near_end(curve, x, y, slack), False)
-
-
 @inlined
-def place_on_curves(work, lists, count, curves, rows, first, place, slack):
-    """Compute the points at which rays meet curves of one kind, which are numbered from ``first``."""
+def place_on_arcs(scope, work, lists, count):
+    """Compute the points at which rays meet arcs, for the rays of each arc in vectors."""
     some = work[w.WORK :]
-    for k in range(rows[0], rows[1]):
-        hits = list_rays(work, lists, count, w.PIECE, first + k, first + k, 0)
+    for k in range(scope.circles[0], scope.circles[1]):
+        hits = list_rays(work, lists, count, w.PIECE, w.CIRCLES + k, w.CIRCLES + k, 0)
         gather(work, lists, hits, some, w.BEFORE_HIT)
-        place(some, hits, numbers_of(curves[k]), slack)
+        place_on_arc(some, hits, numbers_of(scope.tables.circles[k]), scope.slack)
         for j in range(hits):
             i = lists[w.PLACES + j] & NATURAL
             for column in w.AT_HIT:
@@ -418,8 +410,7 @@ def place_hits(scope, work, lists, count):
     """Compute the points at which rays meet their pieces, kind by kind, so that the processor guesses no branch."""
     tables, slack = scope.tables, scope.slack
     joints = tables.joints
-    place_on_curves(work, lists, count, tables.circles, scope.circles, w.CIRCLES, place_on_arc, slack)
-    place_on_curves(work, lists, count, tables.beziers, scope.beziers, w.BEZIERS, place_on_bezier, slack)
+    place_on_arcs(scope, work, lists, count)
     for k in range(list_rays(work, lists, count, w.PIECE, w.LINES, np.inf, 0)):
         i = lists[w.PLACES + k] & NATURAL
         j, (px, py, vx, vy) = int(work[w.PIECE + i] - w.LINES) & NATURAL, ray_at(work, i)
@@ -430,6 +421,12 @@ def place_hits(scope, work, lists, count):
         may_run = (work[w.BEFORE + i] == w.LINES + j) & (tables.lines[j, c.PAIRS_END] > 0.0)
         at_corner = is_corner & (abs(fraction) * line.length <= slack)
         keep_point(work, i, x, y, line.normal_x, line.normal_y, at_corner, may_run)
+    if scope.beziers[0] < scope.beziers[1]:
+        for k in range(list_rays(work, lists, count, w.PIECE, w.BEZIERS, w.LINES - 1.0, 0)):
+            i = lists[w.PLACES + k] & NATURAL
+            curve, s = tables.beziers[int(work[w.PIECE + i] - w.BEZIERS) & NATURAL], work[w.HIT_S + i]
+            (x, y), (nx, ny) = bezier_point(curve, s), bezier_normal(curve, s)
+            keep_point(work, i, x, y, nx, ny, near_end(curve, x, y, slack), False)
 
 
 @inlined
