@@ -38,7 +38,7 @@ LONGEST_ARC = 1.5 * pi
 RUN_CHORDS = 8.0
 OUTLINE_POINTS = 64
 # Number of lines in a hollow from which on it has a tree of boxes.
-TREE_LINES = 96
+TREE_LINES = 48
 # Binary digits of coordinates on the grid of coincident Bezier faces; their coefficients have three more.
 GRID_DIGITS = 50
 # Nominal time of a segment in seconds, and how many times as long it takes on Bezier curves.

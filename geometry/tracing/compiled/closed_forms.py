@@ -67,10 +67,9 @@ def _aligned(count: int) -> Floats:
 def room_for(hollows: Floats, block: int) -> Room:
     """Return the work space of `trace_closed`, for one thread and blocks of rays."""
     rays, others, met = np.empty((3, block), np.int64)
-    # rays near one of many Bezier pieces are gathered in a second part
-    parts = 2 if np.any(hollows[:, c.BEZIERS_END] > hollows[:, c.FIRST_BEZIER]) else 1
+    # rays that are gathered have a second part
     heads = np.full(len(hollows) + 1, -1)
-    return Room(np.empty((7, block)), rays, others, met, heads, _aligned(parts * WORK), np.empty(LISTS, np.int64))
+    return Room(np.empty((7, block)), rays, others, met, heads, _aligned(2 * WORK), np.empty(LISTS, np.int64))
 
 
 @inner

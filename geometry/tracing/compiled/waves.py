@@ -119,14 +119,18 @@ def keep_root(work, i, time, number, s):
 @linked
 def list_rays(work, lists, count, column, low, high, found):
     """-> int: list rays that have a number from low to high in a column, after ``found`` others; the new length."""
+    # parts, because a place in the whole array could be negative for all that the compiler knows
+    numbers, places, listed = work[column:], lists[w.PLACES + found :], 0
+    for i in range(count):
+        listed += np.int64((numbers[i] >= low) & (numbers[i] <= high))
+    if listed == 0:
+        return found
     listed = 0
     for i in range(count):
-        listed += np.int64((work[column + i] >= low) & (work[column + i] <= high))
-    for i in range(count if listed > 0 else 0):
         # written in any case, counted if true
-        lists[w.PLACES + found] = i
-        found += np.int64((work[column + i] >= low) & (work[column + i] <= high))
-    return found
+        places[listed & NATURAL] = i
+        listed += np.int64((numbers[i] >= low) & (numbers[i] <= high))
+    return found + listed
 
 
 @linked
@@ -171,10 +175,14 @@ def meet_arc(work, count, arc, number, close):
         t = arc_root(form, is_own, b, f, math.sqrt(d), speed2)
         is_uncertain = (is_other & is_nearly_tangent(arc, b, d, speed2)) | (from_afar & (abs(t) <= close))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
+        is_met = from_afar | (is_own & (b > least))
+        work[w.ARC_TIME + i] = where(is_met & (t >= 0.0), t, np.inf)
+    # a second loop, because the processor looks ahead over few of the many instructions
+    for i in range(count):
+        (px, py, vx, vy), t = ray_at(work, i), work[w.ARC_TIME + i]
         # at grazing incidence rounding moves the point along the arc by more than the slack
         on_arc = beyond_end(arc, px + t * vx - arc[c.START_X], py + t * vy - arc[c.START_Y]) <= close
-        is_met = from_afar | (is_own & (b > least))
-        keep(work, i, where(is_met & on_arc & (t >= 0.0), t, np.inf), number)
+        keep(work, i, where(on_arc, t, np.inf), number)
 
 
 @linked
@@ -211,17 +219,16 @@ def mark_near(work, count, curve, number):
 
 
 @inlined
-def gather(work, lists, count, some):
-    """Copy the rays that are listed to another work array."""
+def gather(work, lists, count, some, columns):
+    """Copy columns of the rays that are listed to another work array."""
     for j in range(count):
         i = lists[w.PLACES + j] & NATURAL
-        some[w.PX + j], some[w.PY + j], some[w.VX + j], some[w.VY + j] = ray_at(work, i)
-        some[w.OWN + j], some[w.BEFORE + j] = work[w.OWN + i], work[w.BEFORE + i]
-        some[w.UNCERTAIN + j] = 0.0
+        for column in columns:
+            some[column + j] = work[column + i]
 
 
 @inlined
-def scatter(work, lists, count, some, number):
+def keep_roots(work, lists, count, some, number):
     """Keep the hits of the rays that are listed, on one Bezier piece."""
     for j in range(count):
         i = lists[w.PLACES + j] & NATURAL
@@ -325,7 +332,8 @@ def meet_cubic(work, lists, count, curve, number, some):
     end = list_rays(work, lists, count, w.OWN, number, number, others)
     if end == 0:
         return
-    gather(work, lists, end, some)
+    gather(work, lists, end, some, w.STARTS)
+    some[w.UNCERTAIN : w.UNCERTAIN + end] = 0.0
     find_own_root(some[others:], end - others, curve)
     for turn in range(2):
         if find_fall(some, others, curve, turn) == 0 and turn > 0:
@@ -335,7 +343,7 @@ def meet_cubic(work, lists, count, curve, number, some):
         while steps > 0 and improve_roots(some, others, curve) > 0:
             steps -= 1
         time_roots(some, end, curve, number)
-        scatter(work, lists, end, some, number)
+        keep_roots(work, lists, end, some, number)
 
 
 @inlined
@@ -376,14 +384,39 @@ def keep_point(work, i, x, y, nx, ny, at_corner, may_run):
     work[w.NEED + i] = where(at_corner, w.AT_CORNER, where(may_run, w.BEFORE_RUN, 0.0))
 
 
+@linked
+def place_on_arc(some, count, arc, slack):
+    """Compute the points at which rays meet an arc; within rounding of an end, at grazing incidence, as at a corner."""
+    room = 2.0 * NEARBY_SLACKS * slack
+    for j in range(count):
+        px, py, vx, vy = ray_at(some, j)
+        x, y, nx, ny = arc_point(arc, some[w.TIME + j], px, py, vx, vy, 1.0)
+        dx, dy, ex, ey = x - arc[c.START_X], y - arc[c.START_Y], x - arc[c.END_X], y - arc[c.END_Y]
+        at_end = (dx * dx + dy * dy <= room * room) | (ex * ex + ey * ey <= room * room)
+        sine = RUN_MARGIN * arc[c.RUN_SINE]
+        keep_point(some, j, x, y, nx, ny, at_end, (sine > 0.0) & (abs(vx * nx + vy * ny) <= sine))
+
+
+@inlined
+def place_on_arcs(scope, work, lists, count):
+    """Compute the points at which rays meet arcs, for the rays of each arc in vectors."""
+    some = work[w.WORK :]
+    for k in range(scope.circles[0], scope.circles[1]):
+        hits = list_rays(work, lists, count, w.PIECE, w.CIRCLES + k, w.CIRCLES + k, 0)
+        gather(work, lists, hits, some, w.BEFORE_HIT)
+        place_on_arc(some, hits, numbers_of(scope.tables.circles[k]), scope.slack)
+        for j in range(hits):
+            i = lists[w.PLACES + j] & NATURAL
+            for column in w.AT_HIT:
+                work[column + i] = some[column + j]
+
+
 @inlined
 def place_hits(scope, work, lists, count):
-    """Compute the points at which rays meet their pieces, kind by kind, so that the processor guesses no branch.
-
-    A hit of an arc within rounding of its end, as this is at grazing incidence, is as at a corner.
-    """
+    """Compute the points at which rays meet their pieces, kind by kind, so that the processor guesses no branch."""
     tables, slack = scope.tables, scope.slack
-    joints, room = tables.joints, 2.0 * NEARBY_SLACKS * slack
+    joints = tables.joints
+    place_on_arcs(scope, work, lists, count)
     for k in range(list_rays(work, lists, count, w.PIECE, w.LINES, np.inf, 0)):
         i = lists[w.PLACES + k] & NATURAL
         j, (px, py, vx, vy) = int(work[w.PIECE + i] - w.LINES) & NATURAL, ray_at(work, i)
@@ -394,19 +427,10 @@ def place_hits(scope, work, lists, count):
         may_run = (work[w.BEFORE + i] == w.LINES + j) & (tables.lines[j, c.PAIRS_END] > 0.0)
         at_corner = is_corner & (abs(fraction) * line.length <= slack)
         keep_point(work, i, x, y, line.normal_x, line.normal_y, at_corner, may_run)
-    if scope.circles[0] < scope.circles[1]:
-        for k in range(list_rays(work, lists, count, w.PIECE, w.CIRCLES, w.BEZIERS - 1.0, 0)):
-            i = lists[w.PLACES + k] & NATURAL
-            arc, (px, py, vx, vy) = tables.circles[int(work[w.PIECE + i] - w.CIRCLES)], ray_at(work, i)
-            x, y, nx, ny = arc_point(arc, work[w.TIME + i], px, py, vx, vy, 1.0)
-            dx, dy, ex, ey = x - arc[c.START_X], y - arc[c.START_Y], x - arc[c.END_X], y - arc[c.END_Y]
-            at_end = (dx * dx + dy * dy <= room * room) | (ex * ex + ey * ey <= room * room)
-            sine = RUN_MARGIN * arc[c.RUN_SINE]
-            keep_point(work, i, x, y, nx, ny, at_end, (sine > 0.0) & (abs(vx * nx + vy * ny) <= sine))
     if scope.beziers[0] < scope.beziers[1]:
         for k in range(list_rays(work, lists, count, w.PIECE, w.BEZIERS, w.LINES - 1.0, 0)):
             i = lists[w.PLACES + k] & NATURAL
-            curve, s = tables.beziers[int(work[w.PIECE + i] - w.BEZIERS)], work[w.HIT_S + i]
+            curve, s = tables.beziers[int(work[w.PIECE + i] - w.BEZIERS) & NATURAL], work[w.HIT_S + i]
             (x, y), (nx, ny) = bezier_point(curve, s), bezier_normal(curve, s)
             keep_point(work, i, x, y, nx, ny, near_end(curve, x, y, slack), False)
 
@@ -479,15 +503,16 @@ def begin_rays(work, lists, count, following, entry, angle, opening):
     A ray at an end of the opening has no result here: it begins with too many hits.
     """
     left, right = opening
+    x, theta = entry[following:], angle[following:]
     for k in range(count):
-        sine, cosine = sine_cosine(angle[following + k])
+        sine, cosine = sine_cosine(theta[k])
         work[w.END_VX + k], work[w.END_VY + k] = -cosine, -sine
     for k in range(count):
-        i, j = lists[w.PLACES + k] & NATURAL, following + k
-        work[w.PX + i], work[w.PY + i] = entry[j], 0.0
+        i = lists[w.PLACES + k] & NATURAL
+        work[w.PX + i], work[w.PY + i] = x[k], 0.0
         work[w.VX + i], work[w.VY + i] = work[w.END_VX + k], work[w.END_VY + k]
-        work[w.OWN + i], work[w.RAY + i] = w.OPENING, float(j)
-        work[w.BOUNCES + i] = where((left < entry[j]) & (entry[j] < right), 0.0, MOST_HITS + 1.0)
+        work[w.OWN + i], work[w.RAY + i] = w.OPENING, float(following + k)
+        work[w.BOUNCES + i] = where((left < x[k]) & (x[k] < right), 0.0, MOST_HITS + 1.0)
 
 
 @inlined
@@ -496,7 +521,7 @@ def close_ranks(work, lists, first, end, count):
     for k in range(end - 1, first - 1, -1):
         i = lists[w.PLACES + k] & NATURAL
         count -= 1
-        for column in (w.PX, w.PY, w.VX, w.VY, w.OWN, w.BEFORE, w.BOUNCES, w.RAY):
+        for column in w.RAY_COLUMNS:
             work[column + i] = work[column + count]
     return count
 

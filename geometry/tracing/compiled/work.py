@@ -11,18 +11,21 @@ WAVE = 256
 ROOM = WAVE + 56
 # Of the rays: position, velocity, the piece on which they start and what was before it, bounces, and number.
 PX, PY, VX, VY, OWN, BEFORE, BOUNCES, RAY = (ROOM * k for k in range(8))
+STARTS = PX, PY, VX, VY, OWN, BEFORE
+RAY_COLUMNS = *STARTS, BOUNCES, RAY
 # Of their nearest hits so far: time, piece, and parameter on a Bezier piece; above 0, if rounding could change them.
 TIME, PIECE, HIT_S, UNCERTAIN = (ROOM * k for k in range(8, 12))
 # Of the hits: position, unit normal, and what a hit needs; whether the ray is not inside any more, and its velocity
 # before the hit.
 HIT_X, HIT_Y, HIT_NX, HIT_NY, NEED, GONE, OLD_VX, OLD_VY = (ROOM * k for k in range(12, 20))
+BEFORE_HIT, AT_HIT = (PX, PY, VX, VY, TIME), (HIT_X, HIT_Y, HIT_NX, HIT_NY, NEED)
 # Of rays that begin or end: velocity and angle.
 END_VX, END_VY, END_ANGLE = (ROOM * k for k in range(20, 23))
 WORK = ROOM * 23
 # Of rays near a Bezier piece, in a second array of the same length: the part on which g falls, the values at its ends,
 # the root, and whether there is one and it is still sought. In the first array: whether a ray is near.
 LOW, HIGH, VALUE_LOW, VALUE_HIGH, ROOT, FALLS, SOUGHT = (ROOM * k for k in range(12, 19))
-NEAR = END_VX
+NEAR = ARC_TIME = END_VX
 # Columns of whole numbers: a list of rays; of rays in trees the state of the search, and two lists.
 PLACES, ROW, LEVEL, WAITING, LEAF, AT_NODES, AT_LEAVES = (ROOM * k for k in range(7))
 LISTS = ROOM * 7

@@ -34,6 +34,7 @@ LOOPS = {
     waves.start_roots: (WORK, COUNT, CURVE),
     waves.improve_roots: (WORK, COUNT, CURVE),
     waves.time_roots: (WORK, COUNT, CURVE, NUMBER),
+    waves.place_on_arc: (WORK, COUNT, CURVE, NUMBER),
     waves.reflect_rays: (WORK, COUNT, PAIR, NUMBER, NUMBER),
     waves.begin_rays: (WORK, LISTS, COUNT, COUNT, WORK, WORK, PAIR),
     waves.end_rays: (WORK, LISTS, COUNT, WORK, WORK, WORK),
