@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 
 from ...scene import columns as c
 from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, OTHER_X, OTHER_Y, PARENT
-from ...scene.sky import MOST_LINES, SKY_ROOM
+from ...scene.escapes import ESCAPE_ROOM, MOST_LINES
 from ...scene.tolerances import NEARBY_SLACKS
 from ..double_double.formulas import where
 from . import work as w
@@ -218,7 +218,7 @@ def nearest_line_in_boxes(tree, own_line, bounces, px, py, vx, vy, time):
 
 @inlined
 def escapes(tables, own, room, px, py, vx, vy):
-    """-> bool: whether a ray that starts on line ``own`` certainly meets no piece; see `scene/sky`.
+    """-> bool: whether a ray that starts on line ``own`` certainly meets no piece; see `scene/escapes`.
 
     ``room`` is the distance from the ends of the line from which on this is known.
     """
@@ -226,14 +226,14 @@ def escapes(tables, own, room, px, py, vx, vy):
     x0, y0 = abs(joints[j, c.JOINT_X] - px), abs(joints[j, c.JOINT_Y] - py)
     x1, y1 = abs(joints[j + 1, c.JOINT_X] - px), abs(joints[j + 1, c.JOINT_Y] - py)
     is_inside = (max(x0, y0) > room) & (max(x1, y1) > room)
-    is_free = (vx < lines[j, c.SKY_RIGHT] * vy) & (-vx < lines[j, c.SKY_LEFT] * vy)
+    is_free = (vx < lines[j, c.ESCAPE_RIGHT] * vy) & (-vx < lines[j, c.ESCAPE_LEFT] * vy)
     return is_inside & is_free
 
 
 @inlined
 def begin_searches(scope, work, lists, count):
     """-> int: the number of rays of a wave that begin at the root of the tree; the other ones meet no line."""
-    root, top, room = int(scope.hollow[c.TREE_ROOT]), int(scope.hollow[c.TREE_LEVELS]) - 1, SKY_ROOM * scope.slack
+    root, top, room = int(scope.hollow[c.TREE_ROOT]), int(scope.hollow[c.TREE_LEVELS]) - 1, ESCAPE_ROOM * scope.slack
     first, end = scope.joints
     nodes, may_escape = 0, end - first <= MOST_LINES + 1
     for i in range(count):

@@ -1,9 +1,9 @@
-"""The sky above the lines of a hollow: directions in which a ray that leaves a line meets nothing and escapes.
+"""Sectors of escape: directions in which a ray that leaves a line of a hollow meets nothing.
 
 Let a ray leave a line from A to B upwards. The pieces from B on end on its right, at an end of the opening, and those
 up to A on its left; to be in its way they would cross the ray in its direction from A or that from B. Of a piece
 after B only the part above the start of such a ray matters. It is on the right if its ends are, and these are below a
-slope. The greatest of these slopes, and the same on the left, limit the sky of the line.
+slope. The greatest of these slopes, and the same on the left, limit the sector of the line.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from .tolerances import JOINT_ULPS, NEARBY
 MOST_LINES = 1024
 # Joints compared at once, so that the arrays of pairs stay in the cache.
 ROWS = 64
-# Least angle, about, between a ray to the sky and a ray from its start to any joint above.
-SKY_MARGIN = 2.0**-10
-# Distance from the ends of its line, in multiples of the slack at joints, from which on a ray may leave to the sky: the
+# Least angle, about, between a ray of the sector and a ray from its start to any joint above.
+ESCAPE_MARGIN = 2.0**-10
+# Distance from the ends of its line, in multiples of the slack at joints, from which on a ray may escape: the
 # ends are then 16 slacks or more from the ray, and a neighbour that the ray's line crosses behind the start is 2 away.
-SKY_ROOM = 2.0**15
+ESCAPE_ROOM = 2.0**15
 
 
-def sky_of(points: Floats, size: float) -> Floats:
-    """Return the skies of the lines between consecutive points, which end at the two ends of an opening.
+def escape_sectors(points: Floats, size: float) -> Floats:
+    """Return the sectors of escape of the lines between consecutive points, which end at the two ends of an opening.
 
     Parameters
     ----------
@@ -39,24 +39,24 @@ def sky_of(points: Floats, size: float) -> Floats:
     -------
     array, shape (n, 2)
         A ray of velocity (vx, vy) that leaves the line at a distance from its ends escapes if vx < right * vy and
-        -vx < left * vy, where right and left are the two numbers of a row; both are 0 for a line without sky.
+        -vx < left * vy, where right and left are the two numbers of a row; both are 0 for a line without one.
 
     Examples
     --------
-    >>> sky_of(np.array([[0.0, 0.0], [0.5, -1.0], [1.0, 0.0]]), 1.0).round(2).tolist()
+    >>> escape_sectors(np.array([[0.0, 0.0], [0.5, -1.0], [1.0, 0.0]]), 1.0).round(2).tolist()
     [[0.5, 0.5], [0.5, 0.5]]
     """
     count = len(points) - 1
-    skies = np.zeros((count, 2))
+    sectors = np.zeros((count, 2))
     if count > MOST_LINES:
-        return skies
+        return sectors
     slack = JOINT_ULPS * EPS * size
     right, left = _slopes(points, slack), _slopes(points[::-1] * (-1.0, 1.0), slack)[::-1]
     is_alone = _is_alone(points, NEARBY * size)
     for column, slopes in enumerate((right, left)):
         slope = np.maximum(slopes[:-1], slopes[1:])
-        skies[:, column] = is_alone / (slope + SKY_MARGIN * (1.0 + slope * slope))
-    return np.asarray(skies * (skies > 0.0).all(axis=1, keepdims=True))
+        sectors[:, column] = is_alone / (slope + ESCAPE_MARGIN * (1.0 + slope * slope))
+    return np.asarray(sectors * (sectors > 0.0).all(axis=1, keepdims=True))
 
 
 def _slopes(points: Floats, slack: float) -> Floats:
@@ -95,7 +95,7 @@ def _is_alone(points: Floats, close: float) -> NDArray[np.bool_]:
     alone[:-1] &= lengths[1:] > 2.0 * close
     turn = edges[:-1, 0] * edges[1:, 1] - edges[:-1, 1] * edges[1:, 0]
     along = edges[:-1, 0] * edges[1:, 0] + edges[:-1, 1] * edges[1:, 1]
-    is_spike = (along < 0.0) & (np.abs(turn) < SKY_MARGIN * lengths[:-1] * lengths[1:])
+    is_spike = (along < 0.0) & (np.abs(turn) < ESCAPE_MARGIN * lengths[:-1] * lengths[1:])
     alone[1:] &= ~is_spike
     alone[:-1] &= ~is_spike
     for first in range(0, count, ROWS):

@@ -1,4 +1,4 @@
-"""The sky of the lines of a hollow: rays that leave to it meet nothing, and few others escape."""
+"""Sectors of escape of the lines of a hollow: rays in them meet nothing, and few others escape."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from asperity import geometry as geo
-from asperity.geometry.scene.columns import JOINT_X, JOINT_Y, SKY_LEFT, SKY_RIGHT
-from asperity.geometry.scene.sky import MOST_LINES, SKY_MARGIN, sky_of
+from asperity.geometry.scene.columns import ESCAPE_LEFT, ESCAPE_RIGHT, JOINT_X, JOINT_Y
+from asperity.geometry.scene.escapes import ESCAPE_MARGIN, MOST_LINES, escape_sectors
 from asperity.geometry.tracing import tracing
 
 SLOT = [(0, 0), (0.2, -0.6), (0.5, -0.1), (0.5, -0.5), (0.51, -0.5), (0.51, -0.1), (0.9, -0.4), (1, 0)]
@@ -53,60 +53,60 @@ def is_met(points, line, start, velocity):
     ],
     ids=["slot", "cave", "notch", "mirrored notch", "valley", "long valley", *map("star {}".format, range(6))],
 )
-def test_a_ray_that_leaves_to_the_sky_meets_no_piece(points):
-    rng, skies, seen = np.random.default_rng(7), sky_of(points, 1.0), 0
-    for line in np.flatnonzero(skies[:, 0] > 0.0):
+def test_a_ray_in_the_sector_of_its_line_meets_no_piece(points):
+    rng, sectors, seen = np.random.default_rng(7), escape_sectors(points, 1.0), 0
+    for line in np.flatnonzero(sectors[:, 0] > 0.0):
         a, b = points[line], points[line + 1]
         for fraction in (1e-3, *rng.random(10), 1.0 - 1e-3):
-            # up to the very edges of the sky
+            # up to the very edges of the sector
             for share in (-1.0 + 1e-9, *rng.uniform(-1.0, 1.0, 5), 1.0 - 1e-9):
-                velocity = np.array([share * skies[line, 0 if share > 0.0 else 1], 1.0])
+                velocity = np.array([share * sectors[line, 0 if share > 0.0 else 1], 1.0])
                 seen += 1
                 assert not is_met(points, line, a + fraction * (b - a), velocity)
                 assert velocity @ (a[1] - b[1], b[0] - a[0]) > 0.0
     assert seen > 0
 
 
-def test_the_sky_of_a_valley_of_two_lines_ends_at_their_own_directions():
+def test_the_sector_of_a_valley_of_two_lines_ends_at_their_own_directions():
     points = np.array([(0.0, 0.0), (0.5, -1.0), (1.0, 0.0)])
-    limit = 1.0 / (2.0 + 5.0 * SKY_MARGIN)
-    assert np.allclose(sky_of(points, 1.0), limit, rtol=1e-12)
+    limit = 1.0 / (2.0 + 5.0 * ESCAPE_MARGIN)
+    assert np.allclose(escape_sectors(points, 1.0), limit, rtol=1e-12)
 
 
-def test_lines_below_an_overhang_and_at_narrow_slots_have_no_sky():
+def test_lines_below_an_overhang_and_at_narrow_slots_have_no_sector():
     narrow = np.array(SLOT, float)
     narrow[4:6, 0] = 0.5 + 1e-9
-    skies = sky_of(narrow, 1.0)
-    assert np.all(skies[1:6] == 0.0) and np.all(skies[[0, 6]] > 0.0)
-    assert np.all(sky_of(np.array(CAVE, float), 1.0)[1:6] == 0.0)
+    sectors = escape_sectors(narrow, 1.0)
+    assert np.all(sectors[1:6] == 0.0) and np.all(sectors[[0, 6]] > 0.0)
+    assert np.all(escape_sectors(np.array(CAVE, float), 1.0)[1:6] == 0.0)
 
 
-def test_long_hollows_have_no_sky():
-    assert np.all(sky_of(rough(MOST_LINES, 3), 1.0).max(axis=1) >= 0.0)
-    assert np.any(sky_of(rough(MOST_LINES, 3), 1.0) > 0.0)
-    assert not np.any(sky_of(rough(MOST_LINES + 1, 3), 1.0))
+def test_long_hollows_have_no_sectors():
+    assert np.all(escape_sectors(rough(MOST_LINES, 3), 1.0).max(axis=1) >= 0.0)
+    assert np.any(escape_sectors(rough(MOST_LINES, 3), 1.0) > 0.0)
+    assert not np.any(escape_sectors(rough(MOST_LINES + 1, 3), 1.0))
 
 
-def test_most_rays_leave_a_flat_profile_to_the_sky():
+def test_most_rays_leave_a_flat_profile_in_a_sector():
     wall = geo.Wall.from_vertices(rough(400, 4) * (1.0, 0.1))
     lines, joints = wall.scene.tables.lines, wall.scene.joints
-    assert np.mean(lines[:-1, [SKY_LEFT, SKY_RIGHT]] > 0.0) == 1.0
-    skies = sky_of(joints[:, [JOINT_X, JOINT_Y]], 1.0)
-    assert np.array_equal(skies, lines[:-1, [SKY_RIGHT, SKY_LEFT]])
+    assert np.mean(lines[:-1, [ESCAPE_LEFT, ESCAPE_RIGHT]] > 0.0) == 1.0
+    sectors = escape_sectors(joints[:, [JOINT_X, JOINT_Y]], 1.0)
+    assert np.array_equal(sectors, lines[:-1, [ESCAPE_RIGHT, ESCAPE_LEFT]])
 
 
 @pytest.mark.parametrize("count", [100, 900])
-def test_rays_at_the_edges_of_the_sky_have_the_bits_of_the_loop(count, monkeypatch):
+def test_rays_at_the_edges_of_a_sector_have_the_bits_of_the_loop(count, monkeypatch):
     points = rough(count, 5)
     wall, rng = geo.Wall.from_vertices(points), np.random.default_rng(6)
-    skies = sky_of(points, 1.0)
+    sectors = escape_sectors(points, 1.0)
     line = rng.integers(count, size=5_000)
     a, b = points[line], points[line + 1]
     start = a + rng.random(5_000)[:, np.newaxis] ** 6 * (b - a)
     # rays that come in against directions near the edge; sent back, they leave in these directions
     offset = 10.0 ** rng.uniform(-14.0, -1.0, 5_000) * rng.choice([-1.0, 1.0], 5_000)
     side = rng.integers(2, size=5_000)
-    cotangent = np.where(side == 0, skies[line, 0], -skies[line, 1]) + offset
+    cotangent = np.where(side == 0, sectors[line, 0], -sectors[line, 1]) + offset
     x, theta = start[:, 0] - start[:, 1] * cotangent, np.arctan2(1.0, cotangent)
     found = []
     for in_waves in (True, False):
