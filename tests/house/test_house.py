@@ -48,12 +48,6 @@ def test_a_plain_trace_loads_only_the_compiler_and_the_checker_of_crossings():
     assert modules_loaded_by(trace) & HEAVY <= {"numba", "shapely"}
 
 
-def test_a_first_trace_loads_no_linear_algebra():
-    # numba would, to learn whether it is there
-    trace = "from asperity import geometry as g; g.trace(g.triangular_teeth(1.0), [0.2], [1.0])"
-    assert "False" in run_python(f"{trace}\nprint('scipy.linalg' in sys.modules)")
-
-
 def test_a_trace_compiles_no_function_that_few_walls_need():
     code = "from asperity.geometry.tracing.compiled.rays import LATE\nprint([bool(late._words[0]) for late in LATE])"
     trace = "from asperity import geometry as g; g.trace(g.{}, [0.3, 0.4], [1.0, 2.0])\n"

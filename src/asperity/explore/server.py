@@ -73,7 +73,7 @@ def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = Non
             websocket_origin=hosts, websocket_max_message_size=LARGEST_MESSAGE,
             check_unused_sessions_milliseconds=CHECKED_EVERY, unused_session_lifetime_milliseconds=CLOSED_AFTER,
             # from Python 3.14 on no loop is made without being asked for
-            loop=IOLoop(),
+            loop=IOLoop(make_current=False),
         )  # fmt: skip
     finally:
         signal.signal(signal.SIGINT, interrupt)
