@@ -416,6 +416,28 @@ def start_on(number, own, path, ground):
 
 
 @inlined
+def piece_form(kind, number, own, path, size, ground):
+    """-> (is_own, line, conic, graph, patience, reach): a piece for `next_root`, as its kind has it.
+
+    ``is_own`` tells whether the path starts on the piece, ``reach`` is the slack of its function F.
+    """
+    is_own = own.kind == kind and own.piece == number
+    line, conic, patience, reach = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf, path.slack
+    begin = Start(0.0, 0.0, 0.0, 0.0)
+    if kind == LINE:
+        line = line_form(line_of(ground, number), is_own, path.x, path.y, path.turn, path.motion)
+    else:
+        patience = 2.0 * size / path.motion.fastest
+        if kind == ARC:
+            conic = conic_form(arc_of(ground, number), is_own, path.x, path.y)
+            reach = path.slack * max(1.0, ground.arcs[number, c.STRETCH])
+        else:
+            begin, is_own = start_on(number, own, path, ground)
+            reach = path.slack * ground.graphs[number, g.STEEPNESS]
+    return is_own, line, conic, (ground.graphs[number if kind == BEZIER else 0], begin), patience, reach
+
+
+@inlined
 def first_on_piece(kind, number, own, path, span, size, ground):
     """-> (t, state, code): first contact in the span of one satellite with the front of one piece, inf if none.
 
@@ -423,20 +445,7 @@ def first_on_piece(kind, number, own, path, span, size, ground):
     """
     t, end, rotation = span
     motion, slack = path.motion, path.slack
-    is_own = own.kind == kind and own.piece == number
-    line, conic, patience, reach = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf, slack
-    begin = Start(0.0, 0.0, 0.0, 0.0)
-    if kind == LINE:
-        line = line_form(line_of(ground, number), is_own, path.x, path.y, path.turn, motion)
-    else:
-        patience = 2.0 * size / motion.fastest
-        if kind == ARC:
-            conic = conic_form(arc_of(ground, number), is_own, path.x, path.y)
-            reach = slack * max(1.0, ground.arcs[number, c.STRETCH])
-        else:
-            begin, is_own = start_on(number, own, path, ground)
-            reach = slack * ground.graphs[number, g.STEEPNESS]
-    graph = ground.graphs[number if kind == BEZIER else 0], begin
+    is_own, line, conic, graph, patience, reach = piece_form(kind, number, own, path, size, ground)
     here, rate, _, _ = piece_after(kind, line, conic, graph, t, rotation, path)
     leaving = is_own and t == 0.0
     if t == 0.0 and own.kind != NO_PIECE and not is_own and abs(here) <= reach:
