@@ -68,9 +68,9 @@ class SampledArray:
         most p ||S|| + p sqrt(n), because the law given the event is a contraction; on the constants it does not change.
         The spread of rays that agree cannot show such an event.
         """
-        most = missed_fraction(rays) * (
-            math.sqrt(max(float(np.sum(self.symmetric**2)) - 1.0, 0.0)) + math.sqrt(len(self.symmetric) - 1.0)
-        )
+        # of a large matrix the squares would be another one
+        own = math.sqrt(max(float(np.linalg.norm(self.symmetric)) ** 2 - 1.0, 0.0))
+        most = missed_fraction(rays) * (own + math.sqrt(len(self.symmetric) - 1.0))
         return replace(self, error=max(self.error, most))
 
 
