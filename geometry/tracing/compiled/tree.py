@@ -22,7 +22,7 @@ from ..double_double.formulas import where
 from . import work as w
 from .options import inlined, inner
 from .pieces import Line, is_ahead, joint_side, line_at, line_hit, line_sides, side
-from .work import NATURAL
+from .work import NATURAL, ray_at
 
 # No hit on a line, for `nearest_line`.
 NO_LINE_HIT = np.inf, -1, 0.0, np.inf, False
@@ -241,7 +241,7 @@ def begin_searches(scope, work, lists, count):
         lists[w.AT_NODES + nodes] = i
         nodes += 1
         if may_escape and work[w.OWN + i] >= w.LINES:
-            px, py, vx, vy = work[w.PX + i], work[w.PY + i], work[w.VX + i], work[w.VY + i]
+            px, py, vx, vy = ray_at(work, i)
             nodes -= np.int64(escapes(scope.tables, int(work[w.OWN + i] - w.LINES) & NATURAL, room, px, py, vx, vy))
     return nodes
 
@@ -286,7 +286,7 @@ def line_of_leaf(boxes, leaf, place):
 def meet_leaf(scope, work, lists, i):
     """Find the nearest hit of ray i of a wave on the lines of its leaf, if that is nearer."""
     tables, slack, leaf = scope.tables, scope.slack, lists[w.LEAF + i] & NATURAL
-    px, py, vx, vy = work[w.PX + i], work[w.PY + i], work[w.VX + i], work[w.VY + i]
+    px, py, vx, vy = ray_at(work, i)
     first, own, close = (
         int(tables.boxes[leaf, CONTENT]) & NATURAL,
         int(work[w.OWN + i] - w.LINES),
@@ -329,7 +329,7 @@ def search_boxes(scope, work, lists, count):
         rays, nodes = nodes, 0
         for k in range(rays):
             i = lists[w.AT_NODES + k] & NATURAL
-            px, py, vx, vy = work[w.PX + i], work[w.PY + i], work[w.VX + i], work[w.VY + i]
+            px, py, vx, vy = ray_at(work, i)
             met = boxes_met(
                 boxes[lists[w.ROW + i] & NATURAL], px, py, vx, vy, -close, work[w.TIME + i] + 2.0 * scope.slack
             )

@@ -64,7 +64,7 @@ from .rays import scope_of
 from .runs import skip_chords, skip_crossings
 from .tree import search_boxes
 from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
-from .work import NATURAL
+from .work import NATURAL, ray_at
 
 # In place of the slots of late functions, which waves do not call.
 NO_SLOTS = np.int64(0)
@@ -84,12 +84,6 @@ def numbers_of(curve):
         curve[c.X1], curve[c.Y1], curve[c.X2], curve[c.Y2], curve[c.X3], curve[c.Y3],
         curve[c.MIDDLE_X], curve[c.MIDDLE_Y], curve[c.REACH],
     )  # fmt: skip
-
-
-@inlined
-def ray_at(work, i):
-    """-> (px, py, vx, vy): the position and the velocity of ray i."""
-    return work[w.PX + i], work[w.PY + i], work[w.VX + i], work[w.VY + i]
 
 
 @inlined

@@ -1,9 +1,11 @@
-"""The work space of rays in waves: where the columns of its two arrays begin. Without numba.
+"""The work space of rays in waves: where the columns of its two arrays begin. Loads numba.
 
 The columns have constant distances, so the compiler knows that they do not overlap, and computes several rays at once.
 """
 
 from __future__ import annotations
+
+from .options import inlined
 
 # Rays of a wave, and the distance of columns: not close to each other modulo 4 kB, where the processor takes a number
 # that it reads for one that it has just written.
@@ -37,3 +39,9 @@ NO_HIT, OPENING, CIRCLES, BEZIERS, LINES = 0.0, 1.0, 2.0**20, 2.0**30, 2.0**40
 # Mask that tells the compiler that an index is not negative, so that it need not count from the end. A longer mask is
 # an instruction whose register of one byte makes a step of a ray wait for that of the ray before, in some compilations.
 NATURAL = (1 << 31) - 1
+
+
+@inlined
+def ray_at(work, i):
+    """-> (px, py, vx, vy): the position and the velocity of ray i."""
+    return work[PX + i], work[PY + i], work[VX + i], work[VY + i]
