@@ -14,7 +14,6 @@ from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
-from ..channels.grazing import GrazingIntegrals
 from ..expectations.angle_panels import NODES, NORMAL, NULL_RULES, AnglePanels
 from ..expectations.basis_means import means_of_basis
 from ..laws.law import Law
@@ -91,11 +90,6 @@ LEAST_CUT = 1e-7
 # to all products except those with the constant; the wanted ones get their fraction of it times a margin. On 37 walls,
 # the root mean square of the fraction of one product was a tenth.
 FEWEST_FUNCTIONS, SPREAD_MARGIN = 4, 1.5
-# Fraction of the tolerance for the angles near grazing of hollows with a channel.
-GRAZING_FRACTION = 0.5
-# Limit on segments below which quadrature does not begin on them, if another method can take over: to prepare these
-# angles takes .1 s on mushrooms, the time of half a million rays.
-SEGMENTS_FOR_GRAZING = 2**20
 # Limit on the rounds that recompute conditional expectations in which a piece was missed.
 MOST_MENDINGS = 8
 
@@ -200,14 +194,6 @@ class _Integrator:
         elif not basis.is_polynomial and math.isfinite(budget.fallback):
             least_segments = self._predicted(edges, self.first_tolerance)
         self.mean_tolerance = MEAN_FRACTION * self.first_tolerance
-        self.grazing = None
-        if self.halved and (math.isinf(budget.fallback) or budget.segments >= SEGMENTS_FOR_GRAZING):
-            self.grazing = GrazingIntegrals.of(self.conditionals.wall, basis)
-        elif self.halved and GrazingIntegrals.channel(self.conditionals.wall, basis) is not None:
-            least_segments = math.inf
-        self.of_grazing: tuple[Floats, float] = np.zeros((basis.size, basis.size)), 0.0
-        if self.grazing is not None:
-            edges = np.append(self.grazing.highest, edges[edges > self.grazing.highest])
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
         if math.isinf(budget.fallback) or least_segments <= FRACTION_OF_PANELS * budget.segments:
             self._add_first_panels(edges[:-1], edges[1:])
@@ -287,7 +273,6 @@ class _Integrator:
 
     def _begin(self, tolerance: float) -> None:
         """Begin a stage: recompute the expectations on panels where their error is too large for its tolerance."""
-        self._integrate_grazing(tolerance)
         self._renew(tolerance, np.ones(len(self.panels.low), dtype=np.bool_))
 
     def _renew(self, tolerance: float, among: NDArray[np.bool_]) -> None:
@@ -309,16 +294,6 @@ class _Integrator:
             mask[chosen[first : first + step]] = True
             self._fill(self.panels, mask)
         self._recompute()
-
-    def _integrate_grazing(self, tolerance: float) -> None:
-        """Compute the integrals over the angles near grazing, if they are not on panels."""
-        if self.grazing is None:
-            return
-        flat = self.conditionals.flat_fraction
-        matrix, error = self.grazing.matrix(GRAZING_FRACTION * tolerance / (2.0 * (1.0 - flat)))
-        self.of_grazing = flat * self.grazing.flat + (1.0 - flat) * matrix, (1.0 - flat) * error
-        rays, segments = self.grazing.spent()
-        self.rays, self.segments = self.rays + rays, self.segments + segments
 
     def _meet(self, tolerance: float) -> None:
         """Divide panels until the error is below the tolerance, or no segments are left."""
@@ -369,9 +344,9 @@ class _Integrator:
 
     def _state(self) -> tuple[Floats, float, float, float]:
         """The matrix and its errors from the panels, from the expectations, and from the asymmetry."""
-        matrix = self.panels.total(self.basis) + self.of_grazing[0]
+        matrix = self.panels.total(self.basis)
         panels = self.panels.total_error(self.basis)
-        conditionals = self.panels.total_mean_error(self.basis) + self.of_grazing[1]
+        conditionals = self.panels.total_mean_error(self.basis)
         if self.halved:
             flip = reflection_matrix(self.basis)
             # the halves share no row of the matrix if each basis function lives on one side

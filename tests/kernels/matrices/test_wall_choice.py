@@ -7,7 +7,6 @@ from campaigns.cases.random_curved_walls import random_curved_wall
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.bench.quantities.walls import wall_of
-from asperity.kernels.channels.grazing import GrazingIntegrals
 from asperity.kernels.discretisation.auto_wall import RAYS_A_SEGMENT
 from asperity.kernels.discretisation.method import QUICK_SEGMENTS, Budget
 from asperity.kernels.discretisation.traced import Traced, traced_matrix
@@ -177,9 +176,3 @@ def test_first_panels_that_take_all_segments_leave_the_work_to_rays():
     budget = Budget(1e-3, segments=100_000, fallback=1e-3)
     _, error, _ = traced_matrix(wall_of("cusps"), ker.Legendre(2), budget)
     assert error == np.inf
-
-
-def test_few_rays_on_mushrooms_prepare_no_integrals_near_grazing(monkeypatch):
-    monkeypatch.setattr(GrazingIntegrals, "__init__", lambda *a: pytest.fail("prepared"))
-    found = ker.discretise(MUSHROOMS, ker.Legendre(2), tolerance=1e-3, rng=1)
-    assert found.method == "qmc" and float(found.error) <= 1e-3
