@@ -18,8 +18,6 @@ from .consequences.momentum_accommodation import Accommodation as Accommodation
 from .consequences.momentum_accommodation import accommodation as accommodation
 from .consequences.random_flights import ChannelPaths as ChannelPaths
 from .consequences.random_flights import channel_paths as channel_paths
-from .eigenvalues.sparse import LeadingEigenvalues as LeadingEigenvalues
-from .eigenvalues.sparse import leading_eigenvalues as leading_eigenvalues
 from .eigenvalues.spectra import Spectrum as Spectrum
 from .eigenvalues.spectra import SpectrumErrors as SpectrumErrors
 from .eigenvalues.standard_errors import bootstrap_intervals as bootstrap_intervals
