@@ -62,10 +62,10 @@ def draw(path: Path, collisions: int) -> None:
     velocity = np.stack([np.cos(angles), np.sin(angles), 0.8 * np.cos(3.0 * angles)], axis=1)
     for row, (name, law) in zip(axes, LAWS.items(), strict=True):
         start = velocity * [1.0, 1.0, name == "no-slip"]
-        ker.draw_paths(ker.play(stadium, law, [0.1, 0.2], start[:1], 40), row[0])
+        ker.play(stadium, law, [0.1, 0.2], start[:1], 40).draw_paths(row[0])
         row[0].set_title(f"stadium, {name}")
-        ker.draw_phase_portrait(ker.play(stadium, law, [0.1, 0.2], start, collisions), "boundary", row[1])
-        ker.draw_phase_portrait(ker.play(TABLES["circle"], law, [0.8, 0.2], start, collisions), "boundary", row[2])
+        ker.play(stadium, law, [0.1, 0.2], start, collisions).draw_phase_portrait(ax=row[1])
+        ker.play(TABLES["circle"], law, [0.8, 0.2], start, collisions).draw_phase_portrait(ax=row[2])
         row[2].set_title(f"circle, {name}")
     figure.savefig(path, dpi=100)
 

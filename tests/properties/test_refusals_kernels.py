@@ -12,6 +12,7 @@ from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError, WallError
 from asperity.estimates import Estimate
 from asperity.geometry.polygons.beams import beams_of
+from asperity.kernels.billiards.record import BilliardRecord
 
 EXACT = Estimate(0.0, 0.0, "bound", "given")
 MIRROR, DIFFUSE, BACK, HG = ker.specular(), ker.lambertian(), ker.retroreflection(), ker.henyey_greenstein
@@ -47,7 +48,7 @@ def density(function: Callable) -> Callable:
     return lambda: ker.DensityLaw(function)
 
 
-def wedge_record() -> ker.BilliardRecord:
+def wedge_record() -> BilliardRecord:
     return ker.play(geo.Container.wedge(1.0), SMOOTH, [1.0, 0.5], [-1.0, 0.1, 0.0], 20)
 
 
@@ -275,8 +276,8 @@ REFUSED = {
         (lambda: geo.Container.polygon([(0, 0), (1, 0), (0.2, 0.2), (0, 1)]), "convex"),
         (lambda: geo.Container.polygon([(0, 0), (0, 1), (1, 0)]), "counterclockwise"),
         (lambda: geo.Container([[0, 0]], [[0, 2]]), "unit vectors"),
-        (lambda: ker.phase_portrait(wedge_record(), "boundary"), "from curves"),
-        (lambda: ker.phase_portrait(wedge_record(), "angle"), "'boundary' or 'velocity'"),
+        (lambda: wedge_record().phase_portrait("boundary"), "from curves"),
+        (lambda: wedge_record().phase_portrait("angle"), "'boundary' or 'velocity'"),
         (lambda: spec.channel_paths("lambertian", [1, 2, 3]), "expected a law"),
         (lambda: spec.channel_paths(DIFFUSE, [1, 2]), "increasing positive times"),
         *((lambda r=r: spec.channel_paths(DIFFUSE, [1, 2, 3], bend=r, speed=1e308), "flights") for r in (3, math.inf)),
