@@ -1,4 +1,3 @@
-from .aerodynamics.drag import air_resistance as air_resistance
 from .aerodynamics.drag import resistance as resistance
 from .aerodynamics.extremal import ExtremalResistance as ExtremalResistance
 from .aerodynamics.extremal import extremal_resistance as extremal_resistance
@@ -8,8 +7,6 @@ from .aerodynamics.polygonal_body import Scattering as Scattering
 from .aerodynamics.polygonal_body import invisible_body as invisible_body
 from .aerodynamics.polygonal_body import zero_resistance_body as zero_resistance_body
 from .aerodynamics.rough_body import RoughBody as RoughBody
-from .aerodynamics.shape_search import BestHollow as BestHollow
-from .aerodynamics.shape_search import best_hollow as best_hollow
 from .aerodynamics.spinning_disk import SpinForce as SpinForce
 from .aerodynamics.spinning_disk import spin_force as spin_force
 from .bases.basis import Basis as Basis
@@ -46,9 +43,6 @@ from .distances.distances import distance as distance
 from .distances.retroreflectors import retroreflection_distance as retroreflection_distance
 from .distances.two_sample import DifferenceTest as DifferenceTest
 from .distances.two_sample import difference_test as difference_test
-from .distances.wall_sequences import Convergence as Convergence
-from .distances.wall_sequences import ConvergenceStep as ConvergenceStep
-from .distances.wall_sequences import study_convergence as study_convergence
 from .inverse.cell_sequences import Dichotomy as Dichotomy
 from .inverse.cell_sequences import dichotomy as dichotomy
 from .inverse.design import WallDesign as WallDesign
@@ -56,8 +50,6 @@ from .inverse.design import design_wall as design_wall
 from .inverse.exchange_wall import ExchangeHollow as ExchangeHollow
 from .inverse.exchange_wall import Generations as Generations
 from .inverse.exchange_wall import exchange_hollow as exchange_hollow
-from .inverse.two_mirror_hollow import TwoMirrorHollow as TwoMirrorHollow
-from .inverse.two_mirror_hollow import two_mirrors as two_mirrors
 from .inverse.wall_for_law import WallForLaw as WallForLaw
 from .inverse.wall_for_law import collision_for as collision_for
 from .inverse.wall_for_law import wall_for as wall_for
@@ -73,7 +65,6 @@ from .laws.law import DrivenLaw as DrivenLaw
 from .laws.law import Law as Law
 from .laws.law import Power as Power
 from .laws.law import SpecularFrame as SpecularFrame
-from .laws.law import mixture as mixture
 from .laws.law import retroreflection as retroreflection
 from .laws.law import specular as specular
 from .laws.least_resistance import LeastResistanceLaw as LeastResistanceLaw

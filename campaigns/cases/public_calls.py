@@ -133,8 +133,6 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Law.sample": (LAW.sample, {"theta": [1.0], "rng": 0}),
     "Law.apply": (LAW.apply, {"function": np.cos, "theta": [1.0]}),
     "Law.branches": (ker.specular().branches, {"theta": [1.0]}),
-    "best_hollow": (ker.best_hollow, {"family": arc_of, "bounds": [(0.5, 1.0)], "which": "max", "tolerance": 0.1,
-                                      "grid": 2}),
     "design_wall": (ker.design_wall, {"objective": "drag", "family": arc_of, "bounds": [(0.5, 1.0)], "wanted": "max",
                                       "tolerance": 0.1, "grid": 2}),
     "collision_for": (ker.collision_for, {"collision": COLLISION, "disk": DISK, "moments": 2, "tolerance": 0.1}),
@@ -156,7 +154,6 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "extremal_resistance": (ker.extremal_resistance, {"n": 4, "which": "min", "cost": None, "curvature": None}),
     "henyey_greenstein": (ker.henyey_greenstein, {"g": 0.5}),
     "maxwell": (ker.maxwell, {"diffuse_fraction": 0.5}),
-    "mixture": (ker.mixture, {"laws": [LAW, LAW], "weights": [0.5, 0.5]}),
     "limit_study": (ker.limit_study, {"disk": DISK, "wall": TEETH, "scales": [0.1, 0.05, 0.02], "rng": 0, "psi": 1.2,
                                       "spacing": None, "limit": None, "samples": (2, 2, 2), "repetitions": 2}),
     "weak_limit": (ker.weak_limit, {"disk": DISK, "wall": TEETH, "scales": [0.01], "pairs": None, "rng": 0,
@@ -207,11 +204,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "play": (ker.play, {"container": STRIP, "laws": COLLISION, "position": [[0.0, 0.0]], "velocity": [[1.0, 1.0, 0.0]],
                         "collisions": 2, "rng": 0}),
     "resistance": (ker.resistance, {"law": LAW, "tolerance": 0.1}),
-    "study_convergence": (ker.study_convergence, {"members": [LAW, LAW], "limit": None, "names": None, "order": 1,
-                                                  "kind": "rows", "tolerance": 0.1}),
     "exchange_hollow": (ker.exchange_hollow, {
         "exchange": ker.IntervalExchangeLaw(ker.discretise(ker.lambertian(), ker.Bins(2))), "opening": 0.05}),
-    "two_mirrors": (ker.two_mirrors, {"a": 0.3, "b": 0.6, "half_width": 0.02, "opening": 0.01}),
     "ReferenceValue": (spec.ReferenceValue, {"value": 0.0, "error": 0.0, "source": "by hand", "made_by": ()}),
     "WorkMethod": (spec.WorkMethod, {"name": "a", "solve": float, "is_random": False, "order": None}),
     "WorkProblem": (spec.WorkProblem, {"name": "a", "references": PROBLEM.references, "auto": "auto"}),
@@ -251,7 +245,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 # Functions of the first pages (README.md, docs/index.md, docs/quickstart.md) and their kin; all constructors join them.
 FIRST = {
     "accommodation", "collide", "CollisionLaw.sample", "dispersing_arcs", "discretise", "distance", "elliptical_arcs",
-    "focusing_arcs", "henyey_greenstein", "koch", "Law.apply", "Law.sample", "maxwell", "mixture", "no_slip",
+    "focusing_arcs", "henyey_greenstein", "koch", "Law.apply", "Law.sample", "maxwell", "no_slip",
     "rectangular_teeth", "resistance", "smooth", "spectral_gap", "spectrum", "trace", "trajectory",
     "triangular_teeth", "Wall.foreshorten", "wall_for", "wall_from_text",
 }  # fmt: skip
@@ -260,9 +254,9 @@ FIRST = {
 PLAIN = (TypeError, ValueError, AttributeError, IndexError)
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz.
 LEFT_OUT = {
-    "Accommodation", "air_resistance", "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BodyForce",
-    "BoundaryStates", "BranchLaw", "ChannelPaths", "CollisionConstants", "Conductance", "Container", "Convergence",
-    "ConvergenceStep", "Curve", "CylinderCollision", "Defect", "Dichotomy", "DifferenceTest", "Diffusivity",
+    "Accommodation", "AngularMeasure", "Basis", "BilliardRecord", "BodyForce",
+    "BoundaryStates", "BranchLaw", "ChannelPaths", "CollisionConstants", "Conductance", "Container",
+    "Curve", "CylinderCollision", "Defect", "Dichotomy", "DifferenceTest", "Diffusivity",
     "Displacements", "Distance", "double_parabola", "DrivenLaw", "Enclosure", "Enclosures", "Ensemble",
     "EnsembleRow", "EssentialEdge", "ExchangeHollow", "ExitTimes", "ExtremalResistance", "Extremum", "FittedOrder",
     "flat", "GapBounds", "GasRecord", "Generations", "HilbertSchmidtNorm", "Hollow", "invisible_body", "lambertian",
@@ -270,7 +264,7 @@ LEFT_OUT = {
     "MethodFacts", "MixingTime", "ModifiedCollision", "NamedWall", "PairCollision", "Reflector", "retroreflection",
     "RigidCollision", "Scattering", "Shadow", "SpectralGap", "Spectrum", "SpectrumErrors", "specular", "SpinForce",
     "DiskStatus",
-    "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow", "VelocityLaw",
+    "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "VelocityLaw",
     "verify", "WallDesign", "WallForLaw", "WeakLimit", "WorkReport", "WorkRow", "zero_resistance_body",
 }  # fmt: skip
 
@@ -344,7 +338,7 @@ OBJECTS: tuple[Any, ...] = (
     ker.SatelliteLaw(TEETH, DISK, 0.01), PAIR, ROUGH, ker.PolygonalBody([[(0, 0), (1, 0), (0, 1)]]),
     ker.PositionLaw([0.0, 1.0], [LAW]), ker.SpringWall(0.5, 1.0),
     ker.CollisionAlongWall(ker.PositionLaw([0.0, 1.0], [LAW]), DISK), RECORD, ker.displacements(TEETH, 200, rng=0),
-    ker.exchange_hollow(HALVES, 0.05), ker.two_mirrors(0.3, 0.6, 0.02, 0.01), spec.spectrum(LAW, 2, tolerance=0.1),
+    ker.exchange_hollow(HALVES, 0.05), spec.spectrum(LAW, 2, tolerance=0.1),
 )  # fmt: skip
 # Arguments by name, of a class alone after its name; methods that are not here are listed in `UNCALLED`.
 ARGUMENTS: dict[str, Any] = {

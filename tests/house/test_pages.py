@@ -78,7 +78,7 @@ def test_no_slip_plates_confine_and_rough_plates_do_not(run):
 def test_least_resistance_is_below_the_smooth_body_and_the_best_triangle_below_retroreflection(run):
     names = run("the_least_resistance")
     assert names["least"].lower < 0.987823750 < names["least"].upper + 1e-9
-    assert math.sqrt(2) < float(names["best"].resistance) < names["most"].upper == 1.5
+    assert math.sqrt(2) < float(names["best"].value) < names["most"].upper == 1.5
 
 
 def test_the_wall_has_the_wanted_moments(run):

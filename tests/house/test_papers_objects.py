@@ -103,8 +103,6 @@ WORKS = {
         [[1, 0, 0], [0, 0, 0]], 3, rng=0).time.shape == (4, 2),
     "ker.KernelMatrix.symmetry_defect":
         lambda: ker.discretise(ker.lambertian(), ker.Bins(8)).symmetry_defect().value < 1e-14,
-    "ker.Composition": lambda: isinstance(ker.lambertian() @ ker.specular(), ker.Composition),
-    "ker.Power": lambda: isinstance(ker.lambertian() ** 3, ker.Power),
     "ker.SINE_SQUARED": lambda: math.isclose(ker.SINE_SQUARED.mass(0.0, math.pi / 2), 0.5),
     "ker.Law": lambda: isinstance(ker.specular() @ ker.specular(), ker.Law),
     "spec.ChannelPaths":

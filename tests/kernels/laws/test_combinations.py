@@ -143,11 +143,6 @@ def test_ten_tenths_are_one() -> None:
     assert np.count_nonzero(law.branches(1.0)[0]) == 1
 
 
-def test_a_mixture_is_a_sum() -> None:
-    law = ker.mixture([ker.specular(), ker.lambertian()], [0.25, 0.75])
-    assert agree(law, 0.25 * ker.specular() + 0.75 * ker.lambertian())
-
-
 def test_scalars_of_numpy_scale() -> None:
     assert repr(np.float64(0.5) * ker.specular()) == "0.5*specular()"
     assert repr(2 * (0.25 * ker.specular() + 0.25 * ker.lambertian())) == "0.5*specular() + 0.5*lambertian()"
