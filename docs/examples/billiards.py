@@ -18,6 +18,7 @@ import numpy as np
 from asperity import Estimate
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.kernels.billiards.gas import GasRecord
 
 DISK = geo.Disk(mass=1.0, inertia=0.5)
 TABLES = {
@@ -42,7 +43,7 @@ def main(
     return found
 
 
-def gas(events: int) -> ker.GasRecord:
+def gas(events: int) -> GasRecord:
     """Twelve no-slip disks in a smooth room, at first without spin."""
     rng = np.random.default_rng(0)
     seats = np.array([(1.25 + 2.5 * i, 1.25 + 2.5 * j) for i in range(4) for j in range(3)])

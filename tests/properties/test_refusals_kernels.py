@@ -13,6 +13,8 @@ from asperity.errors import AccuracyError, InputError, WallError
 from asperity.estimates import Estimate
 from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.billiards.record import BilliardRecord
+from asperity.kernels.collisions.collision_law import CollisionCombination
+from asperity.kernels.inverse.exchange_wall import ExchangeHollow
 
 EXACT = Estimate(0.0, 0.0, "bound", "given")
 MIRROR, DIFFUSE, BACK, HG = ker.specular(), ker.lambertian(), ker.retroreflection(), ker.henyey_greenstein
@@ -61,7 +63,7 @@ def design(**changed: object) -> Callable:
     return lambda: ker.design_wall(**given | changed)
 
 
-def hollow(cells: int = 2, opening: float = 1e-2) -> ker.ExchangeHollow:
+def hollow(cells: int = 2, opening: float = 1e-2) -> ExchangeHollow:
     return ker.exchange_hollow(ker.IntervalExchangeLaw(ker.discretise(DIFFUSE, ker.Bins(cells))), opening)
 
 
@@ -253,7 +255,7 @@ REFUSED = {
         (lambda: ROUGH ** (-1), "exponent"),
         (lambda: ROUGH.apply_to_states(lambda y, t, p: p, [1.0, 2.0, 3.0], 1.0, 1.0), "shape"),
         (lambda: (ROUGH @ ROUGH).operator(*ANGLES).theta_matrix, "no term of this law flips"),
-        (lambda: ker.CollisionCombination((), DISK), "one with flip"),
+        (lambda: CollisionCombination((), DISK), "one with flip"),
         (lambda: ker.CollisionAlongWall(MIRROR, DISK), "PositionLaw"),
         (lambda: ker.play(CIRCLE, ALONG, [0.0, 0.0], [1.0, 0.0, 0.0], 1), "length of wall 0"),
         (lambda: ALONG.sample_at([0.5], [1.0, -1.0, 0.0]), "shape"),
