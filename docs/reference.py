@@ -54,6 +54,22 @@ RETURNED = {
     "kernels.design_wall": "WallDesign",
     "kernels.exchange_hollow": "ExchangeHollow Generations",
     "kernels.dichotomy": "Dichotomy",
+    "spectral.curvature_gap_bounds": "GapBounds",
+    "spectral.enclosures": "Enclosures Enclosure Separation",
+    "spectral.exit_times": "ExitTimes",
+    "spectral.conductance": "Conductance",
+    "spectral.diffusivity": "Diffusivity",
+    "spectral.laplacian_comparison": "LaplacianComparison",
+    "spectral.mixing_time": "MixingTime",
+    "spectral.accommodation": "Accommodation",
+    "spectral.channel_paths": "ChannelPaths",
+    "spectral.Spectrum": "SpectrumErrors",
+    "spectral.hilbert_schmidt_norm": "HilbertSchmidtNorm",
+    "spectral.essential_edge": "EssentialEdge",
+    "spectral.ensemble": "Ensemble EnsembleRow",
+    "spectral.SweepTable": "SweepRow Extremum",
+    "spectral.fit_order": "FittedOrder",
+    "spectral.WorkReport": "WorkRow MethodFacts Machine",
 }
 # docs/api/index.md documents their contents by hand
 ELSEWHERE = {"asperity.geometry.symbolic", "asperity.geometry.verify"}

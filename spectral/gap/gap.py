@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.checks import Rng, generator, positive_number
-from ...core.errors import AccuracyError, InputError
+from ...core.errors import AccuracyError
 from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
@@ -24,7 +24,7 @@ from ..eigenvalues.spectra import ONE_MATRIX, UNREFINED, Spectrum, matrix_spectr
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .methods import gap_of_power, law_eigenvalues
-from .refinement import EIGENVALUES, RAYS_FRACTION, Refinement, SharedMatrices, refined
+from .refinement import EIGENVALUES, RAYS_FRACTION, LawMatrices, Refinement, refined
 from .shallow import shallow_gap
 from .theorems import gap_by_theorem, gap_of_exact, split_gap
 from .verdict import SpectralGap, isolated, made_from
@@ -42,7 +42,7 @@ ROUGH, GLANCES, FEW_RAYS, BEYOND_CHANGE = 2e-3, ((24, 1.0), (48, 0.1)), 2**17, 2
 MODULI = 3
 
 
-def rough_gap(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap | None:
+def rough_gap(law: Law, tolerance: float, matrices: LawMatrices, edge: EssentialEdge) -> SpectralGap | None:
     """A rough gap of a traced wall, from small matrices sampled with few rays; enclosures take ten times as long.
 
     None for other laws, for tolerances below `ROUGH`, and near the essential spectrum.
@@ -166,30 +166,7 @@ def spectral_gap(
     power = as_power(law)
     if power is not None:
         return _of_power(law, *power, tolerance, rng, seconds)
-    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng, seconds))
-
-
-def gaps_in_both_conventions(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> tuple[SpectralGap, SpectralGap]:
-    """The gaps of a mirror-symmetric law in the convention that it carries and in the other, from the same matrices.
-
-    Raises
-    ------
-    InputError
-        If the law is not known to be reversible and mirror-symmetric, hence self-adjoint in both conventions.
-
-    Examples
-    --------
-    >>> from asperity import kernels as ker
-    >>> [float(gap) for gap in gaps_in_both_conventions(0.5 * ker.specular() + 0.5 * ker.lambertian())]
-    [0.5, 0.5]
-    """
-    positive_number("tolerance", tolerance)
-    if not law.reversible or not law.mirror_symmetric:
-        raise InputError(f"law: expected a reversible and mirror-symmetric one, got {law!r}")
-    matrices = SharedMatrices(generator(rng, 0))
-    other = law.in_specular_frame()
-    first, second = (gap_by_theorem(each) or _by_refinement(each, tolerance, matrices) for each in (law, other))
-    return first, second
+    return gap_by_theorem(law) or _by_refinement(law, tolerance, LawMatrices(rng, seconds))
 
 
 def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
@@ -279,11 +256,11 @@ def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generato
     )  # fmt: skip
 
 
-def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
+def _by_refinement(law: Law, tolerance: float, matrices: LawMatrices) -> SpectralGap:
     """The gap from the quadratic form of 1 - P for shallow walls, or from enclosures and matrices."""
     fraction, rest = without_identity(law)
     if fraction < 1.0:
-        own = SharedMatrices(matrices.rng, matrices.time_limit)
+        own = LawMatrices(matrices.rng, matrices.time_limit)
         return _scaled(gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, own), fraction)
     edge = essential_edge(law)
     small = shallow_gap(law, edge)
@@ -304,7 +281,7 @@ def _scaled(found: SpectralGap, fraction: float) -> SpectralGap:
     return replace(found, value=value, error=error, evidence=(reason, *found.evidence), spectrum=None)
 
 
-def _by_matrices(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap:
+def _by_matrices(law: Law, tolerance: float, matrices: LawMatrices, edge: EssentialEdge) -> SpectralGap:
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))

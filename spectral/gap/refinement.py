@@ -111,28 +111,20 @@ class Refinement:
         return "change by the last refinement + algebraic + matrix + 1.96 x sampling error"
 
 
-class SharedMatrices:
-    """Cache of the matrices of one law, shared by both conventions of a mirror-symmetric law."""
+class LawMatrices:
+    """The matrices of one law: by quadrature, and from the first basis on where that is poor, from rays."""
 
     def __init__(self, rng: np.random.Generator, time_limit: float = TIME_LIMIT) -> None:
         self.rng, self.time_limit = rng, time_limit
-        self._made: dict[tuple[Basis, int, float], KernelMatrix] = {}
         self._by_rays = False
 
     def __call__(self, law: Law, basis: Basis, samples: int, tolerance: float) -> KernelMatrix:
-        """The matrix of a law, from the matrix in the other convention if possible."""
-        if isinstance(law, SpecularFrame) and law.reversible and is_mirror_symmetric(basis):
-            return self(law.law, basis, samples, tolerance).in_specular_frame()
-        key = (basis, samples, tolerance)
-        if key not in self._made:
-            self._made[key] = self._better(law, basis, samples, tolerance)
-        return self._made[key]
-
-    def _better(self, law: Law, basis: Basis, samples: int, tolerance: float) -> KernelMatrix:
         """The matrix by quadrature, unless its error exceeds the tolerance and the sampling error of an eigenvalue.
 
         The Frobenius error bounds the error of an eigenvalue; the error from n rays is about n^(-1/2) in any basis.
         """
+        if isinstance(law, SpecularFrame) and law.reversible and is_mirror_symmetric(basis):
+            return self(law.law, basis, samples, tolerance).in_specular_frame()
         if not self._by_rays:
             found = discretise(law, basis, tolerance=tolerance, samples=samples, rng=self.rng)
             poor = float(found.error) > max(tolerance, POOR / np.sqrt(samples))
@@ -143,13 +135,13 @@ class SharedMatrices:
         return discretise(law, basis, method="monte-carlo", tolerance=tolerance, samples=samples, rng=self.rng)
 
 
-def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> Refinement:
+def refined(law: Law, tolerance: float, matrices: LawMatrices, edge: EssentialEdge) -> Refinement:
     """Refine until the changes decrease and the error is below the tolerance, or the largest basis is reached."""
     with progress_bar(None, "basis", "gap") as bar:
         return _refined(law, tolerance, matrices, edge, bar)
 
 
-def _refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge, bar: Any) -> Refinement:
+def _refined(law: Law, tolerance: float, matrices: LawMatrices, edge: EssentialEdge, bar: Any) -> Refinement:
     """The refinement, whose last error the bar shows."""
     levels: list[Spectrum] = []
     evidence: list[str] = []

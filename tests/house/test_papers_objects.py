@@ -100,8 +100,6 @@ WORKS = {
         lambda: ker.discretise(ker.lambertian(), ker.Bins(8)).symmetry_defect().value < 1e-14,
     "ker.SINE_SQUARED": lambda: math.isclose(ker.SINE_SQUARED.mass(0.0, math.pi / 2), 0.5),
     "ker.Law": lambda: isinstance(ker.specular() @ ker.specular(), ker.Law),
-    "spec.ChannelPaths":
-        lambda: spec.ChannelPaths(np.ones(1), np.array([[3.0], [4.0]]), 1.0, 1.0, math.inf).mean_squares == [12.5],
 }  # fmt: skip
 
 

@@ -15,6 +15,8 @@ from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.billiards.record import BilliardRecord
 from asperity.kernels.collisions.collision_law import CollisionCombination
 from asperity.kernels.inverse.exchange_wall import ExchangeHollow
+from asperity.spectral.consequences.random_flights import ChannelPaths
+from asperity.spectral.work_diagrams.report import WorkRow
 
 EXACT = Estimate(0.0, 0.0, "bound", "given")
 MIRROR, DIFFUSE, BACK, HG = ker.specular(), ker.lambertian(), ker.retroreflection(), ker.henyey_greenstein
@@ -54,7 +56,7 @@ def wedge_record() -> BilliardRecord:
     return ker.play(geo.Container.wedge(1.0), SMOOTH, [1.0, 0.5], [-1.0, 0.1, 0.0], 20)
 
 
-def paths(bend: float = math.inf) -> spec.ChannelPaths:
+def paths(bend: float = math.inf) -> ChannelPaths:
     return spec.channel_paths(DIFFUSE, [1, 2, 3], 10, 0, bend=bend)
 
 
@@ -384,7 +386,7 @@ REFUSED = {
         (lambda: spec.ReferenceValue(1.0, -1.0, "?"), "error: expected"),
         (lambda: spec.ReferenceValue(1.0, 0.0, ""), "source: expected words"),
         (lambda: spec.WorkProblem("none", ()), "references: expected at least one"),
-        (lambda: spec.WorkRow("a", 1, "finished"), "status: expected"),
+        (lambda: WorkRow("a", 1, "finished"), "status: expected"),
         (lambda: spec.fit_order([1, 2, 3], [1, 0, 1]), "positive numbers"),
         (lambda: spec.fit_order([1, 2, 3], [1, 1, 1], [1, 1]), "for each of 3 sizes"),
         (lambda: spec.fit_order([1, 2, 3], [1, 1, 1], [1, 1, 0]), "for each of 3 sizes"),
