@@ -13,7 +13,7 @@ ROOMS = ("geometry", "kernels", "spectral")
 TASKS = (
     ("walls", "Make a wall", ("geometry.walls", "geometry.cells", "geometry.curves")),
     ("rays", "Trace rays", ("geometry.tracing", "geometry.scene")),
-    ("pictures", "Draw walls and collisions", ("geometry.plotting",)),
+    ("pictures", "Draw walls", ("geometry.plotting",)),
     ("laws", "Take and combine laws", ("kernels.laws",)),
     ("laws-of-walls", "Take the law of a wall", ("kernels.walls",)),
     (

@@ -13,6 +13,7 @@ from .collisions.amplification import DiskStatus
 from .collisions.configuration_space import ConfigurationSpace
 from .collisions.cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
 from .collisions.pair import PairCollision, collide_pair
+from .collisions.paths import collision_path
 from .collisions.rigid import RigidCollision, collide
 from .collisions.rim_on_wall import collide_rim
 from .collisions.transversality import CollisionConstants, Shadow, good_fraction, shadow
@@ -20,11 +21,10 @@ from .curves.arc import Arc
 from .curves.bezier import Bezier
 from .curves.curve import Curve
 from .curves.segment import Segment
-from .disk.charts import RollingCharts, plane_crossing, plane_crossing_differential
+from .disk.charts import RollingCharts
 from .disk.disk import Disk
 from .disk.inner_disk import InnerDisk
 from .disk.rim import SatelliteDisk
-from .plotting.collisions import collision_path, draw_collision, draw_configurations, draw_shadow
 from .plotting.walls import draw_wall
 from .scene.plan import TracePlan
 from .tables.container import Container
@@ -90,9 +90,6 @@ __all__ = [
     "collision_path",
     "dispersing_arcs",
     "double_parabola",
-    "draw_collision",
-    "draw_configurations",
-    "draw_shadow",
     "draw_wall",
     "elliptical_arcs",
     "flat",
@@ -104,8 +101,6 @@ __all__ = [
     "mushrooms",
     "nested_reflection",
     "notched_angle",
-    "plane_crossing",
-    "plane_crossing_differential",
     "random_wall",
     "read_profile",
     "rectangular_teeth",

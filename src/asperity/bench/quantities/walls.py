@@ -67,7 +67,7 @@ def random_wall(number: int) -> geo.Wall:
             continue
 
 
-def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> geo.Curve:
+def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> Curve:
     kind = int(rng.integers(0, 3)) if curved else 0
     if kind == 0:
         return geo.Segment(start, end)
