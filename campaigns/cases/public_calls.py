@@ -166,7 +166,6 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
                                       "velocity": [[0.0, -1.0, 0.0]], "max_contacts": 9}),
     "shadow": (geo.shadow, {"space": SPACE, "position": [0.0, 0.0], "velocity": [0.0, -1.0, 0.0]}),
     "good_fraction": (geo.good_fraction, {"space": SPACE, "samples": 10, "rng": 0}),
-    "CollisionConstants.of": (geo.CollisionConstants.of, {"disk": DISK}),
     "ConfigurationSpace.draw_collision": (SPACE.draw_collision, {"position": POSITION[0], "velocity": VELOCITY[0]}),
     "ConfigurationSpace.draw_section": (SPACE.draw_section, {"height": 1.0}),
     "ConfigurationSpace.good_half_width": (SPACE.good_half_width, {"length": 1.0}),
@@ -241,11 +240,9 @@ FIRST = {
 PLAIN = (TypeError, ValueError, AttributeError, IndexError)
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz.
 LEFT_OUT = {
-    "Basis", "BoundaryStates", "CollisionConstants", "Container", "Curve", "CylinderCollision", "DiskStatus",
-    "double_parabola", "flat", "Hollow", "invisible_body", "lambertian", "Law", "LeadingEigenvalues",
-    "LeastResistanceLaw", "ModifiedCollision", "NamedWall", "PairCollision", "retroreflection", "RigidCollision",
-    "Shadow", "SpectralGap", "Spectrum", "specular", "Status", "SweepTable", "Trace", "TracePlan", "verify",
-    "WorkReport", "zero_resistance_body",
+    "Basis", "Container", "DiskStatus", "double_parabola", "flat", "invisible_body", "lambertian", "Law",
+    "LeadingEigenvalues", "LeastResistanceLaw", "retroreflection", "SpectralGap", "Spectrum", "specular", "Status",
+    "SweepTable", "verify", "WorkReport", "zero_resistance_body",
 }  # fmt: skip
 
 

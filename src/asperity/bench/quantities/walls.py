@@ -12,6 +12,7 @@ import numpy as np
 from ... import geometry as geo
 from ...core.checks import Floats
 from ...core.errors import InputError
+from ...geometry.curves.curve import Curve
 
 Point = tuple[float, float]
 
