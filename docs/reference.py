@@ -34,6 +34,27 @@ TASKS = (
     ("inverse", "Find a wall for a law", ("kernels.inverse",)),
     ("work-diagrams", "Measure error against time", ("spectral.work_diagrams",)),
 )
+# Classes that only other objects return or are built upon, by the public name on whose page they are documented.
+RETURNED = {
+    "kernels.Law": "BranchLaw DrivenLaw Combination Composition Power SpecularFrame",
+    "kernels.KernelMatrix": "Defect SymmetryDefect",
+    "kernels.SINE": "AngularMeasure",
+    "kernels.CollisionLaw": "VelocityLaw CollisionCombination",
+    "kernels.limit_study": "LimitStudy",
+    "kernels.weak_limit": "WeakLimit",
+    "kernels.play": "BilliardRecord Reflector",
+    "kernels.play_gas": "GasRecord",
+    "kernels.distance": "Distance",
+    "kernels.difference_test": "DifferenceTest",
+    "kernels.displacements": "Displacements",
+    "kernels.extremal_resistance": "ExtremalResistance",
+    "kernels.PolygonalBody": "BodyForce Scattering",
+    "kernels.spin_force": "SpinForce",
+    "kernels.wall_for": "WallForLaw",
+    "kernels.design_wall": "WallDesign",
+    "kernels.exchange_hollow": "ExchangeHollow Generations",
+    "kernels.dichotomy": "Dichotomy",
+}
 # docs/api/index.md documents their contents by hand
 ELSEWHERE = {"asperity.geometry.symbolic", "asperity.geometry.verify"}
 # Objects whose folder nothing but their own module knows.
@@ -65,10 +86,25 @@ class StoryOrder:
         return STORY.index(name) if name in STORY else len(STORY), name
 
 
+def home_of(thing: object) -> str:
+    """The module of an object; of a constant, that of its class."""
+    return getattr(thing, "__module__", None) or type(thing).__module__
+
+
 def folder_of(name: str, thing: object) -> str:
     """Room and folder of a public name, as "geometry.walls"."""
-    home = getattr(thing, "__module__", None) or type(thing).__module__
-    return FOLDERS.get(name) or ".".join(home.split(".")[1:3])
+    return FOLDERS.get(name) or ".".join(home_of(thing).split(".")[1:3])
+
+
+def returned_classes() -> dict[str, list[str]]:
+    """Full names of the classes of `RETURNED`, by the full name of the object on whose page they are documented."""
+    found = {}
+    for name, classes in RETURNED.items():
+        room, _, public = name.partition(".")
+        home = sys.modules[home_of(getattr(import_module(f"asperity.{room}"), public))]
+        every = [getattr(home, one) for one in classes.split()]
+        found[f"asperity.{name}"] = [f"{one.__module__}.{one.__name__}" for one in every]
+    return found
 
 
 def names_by_folder() -> dict[str, list[str]]:

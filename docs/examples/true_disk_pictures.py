@@ -38,7 +38,8 @@ def main(folder: Path, samples: int = 20_000) -> dict[str, float]:
     figure.savefig(folder / "configurations.png", dpi=DPI)
 
     figure = Figure(figsize=(7, 4.5), layout="constrained")
-    ker.draw_limit(disk, geo.focusing_arcs(1.2), (1e-2, 1e-3, 1e-5), (1.0, 1.2), rng, samples, figure.subplots())
+    law = ker.SatelliteLaw(geo.focusing_arcs(1.2), disk, 1e-2)
+    law.draw_limit((1.0, 1.2), rng, scales=(1e-2, 1e-3, 1e-5), samples=samples, ax=figure.subplots())
     figure.savefig(folder / "limit.png", dpi=DPI)
     energies = disk.inner(hit.velocity[chosen], hit.velocity[chosen]), disk.inner(velocity[chosen], velocity[chosen])
     return {"energy gained": float(energies[0] - energies[1]), "contacts": float(hit.contacts[chosen])}

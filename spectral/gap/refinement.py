@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...core.long_runs import TIME_LIMIT, progress_bar
-from ...kernels import Basis, CircularArcLaw, KernelMatrix, Law, Legendre, Panels, SpecularFrame, discretise
+from ...kernels import Basis, CircularArcLaw, KernelMatrix, Law, Legendre, Panels, discretise
 from ...kernels.bases.mirror import is_mirror_symmetric
+from ...kernels.laws.law import SpecularFrame
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..essential.edge import EssentialEdge
 

@@ -8,7 +8,7 @@ from copy import copy
 
 import numpy as np
 import pytest
-from campaigns.cases.ablations import ablations
+from campaigns.cases.shortcuts import ablations
 from campaigns.speed.exact_rows import ArcRow
 from matplotlib.figure import Figure
 from scipy.stats import norm, t

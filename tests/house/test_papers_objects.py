@@ -95,16 +95,9 @@ WORKS = {
     "geo.Status": lambda: geo.trace(geo.flat(), 0.5, 1.0).status == geo.Status.ESCAPED,
     "geo.Trace": lambda: geo.trace(geo.flat(), 0.5, 1.0).theta == math.pi - 1.0,
     "geo.Wall.islands": lambda: geo.flat().islands == (),
-    "ker.Displacements.exceeds":
-        lambda: float(ker.displacements(TEETH, 100, rng=0).exceeds(0.02, scale=0.01)) == 0.0,
     "ker.PolygonalBody.scatter_in_circle": lambda: passes_a_distant_body_in_straight_lines(),
-    "ker.GasRecord": lambda: ker.play_gas(
-        geo.Container.polygon([(0, 0), (9, 0), (9, 9), (0, 9)]), ker.PairLaw(ker.specular(), DISK), [[2, 2], [6, 6]],
-        [[1, 0, 0], [0, 0, 0]], 3, rng=0).time.shape == (4, 2),
     "ker.KernelMatrix.symmetry_defect":
         lambda: ker.discretise(ker.lambertian(), ker.Bins(8)).symmetry_defect().value < 1e-14,
-    "ker.Composition": lambda: isinstance(ker.lambertian() @ ker.specular(), ker.Composition),
-    "ker.Power": lambda: isinstance(ker.lambertian() ** 3, ker.Power),
     "ker.SINE_SQUARED": lambda: math.isclose(ker.SINE_SQUARED.mass(0.0, math.pi / 2), 0.5),
     "ker.Law": lambda: isinstance(ker.specular() @ ker.specular(), ker.Law),
     "spec.ChannelPaths":

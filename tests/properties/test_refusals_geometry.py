@@ -162,7 +162,7 @@ DISKS = [
     (lambda: SPACE.cylinder_contains([0.0]), r"shape \(..., 3\)"),
     (lambda: SPACE.normal(0, 0, [1.0]), r"shape \(..., 2\)"),
     (study(psi=4.0), "psi"), (study(repetitions=1), "repetitions"), (study(spacing=lambda eps: pi / 250), "spacing"),
-    (lambda: ker.draw_limit(DISK, TEETH, [0.1, 0.05, 0.02, 0.01, 0.005], (1.0, 1.2), np.random.default_rng(0), 4),
+    (lambda: ker.SatelliteLaw(TEETH, DISK, 0.1).draw_limit((1.0, 1.2), 0, scales=[0.1, 0.05, 0.02, 0.01, 0.005]),
      "scales: expected at most 4 numbers"),
     (lambda: geo.collide_cylinder(DISK, TEETH, 0.1, STILL, [[0, 1, 0]]), "v2 < 0"),
     (lambda: geo.collide_modified(DISK, TEETH, 0.1, STILL, DOWN, 1.0), "whole number"),
