@@ -3,7 +3,7 @@
 A word is a chain of laws in the order of application; the empty word is the identity. The rules hold for operators that
 preserve sin(theta) d theta. Retroreflection is the identity. Specular reflection J commutes with mirror-symmetric laws.
 J and other involutions have the square 1. HG(g) HG(h) = HG(g h) and J HG(g) = HG(-g). A chain that contains the
-Lambertian law is the Lambertian law. Powers of the law of rectangular teeth have a closed form.
+Lambertian law is the Lambertian law.
 """
 
 from __future__ import annotations
@@ -16,8 +16,6 @@ from ..laws.involution import InvolutionLaw
 from ..laws.law import Composition, IsometryLaw, Law, SpecularFrame, retroreflection, specular
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import Rules, fold
-from .rectangular import RectangularTeethLaw
-from .repeated_teeth import MOST_TIMES, RepeatedTeethLaw
 
 Word = tuple[Law, ...]
 Sum = dict[Word, float]
@@ -128,27 +126,14 @@ def _mirror_moved(word: Word) -> Word:
 
 
 def _joined(word: Word) -> Word:
-    """Merge neighbouring HG laws and neighbouring rectangular teeth, and cancel pairs of equal involutions."""
+    """Merge neighbouring HG laws, and cancel pairs of equal involutions."""
     for index, (first, second) in enumerate(pairwise(word)):
         if isinstance(first, InvolutionLaw) and first == second:
             return reduced(word[:index] + word[index + 2 :])
         if isinstance(first, HenyeyGreensteinLaw) and isinstance(second, HenyeyGreensteinLaw):
             joint = HenyeyGreensteinLaw(first.g * second.g)
             return reduced((*word[:index], joint, *word[index + 2 :]))
-        again = _repeated(first, second)
-        if again is not None:
-            return reduced((*word[:index], again, *word[index + 2 :]))
     return word
-
-
-def _repeated(first: Law, second: Law) -> Law | None:
-    """The product of two laws of rectangular teeth of the same shape; None for other laws."""
-    teeth = [law for law in (first, second) if isinstance(law, (RectangularTeethLaw, RepeatedTeethLaw))]
-    times = sum(law.times if isinstance(law, RepeatedTeethLaw) else 1 for law in teeth)
-    shapes = {law.height_to_width for law in teeth}
-    return (
-        RepeatedTeethLaw(shapes.pop(), times) if len(teeth) == 2 and len(shapes) == 1 and times <= MOST_TIMES else None
-    )
 
 
 def _is_lambertian(law: Law) -> bool:

@@ -30,7 +30,6 @@ FLOORS = [
         "kernels.expectations",
         "kernels.laws",
         "kernels.walls",
-        "kernels.channels",
         "kernels.sampling",
     ),
     *("kernels.discretisation", "kernels.distances", "kernels.positions", "kernels.thermal", "kernels.collisions"),
