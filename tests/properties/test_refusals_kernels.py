@@ -280,6 +280,7 @@ REFUSED = {
         (lambda: geo.Container([[0, 0]], [[0, 2]]), "unit vectors"),
         (lambda: wedge_record().phase_portrait("boundary"), "from curves"),
         (lambda: wedge_record().phase_portrait("angle"), "'boundary' or 'velocity'"),
+        (lambda: wedge_record().animate(duration=1e308), "duration: expected a number in"),
         (lambda: spec.channel_paths("lambertian", [1, 2, 3]), "expected a law"),
         (lambda: spec.channel_paths(DIFFUSE, [1, 2]), "increasing positive times"),
         *((lambda r=r: spec.channel_paths(DIFFUSE, [1, 2, 3], bend=r, speed=1e308), "flights") for r in (3, math.inf)),
