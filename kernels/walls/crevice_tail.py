@@ -59,13 +59,7 @@ def sum_rule(count: Floats, nodes: int) -> tuple[Floats, Floats]:
 
 def first_crossing(basis: Basis) -> int:
     """The even number d up to which the periods of a crevice are listed one by one for this basis."""
-    stiffness = _stiffness(basis)
-    return max(FIRST_CROSSING, stiffness + stiffness % 2)
-
-
-def _stiffness(basis: Basis) -> int:
-    """The number of basis functions that are polynomials in cos(theta) on all of (0, pi)."""
-    return basis.size if basis.is_polynomial else basis.polynomials_besides
+    return max(FIRST_CROSSING, basis.size + basis.size % 2) if basis.is_polynomial else FIRST_CROSSING
 
 
 def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats, Floats, float]:
@@ -120,16 +114,12 @@ def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats,
 
 def _cells(basis: Basis) -> tuple[Floats, int, int]:
     """Angles below pi/2 at which blocks are cut, and the additional nodes for blocks and half periods."""
-    number = int(np.ceil(np.pi * _stiffness(basis) / WIDEST))
-    regular = np.linspace(0.0, np.pi, number + 1)[1 : (number + 1) // 2]
     if basis.is_polynomial:
-        return regular, MORE_BLOCK_NODES, MORE_HALF_NODES
-    both = np.unique(np.concatenate([regular, basis.edges, np.pi - basis.edges]))
+        number = int(np.ceil(np.pi * basis.size / WIDEST))
+        return np.linspace(0.0, np.pi, number + 1)[1 : (number + 1) // 2], MORE_BLOCK_NODES, MORE_HALF_NODES
+    both = np.unique(np.concatenate([basis.edges, np.pi - basis.edges]))
     cells = both[(both > 0.0) & (both < 0.5 * np.pi)]
-    first = basis.local_part
-    extra = first.degree if isinstance(first, Panels) else 0 if first.is_partition else first.nodes_per_interval
-    if number:
-        return cells, extra + MORE_BLOCK_NODES, extra + MORE_HALF_NODES
+    extra = basis.degree if isinstance(basis, Panels) else 0 if basis.is_partition else basis.nodes_per_interval
     return cells, extra + MORE_BLOCK_NODES if extra else 0, extra
 
 

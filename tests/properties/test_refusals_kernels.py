@@ -220,7 +220,7 @@ REFUSED = {
         (lambda: ker.discretise(ARC @ TEETH, ker.Bins(10_000)), "GB"),
         # Gauss's and Kronrod's rule agreed by chance: a sixth of the error for one of these laws
         *((lambda law=law: ker.discretise(law, ker.Bins(6), "quadrature"), "quadrature")
-          for law in (CREVICES, 0.3 * CREVICES + 0.7 * TEETH, CREVICES**2)),
+          for law in (CREVICES, 0.3 * CREVICES + 0.7 * TEETH)),
         (lambda: ker.discretise(ROUGH, ker.Bins(8)), "one in psi"),
         (lambda: ker.discretise(TEETH, ker.TensorBasis(ANGLES)), "one angle"),
         (lambda: ker.discretise(DIFFUSE, ker.Bins(4, weight="sin2")), "preserves sin"),
@@ -371,7 +371,6 @@ REFUSED = {
         (lambda: spec.enclosures(DIFFUSE, 0), "k: expected"),
         (lambda: spec.enclosures(np.eye(2), 1), "law: expected"),
         (lambda: spec.enclosures(ARC @ HG(0.5) @ ARC, 2), "no known error"),
-        (lambda: spec.enclosures(HG(0.96) @ TEETH @ HG(0.96), 2, tolerance=1e-12), "has a scattering that leaves"),
         *((lambda size=size: spec.curvature_gap_bounds(size), "curvature") for size in (0.0, 1.6, math.nan)),
         (lambda: spec.curvature_gap_bounds(1.0, 10), "bins"),
         *((lambda angle=angle: spec.accommodation(DIFFUSE, theta=[1.0, angle]), "take one beside it")

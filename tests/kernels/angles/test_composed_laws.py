@@ -9,7 +9,7 @@ from campaigns.judges.reference_operators import Expression, exchanged, flip, id
 
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.kernels.walls.simplification import law_of, words_of
+from asperity.kernels.laws.structure import law_of, words_of
 
 TEETH, CREVICES = ker.TriangularTeethLaw(0.7), ker.RectangularTeethLaw(0.8)
 HG = ker.henyey_greenstein
@@ -33,8 +33,8 @@ def smooth(angle: np.ndarray) -> np.ndarray:
         (CYCLE @ ker.lambertian() @ HG(0.3) @ MIRROR, 1),
         (ker.maxwell(0.25) ** 2, 2),
         ((0.3 * TEETH + 0.7 * HG(0.4)) ** 2, 4),
-        ((0.3 * TEETH + 0.7 * MIRROR) ** 5, 6),
-        (0.5 * (MIRROR @ MIRROR) + 0.5 * CYCLE**0, 1),
+        ((0.3 * TEETH + 0.7 * BACK) ** 5, 6),
+        (0.5 * (MIRROR @ MIRROR) + 0.5 * CYCLE**0, 2),
     ],
     ids=repr,
 )
@@ -46,6 +46,24 @@ def test_words_are_the_same_operator_as_the_law(law: ker.Law, words: int) -> Non
     assert np.abs(total - law.apply(smooth, THETA)).max() < 1e-10
 
 
+def test_laws_without_effect_are_left_out_where_laws_are_composed() -> None:
+    arc, diffuse = ker.CircularArcLaw(0.9), ker.lambertian()
+    assert arc @ diffuse @ arc == diffuse @ TEETH @ diffuse == diffuse
+    assert arc @ BACK == BACK @ arc == arc and BACK @ BACK == BACK
+    mirrored = [law.in_specular_frame() for law in (arc, diffuse, BACK, MIRROR)]
+    assert mirrored[0] @ mirrored[1] @ mirrored[2] == mirrored[1] and mirrored[3] @ mirrored[0] == mirrored[0]
+    # whether a law preserves the measure is known of reversible ones only
+    assert repr(arc @ diffuse @ arc @ CYCLE) == f"lambertian() @ {CYCLE!r}"
+
+
+@pytest.mark.parametrize("frame", ["paper", "specular"])
+def test_a_chain_of_rank_one_has_its_gap_exactly(frame: str) -> None:
+    laws = [ker.CircularArcLaw(0.9), ker.lambertian(), ker.CircularArcLaw(0.9)]
+    first, second, third = laws if frame == "paper" else [law.in_specular_frame() for law in laws]
+    gap = spec.spectral_gap(first @ second @ third)
+    assert gap.kind == "bound" and gap.error < 1e-14 and gap.value == pytest.approx(1.0, abs=gap.error)
+
+
 def test_too_many_words_are_left_as_they_are() -> None:
     assert words_of((0.5 * TEETH + 0.5 * HG(0.4)) ** 6) is None
 
@@ -54,7 +72,7 @@ def test_too_many_words_are_left_as_they_are() -> None:
 def test_scatterings_and_isometries_have_their_eigenvalues(method: str) -> None:
     matrix = ker.discretise(BACK @ HG(0.6) @ MIRROR @ HG(0.5), ker.Legendre(64), method=method)
     distance = np.linalg.norm(matrix.symmetric - np.diag((-0.3) ** np.arange(64.0)))
-    assert distance <= float(matrix.error) < 1e-11
+    assert distance <= float(matrix.error) < 1e-8
 
 
 @pytest.mark.parametrize(

@@ -53,10 +53,12 @@ def test_sums_act_linearly(first: ker.Law, second: ker.Law, fraction: float) -> 
 @given(cheap, cheap, laws)
 def test_composition_is_associative_and_the_first_law_acts_first(first, second, third) -> None:
     both = (first @ second) @ third, first @ (second @ third)
-    assert all(isinstance(law, Composition) and len(law.laws) == 3 for law in both)
+    assert repr(both[0]) == repr(both[1])
     if both[0].evaluations < 20_000:
         nested = first.apply(lambda a: second.apply(lambda b: third.apply(smooth, b), a), THETA[:5])
-        assert all(np.array_equal(law.apply(smooth, THETA[:5]), nested) for law in both)
+        whole = isinstance(both[0], Composition) and len(both[0].laws) == 3
+        # what has no effect beside Lambertian reflection is left out, and its rounding with it
+        assert all(np.abs(law.apply(smooth, THETA[:5]) - nested).max() <= (0.0 if whole else 1e-12) for law in both)
 
 
 def test_composition_distributes_over_sums() -> None:
