@@ -99,7 +99,7 @@ def laws() -> dict[str, ker.Law]:
         "rectangular": teeth,
         "arcs": arcs,
         "least resistance": ker.LeastResistanceLaw(),
-        "mixture": ker.mixture([teeth, ker.lambertian(), arcs], [0.3, 0.2, 0.5]),
+        "mixture": 0.3 * teeth + 0.2 * ker.lambertian() + 0.5 * arcs,
         "teeth squared": teeth**2,
         "retro of scatter": retro @ scatter,
         "scatter of triangles": scatter @ ker.TriangularTeethLaw(1.1) @ scatter,

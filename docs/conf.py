@@ -131,6 +131,7 @@ default_role = "py:obj"
 
 # The rooms are listed by their __all__, whichever file a name was written in.
 autosummary_ignore_module_all = False
+autosummary_context = {"returned": reference.returned_classes()}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"

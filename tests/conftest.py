@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from asperity import kernels as ker
+from asperity.kernels.laws.law import DrivenLaw
 from wall_shapes import CLOSED, OPEN
 
 # ---- walls -------------------------------------------------------------------------------------------------------
@@ -88,11 +89,11 @@ BASES = (
 
 
 @cache
-def bounced_law() -> type[ker.DrivenLaw]:
+def bounced_law() -> type[DrivenLaw]:
     """A class of triangular teeth, known only by their rays."""
 
     @dataclass(frozen=True)
-    class Bounce(ker.DrivenLaw):
+    class Bounce(DrivenLaw):
         mirror_symmetric: bool | None = None
 
         reversible = True
@@ -206,7 +207,7 @@ def law(request: pytest.FixtureRequest) -> ker.Law:
 
 
 @pytest.fixture
-def bounce() -> type[ker.DrivenLaw]:
+def bounce() -> type[DrivenLaw]:
     """Makes triangular teeth, known only by their rays; whether the mirror symmetry is known is its argument."""
     return bounced_law()
 

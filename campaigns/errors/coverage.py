@@ -22,6 +22,7 @@ from asperity import spectral as spec
 from asperity.core.checks import Floats
 from asperity.kernels.aerodynamics import drag
 from asperity.kernels.discretisation.method import Budget
+from asperity.kernels.laws.law import DrivenLaw
 from asperity.spectral.eigenvalues.standard_errors import sampling_errors, sampling_quantile
 from asperity.study import check_tracer
 from campaigns.engine import Campaign, Judged
@@ -99,7 +100,7 @@ def flat_distance(law: ker.Law, method: ker.Method, rng: np.random.Generator) ->
 
 
 @dataclass(frozen=True)
-class Rays(ker.DrivenLaw):
+class Rays(DrivenLaw):
     """Triangular teeth, accessible through rays only."""
 
     closed: ker.TriangularTeethLaw

@@ -24,6 +24,8 @@ import numpy as np
 
 from asperity import kernels as ker
 from asperity.errors import AsperityError
+from asperity.kernels.bases.measure import AngularMeasure
+from asperity.kernels.collisions.collision_law import VelocityLaw
 from campaigns.cases import public_calls
 from campaigns.engine import Campaign, Judged
 
@@ -216,7 +218,7 @@ def operands() -> dict[str, Any]:
 def _operators() -> Iterator[Case]:
     holders = [
         thing for thing in public_calls.OBJECTS
-        if isinstance(thing, (ker.Law, ker.KernelMatrix, ker.VelocityLaw, ker.Basis, ker.AngularMeasure))
+        if isinstance(thing, (ker.Law, ker.KernelMatrix, VelocityLaw, ker.Basis, AngularMeasure))
     ]  # fmt: skip
     for thing in holders:
         for kind, other in operands().items():

@@ -22,6 +22,7 @@ from asperity import spectral as spec
 from asperity.core.checks import Floats
 from asperity.errors import InputError
 from asperity.estimates import Estimate
+from asperity.spectral.bounds.enclosure import Enclosure
 from campaigns.engine import Campaign, Judged
 
 DIAGONAL, GIVEN, REFUSED = 200, 120, 12
@@ -164,18 +165,18 @@ def judge_refused(case: Case) -> Iterator[Judged]:
         yield Judged(case.kind, fault="not refused")
 
 
-def _is_indexed(item: spec.Enclosure, items: list[spec.Enclosure], case: Case) -> bool:
+def _is_indexed(item: Enclosure, items: list[Enclosure], case: Case) -> bool:
     """Whether the index is right; enclosures whose moduli overlap may be exchanged."""
     group = [other for other in items if other.index is not None and _overlap(item, other)]
     inside = [_inside(other, case) for other in group]
     return any(_inside(item, case)[other.index] for other in group) and any(one[item.index] for one in inside)
 
 
-def _inside(item: spec.Enclosure, case: Case) -> NDArray[np.bool_]:
+def _inside(item: Enclosure, case: Case) -> NDArray[np.bool_]:
     return np.asarray((item.low - case.error <= case.exact) & (case.exact <= item.high + case.error))
 
 
-def _overlap(one: spec.Enclosure, other: spec.Enclosure) -> bool:
+def _overlap(one: Enclosure, other: Enclosure) -> bool:
     # the moduli of an interval [a, b] run from max(a, -b, 0) to max(-a, b)
     least = max(max(item.low, -item.high, 0.0) for item in (one, other))
     return least <= min(max(-item.low, item.high) for item in (one, other))

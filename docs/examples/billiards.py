@@ -18,6 +18,7 @@ import numpy as np
 from asperity import Estimate
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.kernels.billiards.gas import GasRecord
 
 DISK = geo.Disk(mass=1.0, inertia=0.5)
 TABLES = {
@@ -42,7 +43,7 @@ def main(
     return found
 
 
-def gas(events: int) -> ker.GasRecord:
+def gas(events: int) -> GasRecord:
     """Twelve no-slip disks in a smooth room, at first without spin."""
     rng = np.random.default_rng(0)
     seats = np.array([(1.25 + 2.5 * i, 1.25 + 2.5 * j) for i in range(4) for j in range(3)])
@@ -62,10 +63,10 @@ def draw(path: Path, collisions: int) -> None:
     velocity = np.stack([np.cos(angles), np.sin(angles), 0.8 * np.cos(3.0 * angles)], axis=1)
     for row, (name, law) in zip(axes, LAWS.items(), strict=True):
         start = velocity * [1.0, 1.0, name == "no-slip"]
-        ker.draw_paths(ker.play(stadium, law, [0.1, 0.2], start[:1], 40), row[0])
+        ker.play(stadium, law, [0.1, 0.2], start[:1], 40).draw_paths(row[0])
         row[0].set_title(f"stadium, {name}")
-        ker.draw_phase_portrait(ker.play(stadium, law, [0.1, 0.2], start, collisions), "boundary", row[1])
-        ker.draw_phase_portrait(ker.play(TABLES["circle"], law, [0.8, 0.2], start, collisions), "boundary", row[2])
+        ker.play(stadium, law, [0.1, 0.2], start, collisions).draw_phase_portrait(ax=row[1])
+        ker.play(TABLES["circle"], law, [0.8, 0.2], start, collisions).draw_phase_portrait(ax=row[2])
         row[2].set_title(f"circle, {name}")
     figure.savefig(path, dpi=100)
 

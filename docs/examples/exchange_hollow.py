@@ -15,6 +15,7 @@ from pathlib import Path
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.kernels.inverse.exchange_wall import ExchangeHollow
 
 LAWS = {
     "Lambert, two cells": (ker.lambertian(), 2),
@@ -24,7 +25,7 @@ LAWS = {
 }
 
 
-def main(opening: float = 1e-2, picture: str | Path | None = None) -> dict[str, ker.ExchangeHollow]:
+def main(opening: float = 1e-2, picture: str | Path | None = None) -> dict[str, ExchangeHollow]:
     """A chamber for each exchange; draws them to ``picture`` if that is given."""
     found = {
         name: ker.exchange_hollow(ker.IntervalExchangeLaw(ker.discretise(law, ker.Bins(cells))), opening)

@@ -28,7 +28,7 @@ FAMILIES = {
 def main(points: int = 40, picture: str | Path | None = None) -> dict[str, float]:
     """The extremes, with their bounds, and the best isosceles triangle; draws to ``picture`` if that is given."""
     least, most = ker.extremal_resistance(1024), ker.extremal_resistance(1024, "max")
-    triangle = ker.best_hollow(ker.TriangularTeethLaw, [(0.2, 3.0)], tolerance=1e-8)
+    triangle = ker.design_wall(ker.resistance, ker.TriangularTeethLaw, [(0.2, 3.0)], tolerance=1e-8)
     curves = {}
     for name, (family, low, high) in FAMILIES.items():
         parameters = np.linspace(low, high, points)
@@ -39,7 +39,7 @@ def main(points: int = 40, picture: str | Path | None = None) -> dict[str, float
         "least, lower bound": least.lower,
         "least, upper bound": least.upper,
         "greatest": most.upper,
-        "best triangle": float(triangle.resistance),
+        "best triangle": float(triangle.value),
         "its apex angle": float(triangle.parameters[0]),
         "involution near the least": float(ker.resistance(ker.extremal_resistance(128).involution(), 1e-6)),
     }

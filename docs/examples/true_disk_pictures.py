@@ -28,17 +28,18 @@ def main(folder: Path, samples: int = 20_000) -> dict[str, float]:
     chosen = int(np.flatnonzero(hit.two_satellites & (hit.contacts == 4))[0])
 
     figure = Figure(figsize=(9, 2.6), layout="constrained")
-    geo.draw_collision(disk, teeth, scale, position[chosen], velocity[chosen], ax=figure.subplots())
+    geo.ConfigurationSpace(teeth, disk, scale).draw_collision(position[chosen], velocity[chosen], figure.subplots())
     figure.savefig(folder / "collision.png", dpi=DPI)
 
     # a spacing that is not a multiple of the wall's period, so that the cylinders of two satellites cross in the gaps
     spacing = 2 * math.pi / 24
     figure = Figure(figsize=(7, 4.5), layout="constrained")
-    geo.draw_configurations(geo.ConfigurationSpace(teeth, disk, spacing / 7.5, spacing), -0.6, ax=figure.subplots())
+    geo.ConfigurationSpace(teeth, disk, spacing / 7.5, spacing).draw_section(-0.6, figure.subplots())
     figure.savefig(folder / "configurations.png", dpi=DPI)
 
     figure = Figure(figsize=(7, 4.5), layout="constrained")
-    ker.draw_limit(disk, geo.focusing_arcs(1.2), (1e-2, 1e-3, 1e-5), (1.0, 1.2), rng, samples, figure.subplots())
+    law = ker.SatelliteLaw(geo.focusing_arcs(1.2), disk, 1e-2)
+    law.draw_limit((1.0, 1.2), rng, scales=(1e-2, 1e-3, 1e-5), samples=samples, ax=figure.subplots())
     figure.savefig(folder / "limit.png", dpi=DPI)
     energies = disk.inner(hit.velocity[chosen], hit.velocity[chosen]), disk.inner(velocity[chosen], velocity[chosen])
     return {"energy gained": float(energies[0] - energies[1]), "contacts": float(hit.contacts[chosen])}

@@ -15,12 +15,13 @@ from pathlib import Path
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.kernels.inverse.wall_for_law import WallForLaw
 
 DISK = geo.Disk(1.0, 0.5)
 COIN = 0.5 * ker.specular() + 0.5 * ker.retroreflection()
 
 
-def main(moments: int = 10, picture: str | Path | None = None) -> dict[str, ker.WallForLaw]:
+def main(moments: int = 10, picture: str | Path | None = None) -> dict[str, WallForLaw]:
     """A wall for each law; draws them to ``picture`` if that is given."""
     wall = ker.wall_for(ker.lambertian(), moments=moments)
     found = {

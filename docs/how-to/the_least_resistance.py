@@ -34,12 +34,12 @@ plt.show()
 
 angles = np.linspace(0.3, 3.0, 60)
 values = [float(ker.resistance(ker.TriangularTeethLaw(a))) for a in angles]
-best = ker.best_hollow(ker.TriangularTeethLaw, [(0.2, 3.0)])
-print(f"apex angle {best.parameters[0]:.5f}, resistance {best.resistance}")
+best = ker.design_wall(ker.resistance, ker.TriangularTeethLaw, [(0.2, 3.0)])
+print(f"apex angle {best.parameters[0]:.5f}, resistance {best.value}")
 
 fig, ax = plt.subplots(layout="constrained")
 ax.plot(angles, values)
-ax.plot(best.parameters[0], float(best.resistance), "o")
+ax.plot(best.parameters[0], float(best.value), "o")
 for level, name in ((least.lower, "least"), (1.0, "smooth"), (most.upper, "greatest")):
     ax.axhline(level, color="0.6", linewidth=0.8)
     ax.annotate(name, (2.5, level), xytext=(0, -11 if name == "least" else 3), textcoords="offset points")

@@ -76,7 +76,7 @@ def extremal_resistance(
         ``cost`` at most 2048, which takes a few seconds.
     which : {"min", "max"}
     cost : callable, optional
-        Symmetric ``cost(theta, theta_out)`` of two arrays that broadcast; by default `air_resistance`.
+        Symmetric ``cost(theta, theta_out)`` of two arrays that broadcast; by default that of `resistance`.
     curvature : float
         Required with ``cost``: a bound of the moduli of its second derivatives in either variable.
 

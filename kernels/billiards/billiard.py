@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checkpoints import Stored
-from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shaped, shortened, whole_number
+from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
 from ...core.errors import InputError
 from ...core.long_runs import Engine, all_parts
 from ...core.version import __version__
 from ...geometry.tables.boundary import FlightStatus
-from ...geometry.tracing.tracing import numbers_of
 from ..collisions.satellite_law import SatelliteLaw
 from ..laws.law import Law
 from .along_walls import CollisionAlongWall, Located
+from .record import BilliardRecord
 
 if TYPE_CHECKING:
     from ...geometry import Container, Disk
@@ -38,80 +38,6 @@ class Reflector(Protocol):
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Outgoing (v1, v2, omega) for incoming ones with v2 < 0; the wall is below the disk."""
         ...
-
-
-@dataclass(frozen=True)
-class BilliardRecord:
-    """States of n disks after each of their collisions; the first entry of every array is the initial state.
-
-    A disk that meets no further wall, or whose next collision is not resolved, has fewer ``collisions`` than
-    ``steps``; its last state is repeated. The other disks move as without it.
-
-    Attributes
-    ----------
-    container : Container
-    disk : Disk
-    time : array, shape (steps + 1, n)
-    position : array, shape (steps + 1, n, 2)
-    angle : array, shape (steps + 1, n)
-        Angle of rotation since the start, radians, not reduced modulo 2 pi.
-    velocity : array, shape (steps + 1, n, 3)
-        (v1, v2, omega) after the collision.
-    wall : array of int, shape (steps + 1, n)
-        Index of the wall, -1 at the start.
-    collisions : array of int, shape (n,)
-    status : array of int, shape (n,)
-        Values of ``FlightStatus``. ``FLYING``: all were computed. ``FREE``: no wall is ahead. ``CORNER``: the
-        next one is at a corner, where the outcome depends on which wall is met first. ``GRAZING``: the path runs along
-        a wall that bends towards it. ``UNREFLECTED``: the law of the wall found no outgoing velocity.
-    """
-
-    container: Container
-    disk: Disk
-    time: Floats
-    position: Floats
-    angle: Floats
-    velocity: Floats
-    wall: NDArray[np.int64]
-    collisions: NDArray[np.int64]
-    status: NDArray[np.uint8]
-
-    def counts(self) -> dict[str, int]:
-        """Return the number of disks with every ``FlightStatus``, by name in lower case.
-
-        Examples
-        --------
-        Of two disks in a square one runs into a corner; the other goes on:
-
-        >>> from asperity import geometry as geo, kernels as ker
-        >>> square = geo.Container.polygon([(0, 0), (2, 0), (2, 2), (0, 2)])
-        >>> record = ker.play(square, ker.smooth(geo.Disk()), [1.0, 1.0], [[1.0, 1.0, 0.0], [1.0, 0.5, 0.0]], 8)
-        >>> {name: count for name, count in record.counts().items() if count}, record.collisions.tolist()
-        ({'flying': 1, 'corner': 1}, [0, 8])
-        """
-        return numbers_of(self.status, FlightStatus)
-
-    @property
-    def radius(self) -> float | None:
-        """The radius of the disks relative to the container; None where only the centres count."""
-        return None
-
-    @property
-    def energy(self) -> Floats:
-        """Kinetic energies <w, w>/2, shape (steps + 1, n)."""
-        return np.asarray(0.5 * self.disk.inner(self.velocity, self.velocity))
-
-    @property
-    def angular_momentum(self) -> Floats:
-        """m (x1 v2 - x2 v1) + J omega about the origin, shape (steps + 1, n)."""
-        x, v = self.position, self.velocity
-        orbital = x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]
-        return np.asarray(self.disk.mass * orbital + self.disk.inertia * v[..., 2])
-
-    def extent(self, direction: ArrayLike = (1.0, 0.0)) -> Floats:
-        """Range, shape (n,), of the collision positions along a direction, without the start."""
-        along = self.position[1:] @ shaped("direction", direction, 2)
-        return np.asarray(np.ptp(along, axis=0))
 
 
 def play(

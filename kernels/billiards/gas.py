@@ -15,8 +15,9 @@ from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.collision_law import smooth
-from .billiard import BilliardRecord, Reflector, laws_of_walls, reflected
+from .billiard import Reflector, laws_of_walls, reflected
 from .pair_law import PairLaw
+from .record import BilliardRecord
 
 if TYPE_CHECKING:
     from ...geometry import Container

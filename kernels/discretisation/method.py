@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
@@ -26,9 +25,6 @@ SAMPLING: tuple[MethodName, ...] = ("qmc", "monte-carlo")
 # Limits on the ray segments of traced conditional distributions of one matrix: ten to twenty seconds of work; without
 # an explicit request for quadrature, the time of two million rays, or of the largest number of rays.
 MOST_SEGMENTS, QUICK_SEGMENTS, SEGMENTS_A_RAY = 140_000_000, 4_000_000, 4
-# The error of a traced matrix falls like its segments to the power -ORDER (1.6 to 2.2 on nine walls). Angles that were
-# too coarse are computed again, which costs the factor REPEATED.
-ORDER, REPEATED = 1.75, 2.0
 SEED_WITHOUT_RNG = 0
 # Rounding error of a matrix with n functions, divided by n. Each edge of n cells has a rounding error that moves a
 # fraction of about n eps of a cell's measure; an error of 1.2e-13 was measured for n eps = 1.1e-13.
@@ -51,8 +47,6 @@ class Budget:
         Limit on the sampled rays.
     segments : int
         Limit on the ray segments of traced conditional distributions.
-    fallback : float
-        Predicted error of the next method, inf if there is none. A matrix with a larger error is not needed.
     rng : numpy.random.Generator
     symmetrise : bool
         Whether sampled rays count in both directions.
@@ -63,26 +57,9 @@ class Budget:
     tolerance: float
     rays: int = DEFAULT_SAMPLES
     segments: int = MOST_SEGMENTS
-    fallback: float = math.inf
     rng: np.random.Generator = field(default_factory=_fixed_source)
     symmetrise: bool = False
     engine: Engine | None = None
-
-    def predicted(self, error: float, spent: int) -> float:
-        """The predicted error after all segments, from the error after ``spent`` segments."""
-        return float(error / max(self.segments / (REPEATED * spent), 1.0) ** ORDER)
-
-    def out_of_reach(self, error: float, spent: int) -> bool:
-        """Whether the error predicted from ``spent`` segments exceeds the fallback error.
-
-        Examples
-        --------
-        >>> Budget(1e-8, segments=1000, fallback=1e-3).out_of_reach(1e-2, spent=100)
-        False
-        >>> Budget(1e-8, segments=1000, fallback=1e-3).out_of_reach(1e-2, spent=400)
-        True
-        """
-        return self.predicted(error, spent) > self.fallback
 
 
 class Method(Protocol):

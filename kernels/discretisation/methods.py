@@ -17,22 +17,22 @@ from ..matrices.defects import SymmetryDefect
 from ..matrices.matrix import KernelMatrix
 from .actions import Actions
 from .arcs import Arcs
-from .auto_wall import AutoWall, rays_of_whole
 from .densities import Densities, Diagonal, LeastResistance, Maps
-from .entry_points import EntryPoints
 from .isometries import Isometries
 from .isometry_tables import IsometryTables
 from .method import Budget, Method, MethodName, Recipe
 from .products import Chain, Factor
+from .rays_or_conditionals import RaysOrConditionals
 from .sampled import MonteCarlo, Sobol
 from .traced import Traced
 
-# Methods without rays, except AutoWall. The docstring of `discretise` states the table in this order.
+# Methods without rays, except the first. The docstring of `discretise` states the table in this order.
 METHODS: tuple[Method, ...] = (
-    AutoWall(), IsometryTables(), Isometries(), Diagonal(), Arcs(), Densities(), LeastResistance(), Maps(), Actions(),
+    RaysOrConditionals(), IsometryTables(), Isometries(), Diagonal(), Arcs(), Densities(), LeastResistance(), Maps(),
+    Actions(),
 )  # fmt: skip
 # Methods with rays. They are tried if no method above accepts the law and its parts do not give its matrix.
-SAMPLED: tuple[Method, ...] = (Sobol(), Traced(), EntryPoints(), MonteCarlo())
+SAMPLED: tuple[Method, ...] = (Sobol(), Traced(), MonteCarlo())
 # The kinds of methods of a compound law, in the order of the error message.
 NAMES: tuple[MethodName, ...] = get_args(MethodName)[1:]
 
@@ -44,9 +44,6 @@ def recipe(law: Law, wanted: MethodName) -> Callable[[Basis, Budget], KernelMatr
     """
 
     def made(basis: Basis, budget: Budget) -> KernelMatrix:
-        rough = rays_of_whole(law, basis, budget) if wanted == "auto" else None
-        if rough is not None:
-            return rough
         # Independent rays use the law without simplification.
         found = _Law(law) if wanted == "monte-carlo" else _simplified(law)
         if wanted != "auto" and not found.has(wanted, basis):
@@ -147,13 +144,17 @@ class _Sum:
         )
 
     def _matrices(self, wanted: MethodName, basis: Basis, budget: Budget) -> list[tuple[float, KernelMatrix]]:
-        """The matrices of the terms; those that may need rays come last and share what the others leave over."""
+        """The matrices of the terms: exact ones, whose errors do not depend on the tolerance, leave the others more."""
+        exact = [part.has("exact", basis) for _, part in self.parts]
         found: dict[int, KernelMatrix] = {}
-        left, weight_left = budget.tolerance, sum(weight for weight, _ in self.parts)
-        for k, (weight, part) in sorted(enumerate(self.parts), key=lambda one: not one[1][1].without_rays(basis)):
-            share = max(budget.tolerance, left / weight_left) if weight_left > 0.0 else budget.tolerance
-            found[k] = part.matrix(wanted, basis, replace(budget, tolerance=share))
-            left, weight_left = left - weight * float(found[k].error), weight_left - weight
+        share = budget.tolerance
+        for wanted_exact in (True, False):
+            chosen = [k for k, is_exact in enumerate(exact) if is_exact is wanted_exact]
+            for k in chosen:
+                found[k] = self.parts[k][1].matrix(wanted, basis, replace(budget, tolerance=share))
+            left = budget.tolerance - sum(self.parts[k][0] * float(matrix.error) for k, matrix in found.items())
+            weight_left = sum(weight for k, (weight, _) in enumerate(self.parts) if k not in found)
+            share = max(share, left / weight_left) if weight_left > 0.0 else share
         return [(weight, found[k]) for k, (weight, _) in enumerate(self.parts)]
 
 
@@ -193,8 +194,8 @@ class _Mirrored:
         )
 
     def _has_choice(self, basis: Basis) -> bool:
-        """Whether the law has walls, for which a method is chosen by pilot runs."""
-        return any(AutoWall().accepts(term.law, basis) for _, term in self.inner.terms)
+        """Whether the law has walls, whose method the tolerance decides."""
+        return any(RaysOrConditionals().accepts(term.law, basis) for _, term in self.inner.terms)
 
 
 def _chain(parts: Sequence[_Law]) -> Recipe:

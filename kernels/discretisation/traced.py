@@ -26,14 +26,11 @@ from .method import Budget, MethodName, computed, rounding
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# Fraction of a matrix's limit on ray segments that one angle may use, without and with another method to take over, and
-# the least such number. In some steep Bezier hollows a fiftieth does not complete an angle; in bottles with a neck of a
-# hundredth of their width no number does.
-ANGLE_FRACTION, FRACTION_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
+# Fraction of a matrix's limit on ray segments that one angle may use, and the least such number. In bottles with a neck
+# of a hundredth of their width no number completes an angle.
+ANGLE_FRACTION, LEAST_SEGMENTS = 0.02, 80_000
 # The same fraction for cells, where all nodes of a panel are computed together, and patches on their pieces sampled.
 CELL_FRACTION = 0.005
-# On walls of more pieces quadrature does not begin.
-MOST_PIECES = 30
 # The asymmetry ||S - S^T|| shows the antisymmetric part of errors that the error estimates of panels and angles miss.
 # If the symmetric part has the same size, the whole error is sqrt(2)/2 times the asymmetry; the rest is a margin,
 # larger for few functions, whose pairs may agree by chance.
@@ -48,21 +45,11 @@ ANGLES_AT_ONCE = 1500
 # The errors of all conditional expectations together may be this fraction of the tolerance.
 MEAN_FRACTION = 0.3
 SMALLEST_MEAN_TOLERANCE = 1e-14
-# The tolerance is approached in stages by this ratio, from a first one of at most COARSEST_STAGE. If only a coarse
-# result can be reached, its conditional expectations are coarse as well.
-STAGE_RATIO, COARSEST_STAGE = 1e-2, 1e-3
-# The same for cells, but from COARSEST_CELLS on, and only if the first panels need more than a fraction of the limit on
-# segments at the wanted tolerance. This is predicted from some angles; patches cost a multiple of the rows.
-CELL_RATIO, COARSEST_CELLS, FIRST_FRACTION, PATCH_COST = 0.1, 1e-2, 0.1, 3.0
-# If another method can take over, the first panels of bases with edges may need this fraction of the limit, for cells
-# in the mean of both tolerances. In 16 and 64 bins of ten walls, rays were better at equal error for four of the six
-# matrices that need more and were computed nevertheless, and for one of the ten others.
-FRACTION_OF_PANELS = 0.5
-# This is predicted from some angles, which may be wrong by a factor of four, and then from one in PANELS_A_PROBE of the
-# panels, if these are at least two.
-PANELS_A_PROBE = 8
-# Fraction of the limit before which nothing is predicted: the first few panels of polynomials miss most changes.
-PATIENCE = 1.0 / 16.0
+# The tolerances of the stages: the first, and the ratio of each to the one before. They do not depend on the wanted
+# tolerance, so a computation to a smaller one continues that to a larger one.
+FIRST_STAGE, STAGE_RATIO = 1e-2, 0.1
+# The cost of the cells of a panel as a multiple of that of its conditional expectations.
+PATCH_COST = 3.0
 # Factor of the tolerance of expectations, if their errors have more than this fraction of the tolerance together.
 TIGHTENING, MOST_MEANS = 0.2, 0.4
 # Fraction of the remaining segments that is spent on better expectations before the limit is looked at again.
@@ -79,11 +66,6 @@ SMOOTH_SHRINKING = 1e-3
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
-# A stage begins only if its predicted error is below WORTHWHILE times the present error and tolerance, or the present
-# error below LARGEST_JUMP times the fallback error; it goes on only if its predicted error is below that multiple.
-# In cells the first division reduces the error by a factor of 2 to 60 on seven walls; until then FIRST_JUMP counts.
-# A stage that follows an error below the fallback error needs at least LEAST_LEFT of the segments.
-WORTHWHILE, LARGEST_JUMP, FIRST_JUMP, LEAST_LEFT = 0.5, 4.0, 32.0, 0.25
 # Least distance of cuts from each other and from the ends of a panel, as a fraction of the panel.
 LEAST_CUT = 1e-7
 # Smaller Legendre bases are extended to this many functions, so that no symmetry hides an error. The error then belongs
@@ -108,20 +90,15 @@ class Traced:
         return computed(symmetric, basis, self.name, error + rounding(basis), how)
 
 
-def may_be_affordable(wall: Wall) -> bool:
-    """Whether adaptive quadrature beats the sampling of rays on some walls like this, which its first segments tell.
-
-    Each incoming angle has several changes of itinerary per piece, and there is one breakpoint in theta per piece. In
-    walls that do not close, rays near grazing pass arbitrarily many cells; on three walls with islands sampled rays
-    were better.
-    """
-    return bool(wall.closes) and len(wall.pieces) + sum(map(len, wall.islands)) <= MOST_PIECES
+def first_segments(wall: Wall, basis: Basis) -> float:
+    """The predicted ray segments of the first panels, from conditional distributions at a few angles."""
+    return _Integrator(wall, basis, Budget(FIRST_STAGE, segments=1)).first_segments()
 
 
 def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays used.
 
-    If the first sixteenth of the segments predicts an error above ``budget.fallback``, the computation ends with it.
+    The error does not grow if the tolerance falls or the number of segments rises.
 
     The error of a panel is half the size of the null rules, of which the difference of Kronrod's and Gauss's rule is
     one, if the expectations have a kink there. If they are smooth, it is scaled by a ratio measured when the panel was
@@ -133,7 +110,7 @@ def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, flo
     if basis.is_polynomial and basis.size < FEWEST_FUNCTIONS:
         inner = Legendre(FEWEST_FUNCTIONS)
         fraction = min(SPREAD_MARGIN * max(basis.size - 1, 1) / (FEWEST_FUNCTIONS - 1), 1.0)
-    scaled = replace(budget, tolerance=budget.tolerance / fraction, fallback=budget.fallback / fraction)
+    scaled = replace(budget, tolerance=budget.tolerance / fraction)
     matrix, error, rays = _Integrator(wall, inner, scaled).run()
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), fraction * error, rays
 
@@ -163,9 +140,7 @@ class _Integrator:
             # Piecewise polynomials of this degree are integrated after a substitution of degree 3.
             local = basis.nodes_per_interval
             degree, least = 1, 1 if local < 8 else 2
-        fraction = FRACTION_WITH_FALLBACK if math.isfinite(budget.fallback) else ANGLE_FRACTION
-        if basis.is_partition:
-            fraction = min(fraction, CELL_FRACTION)
+        fraction = CELL_FRACTION if basis.is_partition else ANGLE_FRACTION
         longest = max(int(fraction * budget.segments), LEAST_SEGMENTS)
         self.sizes, _ = basis.magnitudes()
         self.cells: CellMasses | None = None
@@ -178,98 +153,38 @@ class _Integrator:
         self.sided = bool(np.any(np.abs(edges - 0.5 * np.pi) < 1e-12))
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
-        stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
-        self.first_tolerance = self.tolerance / STAGE_RATIO**stages
-        self.ratio, self.tightens, self.jump = STAGE_RATIO, False, LARGEST_JUMP
-        least_segments = 0.0
-        if self.cells is not None:
-            self.ratio, self.jump = CELL_RATIO, FIRST_JUMP
-            self.first_tolerance = max(self.tolerance, COARSEST_CELLS)
-            least_segments = 0.5 * (
-                self._predicted(edges, self.first_tolerance) + self._predicted(edges, self.tolerance)
-            )
-            self.tightens = 2.0 * least_segments <= FIRST_FRACTION * budget.segments
-            if self.tightens:
-                self.first_tolerance = self.tolerance
-        elif not basis.is_polynomial and math.isfinite(budget.fallback):
-            least_segments = self._predicted(edges, self.first_tolerance)
-        self.mean_tolerance = MEAN_FRACTION * self.first_tolerance
+        self.edges, self.mean_tolerance = edges, MEAN_FRACTION * FIRST_STAGE
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
-        if math.isinf(budget.fallback) or least_segments <= FRACTION_OF_PANELS * budget.segments:
-            self._add_first_panels(edges[:-1], edges[1:])
 
     def run(self) -> tuple[Floats, float, int]:
         """Divide panels, in stages of decreasing tolerance, until the error is small enough or no segments are left.
 
-        The matrix with the least error is returned, because an interrupted stage may increase the error. Its error is
-        inf without panels, and where another method can take over and the first panels took all segments.
+        The matrix with the least error is returned, because an interrupted stage may increase the error.
         """
-        spent = math.isfinite(self.budget.fallback) and self.segments >= self.budget.segments
-        if spent or not len(self.panels.low):
-            return *self.best, self.rays
-        tolerance = self.first_tolerance
-        self._begin(tolerance)
-        error, *_ = self._measure()
-        if self._is_out_of_reach(error):
-            return *self.best, self.rays
+        self._add_panels(self.edges[:-1], self.edges[1:])
+        stage = FIRST_STAGE
         while True:
-            self._meet(tolerance)
-            following = self._following(tolerance)
-            if following is None:
+            self._begin(stage)
+            self._meet(stage)
+            if self._is_done() or stage <= self.tolerance:
                 return *self.best, self.rays
-            tolerance = following
-            self._begin(tolerance)
+            stage *= STAGE_RATIO
 
-    def _add_first_panels(self, low: Floats, high: Floats) -> None:
-        """Add the first panels, or none if another method can take over and some of them need too many segments."""
-        number = len(low)
-        some = np.arange(PANELS_A_PROBE // 2, number, PANELS_A_PROBE)
-        if math.isinf(self.budget.fallback) or len(some) < 2:
-            self._add_panels(low, high)
-            return
-        before = self.segments
-        self._add_panels(low[some], high[some])
-        if (self.segments - before) * number > FRACTION_OF_PANELS * self.budget.segments * len(some):
-            self.panels = AnglePanels.between(np.empty(0), np.empty(0), self.basis.size)
-            return
-        self._add_panels(np.delete(low, some), np.delete(high, some))
-
-    def _is_out_of_reach(self, error: float) -> bool:
-        """Whether enough segments were spent to tell that another method is likely to be more exact."""
-        enough = self.segments >= PATIENCE * self.budget.segments
-        return enough and self.budget.out_of_reach(error / self.jump, self.segments)
-
-    def _predicted(self, edges: Floats, tolerance: float) -> float:
-        """The ray segments that the first panels need at a tolerance, beyond those already spent, from some angles."""
-        of_means = min(MEAN_FRACTION * tolerance / math.sqrt(FAIR_FRACTION), self._coarsest_mean)
+    def first_segments(self) -> float:
+        """The predicted ray segments of the first panels, from some angles."""
+        of_means = min(self.mean_tolerance / math.sqrt(FAIR_FRACTION), self._coarsest_mean)
         segments = self.conditionals(SAMPLED_ANGLES, of_means).segments
-        self.segments += segments
         patches = PATCH_COST if self.cells is not None else 1.0
-        return patches * len(NODES) * (len(edges) - 1) * segments / len(SAMPLED_ANGLES)
+        return patches * len(NODES) * (len(self.edges) - 1) * segments / len(SAMPLED_ANGLES)
+
+    def _is_done(self) -> bool:
+        """Whether the error is small enough or no segments are left."""
+        return self.best[1] <= self.tolerance or self.segments >= self.budget.segments
 
     @property
     def _coarsest_mean(self) -> float:
         """The largest tolerance of an expectation."""
         return COARSEST_MEAN * float(np.median(self.sizes))
-
-    def _following(self, tolerance: float) -> float | None:
-        """The tolerance of the next stage; None at the end, or if the fallback is likely to be as good.
-
-        Errors fall in jumps, when the last important pieces are found, so the prediction is a rough one.
-        """
-        if self.segments >= self.budget.segments or tolerance <= self.tolerance:
-            return None
-        wanted = max(self.ratio * tolerance, self.tolerance)
-        if math.isinf(self.budget.fallback):
-            return wanted
-        error, most = self.best[1], LARGEST_JUMP * self.budget.fallback
-        predicted = self.budget.predicted(error, self.segments)
-        hoped = min(WORTHWHILE * min(error, tolerance), most)
-        if predicted < hoped:
-            return max(wanted, predicted)
-        # with few segments left, a stage recomputes expectations and divides no panel
-        left = 1.0 - self.segments / self.budget.segments
-        return wanted if error <= most and (left >= LEAST_LEFT or error > self.budget.fallback) else None
 
     def _begin(self, tolerance: float) -> None:
         """Begin a stage: recompute the expectations on panels where their error is too large for its tolerance."""
@@ -300,9 +215,9 @@ class _Integrator:
         goal = means = pieces = tolerance
         while True:
             error, panels, conditionals, hidden = self._measure()
-            if error <= tolerance or self.segments >= self.budget.segments or self._is_out_of_reach(error):
+            if error <= tolerance or self._is_done():
                 return
-            if self.tightens and conditionals > MOST_MEANS * tolerance and means > 0.01 * tolerance:
+            if self.cells is not None and conditionals > MOST_MEANS * tolerance and means > 0.01 * tolerance:
                 # gaps where a change hardly changes the angle may count more in cells
                 means *= TIGHTENING
                 self._begin(means)
@@ -373,7 +288,6 @@ class _Integrator:
         return np.asarray(chosen & worst)
 
     def _divide(self, chosen: NDArray[np.bool_]) -> None:
-        self.jump = LARGEST_JUMP
         parents = self.panels.selected(chosen)
         before, whole = parents.differences(self.basis, NULL_RULES), parents.values(self.basis)
         cuts = [self._cuts(low, high) for low, high in zip(parents.low.tolist(), parents.high.tolist(), strict=True)]

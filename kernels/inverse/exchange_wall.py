@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate
+from ...core.estimates import LEVEL, NORMAL_95, Estimate
 from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.interval_exchange import IntervalExchangeLaw
-from ..laws.law import Law, mixture, specular
+from ..laws.law import Law, specular
 from .mirror_layout import THICKNESS, MirrorGroup, arranged, mirror_groups
-from .two_mirror_hollow import fraction_half_width
 
 if TYPE_CHECKING:
-    from ...geometry import Trace, Wall
+    from ...geometry import Wall
     from ...geometry.curves.curve import Curve
+    from ...geometry.tracing.tracing import Trace
 
 # The ceiling falls by this angle times the root of the opening: the flux below it is a 32nd of the opening.
 CEILING = 0.25
@@ -104,7 +104,7 @@ class ExchangeHollow:
         """
         theta, traced = self._traced(samples, rng)
         missed = int(np.count_nonzero(~self._arrives(theta, traced)))
-        half = fraction_half_width(missed, theta.size)
+        half = _fraction_half_width(missed, theta.size)
         return Estimate(missed / theta.size, half, "estimate", f"{theta.size} traced rays")
 
     def displacement(self, samples: int = SAMPLES, rng: Rng = None) -> Estimate:
@@ -133,7 +133,7 @@ class ExchangeHollow:
         Parameters
         ----------
         function : callable
-            Of two arrays, radians, such as `air_resistance`; smooth.
+            Of two arrays, radians; smooth.
         unfollowed : float
             The value for rays that are followed no longer: with the largest one the mean is an upper bound.
         samples : int
@@ -147,7 +147,8 @@ class ExchangeHollow:
 
         >>> from asperity import kernels as ker
         >>> least = ker.discretise(ker.LeastResistanceLaw(), ker.Bins(16))
-        >>> found = exchange_hollow(ker.IntervalExchangeLaw(least), 1e-4).mean(ker.air_resistance, 1.5)
+        >>> hollow = exchange_hollow(ker.IntervalExchangeLaw(least), 1e-4)
+        >>> found = hollow.mean(lambda theta, outgoing: 0.75 * (1.0 + np.cos(outgoing - theta)), 1.5)
         >>> round(found.value, 3), found.error < 1e-4
         (0.989, True)
         """
@@ -227,12 +228,22 @@ class ExchangeHollow:
         away = covered * self._away(traced, image) + (1.0 - covered) * np.abs(np.pi - theta - image)
         half = NORMAL_95 * float(np.std(away)) / np.sqrt(theta.size)
         nearby = Estimate(float(np.mean(away)), half, "estimate", f"a coupling of {theta.size} traced rays")
-        law = mixture([self.exchange, specular()], [covered, 1.0 - covered])
+        law = covered * self.exchange + (1.0 - covered) * specular()
         return Generations(number, covered, limit, law, nearby)
 
     @staticmethod
     def _away(traced: Trace, image: Floats) -> Floats:
         return np.where(traced.escaped, np.abs(traced.theta - image), np.pi)
+
+
+def _fraction_half_width(count: int, number: int) -> float:
+    """The longer half of Clopper and Pearson's interval of 95 % of a fraction, ``count`` of ``number``."""
+    from scipy.special import betaincinv
+
+    tail, fraction = 0.5 * (1.0 - LEVEL), count / number
+    low = float(betaincinv(count, number - count + 1, tail)) if count else 0.0
+    high = float(betaincinv(count + 1, number - count, 1.0 - tail)) if count < number else 1.0
+    return max(high - fraction, fraction - low)
 
 
 def exchange_hollow(exchange: IntervalExchangeLaw, opening: float = 1e-3) -> ExchangeHollow:

@@ -515,26 +515,6 @@ class Combination(Law):
         return " + ".join(f"{weight:.12g}*{as_factor(law)}" for weight, law in self.terms)
 
 
-def mixture(laws: Sequence[Law], weights: ArrayLike) -> Combination:
-    """The law that follows ``laws[k]`` with probability ``weights[k]``.
-
-    Raises InputError if the numbers of laws and weights differ, a weight is negative or the weights do not sum to 1.
-
-    Examples
-    --------
-    >>> from asperity.kernels import retroreflection, specular
-    >>> mixture([specular(), retroreflection()], [0.5, 0.5])
-    0.5*specular() + 0.5*retroreflection()
-    """
-    laws = sequence("laws", laws, Law, "ker.lambertian()")
-    weight = finite_array("weights", weights)
-    if weight.shape != (len(laws),):
-        raise InputError(f"weights: expected one for each of {len(laws)} laws, got an array of shape {weight.shape}")
-    total = Combination(tuple(zip(weight.tolist(), laws, strict=True)))
-    total.terms_checked()
-    return total
-
-
 def common_frame(laws: Sequence[Law], verb: str) -> Frame:
     """The common frame of the laws; raises InputError if their frames differ, with ``verb`` in its message."""
     for law in laws[1:]:

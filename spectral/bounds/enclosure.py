@@ -14,10 +14,11 @@ from ...core.estimates import ErrorKind
 from ...core.frames import data_frame
 from ...core.rounding import EPS
 from ...core.tables import html_table
-from ...kernels import Basis, CollisionLaw, Composition, DensityLaw, Law, Legendre, Power, discretise
+from ...kernels import Basis, CollisionLaw, DensityLaw, Law, Legendre, discretise
 from ...kernels.bases.measure import SINE
 from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.law import Composition, Power
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import made_of_isometries

@@ -12,7 +12,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
-from ...kernels import Basis, Bins, CircularArcLaw, Composition, DensityLaw, Law, Legendre, Panels, PolygonLaw, WallLaw
+from ...kernels import Basis, Bins, CircularArcLaw, DensityLaw, Law, Legendre, Panels, PolygonLaw, WallLaw
 from ...kernels.bases.measure import SINE, gauss_on_intervals
 from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
 from ...kernels.discretisation.actions import GRAZING_EDGES
@@ -20,7 +20,7 @@ from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import Means, height_of, weighted_means
 from ...kernels.laws.density import GAUSS_NODES, split_panels
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.law import SpecularFrame
+from ...kernels.laws.law import Composition, SpecularFrame
 from ...kernels.laws.structure import Rules, fold, holds_of_all, law_of, words_of
 from ...kernels.walls.circular_arc import MOST_HITS
 

@@ -12,13 +12,13 @@ from ...core.checks import Floats, Rng, angles, frozen, generator, instance, pos
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, ErrorKind, Estimate
 from ...core.rounding import EPS
-from ...kernels import SINE, Combination, Law, Panels, discretise
+from ...kernels import SINE, Law, Panels, discretise
 from ...kernels.bases.basis import Basis
 from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
 from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
 from ...kernels.expectations.basis_means import Means
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.law import IsometryLaw
+from ...kernels.laws.law import Combination, IsometryLaw
 from ...kernels.laws.structure import has_chain, law_of, words_of
 from ..bounds.operator_residuals import image_rule
 from ..gap.shallow import ROUNDING, Slopes, slopes_of

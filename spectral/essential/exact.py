@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ...kernels import Combination, Law, SpecularFrame
-from ...kernels.laws.law import IsometryLaw
+from ...kernels import Law
+from ...kernels.laws.law import Combination, IsometryLaw, SpecularFrame
 
 
 def without_identity(law: Law) -> tuple[float, Law]:

@@ -12,9 +12,9 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.rounding import EPS
 from ...geometry import trace
-from ...kernels import CircularArcLaw, DensityLaw, DrivenLaw, Law, WallLaw
+from ...kernels import CircularArcLaw, DensityLaw, Law, WallLaw
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
-from ...kernels.laws.law import entry_inside
+from ...kernels.laws.law import DrivenLaw, entry_inside
 
 if TYPE_CHECKING:
     from ...geometry import Wall

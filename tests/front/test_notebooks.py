@@ -116,7 +116,6 @@ def test_an_estimate_has_no_arithmetic():
     [
         (lambda: spec.spectrum(LAW, k=3), ["value", "error", "parity", "algebraic", "discretisation", "sampling"], 3),
         (lambda: spec.enclosures(LAW, 2), ["value", "low", "high", "label", "index"], 2),
-        (lambda: ker.study_convergence([LAW, ker.lambertian()]), ["name", "distance", "error", "seconds"], 1),
         (
             lambda: spec.work_precision(
                 spec.WorkProblem("a", spec.ReferenceValue(0.0, 0.0, "by hand")), [spec.WorkMethod("b", float)], [1, 2],
@@ -131,7 +130,7 @@ def test_an_estimate_has_no_arithmetic():
             ["scale", "spacing", "distance", "distance_error", "seconds"], 3,
         ),
     ],
-    ids=["spectrum", "enclosures", "convergence", "work", "limit"],
+    ids=["spectrum", "enclosures", "work", "limit"],
 )  # fmt: skip
 def test_a_table_of_results_is_a_data_frame(make, columns, rows):
     pytest.importorskip("pandas")

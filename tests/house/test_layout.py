@@ -23,7 +23,7 @@ FLOORS = [
     *("geometry.scene.compiled", "geometry.walls"),
     *("geometry.tracing.double_double", "geometry.tracing.compiled", "geometry.tracing"),
     *("geometry.polygons.compiled", "geometry.polygons", "geometry.itineraries.compiled", "geometry.itineraries"),
-    *("geometry.collisions.compiled", "geometry.collisions", "geometry.plotting", "geometry"),
+    *("geometry.plotting", "geometry.collisions.compiled", "geometry.collisions", "geometry"),
     *(
         "kernels.bases",
         "kernels.matrices",

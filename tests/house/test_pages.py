@@ -1,6 +1,7 @@
 """Examples and scripts of pages run and are right, and the reference lists all public names."""
 
 import importlib.util
+import inspect
 import math
 import re
 import runpy
@@ -78,7 +79,7 @@ def test_no_slip_plates_confine_and_rough_plates_do_not(run):
 def test_least_resistance_is_below_the_smooth_body_and_the_best_triangle_below_retroreflection(run):
     names = run("the_least_resistance")
     assert names["least"].lower < 0.987823750 < names["least"].upper + 1e-9
-    assert math.sqrt(2) < float(names["best"].resistance) < names["most"].upper == 1.5
+    assert math.sqrt(2) < float(names["best"].value) < names["most"].upper == 1.5
 
 
 def test_the_wall_has_the_wanted_moments(run):
@@ -154,6 +155,21 @@ def test_the_reference_lists_every_public_name_once(reference, tmp_path):
     assert len(listed) == len(set(listed)) and set(listed) | reference.ELSEWHERE == public
     by_hand = (DOCS / "api" / "index.md").read_text(encoding="utf-8")
     assert "automodule:: asperity.geometry.disk.symbolic" in by_hand and "   verify\n" in by_hand
+
+
+def test_classes_that_functions_return_are_documented_with_them_and_are_no_public_names(reference):
+    documented = {name for names in reference.returned_classes().values() for name in names}
+    for name in documented:
+        module, _, last = name.rpartition(".")
+        room = importlib.import_module(".".join(module.split(".")[:2]))
+        assert inspect.getdoc(getattr(importlib.import_module(module), last)), name
+        assert last not in dir(room) and not hasattr(room, last), name
+    for room in (asperity.geometry, asperity.kernels, asperity.spectral):
+        for function in filter(inspect.isfunction, (getattr(room, name) for name in room.__all__)):
+            found = vars(inspect.getmodule(function)).get(inspect.signature(function).return_annotation)
+            if inspect.isclass(found) and found.__module__.startswith(f"{room.__name__}."):
+                public = found.__name__ in dir(room) or issubclass(found, ker.Law)
+                assert public or f"{found.__module__}.{found.__name__}" in documented, function
 
 
 def test_a_folder_without_a_task_has_its_own_page(reference, monkeypatch, tmp_path):

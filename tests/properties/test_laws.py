@@ -7,6 +7,7 @@ import pytest
 
 from asperity import kernels as ker
 from asperity.errors import InputError
+from asperity.kernels.laws.law import Composition
 
 EPS = float(np.finfo(float).eps)
 THETA = np.array([0.07, 0.3, 0.9, 1.4, 1.58, 2.1, 2.6, 3.05])
@@ -81,7 +82,7 @@ def test_samples_follow_expectations_and_distributions_and_depend_on_the_generat
             value = function(drawn)
             spread = value.std() / math.sqrt(number)
             assert abs(value.mean() - float(law.apply(function, theta))) <= 4.5 * spread + 5e-5
-        if isinstance(law, ker.Composition) and law.isometry_table() is None:
+        if isinstance(law, Composition) and law.isometry_table() is None:
             # of the later factor the matrix on the cells counts, which are wide here
             continue
         below = law.distribution(np.array([theta]), edges).cumulative(edges)[0]

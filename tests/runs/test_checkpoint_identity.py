@@ -92,7 +92,7 @@ def laws():
         found += [
             0.5 * one + 0.5 * ker.lambertian(), 0.25 * one + 0.75 * ker.lambertian(), one @ ker.lambertian(),
             (one @ ker.lambertian()) ** 2, one.in_specular_frame(),
-            ker.mixture([one, ker.specular()], [0.5, 0.5]),
+            0.5 * one + 0.5 * ker.specular(),
         ]  # fmt: skip
     return found
 

@@ -5,6 +5,7 @@ import pytest
 
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.kernels.laws.law import Composition, Power
 from asperity.spectral.bounds import enclosure
 from asperity.spectral.bounds.enclosure import Enclosure, Enclosures
 from asperity.spectral.bounds.operator_residuals import Residuals, residuals
@@ -364,7 +365,7 @@ def test_phase_functions_are_tried_in_polynomials_beyond_those_asked_for(k, basi
 def test_powers_are_recognised_where_they_tell_something():
     law, other = ker.henyey_greenstein(0.5), ker.henyey_greenstein(0.25)
     assert enclosure.as_power(law**3) == enclosure.as_power(law @ law @ law) == (law, 3)
-    assert enclosure.as_power(ker.Power(law, 1)) == enclosure.as_power(ker.Composition((law,))) == (law, 1)
+    assert enclosure.as_power(Power(law, 1)) == enclosure.as_power(Composition((law,))) == (law, 1)
     assert enclosure.as_power(law @ law) == (law, 2)
     skew = ker.MatrixLaw(np.roll(np.eye(3), 1, axis=1))
     for nothing in (
@@ -374,7 +375,7 @@ def test_powers_are_recognised_where_they_tell_something():
         other @ law @ law,
         ker.specular() @ law,
         skew**2,
-        ker.Power(law, 0),
+        Power(law, 0),
     ):
         assert enclosure.as_power(nothing) is None
 

@@ -24,6 +24,8 @@ from .verdict import Verdict, every
 # Points at which both sides are compared before a proof is sought: for an equality, and for an inequality.
 POINTS = 24
 MORE_POINTS = 60
+# Points at which both sides are sought to be defined before they are refused.
+MOST_POINTS = 600
 # Parts that are tried, and points of every part at which a counterexample is sought.
 PARTS = 60
 FEW_POINTS = 3
@@ -60,6 +62,8 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
             raise InputError(f"{side}: expected a real expression, got one with the imaginary unit")
     search = Search(*claim, domain)
     found = _found(search, domain)
+    if search.undefined == search.tried and found.evidence != NOWHERE:
+        found = search.refutation(domain, MOST_POINTS, until_defined=True) or found
     if search.undefined == search.tried or found.evidence == NOWHERE:
         raise InputError(
             f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {claim[0]} and {claim[1]}, "

@@ -36,7 +36,7 @@ def test_a_disk_at_a_corner_stops_alone_and_the_others_keep_their_bits():
 def test_pictures_portraits_and_extents_are_finite_beside_a_disk_that_stopped():
     square = geo.Container.polygon([(0, 0), (2, 0), (2, 2), (0, 2)]).closed()
     record = ker.play(square, ker.smooth(DISK), [1.0, 1.0], [[1.0, 1.0, 0.0], [1.0, 0.3, 0.0]], 5)
-    s, along = ker.phase_portrait(record)
+    s, along = record.phase_portrait()
     assert np.isnan(s[:, 0]).all() and np.isfinite(s[:, 1]).all() and np.isfinite(along[:, 1]).all()
     assert np.isfinite(record.extent()).all()
 

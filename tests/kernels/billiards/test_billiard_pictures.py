@@ -7,7 +7,7 @@ from matplotlib import pyplot
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.kernels.billiards.equilibrium import equilibrium_starts
-from asperity.kernels.billiards.pictures import path_between
+from asperity.kernels.billiards.record import BilliardRecord, path_between
 
 DISK = geo.Disk(1.0, 0.5)
 STADIUM = geo.Container.stadium(2.0, 1.0)
@@ -19,7 +19,7 @@ def _close():
     pyplot.close("all")
 
 
-def record(law=None, n: int = 5, steps: int = 200) -> ker.BilliardRecord:
+def record(law=None, n: int = 5, steps: int = 200) -> BilliardRecord:
     rng = np.random.default_rng(0)
     position, velocity, _ = equilibrium_starts(STADIUM, DISK, n, True, rng)
     return ker.play(STADIUM, law or ker.no_slip(DISK), position, velocity, steps, rng)
@@ -27,11 +27,11 @@ def record(law=None, n: int = 5, steps: int = 200) -> ker.BilliardRecord:
 
 def test_portraits_lie_in_their_ranges_and_fill_them_evenly():
     found = record(n=200)
-    s, along = ker.phase_portrait(found)
+    s, along = found.phase_portrait()
     assert s.shape == along.shape == (200, 200)
     assert s.min() >= 0.0 and s.max() <= STADIUM.perimeter and np.abs(along).max() <= 1.0
     # the flux has constant density in the disk of tangential velocity and spin: E[r^2] = 1/2
-    first, second = ker.phase_portrait(found, "velocity")
+    first, second = found.phase_portrait("velocity")
     radii = first**2 + second**2
     assert radii.max() <= 1.0
     ends = radii[-1]
@@ -40,7 +40,7 @@ def test_portraits_lie_in_their_ranges_and_fill_them_evenly():
 
 def test_disks_that_left_have_no_points():
     strip = ker.play(geo.Container.wedge(1.0), ker.smooth(DISK), [1.0, 0.5], [-1.0, 0.1, 0.0], 20)
-    first, second = ker.phase_portrait(strip, "velocity")
+    first, second = strip.phase_portrait("velocity")
     count = int(strip.collisions[0])
     assert 0 < count < 20
     assert np.isnan(first).sum() == np.isnan(second).sum() == 20 - count
@@ -48,7 +48,7 @@ def test_disks_that_left_have_no_points():
 
 def test_paths_have_the_points_of_the_record():
     found = record()
-    axes = ker.draw_paths(found)
+    axes = found.draw_paths()
     drawn = axes.lines[-1].get_xydata()
     np.testing.assert_array_equal(drawn, found.position[:, -1])
     assert len(axes.lines) == len(STADIUM.curves) + 5
@@ -56,20 +56,20 @@ def test_paths_have_the_points_of_the_record():
 
 @pytest.mark.parametrize("coordinates", ["boundary", "velocity"])
 def test_a_portrait_has_one_colour_a_disk(coordinates):
-    axes = ker.draw_phase_portrait(record(), coordinates)
+    axes = record().draw_phase_portrait(coordinates)
     assert len({line.get_color() for line in axes.lines[:5]}) == 5
     assert axes.get_xlabel() and axes.get_ylabel()
 
 
 def test_an_animation_shows_the_disks_where_they_are(tmp_path):
     found = record(steps=20)
-    animation = ker.animate(found, frames=5, duration=1.0)
+    animation = found.animate(frames=5, duration=1.0)
     animation.save(tmp_path / "disks.gif", writer="pillow")
     assert (tmp_path / "disks.gif").stat().st_size > 1000
     # the last picture: the middle of the circle of the last disk, and its spoke
     end = found.time[-1].min()
     _, edge, spoke = pyplot.gcf().axes[0].lines[-3:]
-    middle = path_between(found, 4, 0.0, end)[-1]
+    middle = path_between(found.time[:, 4], found.position[:, 4], 0.0, end)[-1]
     np.testing.assert_allclose(edge.get_xydata()[:-1].mean(axis=0), middle, atol=1e-12)
     np.testing.assert_allclose(spoke.get_xydata()[0], middle, atol=1e-12)
     assert STADIUM.contains(middle[None]).all()
@@ -79,6 +79,6 @@ def test_the_disks_of_a_gas_are_drawn_in_their_size():
     room = geo.Container.polygon([(0, 0), (9, 0), (9, 6), (0, 6)])
     pair = ker.PairLaw(ker.retroreflection(), DISK)
     gas = ker.play_gas(room, pair, [[2, 3], [6, 3]], [[1, 0.1, 0], [0, 0, 0]], 4)
-    ker.animate(gas, frames=3)
+    gas.animate(frames=3)
     edge = pyplot.gcf().axes[0].lines[-2].get_xydata()
     assert np.ptp(edge[:, 0]) == pytest.approx(2.0, rel=1e-2)

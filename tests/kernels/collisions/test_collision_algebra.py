@@ -6,6 +6,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.kernels.collisions.collision_law import CollisionCombination
 
 RNG = 20_260_318
 DISK = geo.Disk(1.3, 0.4)
@@ -115,7 +116,7 @@ def test_powers_of_a_sum_multiply_out():
     rotation = (law**3).operator(*ANGLES).dense()
     parts = (law @ law @ law).operator(*ANGLES).dense()
     assert np.allclose(rotation, parts, atol=1e-12)
-    assert isinstance(law**1, ker.CollisionCombination) and law**1 is law
+    assert isinstance(law**1, CollisionCombination) and law**1 is law
     assert np.allclose((law**0).operator(*ANGLES).dense(), np.eye(20), atol=1e-13)
 
 

@@ -24,6 +24,7 @@ from asperity.kernels.distances.distributions import cells_error, entry_error, o
 from asperity.kernels.distances.pseudometric import flux_means
 from asperity.kernels.distances.transport import Distributions, absolute_area, grid_wasserstein, wasserstein
 from asperity.kernels.laws.distribution import Distribution
+from asperity.kernels.laws.law import DrivenLaw
 
 KINDS = ("rows", "sup", "joint", "pseudometric")
 
@@ -455,7 +456,7 @@ class Split(ker.Law):
         return low * function(np.full_like(theta, 0.5)) + (1.0 - low) * function(np.full_like(theta, 2.5))
 
 
-class SplitByEntryPoints(ker.DrivenLaw):
+class SplitByEntryPoints(DrivenLaw):
     """The same law as a map of the entry point, of which distributions are known from 4096 points only."""
 
     def reflect(self, x, theta):

@@ -172,12 +172,6 @@ def test_a_wanted_resistance_is_met():
     )
 
 
-def test_best_hollow_is_the_same_search():
-    design = ker.design_wall(ker.resistance, ker.TriangularTeethLaw, [(0.2, 3.0)])
-    best = ker.best_hollow(ker.TriangularTeethLaw, [(0.2, 3.0)])
-    assert design.parameters.tolist() == best.parameters.tolist() and design.value == best.resistance
-
-
 def test_the_gap_is_an_objective():
     found = ker.design_wall(
         lambda law, tolerance: spec.spectral_gap(law, tolerance), ker.maxwell, [(0.0, 1.0)], wanted=0.3, tolerance=1e-6

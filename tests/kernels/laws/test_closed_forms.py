@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.kernels.laws.law import BranchLaw
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -116,7 +117,7 @@ def test_extreme_walls_and_angles_give_probabilities_and_angles(law: ker.Law) ->
     assert np.all((outgoing > 0.0) & (outgoing < math.pi))
     assert np.all(hits >= 1)
     assert np.allclose(law.apply(np.ones_like, EXTREME), 1.0, rtol=0.0, atol=4 * EPS)
-    if isinstance(law, ker.BranchLaw):
+    if isinstance(law, BranchLaw):
         probability, outgoing = law.branches(EXTREME)
         assert np.all(probability >= 0.0)
         assert np.allclose(probability.sum(axis=-1), 1.0, rtol=0.0, atol=4 * EPS)
@@ -204,7 +205,7 @@ def test_rays_into_a_crevice_have_the_law_and_the_parity_of_their_hits(ratio, th
 
 # ---- laws that hold for every wall --------------------------------------------------------------------------------
 @pytest.mark.parametrize("law", [*map(ker.TriangularTeethLaw, (0.7, 2.0)), ker.RectangularTeethLaw(1.3)], ids=repr)
-def test_every_slot_is_one_isometry_between_kinks(law: ker.BranchLaw) -> None:
+def test_every_slot_is_one_isometry_between_kinks(law: BranchLaw) -> None:
     breakpoints, _ = law.breakpoints(400)
     edges = np.concatenate([[0.0], breakpoints, [math.pi]])
     low, width = edges[:-1, None], np.diff(edges)[:, None]

@@ -48,7 +48,7 @@ def test_foreshortened_teeth_have_the_corrected_parameters() -> None:
 def test_several_hollows_make_a_combination_by_their_widths() -> None:
     wall = geo.Wall.from_vertices([(0, 0), (1, -1), (2, 0), (3, 0), (3, -2), (3.5, -2), (3.5, 0), (4, 0)])
     law = ker.WallLaw(wall).closed_form
-    assert isinstance(law, ker.Combination)
+    assert isinstance(law, Combination)
     expected = 0.5 * ker.TriangularTeethLaw(math.pi / 2) + 0.25 * ker.RectangularTeethLaw(4.0) + 0.25 * ker.specular()
     assert same(law, expected)
     assert np.allclose(ker.WallLaw(wall).branches(1.0)[0].sum(), 1.0)

@@ -7,6 +7,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.kernels.laws.law import BranchLaw
 
 # <u, P u>/<u, u> with u = cos theta, from independent tracers and high-precision quadrature.
 TRIANGULAR_07 = 0.134541971359171
@@ -51,7 +52,7 @@ def test_rectangular_teeth_are_exact_up_to_grazing() -> None:
 
 
 @dataclass(frozen=True)
-class Swap(ker.BranchLaw):
+class Swap(BranchLaw):
     """Specular reflection for steep angles, retroreflection for others: two breakpoints."""
 
     steep: float

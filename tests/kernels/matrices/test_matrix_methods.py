@@ -8,7 +8,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.kernels.discretisation import methods
-from asperity.kernels.discretisation.method import Budget, computed
+from asperity.kernels.discretisation.method import computed
 
 BASIS = ker.Bins(4)
 HG, TEETH = ker.henyey_greenstein, ker.RectangularTeethLaw(0.8)
@@ -45,12 +45,6 @@ def test_a_new_method_is_used_for_the_law_and_for_all_that_is_made_of_it():
     assert ker.discretise(ker.maxwell(0.5), BASIS, "exact").method == "exact"
     assert ker.discretise(0.5 * ker.lambertian() + 0.5 * HG(0.5), BASIS).method == "exact + quadrature"
     assert ker.discretise(ker.lambertian().in_specular_frame(), BASIS).method == "quadrature"
-
-
-def test_a_prediction_does_not_exceed_the_error_that_is_there():
-    budget = Budget(1e-8, segments=100, fallback=1e-3)
-    assert budget.predicted(0.5, 100) == 0.5 and not budget.out_of_reach(1e-3, 100)
-    assert budget.out_of_reach(1e-2, 100) and not budget.out_of_reach(1e-2, 1)
 
 
 def test_sums_with_chains_that_are_too_long_to_be_multiplied_out_have_matrices():

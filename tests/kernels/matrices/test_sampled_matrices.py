@@ -11,7 +11,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
-from asperity.kernels.laws.law import RandomMap
+from asperity.kernels.laws.law import DrivenLaw, RandomMap
 from asperity.kernels.sampling.counts import LEVEL, _squared_norms
 from asperity.kernels.sampling.sobol import PARTS
 
@@ -30,7 +30,7 @@ def test_z_scores_of_sampled_matrices_are_those_of_noise(basis: ker.Basis, metho
 
 def test_a_law_that_is_not_reversible_is_found_out_also_when_symmetrised_by_hand() -> None:
     @dataclass(frozen=True)
-    class Drift(ker.DrivenLaw):
+    class Drift(DrivenLaw):
         """Keeps the measure and moves fractions of it by a tenth and a bit: not reversible."""
 
         def reflect(self, x: object, theta: object) -> np.ndarray:

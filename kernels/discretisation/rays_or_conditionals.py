@@ -1,0 +1,76 @@
+"""The method choice of `auto` for the law of a wall without closed form: isometries, rays or conditionals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import cast
+
+from ...core.errors import AccuracyError
+from ..bases.basis import Basis
+from ..laws.law import Law
+from ..matrices.matrix import KernelMatrix
+from ..sampling.sobol import SobolSampler
+from ..walls.wall_law import FEW_PIECES, WallLaw
+from .isometry_tables import IsometryTables
+from .method import Budget, MethodName
+from .sampled import sobol_matrix
+from .traced import Traced, first_segments
+
+# These rays take .02 to .1 s.
+FIRST_RAYS = 2**17
+# Walls of more pieces, and walls that do not close, have no conditionals.
+MOST_PIECES = 16
+# Nor walls whose first panels are predicted to need more than this fraction of the limit on ray segments.
+FRACTION_OF_PANELS = 0.5
+# All rays, eight times as many as the first, have hardly ever an error below this fraction of that of the first.
+RAYS_GAIN = 1.0 / 16.0
+
+
+class RaysOrConditionals:
+    """Walls without closed form: the first of these matrices that meets the tolerance, or else the most exact one.
+
+    1. Isometries of a polygonal wall, if its beams resolve; if it has many pieces, after the first rays.
+    2. The first rays.
+    3. Conditional distributions, of walls that close and have few pieces.
+    4. All rays.
+
+    The error does not grow if the tolerance falls.
+    """
+
+    name: MethodName = "auto"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return isinstance(law, WallLaw) and law.closed_form is None
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        law = cast(WallLaw, law)
+        if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
+            return IsometryTables().matrix(law.exact_law, basis, budget)
+        sampler = SobolSampler(law, basis, budget.rng)
+        first = _by_rays(sampler, basis, replace(budget, rays=min(FIRST_RAYS, budget.rays)))
+        if first is not None and float(first.error) <= budget.tolerance:
+            return first
+        if law.exact_law is not None:
+            return IsometryTables().matrix(law.exact_law, basis, budget)
+        if not _has_conditionals(law, basis, budget):
+            return sobol_matrix(sampler, basis, budget)
+        found = Traced().matrix(law, basis, budget)
+        enough = budget.tolerance if first is None else max(budget.tolerance, RAYS_GAIN * float(first.error))
+        if float(found.error) <= enough:
+            return found
+        rays = _by_rays(sampler, basis, budget)
+        return found if rays is None else min(found, rays, key=lambda matrix: float(matrix.error))
+
+
+def _by_rays(sampler: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix | None:
+    """The matrix by rays; None if a bin has none or too many do not escape."""
+    try:
+        return sobol_matrix(sampler, basis, budget)
+    except AccuracyError:
+        return None
+
+
+def _has_conditionals(law: WallLaw, basis: Basis, budget: Budget) -> bool:
+    """Whether the conditional distributions at the first panels are affordable."""
+    few = law.wall.closes and len(law.wall.pieces) <= MOST_PIECES
+    return few and first_segments(law.wall, basis) <= FRACTION_OF_PANELS * budget.segments
