@@ -48,7 +48,6 @@ class RepeatedTeethLaw(BranchLaw):
     times: int
 
     mirror_symmetric = True
-    evaluations = 2
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         theta = angles("theta", theta)
