@@ -11,8 +11,7 @@ from ...core.checks import Floats, finite_number, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ..bases.measure import gauss_rule
-from ..laws.law import Law
-from ..laws.structure import is_atomic
+from ..laws.law import Law, is_atomic
 
 # Equal panels over the lit half of the rim, besides those at breakpoints of the law, and Gauss nodes on each. The finer
 # rule halves every panel.

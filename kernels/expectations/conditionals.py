@@ -97,17 +97,17 @@ class Conditionals(NamedTuple):
         """The distributions of pi minus the outgoing angle."""
         return self._replace(nodes=clipped_inside(np.pi - self.nodes))
 
-    def followed_by(self, after: Callable[[Floats], Conditionals]) -> Conditionals:
+    def followed_by(self, after: Callable[[Floats], Conditionals], exact: bool) -> Conditionals:
         """The distributions after another law, whose conditional distributions ``after`` gives at all nodes.
 
-        The error is unknown unless these distributions are exact, because means under the other law may have
-        breakpoints that they do not resolve.
+        The error is unknown unless these distributions are ``exact`` for any function, because means under the other
+        law may have breakpoints that they do not resolve.
         """
         found = after(self.nodes)
         weights = np.repeat(self.weights, np.diff(found.starts)) * found.weights
         error = np.add.reduceat(self.weights * found.error, self.starts[:-1])
-        exact = self.error <= 0.0
-        return Conditionals(found.nodes, weights, found.starts[self.starts], np.where(exact, error, np.nan))
+        error = self.error + error if exact else np.full(self.error.shape, np.nan)
+        return Conditionals(found.nodes, weights, found.starts[self.starts], error)
 
 
 def gauss_nodes(

@@ -55,8 +55,10 @@ ENTRY_POINTS = 4096
 TOLERANCE, FIRST_ANGLES, NODES_AT_ONCE = 1e-8, 16, 2**20
 # Degree of the functions that `conditionals` averages by default.
 DEGREE = 8
-# Breakpoints of a law at which the means under the law before it are cut.
-CUTS = 8
+# Breakpoints of laws at which the means under the law before them are cut.
+CUTS = 64
+# Incoming angle, tolerance and degrees of the test whether conditional distributions depend on the degree.
+PROBE, PROBE_TOLERANCE, PROBE_DEGREES = np.array([1.0]), 1e-2, (0, 64)
 # Edges begin at 0 and end at pi within a few roundings.
 ENDS_TOLERANCE = 1e-14
 # Limit on nested calls of `apply`; more would exceed Python's recursion limit.
@@ -735,25 +737,41 @@ def as_base(law: Law) -> str:
     return f"({law!r})" if isinstance(law, Power) else as_factor(law)
 
 
+def is_atomic(law: Law) -> bool:
+    """Whether the conditional distributions of a law are finitely many atoms, which average any function exactly."""
+    few, many = (_probe(law, degree) for degree in PROBE_DEGREES)
+    return not np.isnan(few.error).any() and np.array_equal(few.nodes, many.nodes)
+
+
+def _probe(law: Law, degree: int) -> Conditionals:
+    return law._conditionals(PROBE, PROBE_TOLERANCE, degree, np.empty(0))
+
+
 def _conditionals_of_chain(
     law: Law, laws: Sequence[Law], theta: Floats, tolerance: float, degree: int, edges: Floats
 ) -> Conditionals:
     """The conditional distributions of composed laws; means under a law are cut at the next law's breakpoints."""
     try:
         probability, outgoing = chained(laws, theta)
-        return Conditionals.of_atoms(outgoing, probability)
+        error = {part: float(_probe(part, 0).error[0]) for part in set(laws)}
+        return Conditionals.of_atoms(outgoing, probability, sum(error[part] for part in laws))
     except InputError:
         # not isometries, or too many of them
-        found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)))
+        found, exact = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1))), True
     for index, part in enumerate(laws):
-        cuts = laws[index + 1].breakpoints(CUTS)[0] if index + 1 < len(laws) else edges
+        cuts, later = edges, laws[index + 1 :]
+        if later:
+            # all breakpoints of the later laws together, or else of the next one
+            known, left_out = chained_breakpoints(later, CUTS)
+            cuts = known if math.isfinite(left_out) else later[0].breakpoints(CUTS)[0]
         each = part._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
         if each * found.nodes.size > MOST_VALUES:
             raise InputError(
                 f"apply: {law!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
                 "discretise() and compose the matrices, or fewer angles at a time"
             )
-        found = found.followed_by(partial(part._conditionals, tolerance=tolerance, degree=degree, edges=cuts))
+        after = partial(part._conditionals, tolerance=tolerance, degree=degree, edges=cuts)
+        found, exact = found.followed_by(after, exact), exact and is_atomic(part)
     return found
 
 

@@ -118,6 +118,10 @@ class MatrixLaw(DensityLaw):
         """The edges of the bins."""
         return np.broadcast_to(self.edges, (*finite_array("theta", theta).shape, self.edges.size))
 
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        """The inner edges of the bins; none are left out."""
+        return self.edges[1:-1], 0.0
+
     def _density_cuts(self, theta: Floats) -> Floats:
         """The edges of the bins."""
         return np.broadcast_to(self.edges, (theta.size, self.edges.size))

@@ -7,16 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-import numpy as np
-
 from ...core.errors import InputError
 from .law import Combination, Composition, Law, Power, SpecularFrame
 
 Fact = TypeVar("Fact")
 # Breakpoint limit and incoming angle (in radians) of the test whether a law lists isometries.
 FEW_BREAKPOINTS, PROBE = 8, 1.0
-# Tolerance and degrees of the test whether conditional distributions depend on the degree.
-PROBE_TOLERANCE, PROBE_DEGREES = 1e-2, (0, 64)
 # Limit on the factors of a power whose facts are combined.
 MOST_FACTORS = 10**6
 
@@ -100,12 +96,6 @@ def made_of_isometries(law: Law) -> bool:
 def lists_branches(law: Law) -> bool:
     """Whether every part of a law lists its isometries and breakpoints; stronger than `made_of_isometries`."""
     return holds_of_all(law, _answers)
-
-
-def is_atomic(law: Law) -> bool:
-    """Whether the conditional distributions of a law are finitely many atoms, which average any function exactly."""
-    few, many = (law.conditionals(PROBE, PROBE_TOLERANCE, degree) for degree in PROBE_DEGREES)
-    return not np.isnan(few.error).any() and np.array_equal(few.nodes, many.nodes)
 
 
 def _answers(law: Law) -> bool:

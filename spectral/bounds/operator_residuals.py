@@ -20,8 +20,8 @@ from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import Means, height_of, weighted_means
 from ...kernels.laws.density import GAUSS_NODES, split_panels
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.law import Composition, SpecularFrame
-from ...kernels.laws.structure import Rules, fold, holds_of_all, is_atomic
+from ...kernels.laws.law import Composition, SpecularFrame, is_atomic
+from ...kernels.laws.structure import Rules, fold, holds_of_all
 from ...kernels.walls.circular_arc import MOST_HITS
 from ...kernels.walls.simplification import law_of, words_of
 
