@@ -13,7 +13,7 @@ ROOMS = ("geometry", "kernels", "spectral")
 TASKS = (
     ("walls", "Make a wall", ("geometry.walls", "geometry.cells", "geometry.curves")),
     ("rays", "Trace rays", ("geometry.tracing", "geometry.scene")),
-    ("pictures", "Draw walls and collisions", ("geometry.plotting",)),
+    ("pictures", "Draw walls", ("geometry.plotting",)),
     ("laws", "Take and combine laws", ("kernels.laws",)),
     ("laws-of-walls", "Take the law of a wall", ("kernels.walls",)),
     (
@@ -34,8 +34,18 @@ TASKS = (
     ("inverse", "Find a wall for a law", ("kernels.inverse",)),
     ("work-diagrams", "Measure error against time", ("spectral.work_diagrams",)),
 )
-# Classes that only other objects return or are built upon, by the public name on whose page they are documented.
+# Classes that only other objects return or are built upon, by the public name on whose page they are documented: their
+# names in its module, or their full names below asperity.
 RETURNED = {
+    "geometry.Wall": "Curve TracePlan geometry.cells.hollow.Hollow",
+    "geometry.wall_from_text": "NamedWall",
+    "geometry.trace": "Trace",
+    "geometry.billiard_map": "BoundaryStates",
+    "geometry.collide": "RigidCollision",
+    "geometry.collide_cylinder": "CylinderCollision",
+    "geometry.collide_modified": "ModifiedCollision",
+    "geometry.collide_pair": "PairCollision",
+    "geometry.shadow": "Shadow CollisionConstants",
     "kernels.Law": "BranchLaw DrivenLaw Combination Composition Power SpecularFrame",
     "kernels.KernelMatrix": "Defect SymmetryDefect",
     "kernels.SINE": "AngularMeasure",
@@ -54,6 +64,22 @@ RETURNED = {
     "kernels.design_wall": "WallDesign",
     "kernels.exchange_hollow": "ExchangeHollow Generations",
     "kernels.dichotomy": "Dichotomy",
+    "spectral.curvature_gap_bounds": "GapBounds",
+    "spectral.enclosures": "Enclosures Enclosure Separation",
+    "spectral.exit_times": "ExitTimes",
+    "spectral.conductance": "Conductance",
+    "spectral.diffusivity": "Diffusivity",
+    "spectral.laplacian_comparison": "LaplacianComparison",
+    "spectral.mixing_time": "MixingTime",
+    "spectral.accommodation": "Accommodation",
+    "spectral.channel_paths": "ChannelPaths",
+    "spectral.Spectrum": "SpectrumErrors",
+    "spectral.hilbert_schmidt_norm": "HilbertSchmidtNorm",
+    "spectral.essential_edge": "EssentialEdge",
+    "spectral.ensemble": "Ensemble EnsembleRow",
+    "spectral.SweepTable": "SweepRow Extremum",
+    "spectral.fit_order": "FittedOrder",
+    "spectral.WorkReport": "WorkRow MethodFacts Machine",
 }
 # docs/api/index.md documents their contents by hand
 ELSEWHERE = {"asperity.geometry.symbolic", "asperity.geometry.verify"}
@@ -102,7 +128,8 @@ def returned_classes() -> dict[str, list[str]]:
     for name, classes in RETURNED.items():
         room, _, public = name.partition(".")
         home = sys.modules[home_of(getattr(import_module(f"asperity.{room}"), public))]
-        every = [getattr(home, one) for one in classes.split()]
+        paths = [one.rpartition(".") for one in classes.split()]
+        every = [getattr(import_module(f"asperity.{path}") if path else home, last) for path, _, last in paths]
         found[f"asperity.{name}"] = [f"{one.__module__}.{one.__name__}" for one in every]
     return found
 

@@ -6,32 +6,29 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ..verification.identity import verify
-from .cells.hollow import Hollow
 from .cells.measured import Profile
 from .cells.profile import read_profile
 from .collisions.amplification import DiskStatus
 from .collisions.configuration_space import ConfigurationSpace
-from .collisions.cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
-from .collisions.pair import PairCollision, collide_pair
-from .collisions.rigid import RigidCollision, collide
+from .collisions.cylinder import collide_cylinder, collide_modified
+from .collisions.pair import collide_pair
+from .collisions.paths import collision_path
+from .collisions.rigid import collide
 from .collisions.rim_on_wall import collide_rim
-from .collisions.transversality import CollisionConstants, Shadow, good_fraction, shadow
+from .collisions.transversality import good_fraction, shadow
 from .curves.arc import Arc
 from .curves.bezier import Bezier
-from .curves.curve import Curve
 from .curves.segment import Segment
-from .disk.charts import RollingCharts, plane_crossing, plane_crossing_differential
+from .disk.charts import RollingCharts
 from .disk.disk import Disk
 from .disk.inner_disk import InnerDisk
 from .disk.rim import SatelliteDisk
-from .plotting.collisions import collision_path, draw_collision, draw_configurations, draw_shadow
 from .plotting.walls import draw_wall
-from .scene.plan import TracePlan
 from .tables.container import Container
-from .tracing.boundary_map import BoundaryStates, billiard_map, nested_reflection
+from .tracing.boundary_map import billiard_map, nested_reflection
 from .tracing.generations import MushroomGenerations
-from .tracing.tracing import Status, Trace, trace, trajectory
-from .walls.catalogue import WALLS, NamedWall, wall_from_text
+from .tracing.tracing import Status, trace, trajectory
+from .walls.catalogue import WALLS, wall_from_text
 from .walls.joined import join_walls
 from .walls.mushroom import mushrooms
 from .walls.named import (
@@ -55,31 +52,19 @@ __all__ = [
     "WALLS",
     "Arc",
     "Bezier",
-    "BoundaryStates",
-    "CollisionConstants",
     "ConfigurationSpace",
     "Container",
-    "Curve",
-    "CylinderCollision",
     "Disk",
     "DiskStatus",
     "HeightCorrelation",
-    "Hollow",
     "InnerDisk",
-    "ModifiedCollision",
     "MushroomGenerations",
-    "NamedWall",
-    "PairCollision",
     "Profile",
-    "RigidCollision",
     "RollingCharts",
     "SatelliteDisk",
     "Segment",
     "SelfAffine",
-    "Shadow",
     "Status",
-    "Trace",
-    "TracePlan",
     "Wall",
     "billiard_map",
     "collide",
@@ -90,9 +75,6 @@ __all__ = [
     "collision_path",
     "dispersing_arcs",
     "double_parabola",
-    "draw_collision",
-    "draw_configurations",
-    "draw_shadow",
     "draw_wall",
     "elliptical_arcs",
     "flat",
@@ -104,8 +86,6 @@ __all__ = [
     "mushrooms",
     "nested_reflection",
     "notched_angle",
-    "plane_crossing",
-    "plane_crossing_differential",
     "random_wall",
     "read_profile",
     "rectangular_teeth",

@@ -6,7 +6,6 @@ law, and of other matrices one of ten times as many ray segments. Errors are est
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -31,19 +30,7 @@ BASES = (ker.Bins(8), ker.Bins(32), ker.Legendre(8))
 EXACT = (
     geo.focusing_arcs(0.5), geo.focusing_arcs(1.0), geo.focusing_arcs(1.4), geo.rectangular_teeth(0.5),
     geo.rectangular_teeth(3.0), geo.triangular_teeth(0.4), geo.triangular_teeth(0.9), geo.koch(1), geo.koch(2),
-)  # fmt: skip
-# Hollows with a channel, of which the angles near grazing have a method of their own, in a basis that it accepts: stem
-# over cap and length over width of mushrooms; width, depth and half angle of an arc below parallel sides; and polygons
-# below such sides, by fractions of the width and depths below, which have an exact law.
-CHANNEL_BASIS, CHANNEL_TOLERANCES, CHANNEL_SEGMENTS = ker.Legendre(4), (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), 40_000_000
-MUSHROOMS = (
-    (0.05, 0.5), (0.1, 0.3), (0.1, 1.0), (0.2, 0.5), (0.3, 0.2), (0.3, 0.5), (0.3, 1.5), (0.4, 0.7), (0.5, 0.5),
-    (0.7, 0.4), (0.8, 1.0), (0.25, 0.5),
-)  # fmt: skip
-NOTCHES = ((0.5, 0.2, 0.4), (0.5, 0.4, 0.9), (0.5, 0.3, 1.2), (0.5, 0.5, 1.5707), (0.3, 0.4, 0.7), (0.6, 0.1, 0.3))
-FLOORS = (
-    ((0.5, 0.2),), ((0.5, 0.25),), ((0.25, 0.1), (0.75, 0.1)), ((0.25, 0.15), (0.5, 0.05), (0.75, 0.15)),
-    ((0.0, 0.1), (0.5, 0.3), (1.0, 0.1)),
+    geo.Wall.from_vertices([(0, 0), (0.2, 0), (0.2, -0.3), (0.45, -0.5), (0.7, -0.3), (0.7, 0), (0.9, 0)]),
 )  # fmt: skip
 # Rectangular teeth of random sizes, traced on purpose: ranges of depth over width, of width over period, and bins.
 TEETH_COUNT, TEETH_DEPTHS, TEETH_WIDTHS, TEETH_BINS = 40, (0.4, 8.0), (0.2, 0.95), (8, 16, 24, 32, 48)
@@ -86,28 +73,6 @@ def draw_matrix(number: int) -> Case:
     return _exact(EXACT[number - COUNT], basis, f"exact, {basis!r}")
 
 
-def draw_channel(number: int) -> Case:
-    """Polygons with an exact law, mushrooms, and notches."""
-    if number < len(FLOORS):
-        bottom = [(0.2 + 0.5 * x, -0.3 - depth) for x, depth in FLOORS[number]]
-        wall = geo.Wall.from_vertices([(0, 0), (0.2, 0), (0.2, -0.3), *bottom, (0.7, -0.3), (0.7, 0), (0.9, 0)])
-        return _exact(wall, CHANNEL_BASIS, "polygon")
-    number -= len(FLOORS)
-    if number < len(MUSHROOMS):
-        return _fine(geo.mushrooms(*MUSHROOMS[number]), CHANNEL_BASIS, 1e-8, CHANNEL_SEGMENTS, "mushroom")
-    return _fine(_notch(*NOTCHES[number - len(MUSHROOMS)]), CHANNEL_BASIS, 1e-8, CHANNEL_SEGMENTS, "arc")
-
-
-def _notch(width: float, depth: float, half_angle: float) -> geo.Wall:
-    """Parallel sides above an arc."""
-    radius = 0.5 * width / math.sin(half_angle)
-    center = (0.5 * width, radius * math.cos(half_angle) - depth)
-    below = geo.Arc(center, radius, 1.5 * math.pi - half_angle, 1.5 * math.pi + half_angle)
-    left, right = (0.0, -depth), (width, -depth)
-    sides = geo.Segment((0.0, 0.0), left), geo.Segment(right, (width, 0.0))
-    return geo.Wall([sides[0], below.pinned(left, right), sides[1], geo.Segment((width, 0.0), (1.0, 0.0))])
-
-
 def draw_teeth(number: int) -> Case:
     """Rectangular teeth in bins, hollows with a channel and a level floor."""
     rng = np.random.default_rng([0, number])
@@ -146,11 +111,6 @@ CAMPAIGNS = (
         "traced-matrices", "Do errors of matrices over traced rays hold?", draw_matrix,
         lambda case: _judge_matrices(case, MATRIX_TOLERANCES, MATRIX_SEGMENTS),
         len(BASES) * (COUNT + len(EXACT)), [len(BASES) * COUNT], level=0.99,
-    ),
-    Campaign(
-        "channels", "Do they hold for hollows with a channel?", draw_channel,
-        lambda case: _judge_matrices(case, CHANNEL_TOLERANCES, CHANNEL_SEGMENTS),
-        len(FLOORS) + len(MUSHROOMS) + len(NOTCHES), [1], level=0.99,
     ),
     Campaign(
         "traced-teeth", "Do they hold for rectangular teeth, traced although their law is exact?", draw_teeth,

@@ -20,6 +20,7 @@ from asperity.core.rounding import EPS
 from asperity.geometry.tracing.double_double.numbers import EPS_DOUBLE_DOUBLE
 from asperity.geometry.tracing.double_double.rays import UNRESOLVED
 from asperity.geometry.tracing.refinement import RefinedTrace, refined_trace
+from asperity.geometry.tracing.tracing import Trace
 from campaigns.engine import Campaign, Judged
 from campaigns.judges.precise_tracer import trace_precisely
 
@@ -193,7 +194,7 @@ def _judges_compared(case: AimedRays, known: RefinedTrace, rays: NDArray[np.int6
         yield Judged("the judge in 50 digits", fault=fault)
 
 
-def _is_precise(wall: geo.Wall, traced: geo.Trace, k: int, x: float, theta: float) -> bool:
+def _is_precise(wall: geo.Wall, traced: Trace, k: int, x: float, theta: float) -> bool:
     """Whether the tracer agrees with 50 digits on a ray that its judge left undecided or flagged."""
     ray = trace_precisely(wall.scene, x, theta, COLLISIONS)
     if ray.theta is None:
@@ -202,7 +203,7 @@ def _is_precise(wall: geo.Wall, traced: geo.Trace, k: int, x: float, theta: floa
     return bool(ray.bounces == traced.collisions[k]) and apart < OPEN_ERROR
 
 
-def agreement(wall: geo.Wall, traced: geo.Trace, known: RefinedTrace) -> tuple[NDArray[np.bool_], Floats]:
+def agreement(wall: geo.Wall, traced: Trace, known: RefinedTrace) -> tuple[NDArray[np.bool_], Floats]:
     """Which rays end alike within conditioning, and their distances in units of EPS times the derivative.
 
     The distance is the larger of the difference of angles and the difference of positions across the ray.
@@ -218,7 +219,7 @@ def agreement(wall: geo.Wall, traced: geo.Trace, known: RefinedTrace) -> tuple[N
     return near | limited | ((traced.status == known.status) & ~gone), distance
 
 
-def explained(wall: geo.Wall, traced: geo.Trace, x: Floats, theta: Floats, follow: Follow) -> NDArray[np.bool_]:
+def explained(wall: geo.Wall, traced: Trace, x: Floats, theta: Floats, follow: Follow) -> NDArray[np.bool_]:
     """Which rays of the judge agree with the tracer after a move by a few ulps of the cell or of the angle."""
     result = np.zeros(len(x), np.bool_)
     for ulps, (dx, dt) in MOVES:
@@ -232,9 +233,9 @@ def explained(wall: geo.Wall, traced: geo.Trace, x: Floats, theta: Floats, follo
     return result
 
 
-def part(traced: geo.Trace, rays: NDArray[np.bool_]) -> geo.Trace:
+def part(traced: Trace, rays: NDArray[np.bool_]) -> Trace:
     """These rays of a trace."""
-    return geo.Trace(traced.x[rays], traced.theta[rays], traced.collisions[rays], traced.status[rays])
+    return Trace(traced.x[rays], traced.theta[rays], traced.collisions[rays], traced.status[rays])
 
 
 CAMPAIGNS = (Campaign("aimed-rays", "Is any ray lost or wrong?", draw, judge, 4000, range(24)),)

@@ -31,6 +31,7 @@ from asperity.bench.quantities.walls import wall_of
 from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.discretisation.isometry_tables import table_matrix
 from asperity.kernels.walls.polygon import table_of_beams
+from asperity.spectral.work_diagrams.machine import Machine
 from campaigns.judges import precise_triangular
 
 from ..pages import print_table
@@ -335,7 +336,7 @@ def main(patterns: Sequence[str]) -> int:
         return goal.row(reached)
 
     print_table("what | goal | reached | met", map(row, chosen))
-    print(f"\n{len(missed)} of {len(chosen)} goals are missed. Machine: {spec.Machine.here()}.")
+    print(f"\n{len(missed)} of {len(chosen)} goals are missed. Machine: {Machine.here()}.")
     return 1 if missed or not chosen else 0
 
 

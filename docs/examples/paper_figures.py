@@ -343,7 +343,7 @@ def configuration_space() -> Figure:
     figure = Figure(figsize=(6.5, 4.2), layout="constrained")
     spacing = 2 * math.pi / 12
     space = geo.ConfigurationSpace(geo.triangular_teeth(1.2), geo.Disk(1.0, 1.0), spacing / 14.5, spacing)
-    ax = geo.draw_configurations(space, -0.6, ax=figure.subplots())
+    ax = space.draw_section(-0.6, figure.subplots())
     ax.legend(loc="upper right")
     return figure
 
@@ -430,7 +430,7 @@ def radius_of_transversality() -> Figure:
     space = geo.ConfigurationSpace(geo.triangular_teeth(1.3), disk, 3e-5)
     state = [0.5 * space.scale, 0.2 * space.spacing], -disk.from_angles(1.25, 1.2)
     pair = geo.shadow(space, *state)
-    geo.draw_shadow(space, *state, ax=ax)
+    pair.draw(ax)
     radii = ", ".join(f"{radius:.3f}" for radius in pair.radii)
     ax.set_title(f"radii {radii}; velocities differ by less than {pair.error:.3f}")
     return figure

@@ -28,13 +28,13 @@ def main(folder: Path, samples: int = 20_000) -> dict[str, float]:
     chosen = int(np.flatnonzero(hit.two_satellites & (hit.contacts == 4))[0])
 
     figure = Figure(figsize=(9, 2.6), layout="constrained")
-    geo.draw_collision(disk, teeth, scale, position[chosen], velocity[chosen], ax=figure.subplots())
+    geo.ConfigurationSpace(teeth, disk, scale).draw_collision(position[chosen], velocity[chosen], figure.subplots())
     figure.savefig(folder / "collision.png", dpi=DPI)
 
     # a spacing that is not a multiple of the wall's period, so that the cylinders of two satellites cross in the gaps
     spacing = 2 * math.pi / 24
     figure = Figure(figsize=(7, 4.5), layout="constrained")
-    geo.draw_configurations(geo.ConfigurationSpace(teeth, disk, spacing / 7.5, spacing), -0.6, ax=figure.subplots())
+    geo.ConfigurationSpace(teeth, disk, spacing / 7.5, spacing).draw_section(-0.6, figure.subplots())
     figure.savefig(folder / "configurations.png", dpi=DPI)
 
     figure = Figure(figsize=(7, 4.5), layout="constrained")

@@ -1,22 +1,36 @@
-"""The configuration space of a disk with satellites above a wall."""
+"""The configuration space of a disk with satellites above a wall, its sections, and the plot of a collision."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, instance, positive_number, shaped
+from ...core.checks import Floats, finite_array, instance, number_between, positive_number, shaped
 from ...core.errors import InputError
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk, contact_normal
 from ..disk.inner_disk import InnerDisk
 from ..disk.satellites import Satellites
+from ..plotting.walls import LEVEL, RAY_COLOURS, SOLID
 from ..walls.interior import in_solid
 from ..walls.wall import Wall
+from .paths import collision_path
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Number of points on a satellite's nearly straight path between two contacts.
+FLIGHT_POINTS = 40
+# Free space shown above the tops, in depths of the wall, and cells shown beside the contacts.
+FREE, MARGIN = 1.0, 1.0
+# Pixels per side of a section of the space.
+SECTION = 500
 
 
 @dataclass(frozen=True)
@@ -179,6 +193,118 @@ class ConfigurationSpace:
         angle = finite_array("alpha", alpha) + finite_array("number", number) * self.spacing
         n = contact_normal(self.disk.mass, self.disk.inertia, (k[..., 0], k[..., 1]), angle)
         return np.stack(np.broadcast_arrays(*n), axis=-1)
+
+    def draw_collision(self, position: ArrayLike, velocity: ArrayLike, ax: Axes | None = None) -> Axes:
+        """Draw one collision near the wall: the rim at every contact, and the paths of the satellites near the wall.
+
+        Parameters
+        ----------
+        position, velocity : array_like, shapes (2,) and (3,)
+            As in `collision_path`.
+        ax : matplotlib Axes, optional
+            By default the axes of a new figure.
+
+        Returns
+        -------
+        matplotlib Axes
+            Lengths are in units of the wall. Dots are the satellites at height 0 and at every contact, lines are their
+            paths. The rim between satellites, dashed, does not touch the wall.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> space = geo.ConfigurationSpace(geo.triangular_teeth(2.0), geo.Disk(), 0.01)
+        >>> space.draw_collision([0.0025, 0.0], [0.0, -1.0, 0.0]).get_ylabel()
+        'height above the tops'
+        """
+        wall, eps = self.wall, self.scale
+        path = collision_path(self.disk, wall, eps, position, velocity, self.spacing)
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.figure(layout="constrained").subplots()
+        lowest = -self.charts.nearest(path[:, 2])
+        numbers = np.arange(lowest.min() - 1, lowest.max() + 2)
+        low = self.zoomed.satellite(path / eps, lowest)
+        cells = np.array([low[:, 0].min(), low[:, 0].max()]) / wall.period
+        left, right = np.floor(cells[0] - MARGIN), np.ceil(cells[1] + MARGIN)
+        top = FREE * max(wall.depth, 0.3 * wall.period)
+        outline = wall.outline(1e-3 * wall.period)
+        for k in range(int(left) - 1, int(right) + 1):
+            ax.fill_between(outline[:, 0] + k * wall.period, outline[:, 1], -2.0 * top, color=SOLID, linewidth=0)
+            ax.plot(outline[:, 0] + k * wall.period, outline[:, 1], color="black", linewidth=1.2)
+        for j, number in enumerate(numbers):
+            colour = RAY_COLOURS[j % len(RAY_COLOURS)]
+            for before, after in pairwise(path):
+                fraction = np.linspace(0.0, 1.0, FLIGHT_POINTS)[:, None]
+                track = self.zoomed.satellite((before + fraction * (after - before)) / eps, number)
+                ax.plot(track[:, 0], track[:, 1], color=colour, linewidth=1.1)
+        self._draw_rims(ax, path, numbers)
+        ax.axhline(0.0, color=LEVEL, linewidth=0.8, linestyle=":")
+        ax.set_xlim(left * wall.period, right * wall.period)
+        ax.set_ylim(-1.15 * max(wall.depth, 0.1 * wall.period), top)
+        ax.set_aspect("equal")
+        ax.set_xlabel("x (length units of the wall)")
+        ax.set_ylabel("height above the tops")
+        return ax
+
+    def _draw_rims(self, ax: Axes, path: Floats, numbers: Floats) -> None:
+        """Draw the rim of the disk with its satellites at start, contacts and end."""
+        angles = np.linspace(-1.5 * self.spacing, 1.5 * self.spacing, 4 * FLIGHT_POINTS)
+        for configuration in path:
+            x1, x2, alpha = configuration / self.scale
+            x = x1 + np.sin(angles) / self.scale
+            y = x2 + 2.0 * np.sin(0.5 * angles) ** 2 / self.scale
+            ax.plot(x, y, color=LEVEL, linewidth=0.7, linestyle=(0, (4, 3)), zorder=1.5)
+            for j, number in enumerate(numbers):
+                dot = self.zoomed.satellite(np.array([x1, x2, alpha]), number)
+                ax.plot(*dot, "o", color=RAY_COLOURS[j % len(RAY_COLOURS)], markersize=4.5, zorder=4)
+
+    def draw_section(self, height: float, ax: Axes | None = None) -> Axes:
+        """Draw the section of the space at one ``height`` of the lowest satellite.
+
+        The section covers two cells and two spacings. Free configurations are white. For alpha in Z the solid is a bent
+        cylinder over the wall, x1 + sin(alpha) constant. In the coloured bands two satellites may be below the tops,
+        and two cylinders cross.
+
+        Parameters
+        ----------
+        height : float
+            Height of the lowest satellite relative to the tops, in units of the depth of the scaled wall, in (-1, 0).
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> space = ConfigurationSpace(geo.triangular_teeth(2.0), geo.Disk(), 0.01)
+        >>> space.draw_section(-0.5).get_images()[0].get_extent()
+        [0.0, 2.0, -1.0, 1.0]
+        """
+        height = number_between("height", height, -1.0, 0.0)
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.figure(layout="constrained").subplots()
+        width, rho = self.scale * self.wall.period, self.spacing
+        x1 = width * (np.arange(SECTION) + 0.5) / SECTION * 2.0
+        alpha = rho * (2.0 * (np.arange(SECTION) + 0.5) / SECTION - 1.0)
+        grid = np.stack(np.meshgrid(x1, alpha, indexing="xy"), axis=-1)
+        x2 = height * self.depth - 2.0 * np.sin(0.5 * self.charts.residual(grid[..., 1])) ** 2
+        free = self.contains(np.stack([grid[..., 0], x2, grid[..., 1]], axis=-1))
+        extent = (0.0, 2.0 * self.wall.period, -1.0, 1.0)
+        ax.imshow(np.where(free, 1.0, float(SOLID)), cmap="gray", vmin=0.0, vmax=1.0, origin="lower", extent=extent,
+                  aspect="auto", interpolation="nearest")  # fmt: skip
+        gap = self.gap_radius / rho
+        for middle in (-0.5, 0.5):
+            label = "two satellites can be low" if middle < 0.0 else None
+            ax.axhspan(middle - gap, middle + gap, color=RAY_COLOURS[4], alpha=0.25, linewidth=0, label=label)
+        ax.set_xlabel("x1 / eps")
+        ax.set_ylabel("alpha / rho")
+        return ax
 
 
 def _configurations(value: ArrayLike) -> Floats:

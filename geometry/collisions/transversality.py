@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +17,15 @@ from ..curves.curvature import largest_curvature
 from ..curves.segment import Segment
 from ..disk import rolling
 from ..disk.disk import Disk
+from ..plotting.walls import LEVEL, OUTLINE_TOLERANCE, RAY_COLOURS, SOLID
 from ..tracing.tracing import trace, trajectory
 from ..walls.wall import Wall
-from .configuration_space import ConfigurationSpace
+from .configuration_space import FLIGHT_POINTS, ConfigurationSpace
+from .paths import collision_path
 from .rigid import at_the_tops, checked_states
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Distance, in periods, of the polylines that stand for curved pieces; it is taken off every distance to them.
 FLATTENING = 1e-5
@@ -81,6 +87,9 @@ class Shadow:
 
     Attributes
     ----------
+    space : ConfigurationSpace
+    state : (array, array), shapes (2,) and (3,)
+        Position (x1, alpha) at x2 = 0 and incoming velocity.
     points : array, shape (k + 2, 2)
         The path of the contact: start, contacts, end.
     sines : array, shape (k,)
@@ -100,6 +109,8 @@ class Shadow:
         Why no bound is found; empty if one is.
     """
 
+    space: ConfigurationSpace
+    state: tuple[Floats, Floats]
     points: Floats
     sines: Floats
     radii: Floats
@@ -112,6 +123,75 @@ class Shadow:
     def is_licit(self) -> bool:
         """Whether the bounds show the same contacts of the true disk, on the same pieces, with one satellite."""
         return not self.reason
+
+    def draw(self, ax: Axes | None = None) -> Axes:
+        """Draw the contact's path on the cylinder with the radius of transversality, and the path of the true contact.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            By default the axes of a new figure.
+
+        Returns
+        -------
+        matplotlib Axes
+            Lengths are in units of the wall. Each flight on the cylinder has a band as wide as its radius on both
+            sides. Rings have the bounds of the distances of the contacts as radii. The true path is that of the
+            satellite that begins lowest.
+
+        Raises
+        ------
+        InputError
+            As in `collision_path`.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> space = geo.ConfigurationSpace(geo.triangular_teeth(1.2), geo.Disk(), scale=1e-9)
+        >>> geo.shadow(space, [0.2e-9, 0.0], [0.0, -1.0, 0.0]).draw().get_legend().get_texts()[0].get_text()
+        'on the cylinder'
+        """
+        space = self.space
+        path = collision_path(space.disk, space.wall, space.scale, *self.state, space.spacing) / space.scale
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.figure(layout="constrained").subplots()
+        wall = space.wall
+        # the hollow is drawn in the cell that begins at 0
+        shift = np.array([np.floor(self.points[-2, 0] / wall.period) * wall.period, 0.0])
+        points = self.points - shift + np.array(wall.origin)
+        left, right = np.floor(points[1:, 0].min() / wall.period), np.ceil(points[1:, 0].max() / wall.period)
+        cells = np.arange(left - 1, right + 1) * wall.period
+        line = wall.outline(OUTLINE_TOLERANCE * wall.period)[:-1]
+        outline = np.concatenate([line + np.array([cell, 0.0]) for cell in cells])
+        floor = wall.origin[1] - 1.4 * wall.depth - 0.05 * wall.period
+        ax.fill_between(outline[:, 0], outline[:, 1], floor, color=SOLID, linewidth=0, zorder=1.2)
+        ax.plot(outline[:, 0], outline[:, 1], color="black", linewidth=1.2, zorder=2)
+        for (first, last), radius in zip(pairwise(points), self.radii, strict=True):
+            along = (last - first) / max(float(np.hypot(*(last - first))), np.finfo(float).tiny)
+            side = radius * np.array([-along[1], along[0]])
+            corners = np.array([first + side, last + side, last - side, first - side])
+            ax.fill(*corners.T, color=RAY_COLOURS[0], alpha=0.15, linewidth=0, zorder=1.0)
+        ax.plot(*points.T, color=RAY_COLOURS[0], linewidth=1.2, zorder=3, label="on the cylinder")
+        number = -space.charts.nearest(path[0, 2] * space.scale)
+        fraction = np.linspace(0.0, 1.0, FLIGHT_POINTS)[:, np.newaxis]
+        legs = [space.zoomed.satellite(a + fraction * (b - a), number) for a, b in pairwise(path)]
+        ax.plot(*(np.concatenate(legs) - shift).T, color=RAY_COLOURS[2], linestyle="--", linewidth=1.4, zorder=3,
+                label="of the true disk")  # fmt: skip
+        turn = np.linspace(0.0, 2.0 * np.pi, 2 * FLIGHT_POINTS)
+        for point, reach in zip(points[1:-1], self.reaches, strict=True):
+            if np.isfinite(reach):
+                ring = point + reach * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+                ax.plot(*ring.T, color="black", linewidth=0.8, zorder=3)
+        ax.axhline(0.0, color=LEVEL, linewidth=0.8, linestyle=":")
+        ax.set_xlim(points[1:, 0].min() - 0.5 * wall.period, points[1:, 0].max() + 0.5 * wall.period)
+        ax.set_ylim(floor, wall.origin[1] + 0.6 * max(wall.depth, 0.5 * wall.period))
+        ax.set_aspect("equal")
+        ax.legend(loc="upper left", frameon=False)
+        ax.set_xlabel("x (length units of the wall)")
+        ax.set_ylabel("height above the tops")
+        return ax
 
 
 def shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayLike) -> Shadow:
@@ -163,8 +243,7 @@ def shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayLike) 
     instance("space", space, ConfigurationSpace, "geo.ConfigurationSpace(wall, disk, 1e-6)")
     one = (finite_array("position", position)[np.newaxis], finite_array("velocity", velocity)[np.newaxis])
     at, moving = checked_states(*one)
-    start = at_the_tops(space.wall, space.scale, at, moving)[0]
-    return _Pair(_Model(space), start, moving[0]).follow()
+    return _Pair(_Model(space), at[0], moving[0]).follow()
 
 
 def good_fraction(space: ConfigurationSpace, samples: int = 1000, rng: Rng = None) -> Estimate:
@@ -208,8 +287,7 @@ def good_fraction(space: ConfigurationSpace, samples: int = 1000, rng: Rng = Non
     side = np.sqrt(1.0 - upward**2)
     parts = np.stack([side * np.cos(turn), -np.maximum(upward, np.finfo(float).tiny), side * np.sin(turn)], axis=1)
     model, velocity = _Model(space), parts @ space.disk.frame
-    start = at_the_tops(space.wall, space.scale, position, velocity)
-    good = sum(_Pair(model, x, w).follow().is_licit for x, w in zip(start, velocity, strict=True))
+    good = sum(_Pair(model, x, w).follow().is_licit for x, w in zip(position, velocity, strict=True))
     return fraction_estimate(good / n, n, f"{n} states, 95 % of a binomial sample")
 
 
@@ -252,9 +330,11 @@ class _Model:
 class _Pair:
     """The bounds of one pair of collisions, from contact to contact."""
 
-    def __init__(self, model: _Model, start: Floats, velocity: Floats) -> None:
+    def __init__(self, model: _Model, position: Floats, velocity: Floats) -> None:
         self.space, self.wall, self.plane = model.space, model.wall, model.plane
+        self.state = position, velocity
         disk = self.space.disk
+        start = at_the_tops(self.space.wall, self.space.scale, position[np.newaxis], velocity[np.newaxis])[0]
         self.disk, self.scale = disk, self.space.scale
         self.w = velocity / math.sqrt(float(disk.inner(velocity, velocity)))
         self.rolled = float(disk.rolling_momentum(self.w))
@@ -314,7 +394,10 @@ class _Pair:
         except _Refused as why:
             reason = str(why)
         path, out = np.vstack([self.begin, self.points[1:]]), self.whole_velocity(self.directions[-1])
-        return Shadow(frozen(path), frozen(sines), frozen(radii), frozen(reaches), frozen(out), error, reason)
+        state = frozen(self.state[0]), frozen(self.state[1])
+        return Shadow(
+            self.space, state, frozen(path), frozen(sines), frozen(radii), frozen(reaches), frozen(out), error, reason
+        )
 
     def _bounds(self, on: list[int | None], sines: Floats, radii: Floats, reaches: Floats) -> float:
         """Fill the reaches and return the bound on the last velocity's difference."""

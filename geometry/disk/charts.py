@@ -182,47 +182,47 @@ class RollingCharts:
         entries = rolling.transfer_differential(self.residual(alpha), w, self.scale)
         return _matrix(entries, np.broadcast_shapes(x1.shape, w[0].shape))
 
+    @staticmethod
+    def plane_crossing(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
+        """Return (x1, alpha) at x2 = 0 on the line through a configuration along its velocity: Psi (eq. 4.66).
 
-def plane_crossing(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
-    """Return (x1, alpha) at x2 = 0 on the line through a configuration along its velocity: Psi (eq. 4.66).
+        Parameters
+        ----------
+        configuration : array_like, shape (..., 3)
+            (x1, x2, alpha).
+        velocity : array_like, shape (..., 3)
+            (v1, v2, omega) with v2 other than 0.
 
-    Parameters
-    ----------
-    configuration : array_like, shape (..., 3)
-        (x1, x2, alpha).
-    velocity : array_like, shape (..., 3)
-        (v1, v2, omega) with v2 other than 0.
+        Returns
+        -------
+        ndarray, shape (..., 2)
 
-    Returns
-    -------
-    ndarray, shape (..., 2)
+        Raises
+        ------
+        InputError
+            If a number is not finite, a shape is wrong or some v2 is 0.
 
-    Raises
-    ------
-    InputError
-        If a number is not finite, a shape is wrong or some v2 is 0.
+        Examples
+        --------
+        >>> RollingCharts.plane_crossing([1.0, 2.0, 3.0], [1.0, 4.0, 2.0]).tolist()
+        [0.5, 2.0]
+        """
+        return _join(rolling.project(*_split("configuration", configuration, 3), *_velocity(velocity)))
 
-    Examples
-    --------
-    >>> plane_crossing([1.0, 2.0, 3.0], [1.0, 4.0, 2.0]).tolist()
-    [0.5, 2.0]
-    """
-    return _join(rolling.project(*_split("configuration", configuration, 3), *_velocity(velocity)))
+    @staticmethod
+    def plane_crossing_differential(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
+        """Return the differential (..., 2, 6) of `plane_crossing` in (x1, x2, alpha, v1, v2, omega).
 
+        Arguments and errors are the same as for `plane_crossing`.
 
-def plane_crossing_differential(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
-    """Return the differential (..., 2, 6) of `plane_crossing` in (x1, x2, alpha, v1, v2, omega).
-
-    Arguments and errors are the same as for `plane_crossing`.
-
-    Examples
-    --------
-    >>> plane_crossing_differential([0.0, 2.0, 0.0], [1.0, 2.0, 0.0])[0].tolist()
-    [1.0, -0.5, 0.0, -1.0, 0.5, 0.0]
-    """
-    _, x2, _ = _split("configuration", configuration, 3)
-    w = _velocity(velocity)
-    return _matrix(rolling.project_differential(x2, *w), np.broadcast_shapes(x2.shape, w[0].shape))
+        Examples
+        --------
+        >>> RollingCharts.plane_crossing_differential([0.0, 2.0, 0.0], [1.0, 2.0, 0.0])[0].tolist()
+        [1.0, -0.5, 0.0, -1.0, 0.5, 0.0]
+        """
+        _, x2, _ = _split("configuration", configuration, 3)
+        w = _velocity(velocity)
+        return _matrix(rolling.project_differential(x2, *w), np.broadcast_shapes(x2.shape, w[0].shape))
 
 
 def _split(name: str, value: ArrayLike, size: int) -> tuple[Floats, ...]:

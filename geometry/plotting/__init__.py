@@ -1,1 +1,1 @@
-"""Plots of walls with rays, and of collisions of the disk."""
+"""Plots of walls with rays."""

@@ -45,8 +45,6 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
     if basis.is_partition:
         add_masses(total, basis, basis.index(incoming), basis.index(outgoing), weight)
         return
-    if basis.add_products(total, incoming, outgoing, weight):
-        return
     if isinstance(basis, Panels):
         (source, values), (target, images) = basis.local(incoming), basis.local(outgoing)
         add_blocks(total, basis, source, target, values, weight[:, None] * images)

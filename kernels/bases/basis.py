@@ -47,16 +47,6 @@ class Basis(ABC):
         return False
 
     @property
-    def local_part(self) -> Basis:
-        """The basis of those functions that vanish outside one interval between edges; by default the whole basis."""
-        return self
-
-    @property
-    def polynomials_besides(self) -> int:
-        """The number of polynomials in cos(theta) on the whole of (0, pi) that the basis adds to its local part."""
-        return 0
-
-    @property
     @abstractmethod
     def measure(self) -> AngularMeasure:
         """The measure in which the family is orthonormal."""
@@ -108,13 +98,6 @@ class Basis(ABC):
     def index(self, angle: ArrayLike) -> NDArray[np.int64]:
         """The index of the interval between edges that contains each angle."""
         return cell_among(self.edges, finite_array("angle", angle))
-
-    def add_products(self, total: Floats, incoming: Floats, outgoing: Floats, weight: Floats) -> bool:
-        """Add the sum of weight e_i(incoming) e_j(outgoing) to ``total``, or return False if the basis cannot.
-
-        `asperity.kernels.bases.assembly.add_products` then computes the sum from the values of the functions.
-        """
-        return False
 
     def magnitudes(self) -> tuple[Floats, Floats]:
         """Bounds of the root of the sum of e_i^2, and of sin(theta)^(1/2) times it, on each interval between edges.

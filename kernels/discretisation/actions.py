@@ -12,7 +12,6 @@ from ..expectations.angle_panels import NODES, AnglePanels
 from ..laws.law import DrivenLaw, Law
 from ..laws.structure import is_compound, lists_branches
 from ..matrices.matrix import KernelMatrix
-from ..walls.repeated_teeth import RepeatedTeethLaw
 from .method import Budget, MethodName, computed, rounding
 
 # Limit on the values of basis functions: one or two seconds of work.
@@ -56,7 +55,7 @@ def _has_too_many_breakpoints(law: Law) -> bool:
     Where breakpoints are dense, the rules of Gauss and Kronrod can agree by chance: for rectangular teeth the error was
     up to 14 times their difference.
     """
-    return isinstance(law, RepeatedTeethLaw) or (lists_branches(law) and law.breakpoints(FIRST_BREAKPOINTS)[1] > 0.0)
+    return lists_branches(law) and law.breakpoints(FIRST_BREAKPOINTS)[1] > 0.0
 
 
 def action_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:

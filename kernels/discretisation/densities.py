@@ -15,11 +15,13 @@ from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.directions import Directions
 from ..bases.intervals import bisected
+from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..laws.density import DensityLaw, cut_by_edges
 from ..laws.involution import InvolutionLaw, jumps_of_map
 from ..laws.law import Law
 from ..laws.least_resistance import LeastResistanceLaw
+from ..laws.phase_function import HenyeyGreensteinLaw
 from ..matrices.matrix import KernelMatrix
 from .method import Budget, MethodName, computed, rounding, until_converged
 
@@ -55,6 +57,20 @@ class HasDensity(Protocol):
     def resolution(self) -> float: ...
     @property
     def mirror_symmetric(self) -> bool | None: ...
+
+
+class Diagonal:
+    """Henyey-Greenstein scattering in Legendre polynomials, in which its matrix is diagonal."""
+
+    name: MethodName = "exact"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return isinstance(law, HenyeyGreensteinLaw) and isinstance(basis, Legendre)
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        diagonal = np.diag(cast(HenyeyGreensteinLaw, law).g ** np.arange(float(basis.size)))
+        how = "eigenvalues g^l of the polynomials of degree l, to rounding"
+        return computed(diagonal, basis, self.name, EPS * basis.size**0.5, how, "bound")
 
 
 class Densities:

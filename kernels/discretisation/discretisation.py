@@ -124,9 +124,8 @@ def discretise(
     A law of matrices, with Lambertian reflection and isometries, in `Bins` that refine the matrices' is exact (auto).
 
     For a composition the result is the Galerkin matrix of the product, not the product of Galerkin matrices, which
-    differs unless the basis is invariant. Compositions are first simplified by the algebra: isometries are moved
-    through mirror-symmetric laws, scatterings joined, mixtures multiplied out. They are then computed by isometries,
-    else by scatterings between isometries, else through adapted panels.
+    differs unless the basis is invariant. Mixtures in compositions are multiplied out first. Compositions are then
+    computed by isometries, else through adapted panels.
 
     Examples
     --------

@@ -14,10 +14,9 @@ from ..bases.displacement import Displacement
 from ..bases.measure import gauss_on_intervals
 from ..laws.branches import preimages
 from ..laws.law import Law
-from ..laws.structure import Rules, fold, has_chain, lists_branches
+from ..laws.structure import has_chain, lists_branches
 from ..matrices.matrix import KernelMatrix
-from ..walls.repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
-from .isometry_tables import add_mirrored_edges, bounded, table_matrix
+from .isometry_tables import bounded, table_matrix
 from .method import Budget, MethodName, rounding
 
 # A probability linear in cot(theta), times sin(theta), is a combination of sin and cos. A Gauss rule with m nodes has
@@ -56,24 +55,7 @@ class Isometries:
 def isometric_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:
     """The matrix of a law that lists its isometries, and a bound on its Frobenius error."""
     table = law.isometry_table()
-    if table is not None:
-        return table_matrix(table, basis)
-    teeth = fold(law, REPEATED_TEETH)
-    if teeth is not None:
-        symmetric, omitted = repeated_teeth_matrix(teeth[0], basis, exchanged=teeth[1])
-        displacement = Displacement(basis)
-        add_mirrored_edges(basis, displacement)
-        return symmetric, omitted + rounding(basis) + displacement.bound()
-    return branch_matrix(law, basis, tolerance)
-
-
-# The law of repeated teeth (or None), and whether it is in the other frame. It has exact integrals up to grazing.
-REPEATED_TEETH: Rules[tuple[RepeatedTeethLaw, bool] | None] = Rules(
-    lambda law: (law, False) if isinstance(law, RepeatedTeethLaw) else None,
-    lambda terms: None,
-    lambda parts: None,
-    lambda found: None if found is None else (found[0], not found[1]),
-)
+    return branch_matrix(law, basis, tolerance) if table is None else table_matrix(table, basis)
 
 
 def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Floats, float]:

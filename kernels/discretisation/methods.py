@@ -12,20 +12,18 @@ from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.mirror import mirror_refinement, reflection_matrix
 from ..laws.law import Law, retroreflection, specular
-from ..laws.structure import Rules, fold, has_chain
+from ..laws.structure import LONGEST_WORD, Rules, fold, has_chain, law_of, words_of
 from ..matrices.defects import SymmetryDefect
 from ..matrices.matrix import KernelMatrix
-from ..walls.simplification import LONGEST_WORD, law_of, words_of
 from .actions import Actions
 from .arcs import Arcs
-from .densities import Densities, LeastResistance, Maps
+from .densities import Densities, Diagonal, LeastResistance, Maps
 from .isometries import Isometries
 from .isometry_tables import IsometryTables
 from .method import Budget, Method, MethodName, Recipe
 from .products import Chain, Factor
 from .rays_or_conditionals import RaysOrConditionals
 from .sampled import MonteCarlo, Sobol
-from .scattering import Diagonal
 from .traced import Traced
 
 # Methods without rays, except the first. The docstring of `discretise` states the table in this order.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -19,12 +19,10 @@ from ..bases.panels import Panels
 from ..laws.involution import InvolutionLaw, jumps_of_map
 from ..laws.law import Law
 from ..laws.phase_function import HenyeyGreensteinLaw
-from ..laws.structure import lists_branches
+from ..laws.structure import law_of, lists_branches
 from ..matrices.matrix import KernelMatrix
-from ..walls.simplification import law_of
-from .isometries import Isometries, isometric_matrix
+from .isometries import Isometries
 from .method import Budget, MethodName, Recipe, computed, rounding
-from .scattering import degrees_used, is_scattered, local_values, scattered_matrix, split
 
 # Width and degree of the first panels; panels of width OSCILLATION / n resolve the n polynomials of a Legendre basis.
 WIDEST, DEGREE, OSCILLATION = np.pi / 12.0, 9, 8.0
@@ -46,8 +44,9 @@ PROBES, PROBED = (0.31 + 0.6180339887 * np.arange(24)) % 1.0, 2.0
 MARKED, PARTS = 0.9, 4
 # Panels for the question whether a factor needs rays, whose answer is the same on all panels.
 ANY_PANELS = Panels(np.array([0.0, np.pi]), DEGREE)
-# Henyey-Greenstein laws that need more polynomials than this are treated like any other density.
-HIGHEST_DEGREE = 4096
+# The sum over the polynomials of a Henyey-Greenstein law ends where g^l is below NEGLIGIBLE. Laws that need more
+# polynomials than HIGHEST_DEGREE are treated like any other density.
+NEGLIGIBLE, HIGHEST_DEGREE = 1e-17, 4096
 
 
 class Factor(Recipe, Protocol):
@@ -60,7 +59,7 @@ class Factor(Recipe, Protocol):
 
 
 class Chain:
-    """A chain of laws: by isometries, else by scatterings between isometries, else through panels.
+    """A chain of laws: by isometries, else through panels.
 
     The first of these matrices that meets the tolerance is returned, or else the most exact one. The method through
     panels requires that no part of the chain needs rays.
@@ -97,17 +96,7 @@ class Chain:
         if wanted != "quadrature" and all(map(lists_branches, self.laws)):
             yield lambda basis, budget: Isometries().matrix(law_of(self.laws), basis, budget)
         if wanted != "exact":
-            if is_scattered(self.laws):
-                yield self._scattered
             yield self._through_panels
-
-    def _scattered(self, basis: Basis, budget: Budget) -> KernelMatrix:
-        def isometric(laws: Sequence[Law], joint: Basis) -> tuple[Floats, float]:
-            return isometric_matrix(law_of(tuple(laws)), joint, budget.tolerance)
-
-        symmetric, error = scattered_matrix(self.laws, basis, isometric)
-        how = "eigenvalues of scatterings between isometries, to rounding, plus omitted breakpoints and polynomials"
-        return computed(symmetric, basis, "quadrature", error, how)
 
     def _through_panels(self, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error = product_matrix(self.factors, basis, budget)
@@ -254,13 +243,19 @@ def _terms(factor: Factor, panels: Panels, budget: Budget) -> list[tuple[float, 
 
 def _on_panels(factor: Factor, panels: Panels, budget: Budget) -> tuple[Floats, float]:
     law = factor.law
-    if isinstance(law, HenyeyGreensteinLaw) and degrees_used(law) <= HIGHEST_DEGREE:
-        polynomials = Legendre(degrees_used(law))
+    degrees = _degrees_used(law.g) if isinstance(law, HenyeyGreensteinLaw) else HIGHEST_DEGREE + 1
+    if isinstance(law, HenyeyGreensteinLaw) and degrees <= HIGHEST_DEGREE:
+        polynomials = Legendre(degrees)
         angle, mass = SINE.quadrature(panels.edges, _nodes(polynomials, panels))
         ends = local_values(panels, angle).T @ (mass[:, None] * polynomials.evaluate(angle))
         return np.asarray((ends * law.g ** np.arange(polynomials.n)) @ ends.T), 0.0
     matrix = factor.matrix("auto", panels, budget)
     return matrix.symmetric, float(matrix.error)
+
+
+def _degrees_used(g: float) -> int:
+    """The number of polynomials P_l with a factor g^l that is not negligible; 1 for g = 0."""
+    return 1 if abs(g) <= NEGLIGIBLE else 1 + int(np.ceil(np.log(NEGLIGIBLE) / np.log(abs(g))))
 
 
 def _nodes(basis: Basis, panels: Panels) -> int:
@@ -284,3 +279,33 @@ def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
     found[-1] = np.pi
     widest = min(WIDEST, OSCILLATION / basis.size) if basis.is_polynomial else WIDEST
     return split(found, widest)
+
+
+def split(edges: Floats, widest: float) -> Floats:
+    """The edges and equally spaced ones between them, so that neighbours are at most ``widest`` apart.
+
+    Examples
+    --------
+    >>> split(np.array([0.0, 1.0, 3.0]), 1.0).tolist()
+    [0.0, 1.0, 2.0, 3.0]
+    """
+    pieces = np.maximum(np.ceil(np.diff(edges) / widest), 1.0)
+    parts = [np.linspace(edges[k], edges[k + 1], int(n), endpoint=False) for k, n in enumerate(pieces)]
+    return np.append(np.concatenate(parts), edges[-1])
+
+
+def local_values(basis: Basis, angle: Floats) -> Any:
+    """Values of the functions of a basis, shape (angles, n), as a sparse matrix."""
+    from scipy.sparse import csr_array
+
+    rows = np.arange(angle.size)
+    if basis.is_partition:
+        cell = basis.index(angle)
+        return csr_array((basis.normalisation[cell], (rows, cell)), shape=(angle.size, basis.size))
+    if isinstance(basis, Panels):
+        panel, values = basis.local(angle)
+        width = basis.degree + 1
+        columns = panel[:, None] * width + np.arange(width)
+        owner = np.repeat(rows, width)
+        return csr_array((values.ravel(), (owner, columns.ravel())), shape=(angle.size, basis.size))
+    return csr_array(basis.evaluate(angle))

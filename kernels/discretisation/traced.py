@@ -14,7 +14,6 @@ from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
-from ..channels.grazing import GrazingIntegrals
 from ..expectations.angle_panels import NODES, NORMAL, NULL_RULES, AnglePanels
 from ..expectations.basis_means import means_of_basis
 from ..laws.law import Law
@@ -73,8 +72,6 @@ LEAST_CUT = 1e-7
 # to all products except those with the constant; the wanted ones get their fraction of it times a margin. On 37 walls,
 # the root mean square of the fraction of one product was a tenth.
 FEWEST_FUNCTIONS, SPREAD_MARGIN = 4, 1.5
-# Fraction of the tolerance for the angles near grazing of hollows with a channel.
-GRAZING_FRACTION = 0.5
 # Limit on the rounds that recompute conditional expectations in which a piece was missed.
 MOST_MENDINGS = 8
 
@@ -156,10 +153,6 @@ class _Integrator:
         self.sided = bool(np.any(np.abs(edges - 0.5 * np.pi) < 1e-12))
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
-        self.grazing = GrazingIntegrals.of(self.conditionals.wall, basis) if self.halved else None
-        self.of_grazing: tuple[Floats, float] = np.zeros((basis.size, basis.size)), 0.0
-        if self.grazing is not None:
-            edges = np.append(self.grazing.highest, edges[edges > self.grazing.highest])
         self.edges, self.mean_tolerance = edges, MEAN_FRACTION * FIRST_STAGE
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
 
@@ -195,7 +188,6 @@ class _Integrator:
 
     def _begin(self, tolerance: float) -> None:
         """Begin a stage: recompute the expectations on panels where their error is too large for its tolerance."""
-        self._integrate_grazing(tolerance)
         self._renew(tolerance, np.ones(len(self.panels.low), dtype=np.bool_))
 
     def _renew(self, tolerance: float, among: NDArray[np.bool_]) -> None:
@@ -217,16 +209,6 @@ class _Integrator:
             mask[chosen[first : first + step]] = True
             self._fill(self.panels, mask)
         self._recompute()
-
-    def _integrate_grazing(self, tolerance: float) -> None:
-        """Compute the integrals over the angles near grazing, if they are not on panels."""
-        if self.grazing is None:
-            return
-        flat = self.conditionals.flat_fraction
-        matrix, error = self.grazing.matrix(GRAZING_FRACTION * tolerance / (2.0 * (1.0 - flat)))
-        self.of_grazing = flat * self.grazing.flat + (1.0 - flat) * matrix, (1.0 - flat) * error
-        rays, segments = self.grazing.spent()
-        self.rays, self.segments = self.rays + rays, self.segments + segments
 
     def _meet(self, tolerance: float) -> None:
         """Divide panels until the error is below the tolerance, or no segments are left."""
@@ -277,9 +259,9 @@ class _Integrator:
 
     def _state(self) -> tuple[Floats, float, float, float]:
         """The matrix and its errors from the panels, from the expectations, and from the asymmetry."""
-        matrix = self.panels.total(self.basis) + self.of_grazing[0]
+        matrix = self.panels.total(self.basis)
         panels = self.panels.total_error(self.basis)
-        conditionals = self.panels.total_mean_error(self.basis) + self.of_grazing[1]
+        conditionals = self.panels.total_mean_error(self.basis)
         if self.halved:
             flip = reflection_matrix(self.basis)
             # the halves share no row of the matrix if each basis function lives on one side

@@ -20,8 +20,9 @@ from ..laws.law import Law, specular
 from .mirror_layout import THICKNESS, MirrorGroup, arranged, mirror_groups
 
 if TYPE_CHECKING:
-    from ...geometry import Trace, Wall
+    from ...geometry import Wall
     from ...geometry.curves.curve import Curve
+    from ...geometry.tracing.tracing import Trace
 
 # The ceiling falls by this angle times the root of the opening: the flux below it is a 32nd of the opening.
 CEILING = 0.25

@@ -26,6 +26,11 @@ class LambertianLaw(DensityLaw):
     def __init__(self) -> None:
         """Takes no arguments."""
 
+    @property
+    def is_lambertian(self) -> bool:
+        """Always True."""
+        return True
+
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """sin(theta')/2, in the shape to which the two arguments broadcast."""
         density = SINE.density(theta_out)

@@ -223,6 +223,11 @@ class Law(ABC):
         """
         return False
 
+    @property
+    def is_lambertian(self) -> bool:
+        """Whether the outgoing angle has the density sin(theta')/2 for every incoming angle."""
+        return False
+
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Increasing incoming angles in (0, pi) between which P~(theta, .) varies smoothly, about ``limit`` at most.
 
@@ -631,14 +636,18 @@ class Composition(Law):
     def of(first: Law, second: Law) -> Law:
         """The first law followed by the second, bilinear: ``0.6 * law @ other`` is 0.6 times the composition.
 
-        A combination whose weights sum to 1 remains one factor.
+        A combination whose weights sum to 1 remains one factor. Laws without effect are left out, see `simplified`.
         """
         for index, law in enumerate((first, second)):
             if isinstance(law, Combination) and not law.sums_to_one:
                 pairs = [(term, second) if index == 0 else (first, term) for _, term in law.terms]
                 weights = [weight for weight, _ in law.terms]
                 return Combination(tuple((w, Composition.of(*pair)) for w, pair in zip(weights, pairs, strict=True)))
-        return Composition((first, second))
+        chain = Composition((first, second))
+        laws = simplified(chain.laws)
+        if len(laws) < 2:
+            return laws[0] if laws else first
+        return chain if laws == chain.laws else Composition(laws)
 
     def adjoint(self) -> Law:
         """(P Q)* = Q* P*."""
@@ -664,6 +673,25 @@ class Composition(Law):
 
     def __repr__(self) -> str:
         return " @ ".join(as_factor(law) for law in self.laws)
+
+
+def simplified(laws: tuple[Law, ...]) -> tuple[Law, ...]:
+    """A chain without identities, and without the laws that have no effect beside a Lambertian law.
+
+    The reversible laws after it preserve its measure; of others this is not known.
+    """
+    laws = tuple(law for law in laws if not _is_identity(law))
+    last = max((k for k, law in enumerate(laws) if law.is_lambertian), default=None)
+    if last is None:
+        return laws
+    after = laws[last + 1 :]
+    return (laws[last], *after[next((k for k, law in enumerate(after) if not law.reversible), len(after)) :])
+
+
+def _is_identity(law: Law) -> bool:
+    if isinstance(law, SpecularFrame):
+        return law.law == specular()
+    return law == retroreflection()
 
 
 @dataclass(frozen=True, repr=False)
@@ -828,6 +856,10 @@ class SpecularFrame(Law):
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         probability, outgoing = self.law.branches(theta)
         return probability, mirrored_angle(outgoing)
+
+    @property
+    def is_lambertian(self) -> bool:
+        return self.law.is_lambertian
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return self.law.breakpoints(limit)

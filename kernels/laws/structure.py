@@ -1,4 +1,7 @@
-"""Recursion over compound laws: properties of sums, products and powers from those of their parts."""
+"""Recursion over compound laws: properties of sums, products and powers from those of their parts, and words.
+
+A word is a chain of laws in the order of application; the empty word is the identity.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,15 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from ...core.errors import InputError
-from .law import Combination, Composition, Law, Power, SpecularFrame
+from .law import Combination, Composition, Law, Power, SpecularFrame, retroreflection, simplified, specular
 
 Fact = TypeVar("Fact")
+Word = tuple[Law, ...]
+Sum = dict[Word, float]
+# Compositions of sums are multiplied out if the result has at most this many words.
+MOST_WORDS = 24
+# Limit on the laws of a word.
+LONGEST_WORD = 100
 # Breakpoint limit and incoming angle (in radians) of the test whether a law lists isometries.
 FEW_BREAKPOINTS, PROBE = 8, 1.0
 # Limit on the factors of a power whose facts are combined.
@@ -104,3 +113,61 @@ def _answers(law: Law) -> bool:
     except InputError:
         return False
     return math.isfinite(law.breakpoints(FEW_BREAKPOINTS)[1])
+
+
+def words_of(law: Law) -> Sum | None:
+    """The law as a weighted sum of words, in the paper's frame; None if there are more than `MOST_WORDS` words.
+
+    Also None if a word is longer than `LONGEST_WORD`.
+
+    Raises an InputError if a sum in the law has negative weights or weights that do not sum to 1.
+
+    Examples
+    --------
+    >>> from asperity.kernels import lambertian
+    >>> words_of((0.5 * lambertian() + 0.5 * specular()) ** 2)
+    {(lambertian(),): 0.75, (specular(), specular()): 0.25}
+    """
+    return fold(law, Rules(_word, _mixed, _multiplied, lambda words: _multiplied((words, _word(specular())))))
+
+
+def law_of(word: Word) -> Law:
+    """The word as one law; a law followed by specular reflection becomes a `SpecularFrame`, which has more methods."""
+    if not word:
+        return retroreflection()
+    if len(word) == 1:
+        return word[0]
+    if len(word) == 2 and word[1] == specular():
+        return SpecularFrame(word[0])
+    return Composition(word)
+
+
+def _word(law: Law) -> Sum | None:
+    # a wall's law in closed form, or as a table of isometries
+    return {simplified((law.exact_law or law,)): 1.0}
+
+
+def _mixed(terms: Sequence[tuple[float, Sum | None]]) -> Sum | None:
+    total: Sum = {}
+    for weight, words in terms:
+        if words is None:
+            return None
+        for word, fraction in words.items():
+            total[word] = total.get(word, 0.0) + weight * fraction
+    return total
+
+
+def _multiplied(parts: Sequence[Sum | None]) -> Sum | None:
+    total: Sum = {(): 1.0}
+    for words in parts:
+        if words is None:
+            return None
+        product: Sum = {}
+        for word, weight in total.items():
+            for other, fraction in words.items():
+                longer = simplified(word + other)
+                product[longer] = product.get(longer, 0.0) + weight * fraction
+        if len(product) > MOST_WORDS or max(map(len, product)) > LONGEST_WORD:
+            return None
+        total = product
+    return total

@@ -59,18 +59,10 @@ def sum_rule(count: Floats, nodes: int) -> tuple[Floats, Floats]:
 
 def first_crossing(basis: Basis) -> int:
     """The even number d up to which the periods of a crevice are listed one by one for this basis."""
-    stiffness = _stiffness(basis)
-    return max(FIRST_CROSSING, stiffness + stiffness % 2)
+    return max(FIRST_CROSSING, basis.size + basis.size % 2) if basis.is_polynomial else FIRST_CROSSING
 
 
-def _stiffness(basis: Basis) -> int:
-    """The number of basis functions that are polynomials in cos(theta) on all of (0, pi)."""
-    return basis.size if basis.is_polynomial else basis.polynomials_besides
-
-
-def crevice_nodes(
-    height_to_width: float, basis: Basis, times: int | None = None
-) -> tuple[Floats, Floats, Floats, float]:
+def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats, Floats, float]:
     r"""Nodes and weights for integrals over the law of a crevice, for theta < pi/2 beyond the first periods.
 
     Parameters
@@ -78,8 +70,6 @@ def crevice_nodes(
     height_to_width : float
         r, depth over width.
     basis : Basis
-    times : int, optional
-        If given, the probability (1 + (q - 1)^times) / 2 of this power of the law of rectangular teeth replaces q.
 
     Returns
     -------
@@ -93,8 +83,8 @@ def crevice_nodes(
     angles, extra_block, extra_half = _cells(basis)
     # the measure is sin(theta)^3 / (4 r) d d, for large d (2 r)^2 / d^3 / 2
     mean_from = max(np.cbrt(0.125 / NEGLIGIBLE * (4.0 * r) * r), 2.0 * begin)
-    # the antiderivative of a probability minus its mean is below 1/4 on half a period; for q it is below 1/8
-    omitted = min((0.25 if times is None else 0.5) * _density(np.array([mean_from]), r)[0], 1.0)
+    # the antiderivative of q minus its mean is below 1/8 on half a period
+    omitted = min(0.25 * _density(np.array([mean_from]), r)[0], 1.0)
     inside = angles[angles < np.arctan2(2.0 * r, begin)]
     crossing = 2.0 * r / np.tan(inside[inside > np.arctan2(2.0 * r, mean_from)])
     scale = np.arange(np.arcsinh(begin / (2.0 * r)), np.arcsinh(mean_from / (2.0 * r)), BLOCK)[1:]
@@ -103,7 +93,7 @@ def crevice_nodes(
     low, high = cuts[:-1], cuts[1:]
     first, last = np.ceil(0.5 * low), np.floor(0.5 * high)
     whole = last > first
-    half_nodes = HALF_NODES + extra_half + (times or 0) // 2
+    half_nodes = HALF_NODES + extra_half
     nodes = BLOCK_NODES + extra_block
     parts = [_periods(first[whole], last[whole], nodes, half_nodes)]
     # the partial periods at both ends of a block
@@ -117,26 +107,19 @@ def crevice_nodes(
     end = float(np.arctan2(2.0 * r, mean_from))
     edges = np.concatenate([[0.0], inside[inside < end], [end]])
     far, fraction = SINE.quadrature(np.unique(edges), max(basis.nodes_per_interval, nodes))
-    mean = 0.5
-    if times is not None:
-        retro, mean = 0.5 * (1.0 + (retro - 1.0) ** times), 0.5 * (1.0 + (-1.0) ** times / (times + 1.0))
     angle = np.concatenate([theta, far])
-    specular = np.concatenate([weight * (1.0 - retro), fraction * (1.0 - mean)])
-    return angle, specular, np.concatenate([weight * retro, fraction * mean]), float(omitted)
+    specular = np.concatenate([weight * (1.0 - retro), fraction * 0.5])
+    return angle, specular, np.concatenate([weight * retro, fraction * 0.5]), float(omitted)
 
 
 def _cells(basis: Basis) -> tuple[Floats, int, int]:
     """Angles below pi/2 at which blocks are cut, and the additional nodes for blocks and half periods."""
-    number = int(np.ceil(np.pi * _stiffness(basis) / WIDEST))
-    regular = np.linspace(0.0, np.pi, number + 1)[1 : (number + 1) // 2]
     if basis.is_polynomial:
-        return regular, MORE_BLOCK_NODES, MORE_HALF_NODES
-    both = np.unique(np.concatenate([regular, basis.edges, np.pi - basis.edges]))
+        number = int(np.ceil(np.pi * basis.size / WIDEST))
+        return np.linspace(0.0, np.pi, number + 1)[1 : (number + 1) // 2], MORE_BLOCK_NODES, MORE_HALF_NODES
+    both = np.unique(np.concatenate([basis.edges, np.pi - basis.edges]))
     cells = both[(both > 0.0) & (both < 0.5 * np.pi)]
-    first = basis.local_part
-    extra = first.degree if isinstance(first, Panels) else 0 if first.is_partition else first.nodes_per_interval
-    if number:
-        return cells, extra + MORE_BLOCK_NODES, extra + MORE_HALF_NODES
+    extra = basis.degree if isinstance(basis, Panels) else 0 if basis.is_partition else basis.nodes_per_interval
     return cells, extra + MORE_BLOCK_NODES if extra else 0, extra
 
 

@@ -26,7 +26,6 @@ from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
 from ..eigenvalues.spectra import Spectrum, check_reversible, matrix_spectrum
 from .contraction import refuse_unless_self_adjoint
 from .operator_residuals import Residuals, image_rule, residuals
-from .scattered import ScatteredSpectrum, scattered_spectrum, scattered_words
 from .separation import Separation, rest_of_spectrum
 from .trial_space import adapted_trial_space
 
@@ -161,8 +160,7 @@ def enclosures(
     ------
     InputError
         If the errors of conditional expectations are unknown: for compositions with laws whose expectations are
-        computed by quadrature, and laws given by entry points. Also if
-        the phase function of a scattering in a composition is too concentrated.
+        computed by quadrature, and laws given by entry points.
     AccuracyError
         If the law is not symmetric within its error. If the law is self-adjoint in the other convention only, the
         message states the norm bound that holds in this one.
@@ -197,14 +195,6 @@ def enclosures(
     matrix = finite_matrix(law, k + 1) if own is not None and own.size > 1 else None
     if matrix is not None:
         return _of_matrix(matrix_spectrum(matrix, k + 1), k, float(np.abs(matrix.beyond or ()).max()))
-    words = None if isinstance(law, DensityLaw) else scattered_words(law)
-    if words is not None:
-        if [len(word) for word in words] == [1]:
-            # a product of HG laws is one HG law
-            ((only,),) = words
-            return replace(enclosures(only, k, basis, tolerance), convention=law.frame)
-        if basis is None:
-            return _of_scattered(scattered_spectrum(law, words, k, tolerance), law.frame)
     power = as_power(law)
     if power is not None:
         return _raised(enclosures(power[0], k, basis, tolerance / power[1]), power[1])
@@ -345,26 +335,6 @@ def _of_matrix(found: Spectrum, k: int, beyond: float) -> Enclosures:
     radius = float(moduli[order[k]] + errors[order[k]]) if order.size > k else 0.0
     apart = Separation(radius, "bound", f"the next eigenvalue; {reason}")
     return Enclosures(_with_ties(items), apart, found.convention, f"eigenvalues of a matrix in {found.basis!r}")
-
-
-def _of_scattered(found: ScatteredSpectrum, convention: str) -> Enclosures:
-    """Enclosures from the eigenvalues of a matrix close to the law in norm."""
-    reason = f"the law is a matrix in {found.degrees} Legendre polynomials within {found.distance:.2g}"
-    if found.essential > 0.0:
-        reason += f", beyond them the essential spectrum of modulus {found.essential:.6g}"
-    items = [Enclosure(1.0, 1.0, 1.0, "indexed", 0, 0.0, found.kind, f"P 1 = 1; {reason}", found.parities[0])]
-    for position in range(1, len(found.values)):
-        value, certain = float(found.values[position]), found.certain[position]
-        label: Label = "indexed" if certain else "contains-spectrum"
-        why = reason if certain else f"not indexed: another value, or the essential spectrum, may be as large; {reason}"
-        low, high = value - found.distance, min(value + found.distance, 1.0)
-        index = position if certain else None
-        items.append(
-            Enclosure(value, low, high, label, index, found.distance, found.kind, why, found.parities[position])
-        )
-    items.sort(key=lambda item: (item.index != 0, -item.value))
-    apart = Separation(found.essential + found.distance, found.kind, reason)
-    return Enclosures(tuple(items), apart, convention, "eigenvalues of a matrix that the law is near to")
 
 
 def _first_that_separates(

@@ -21,9 +21,8 @@ from ...kernels.expectations.basis_means import Means, height_of, weighted_means
 from ...kernels.laws.density import GAUSS_NODES, split_panels
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic
-from ...kernels.laws.structure import Rules, fold, holds_of_all
+from ...kernels.laws.structure import Rules, fold, holds_of_all, law_of, words_of
 from ...kernels.walls.circular_arc import MOST_HITS
-from ...kernels.walls.simplification import law_of, words_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9

@@ -15,7 +15,6 @@ from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.matrix_law import not_a_law
 from ...kernels.laws.structure import holds_of_all
-from ...kernels.walls.repeated_teeth import RepeatedTeethLaw
 from ..essential.edge import grazing_symbol
 
 Arrangement = Literal["mirror", "half-turn"]
@@ -177,7 +176,7 @@ def _keeps_sines(law: Law) -> bool:
         wall = law.wall
         steps = [np.subtract(piece.end, piece.start) for loop in (wall.pieces, *wall.islands) for piece in loop]
         return wall.is_polygonal and all(np.count_nonzero(step) == 1 for step in steps)
-    return isinstance(law, (IsometryLaw, RectangularTeethLaw, RepeatedTeethLaw))
+    return isinstance(law, (IsometryLaw, RectangularTeethLaw))
 
 
 def _step(symbol: Floats, arrangement: Arrangement) -> Floats:

@@ -19,8 +19,7 @@ from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
 from ...kernels.expectations.basis_means import Means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Combination, IsometryLaw, is_atomic
-from ...kernels.laws.structure import has_chain
-from ...kernels.walls.simplification import law_of, words_of
+from ...kernels.laws.structure import has_chain, law_of, words_of
 from ..bounds.operator_residuals import image_rule
 from ..gap.shallow import ROUNDING, Slopes, slopes_of
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.checks import Rng, generator, positive_number
-from ...core.errors import AccuracyError, InputError
+from ...core.errors import AccuracyError
 from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
-from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
+from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
 from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.laws.structure import made_of_isometries
@@ -24,7 +24,7 @@ from ..eigenvalues.spectra import ONE_MATRIX, UNREFINED, Spectrum, matrix_spectr
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .methods import gap_of_power, law_eigenvalues
-from .refinement import EIGENVALUES, RAYS_FRACTION, Refinement, SharedMatrices, refined
+from .refinement import EIGENVALUES, RAYS_FRACTION, Refinement, refined
 from .shallow import shallow_gap
 from .theorems import gap_by_theorem, gap_of_exact, split_gap
 from .verdict import SpectralGap, isolated, made_from
@@ -35,28 +35,8 @@ ENCLOSED, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS = 3, 8, 1e-2, 2
 # Enclosures slightly wider than the tolerance are computed again with CLOSER times the tolerance. A gap whose error
 # exceeds the tolerance is accepted if its relative error is at most LARGEST_MISS.
 CLOSER, LARGEST_MISS = 0.25, 1e-3
-# From the tolerance ROUGH on, small sampled matrices are tried for traced walls: sizes with wanted errors, and rays.
-# Larger bases change the gap by at most BEYOND_CHANGE times the last change, if changes decrease like size^-0.6.
-ROUGH, GLANCES, FEW_RAYS, BEYOND_CHANGE = 2e-3, ((24, 1.0), (48, 0.1)), 2**17, 2.0
 # Number of eigenvalues computed to find the least one.
 MODULI = 3
-
-
-def rough_gap(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap | None:
-    """A rough gap of a traced wall, from small matrices sampled with few rays; enclosures take ten times as long.
-
-    None for other laws, for tolerances below `ROUGH`, and near the essential spectrum.
-    """
-    if tolerance < ROUGH or not law.expectations(ONE_PANEL).is_traced:
-        return None
-    for size, matrix_error in GLANCES:
-        found = matrix_spectrum(matrices(law, Legendre(size), FEW_RAYS, matrix_error), EIGENVALUES, margin=1.0)
-        error = found.gap_error + (BEYOND_CHANGE - 1.0) * float(found.gap_errors.discretisation[0])
-        how = f"algebraic + {BEYOND_CHANGE:.0f} x two-grid + {found.gap_errors.quantile:.3g} x sampling error"
-        gap = isolated(found, error, how, edge, law.frame) if error <= tolerance else None
-        if gap is not None:
-            return gap
-    return None
 
 
 def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
@@ -166,30 +146,7 @@ def spectral_gap(
     power = as_power(law)
     if power is not None:
         return _of_power(law, *power, tolerance, rng, seconds)
-    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng, seconds))
-
-
-def gaps_in_both_conventions(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> tuple[SpectralGap, SpectralGap]:
-    """The gaps of a mirror-symmetric law in the convention that it carries and in the other, from the same matrices.
-
-    Raises
-    ------
-    InputError
-        If the law is not known to be reversible and mirror-symmetric, hence self-adjoint in both conventions.
-
-    Examples
-    --------
-    >>> from asperity import kernels as ker
-    >>> [float(gap) for gap in gaps_in_both_conventions(0.5 * ker.specular() + 0.5 * ker.lambertian())]
-    [0.5, 0.5]
-    """
-    positive_number("tolerance", tolerance)
-    if not law.reversible or not law.mirror_symmetric:
-        raise InputError(f"law: expected a reversible and mirror-symmetric one, got {law!r}")
-    matrices = SharedMatrices(generator(rng, 0))
-    other = law.in_specular_frame()
-    first, second = (gap_by_theorem(each) or _by_refinement(each, tolerance, matrices) for each in (law, other))
-    return first, second
+    return gap_by_theorem(law) or _by_refinement(law, tolerance, rng, seconds)
 
 
 def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
@@ -279,17 +236,17 @@ def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generato
     )  # fmt: skip
 
 
-def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
+def _by_refinement(law: Law, tolerance: float, rng: np.random.Generator, seconds: float) -> SpectralGap:
     """The gap from the quadratic form of 1 - P for shallow walls, or from enclosures and matrices."""
     fraction, rest = without_identity(law)
     if fraction < 1.0:
-        own = SharedMatrices(matrices.rng, matrices.time_limit)
-        return _scaled(gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, own), fraction)
+        own = gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, rng, seconds)
+        return _scaled(own, fraction)
     edge = essential_edge(law)
     small = shallow_gap(law, edge)
     if small is not None and small.error <= tolerance:
         return small
-    found = _by_matrices(law, tolerance, matrices, edge).cut_at_zero()
+    found = _by_matrices(law, tolerance, rng, seconds, edge).cut_at_zero()
     if found.verdict == "isolated" and found.kind == "estimate":
         found = held_against_oscillations(law, found)
     return small if small is not None and small.error < found.error else found
@@ -304,17 +261,17 @@ def _scaled(found: SpectralGap, fraction: float) -> SpectralGap:
     return replace(found, value=value, error=error, evidence=(reason, *found.evidence), spectrum=None)
 
 
-def _by_matrices(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap:
+def _by_matrices(
+    law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge
+) -> SpectralGap:
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
-    found_at_once = rough_gap(law, tolerance, matrices, edge)
-    if found_at_once is None:
-        with suppress(OutOfTime), time_limited((1.0 - RAYS_FRACTION) * matrices.time_limit):
-            found_at_once = enclosed_gap(law, tolerance, edge)
-    if found_at_once is not None:
-        return found_at_once
-    steps = refined(law, tolerance, matrices, edge)
+    with suppress(OutOfTime), time_limited((1.0 - RAYS_FRACTION) * seconds):
+        enclosed = enclosed_gap(law, tolerance, edge)
+        if enclosed is not None:
+            return enclosed
+    steps = refined(law, tolerance, rng, seconds, edge)
     found, error = steps.finest, steps.error
     evidence = (*steps.evidence, *_lower_bound(law))
     gap = isolated(found, error, steps.how, edge, law.frame, evidence) if steps.converges else None

@@ -9,20 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ...core.long_runs import TIME_LIMIT, progress_bar
-from ...kernels import Basis, CircularArcLaw, KernelMatrix, Law, Legendre, Panels, discretise
-from ...kernels.bases.mirror import is_mirror_symmetric
-from ...kernels.laws.law import SpecularFrame
+from ...core.long_runs import progress_bar
+from ...kernels import Basis, Law, Legendre, discretise
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..essential.edge import EssentialEdge
 
 # Number of eigenvalues in the spectrum of a gap.
 EIGENVALUES = 4
 DEGREES = (12, 24, 48, 96)
-# Panels for one circular arc, whose matrices need no sampling: degree, and width of the smallest panel at grazing.
-ARC_PANELS = ((1, 1e-1), (2, 1e-2), (3, 1e-3), (4, 1e-3), (6, 1e-4))
-# Up to this half angle the eigenfunctions of arcs are close to Legendre polynomials.
-SHALLOW = 0.5
 FIRST_SAMPLES = 2**17
 # Fraction of the time limit for rays; the rest is for the enclosures that are tried before.
 RAYS_FRACTION = 0.5
@@ -30,8 +24,6 @@ RAYS_FRACTION = 0.5
 RAY_TIME, PRODUCT_TIME = 1e-6, 4e-10
 # Limits at an edge of the essential spectrum, where the edge itself is the result and more rays do not help.
 SAMPLES_AT_EDGE, DEGREE_AT_EDGE, TOLERANCE_AT_EDGE = 2**19, 24, 1e-4
-# Quadratures are abandoned if their error exceeds this many standard errors n^(-1/2) of n rays.
-POOR = 4.0
 # Fraction of the tolerance for the error of a matrix.
 MATRIX_FRACTION = 0.1
 FEWEST_LEVELS = 3
@@ -111,53 +103,23 @@ class Refinement:
         return "change by the last refinement + algebraic + matrix + 1.96 x sampling error"
 
 
-class SharedMatrices:
-    """Cache of the matrices of one law, shared by both conventions of a mirror-symmetric law."""
-
-    def __init__(self, rng: np.random.Generator, time_limit: float = TIME_LIMIT) -> None:
-        self.rng, self.time_limit = rng, time_limit
-        self._made: dict[tuple[Basis, int, float], KernelMatrix] = {}
-        self._by_rays = False
-
-    def __call__(self, law: Law, basis: Basis, samples: int, tolerance: float) -> KernelMatrix:
-        """The matrix of a law, from the matrix in the other convention if possible."""
-        if isinstance(law, SpecularFrame) and law.reversible and is_mirror_symmetric(basis):
-            return self(law.law, basis, samples, tolerance).in_specular_frame()
-        key = (basis, samples, tolerance)
-        if key not in self._made:
-            self._made[key] = self._better(law, basis, samples, tolerance)
-        return self._made[key]
-
-    def _better(self, law: Law, basis: Basis, samples: int, tolerance: float) -> KernelMatrix:
-        """The matrix by quadrature, unless its error exceeds the tolerance and the sampling error of an eigenvalue.
-
-        The Frobenius error bounds the error of an eigenvalue; the error from n rays is about n^(-1/2) in any basis.
-        """
-        if not self._by_rays:
-            found = discretise(law, basis, tolerance=tolerance, samples=samples, rng=self.rng)
-            poor = float(found.error) > max(tolerance, POOR / np.sqrt(samples))
-            if found.samples or not poor or not law.reversible:
-                return found
-            # quadrature would be no better on larger bases
-            self._by_rays = True
-        return discretise(law, basis, method="monte-carlo", tolerance=tolerance, samples=samples, rng=self.rng)
-
-
-def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> Refinement:
+def refined(law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge) -> Refinement:
     """Refine until the changes decrease and the error is below the tolerance, or the largest basis is reached."""
     with progress_bar(None, "basis", "gap") as bar:
-        return _refined(law, tolerance, matrices, edge, bar)
+        return _refined(law, tolerance, rng, seconds, edge, bar)
 
 
-def _refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge, bar: Any) -> Refinement:
+def _refined(
+    law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge, bar: Any
+) -> Refinement:
     """The refinement, whose last error the bar shows."""
     levels: list[Spectrum] = []
     evidence: list[str] = []
     steps = Refinement((), False, ())
     near_edge = edge.low > NEGLIGIBLE
-    for basis, samples in _steps(law, RAYS_FRACTION * matrices.time_limit):
+    for basis, samples in _steps(RAYS_FRACTION * seconds):
         wanted = max(MATRIX_FRACTION * tolerance, TOLERANCE_AT_EDGE if near_edge else 0.0)
-        matrix = matrices(law, basis, samples, wanted)
+        matrix = discretise(law, basis, tolerance=wanted, samples=samples, rng=rng)
         found = matrix_spectrum(matrix, EIGENVALUES, margin=1.0)
         levels.append(found)
         evidence.append(f"{basis!r}: gap {found.gap:.12g} +- {found.gap_error:.2g} ({matrix.method})")
@@ -180,14 +142,8 @@ def _refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essenti
     return steps
 
 
-def _steps(law: Law, seconds: float) -> Iterator[tuple[Basis, int]]:
+def _steps(seconds: float) -> Iterator[tuple[Basis, int]]:
     """Pairs of a basis and a number of rays, as many as some seconds allow."""
-    inner = law.law if isinstance(law, SpecularFrame) else law
-    inner = inner.closed_form or inner
-    if isinstance(inner, CircularArcLaw) and inner.half_angle > SHALLOW:
-        for degree, smallest in ARC_PANELS:
-            yield Panels.for_arc(inner.half_angle, degree, smallest), FIRST_SAMPLES
-        return
     samples = FIRST_SAMPLES
     for degree in DEGREES:
         of_ray = RAY_TIME + PRODUCT_TIME * degree**2

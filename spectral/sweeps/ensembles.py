@@ -273,7 +273,7 @@ def mean_law(
     KernelMatrix
         Its error is the 95 % quantile of the Frobenius distance from the expected matrix, by the spread of the
         realisations, plus the mean of their own errors. ``replicates`` are the matrices of the realisations, from
-        which `bootstrap_intervals` takes the errors of eigenvalues. Where realisations were refused it is the mean
+        which the errors of eigenvalues follow. Where realisations were refused it is the mean
         over the others, and ``law`` says of how many.
 
     Raises

@@ -31,6 +31,8 @@ from asperity.errors import InputError
 from asperity.estimates import student_95
 from asperity.kernels.bases.directions import Directions
 from asperity.kernels.sampling.sobol import PARTS
+from asperity.spectral.work_diagrams.machine import Machine
+from asperity.spectral.work_diagrams.report import WorkRow
 from commands import run
 
 RAYS = 2**12
@@ -39,9 +41,9 @@ RAYS = 2**12
 def run_report(rows, problem="teeth/law"):
     reference = spec.ReferenceValue(0.0, 1e-9, "by hand")
     methods = [spec.WorkMethod(name, float) for name in dict.fromkeys(row[0] for row in rows)]
-    report = spec.WorkReport.of(spec.WorkProblem(problem, reference), methods, spec.Machine.here())
+    report = spec.WorkReport.of(spec.WorkProblem(problem, reference), methods, Machine.here())
     for name, error, seconds in rows:
-        report = report.with_row(spec.WorkRow(name, 1, "done", {"absolute": error}, tuple(seconds)))
+        report = report.with_row(WorkRow(name, 1, "done", {"absolute": error}, tuple(seconds)))
     return BenchRun((report,))
 
 

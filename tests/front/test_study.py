@@ -167,7 +167,7 @@ def test_a_refused_gap_is_reported_and_the_rest_stands(monkeypatch, tmp_path):
     def refuse(*arguments, **keywords):
         raise AccuracyError("the counts speak against symmetry", 0.5)
 
-    for name in ("spectral_gap", "gaps_in_both_conventions", "spectrum", "enclosures"):
+    for name in ("spectral_gap", "spectrum", "enclosures"):
         monkeypatch.setattr(f"asperity.study.study.{name}", refuse)
     report = study_wall(geo.rectangular_teeth(1.0), bins=8)
     assert set(report.refusals) == {"gap", "specular_gap", "collision_gap", "spectrum", "enclosures"}

@@ -9,6 +9,8 @@ import pytest
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
 from asperity.estimates import Estimate
+from asperity.spectral.work_diagrams.machine import Machine
+from asperity.spectral.work_diagrams.report import WorkRow
 from asperity.spectral.work_diagrams.runs import measure
 
 EXACT = np.e - 1.0
@@ -102,9 +104,9 @@ def test_errors_below_the_reference_take_no_part_in_the_order():
 
 def synthetic_report(rows, auto="auto"):
     methods = [spec.WorkMethod(name, float) for name in dict.fromkeys(row[0] for row in rows)]
-    report = spec.WorkReport.of(problem(auto), methods, spec.Machine.here())
+    report = spec.WorkReport.of(problem(auto), methods, Machine.here())
     for name, budget, error, seconds in rows:
-        report = report.with_row(spec.WorkRow(name, budget, "done", {"absolute": error}, (seconds,)))
+        report = report.with_row(WorkRow(name, budget, "done", {"absolute": error}, (seconds,)))
     return report
 
 
@@ -140,9 +142,9 @@ def test_errors_that_must_be_known_are_those_that_methods_report():
         ("auto", 1e-3, 3.0, 1e-3),
     ]
     methods = [spec.WorkMethod(name, float) for name in ("auto", "silent", "modest", "good", "vain")]
-    report = spec.WorkReport.of(problem("auto"), methods, spec.Machine.here())
+    report = spec.WorkReport.of(problem("auto"), methods, Machine.here())
     for name, error, seconds, reported in rows:
-        report = report.with_row(spec.WorkRow(name, 1, "done", {"absolute": error}, (seconds,), reported))
+        report = report.with_row(WorkRow(name, 1, "done", {"absolute": error}, (seconds,), reported))
     assert report.choice() == pytest.approx(30.0)
     assert report.choice(known=True) == pytest.approx(1.5)
 
@@ -222,9 +224,9 @@ def test_a_file_of_another_problem_or_machine_is_refused(tmp_path):
 
 
 def test_the_machine_and_its_threads_are_named():
-    machine = spec.Machine.here(1)
+    machine = Machine.here(1)
     assert machine.threads == 1 and machine.processor and machine.versions["numpy"] == np.__version__
-    assert spec.Machine.of_dict(json.loads(json.dumps(machine.as_dict()))) == machine
+    assert Machine.of_dict(json.loads(json.dumps(machine.as_dict()))) == machine
     assert "1 thread" in str(machine)
 
 

@@ -153,7 +153,7 @@ DISKS = [
     (lambda: geo.RollingCharts(1.0), "2 pi divided by a whole number"),
     (lambda: geo.RollingCharts(2 * pi / 3), "at least 4"),
     (lambda: geo.RollingCharts(pi / 4, scale=0.0), "scale: expected a number greater than 0"),
-    (lambda: geo.plane_crossing([0, 1, 0], [1, 0, 1]), "v2 other than 0"),
+    (lambda: geo.RollingCharts.plane_crossing([0, 1, 0], [1, 0, 1]), "v2 other than 0"),
     (lambda: geo.RollingCharts(pi / 4).transfer([0, 0, 0], [1, 1, 1]), r"shape \(..., 2\)"),
     (lambda: geo.ConfigurationSpace(geo.koch(2), DISK, 5.0), "at most two satellites"),
     (lambda: geo.ConfigurationSpace(geo.flat(), None, 0.1), "disk: expected a Disk such as"),

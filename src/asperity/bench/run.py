@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from ..core.errors import FileExistsRefusal, InputError
 from ..core.files import moved_when_complete
 from ..core.tables import table
-from ..spectral import WorkReport, WorkRow
+from ..spectral import WorkReport
+from ..spectral.work_diagrams.report import WorkRow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,8 @@ from itertools import groupby
 from pathlib import Path
 
 from ..core.child import ChildCrashed, ChildProcess, OutOfTime
-from ..spectral import WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
+from ..spectral import WorkMethod, WorkProblem, WorkReport, work_precision
+from ..spectral.work_diagrams.report import WorkRow
 from .problems import measured, methods_of, prepare
 from .quantities.walls import scenes
 from .references import FINEST, known_reference, made_references

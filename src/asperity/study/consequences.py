@@ -10,7 +10,8 @@ from ..core.errors import AsperityError
 from ..core.estimates import Estimate, estimate_as_dict, finite, rounded
 from ..geometry import Wall
 from ..kernels import Law
-from ..spectral import Diffusivity, SpectralGap, Spectrum, diffusivity, mean_squared_slope
+from ..spectral import SpectralGap, Spectrum, diffusivity, mean_squared_slope
+from ..spectral.consequences.diffusion import Diffusivity
 from ..spectral.consequences.mixing import relaxation_time, slem_from_gap
 
 

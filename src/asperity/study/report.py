@@ -10,7 +10,8 @@ from ..core.estimates import Estimate, compact, estimate_as_dict, finite, rounde
 from ..core.version import __version__
 from ..geometry import Wall
 from ..kernels import KernelMatrix
-from ..spectral import Enclosures, SpectralGap
+from ..spectral import SpectralGap
+from ..spectral.bounds.enclosure import Enclosures
 from ..spectral.plotting import CONVENTIONS
 from .result import StudyResult, TracerCheck
 

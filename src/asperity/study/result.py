@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from ..core.estimates import NORMAL_95, Estimate
 from ..geometry import Disk, Wall
 from ..kernels import CollisionLaw, KernelMatrix
-from ..spectral import Enclosures, SpectralGap, Spectrum
+from ..spectral import SpectralGap, Spectrum
+from ..spectral.bounds.enclosure import Enclosures
 from .consequences import Consequences
 
 

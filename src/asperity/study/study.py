@@ -24,7 +24,8 @@ from ..geometry import Disk, Wall, trace
 from ..geometry.cells.miniature import wall_miniature
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
 from ..kernels.bases.measure import SINE
-from ..spectral import Enclosures, SpectralGap, Spectrum, enclosures, gaps_in_both_conventions, spectral_gap, spectrum
+from ..spectral import SpectralGap, Spectrum, enclosures, spectral_gap, spectrum
+from ..spectral.bounds.enclosure import Enclosures
 from ..spectral.gap.law_spectrum import with_gap
 from ..spectral.gap.methods import law_eigenvalues
 from .consequences import consequences_of
@@ -226,10 +227,7 @@ def _or_refusal(
 def _gaps(
     law: WallLaw, tolerance: float, rng: np.random.Generator, refusals: dict[str, str]
 ) -> tuple[SpectralGap | None, SpectralGap | None]:
-    """In the paper's convention and in Feres'; of a mirror-symmetric wall from one computation."""
-    if law.mirror_symmetric:
-        both = _or_refusal(lambda: gaps_in_both_conventions(law, tolerance, rng), refusals, "gap", "specular_gap")
-        return both or (None, None)
+    """In the paper's convention and in Feres'."""
     gap = _or_refusal(lambda: spectral_gap(law, tolerance, rng), refusals, "gap")
     specular = law.in_specular_frame()
     return gap, _or_refusal(lambda: spectral_gap(specular, tolerance, rng), refusals, "specular_gap")

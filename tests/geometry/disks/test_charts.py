@@ -124,10 +124,10 @@ def test_the_differential_of_the_transfer(charts):
 def test_the_differential_of_the_plane_crossing():
     c, w = configurations(CHARTS[0]), velocities()
     expected = complex_steps(rolling.project, [*c.T, *w.T])
-    np.testing.assert_allclose(geo.plane_crossing_differential(c, w), expected, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(geo.RollingCharts.plane_crossing_differential(c, w), expected, rtol=1e-12, atol=1e-15)
     # the line itself is collapsed: (w, 0) is in the null space
     along = np.concatenate([w, np.zeros_like(w)], axis=-1)
-    assert np.abs(np.einsum("nij,nj->ni", geo.plane_crossing_differential(c, w), along)).max() < 1e-13
+    assert np.abs(np.einsum("nij,nj->ni", geo.RollingCharts.plane_crossing_differential(c, w), along)).max() < 1e-13
 
 
 @IN_UNITS
@@ -138,7 +138,7 @@ def test_the_transfer_is_bending_followed_by_free_flight(charts):
     landed = bent - (bent[:, 1] / w[:, 1])[:, np.newaxis] * w
     found = charts.transfer(c[:, [0, 2]], w)
     np.testing.assert_allclose(found, landed[:, [0, 2]], rtol=1e-14, atol=1e-14 * np.abs(c).max())
-    np.testing.assert_allclose(geo.plane_crossing(bent, w), found, rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(geo.RollingCharts.plane_crossing(bent, w), found, rtol=1e-14, atol=1e-14)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-2, 1e-5, 1e-8])
@@ -253,7 +253,7 @@ def test_the_symbolic_charts_are_the_maps_that_arrays_go_through():
         (sym.bend, charts.bend(c)),
         (sym.straighten, charts.straighten(c)),
         (sym.contact, charts.contact(c)),
-        (sym.plane_crossing, geo.plane_crossing(c, w)),
+        (sym.plane_crossing, geo.RollingCharts.plane_crossing(c, w)),
         (sym.transfer, charts.transfer([x1, bar], w)),
     ]
     for expressions, found in pairs:
@@ -266,5 +266,5 @@ def test_arrays_broadcast():
     assert charts.roll(np.zeros((5, 1, 2)), np.zeros(4)).shape == (5, 4, 3)
     assert charts.transfer(np.zeros(2), np.ones((5, 3))).shape == (5, 2)
     assert charts.transfer_differential(np.zeros(2), np.ones((5, 3))).shape == (5, 2, 5)
-    assert geo.plane_crossing_differential(np.zeros((6, 1, 3)), np.ones((5, 3))).shape == (6, 5, 2, 6)
+    assert geo.RollingCharts.plane_crossing_differential(np.zeros((6, 1, 3)), np.ones((5, 3))).shape == (6, 5, 2, 6)
     assert charts.bend_differential(np.zeros(3)).shape == (3, 3)

@@ -193,7 +193,7 @@ def test_a_collision_with_the_flat_wall_is_a_reflection_at_the_normal():
     same = (found.contacts == 1) & (space.charts.nearest(place[:, 2]) == -lowest)
     assert same.mean() > 0.5
     np.testing.assert_allclose(found.velocity[same], reflected[same], rtol=0, atol=1e-12)
-    back = geo.plane_crossing(place[same], reflected[same])
+    back = geo.RollingCharts.plane_crossing(place[same], reflected[same])
     np.testing.assert_allclose(found.position[same], back, rtol=0, atol=1e-12)
 
 

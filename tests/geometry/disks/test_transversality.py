@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from asperity import geometry as geo
+from asperity.geometry.collisions.transversality import CollisionConstants
 
 DISKS = geo.Disk(1.0, 0.5), geo.Disk(2.0, 0.3)
 WALLS = {
@@ -123,9 +124,17 @@ def test_the_error_of_the_good_fraction_covers():
     assert 0.3 < reference.value < 0.99 and missed <= 5
 
 
+def test_the_first_flight_into_right_angled_teeth_has_its_radius():
+    space = geo.ConfigurationSpace(geo.triangular_teeth(math.pi / 2), geo.Disk(1.0, 1 / 3), 1e-9)
+    pair = geo.shadow(space, [0.2e-9, 0.0], [0.0, -1.0, 0.0])
+    assert pair.is_licit and 0.0 < pair.error < 1e-6 and len(pair.reaches) == len(pair.sines)
+    # the distance from the side of the tooth before
+    assert pair.radii[0] == pytest.approx(0.2, rel=1e-9)
+
+
 def test_the_constants_of_the_paper_are_larger_than_the_bounds():
     disk = geo.Disk(1.0, 1.0)
-    constants = geo.CollisionConstants.of(disk)
+    constants = CollisionConstants.of(disk)
     space = geo.ConfigurationSpace(WALLS["focusing"], disk, 1e-9)
     tested = 0
     for x, w in zip(*states(space, 60, 5), strict=True):
@@ -136,7 +145,7 @@ def test_the_constants_of_the_paper_are_larger_than_the_bounds():
             tested += 1
     assert tested > 5
     assert constants.state - constants.velocity == pytest.approx(3.4) and constants.state < 80.0
-    light = geo.CollisionConstants.of(geo.Disk(2.0, 0.5))
+    light = CollisionConstants.of(geo.Disk(2.0, 0.5))
     assert light.velocity / constants.velocity == pytest.approx(math.sqrt(2.5))
 
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from asperity import geometry as geo
 from asperity.geometry import Arc, Bezier, Segment, Wall
+from asperity.geometry.cells.hollow import Hollow
 from wall_shapes import CLOSED, OPEN, flask, over_floor, square
 
 pi = math.pi
@@ -36,9 +37,9 @@ def test_every_graph_of_a_function_is_a_wall(steps):
 
 
 def test_a_plate_of_zero_thickness_does_not_split_its_hollow():
-    assert CLOSED["plate along the top"]().hollows == (geo.Hollow(0.7, 1.0, 1, 5),)
+    assert CLOSED["plate along the top"]().hollows == (Hollow(0.7, 1.0, 1, 5),)
     mushroom = geo.mushrooms(0.25)
-    assert mushroom.hollows == (geo.Hollow(0.375, 0.625, 1, 4),)
+    assert mushroom.hollows == (Hollow(0.375, 0.625, 1, 4),)
     assert mushroom.vertices.tolist() == [[0, 0], [0.375, 0], [0, 0], [1, 0], [0.625, 0], [1, 0]]
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from asperity import geometry as geo
+from asperity.geometry.cells.hollow import Hollow
 
 EPS = np.finfo(float).eps
 pi = math.pi
@@ -36,7 +37,7 @@ def test_triangular_teeth_have_their_apex_angle(angle):
 @pytest.mark.parametrize("ratio", [1e-6, 1.0, 1e8])
 def test_rectangular_teeth_are_half_flat(ratio):
     wall = geo.rectangular_teeth(ratio)
-    assert wall.hollows == (geo.Hollow(0.5, 1.0, 1, 4),)
+    assert wall.hollows == (Hollow(0.5, 1.0, 1, 4),)
     assert wall.flat_top == 0.5 and wall.depth == ratio / 2
     assert wall.arc_length == pytest.approx(1.0 + ratio, rel=2 * EPS)
 
@@ -49,7 +50,7 @@ def test_focusing_arcs_subtend_their_angle(xi):
     assert arc.semi_axes[0] == pytest.approx(0.5 / math.sin(xi), rel=2 * EPS)
     assert wall.depth == pytest.approx(0.5 * math.tan(xi / 2), rel=8 * EPS)
     assert wall.arc_length == pytest.approx(xi / math.sin(xi), rel=4 * EPS)
-    assert wall.hollows == (geo.Hollow(0.0, 1.0, 0, 1),)
+    assert wall.hollows == (Hollow(0.0, 1.0, 0, 1),)
 
 
 @pytest.mark.parametrize("curvature", [1e-8, 1e-4, 1 / 3, 1.0, 2.0])

@@ -10,6 +10,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import WallError
 from asperity.geometry import Arc, Bezier, Segment
+from asperity.geometry.cells.hollow import Hollow
 from asperity.geometry.cells.origin import first_top, joined
 from asperity.geometry.tracing.tracing import entries
 
@@ -69,7 +70,7 @@ def test_a_cell_begins_at_a_top_that_no_plate_covers():
     # a plate along the level runs back over the joint at which the period begins
     wall = geo.Wall.from_vertices([(0, 0), (0.1, -0.5), (0.7, -0.5), (0.9, 0), (1.2, 0), (1, 0)])
     assert first_top(wall.vertices, 1.0) == 3
-    assert wall.hollows == (geo.Hollow(pytest.approx(1.2), pytest.approx(1.9), 1, 5),)
+    assert wall.hollows == (Hollow(pytest.approx(1.2), pytest.approx(1.9), 1, 5),)
     assert wall.flat_top == pytest.approx(0.3)
     over, beside = geo.trace(wall, [0.1, 0.5], 1.4), geo.trace(wall, 0.5, 1.4)
     assert over.theta[0] == pytest.approx(np.pi - 1.4) and over.collisions[0] == 1

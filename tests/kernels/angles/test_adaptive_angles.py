@@ -159,6 +159,25 @@ def test_near_grazing_in_channels_where_nodes_sample_noise_errors_still_hold(dep
         assert np.linalg.norm(matrix - exact.symmetric) <= error + float(exact.error)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("floor", [[(0.5, 0.2)], [(0.25, 0.15), (0.5, 0.05), (0.75, 0.15)]])
+def test_matrices_of_crevices_with_straight_floors_are_the_exact_ones(floor):
+    bottom = [(0.2 + 0.5 * x, -0.3 - depth) for x, depth in floor]
+    wall = geo.Wall.from_vertices([(0, 0), (0.2, 0), (0.2, -0.3), *bottom, (0.7, -0.3), (0.7, 0), (0.9, 0)])
+    exact = ker.discretise(ker.WallLaw(wall), ker.Legendre(4), tolerance=1e-9)
+    matrix, error, _ = traced_matrix(wall, ker.Legendre(4), Budget(2e-4))
+    distance = np.linalg.norm(matrix - exact.symmetric)
+    assert float(exact.error) < 2e-8
+    assert distance < error < 2e-4
+
+
+@pytest.mark.slow
+def test_the_resistance_of_mushrooms_has_the_error_that_it_reports():
+    # a reference to 1e-9, by rays that cross the stem up to 113 times
+    resistance = ker.resistance(ker.WallLaw(geo.mushrooms(0.3, 0.5)), 1e-4)
+    assert abs(float(resistance) - 1.059828846044) < resistance.error < 1e-4
+
+
 def test_null_rules_vanish_for_polynomials_and_have_the_size_of_the_difference() -> None:
     for number, rule in enumerate(NULL_RULES):
         degree = len(NODES) - 2 - number

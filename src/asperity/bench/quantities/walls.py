@@ -12,6 +12,7 @@ import numpy as np
 from ... import geometry as geo
 from ...core.checks import Floats
 from ...core.errors import InputError
+from ...geometry.curves.curve import Curve
 
 Point = tuple[float, float]
 
@@ -67,7 +68,7 @@ def random_wall(number: int) -> geo.Wall:
             continue
 
 
-def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> geo.Curve:
+def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> Curve:
     kind = int(rng.integers(0, 3)) if curved else 0
     if kind == 0:
         return geo.Segment(start, end)
