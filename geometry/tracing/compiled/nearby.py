@@ -7,10 +7,10 @@ itself contains no call.
 from __future__ import annotations
 
 import numpy as np
+from numba import carray  # type: ignore[attr-defined]
 
 from ...scene import columns as c
 from ...scene.boxes import BOXES, CONTENT
-from ...scene.compiled.records import array_of
 from ...scene.tolerances import NEARBY_SLACKS
 from ..double_double.arcs import refined_arcs
 from ..double_double.numbers import extended
@@ -37,10 +37,10 @@ def face_of(tables, kind, number, s):
     form = STRAIGHT
     # numba would compile a function for the operator `in`
     if kind == CIRCLE or kind == ELLIPSE:  # noqa: SIM109
-        arcs = tables.circles if kind == CIRCLE else tables.ellipses
-        form, arc = ARC, refined_arcs(array_of(arcs)[number : number + 1])[0]
+        row = tables.circles[number] if kind == CIRCLE else tables.ellipses[number]
+        form, arc = ARC, refined_arcs(carray(row, (1, c.ARC_COLUMNS)))[0]
     if kind == BEZIER:
-        form, curve = CURVE, array_of(tables.beziers)[number]
+        form, curve = CURVE, carray(tables.beziers[number], c.BEZIER_COLUMNS)
     return Face(form, number, arc, curve, extended(s))
 
 
@@ -51,7 +51,7 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
     At least one of the pieces is a curve.
     """
     return in_front_at(
-        array_of(tables.joints),
+        tables.joints,
         face_of(tables, hit.kind, hit.number, hit.s),
         face_of(tables, own.kind, own.number, own.s),
         extended(px), extended(py), vx, vy, Arrival(own.flown, slack, slack),
@@ -62,7 +62,7 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
 def line_starts_in_front(tables, line, own, px, py, vx, vy, slack):
     """-> bool: `starts_in_front` for a ray that left a line, and another line."""
     arrival = Arrival(own.flown, slack, slack)
-    return line_in_front_of_line(array_of(tables.joints), line, own.number, extended(px), extended(py), vx, vy, arrival)
+    return line_in_front_of_line(tables.joints, line, own.number, extended(px), extended(py), vx, vy, arrival)
 
 
 @linked

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from llvmlite import ir
-from numba import typeof, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
@@ -22,9 +22,8 @@ from ....core.compilation import is_stored
 Result = TypeVar("Result")
 
 
-def address_of(function: Any, arguments: tuple[Any, ...]) -> int:
-    """Return the address of a function compiled for the types of ``arguments``; compile or load it if necessary."""
-    kinds = tuple(typeof(argument) for argument in arguments)
+def address_of(function: Any, *kinds: Any) -> int:
+    """Return the address of a function compiled for arguments of some types; compile or load it if necessary."""
     function.compile(kinds)
     version = function.overloads[kinds]
     return int(version.library.get_pointer_to_function(version.fndesc.llvm_func_name))
@@ -42,8 +41,8 @@ class Late:
 
     failures: ClassVar[list[BaseException]] = []
 
-    def __init__(self, function: Any, arguments: tuple[Any, ...]) -> None:
-        self._function, self._arguments = function, arguments
+    def __init__(self, function: Any, *kinds: Any) -> None:
+        self._function, self._kinds = function, kinds
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64)(self.load)
         self._words = np.array([0, ctypes.cast(self._callback, ctypes.c_void_p).value], np.int64)
         self._uses, self._stored = 0, False
@@ -62,7 +61,7 @@ class Late:
     def load(self) -> int:
         """Compile or load the function now; return its address, 0 if that failed."""
         try:
-            self._words[0] = address_of(self._function, self._arguments)
+            self._words[0] = address_of(self._function, *self._kinds)
         except BaseException as reason:
             self.failures.append(reason)
         return int(self._words[0])
@@ -115,14 +114,16 @@ def call_at(context, address, result, arguments):
 
 @intrinsic
 def is_raised(context, flag):
-    """Whether the first number of an array of integers is not 0, read from memory at every call.
+    """Whether the first number of an array of integers, or at a pointer, is not 0, read from memory at every call.
 
     The compiler would move an ordinary read out of a loop that does not write to the array.
     """
 
     def read(context, builder, signature, arguments):
-        array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        number = builder.load_atomic(array.data, "monotonic", 8)
+        [data] = arguments
+        if isinstance(flag, types.Array):
+            data = context.make_array(flag)(context, builder, data).data
+        number = builder.load_atomic(data, "monotonic", 8)
         return builder.icmp_signed("!=", number, number.type(0))
 
     return types.boolean(flag), read
