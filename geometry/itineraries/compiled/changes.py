@@ -9,7 +9,6 @@ The constants of one angle are in a `Task`, the samples in a `Chain`.
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +22,8 @@ from ...scene.compiled.tables import ROW, Table, named, reader_of
 from ...scene.scene import Scene
 from ...scene.structs import Struct
 from ...tracing.compiled.options import inlined, inner, linked
-from ...tracing.compiled.pointers import address_of, call_at
-from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, trace_rays_address
+from ...tracing.compiled.pointers import Late, call_late
+from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, TRACE
 from ...tracing.compiled.records import Rays, details_for, results_for
 
 # Start integers as np.int64(0): a literal 0 has its own type in numba, and each function that receives it would be
@@ -65,8 +64,8 @@ class Limits(NamedTuple):
 class Tracer(NamedTuple):
     """What `trace_block` needs: addresses, and the arrays for a block of rays, of the same incoming angle.
 
-    The addresses are those of `trace_rays` and `halve_gaps`, of the `Rays`, the tables of the wall, the details, and
-    the slots of late functions. ``spent``, with one entry, counts ray segments.
+    The addresses are those of the slots of `trace_rays` and `halve_gaps`, and of the `Rays`, the tables, details and
+    `SLOTS`. ``spent``, with one entry, counts ray segments.
     """
 
     trace: int
@@ -124,7 +123,7 @@ def setting_of(scene: Scene, hollow: int, limits: Limits, degree: int, edges: Fl
     results, details = results_for(BLOCK), details_for(BLOCK, BLOCK)
     rays, (exits, _, _, status) = Struct(Rays(entries, angles, *results, np.zeros(1, np.int64))), results
     arrays = entries, angles, exits, status, *details.values[:3], np.zeros(1, np.int64)
-    tracer = Tracer(trace_rays_address(), _halve_address(), rays, scene.tables, details, SLOTS, *arrays)
+    tracer = Tracer(TRACE.slot, HALVE.slot, rays, scene.tables, details, SLOTS, *arrays)
     edges, sizes = (np.require(values, np.float64, ["C", "A", "W"]) for values in (edges, sizes))
     return Struct(Setting(scene.tables.values.hollows[hollow], limits, degree, len(edges), edges, sizes, tracer))
 
@@ -148,7 +147,7 @@ def trace_block(count, setting):
     """Trace the first rays, at most `BLOCK`, of the tracer."""
     tracer = setting.tracer
     arguments = count, tracer.rays, tracer.tables, setting.limits.collisions, tracer.details, tracer.slots
-    call_at(tracer.trace, None, arguments)
+    call_late(tracer.trace, None, arguments)
 
 
 @inlined
@@ -326,15 +325,13 @@ TASK, CHAIN = named(Task, SETTING, types.float64), named(Chain, ROW, ROW, LABELS
 setting_at = reader_of(SETTING)
 
 
-@cache
-def _halve_address() -> int:
-    return address_of(halve_gaps, TASK, CHAIN, types.int64, types.int64, types.float64, types.int64)
+HALVE = Late(halve_gaps, TASK, CHAIN, types.int64, types.int64, types.float64, types.int64)
 
 
 @inlined
 def halved(task, chain, count, gap_count, goal, most):
     """`halve_gaps`, called by its address."""
-    return call_at(task.setting.tracer.halve, count, (task, chain, count, gap_count, goal, most))
+    return call_late(task.setting.tracer.halve, count, (task, chain, count, gap_count, goal, most))
 
 
 @linked

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ...scene import columns as c
 from .options import compiled, inlined, inner
-from .pointers import Late, address_at, call_at
+from .pointers import Late, call_late
 from .rays import TABLES, TOP_CORNER, last_hollow, opening_at, tables_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 from .waves import cross_simple
@@ -191,30 +191,24 @@ def cross(form, entry, angle, hits, room, crossings):
     """Reflect rays by one hollow with a closed form; ``room`` is work space."""
     count = entry.shape[0]
     wedge, arc, _ = crossings
-    address = address_at(wedge if form[c.FORM] == c.WEDGE else arc)
     first, second = room.numbers[0, :count], room.numbers[1, :count]
-    if address == 0:
-        for j in range(count):
-            hits[j] = 0.0
-    elif form[c.FORM] == c.WEDGE:
-        call_at(address, None, (form, entry, angle, hits, first, second, room.numbers[2, :count]))
+    if form[c.FORM] == c.WEDGE:
+        call_late(wedge, None, (form, entry, angle, hits, first, second, room.numbers[2, :count]))
     else:
-        call_at(address, None, (form, entry, angle, hits, first, second))
+        call_late(arc, None, (form, entry, angle, hits, first, second))
 
 
 @inlined
 def cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings):
     """Reflect rays by hollow number h: by its closed form if it has one, else in waves."""
+    _, _, simple = crossings
     if closed.shape[0] > 0 and closed[h, c.FORM] != c.NO_FORM:
         cross(closed[h], entry, angle, hits, room, crossings)
-        return
-    _, _, simple = crossings
-    address = address_at(simple) if simple != 0 else 0
-    if address == 0:
+    elif simple != 0:
+        call_late(simple, None, (tables, h, limit, entry, angle, hits, room.waves, room.lists))
+    else:
         for j in range(entry.shape[0]):
             hits[j] = 0.0
-    else:
-        call_at(address, None, (tables, h, limit, entry, angle, hits, room.waves, room.lists))
 
 
 @inlined

@@ -12,7 +12,6 @@ stable, and no epsilon decides which piece is hit:
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -49,7 +48,7 @@ from .pieces import (
     on_arc_after,
     opening_met,
 )
-from .pointers import Late, address_at, address_of, call_at, checked, is_raised
+from .pointers import Late, call_late, checked, is_raised
 from .records import (
     BEZIER,
     CIRCLE,
@@ -162,12 +161,9 @@ def nearest_curve(scope, own, px, py, vx, vy):
             time, kind, number = t, of_kind, k
     first, end = scope.beziers
     if first < end:
-        address = address_at(scope.slots.bezier)
-        if address == 0:
-            return Hit(0.0, BEZIER, first, 0.0, DOUBTFUL), np.inf, False
         own_number = own.number if own.kind == BEZIER else -1
         arguments = tables, first, end, own_number, own.s, px, py, vx, vy, slack, time
-        t, k, s, touch, near_s = call_at(address, NO_BEZIER_HIT, arguments)
+        t, k, s, touch, near_s = call_late(scope.slots.bezier, NO_BEZIER_HIT, arguments)
         contact = min(contact, touch)
         if k >= 0:
             time, kind, number, hit_s = t, BEZIER, k, s
@@ -180,12 +176,9 @@ def nearest_piece(scope, own, px, py, vx, vy):
     """-> (Hit, corner): the first hit on a piece, and the time to the first corner within the slack of the ray."""
     hit, contact, nearby = nearest_curve(scope, own, px, py, vx, vy)
     if scope.has_tree:
-        address = address_at(scope.slots.boxes)
-        if address == 0:
-            return Hit(0.0, NO_PIECE, -1, 0.0, DOUBTFUL), np.inf
         tree = Tree(scope.tables, scope.hollow, scope.slack)
         arguments = tree, own.number if own.kind == LINE else -1, own.bounces, px, py, vx, vy, hit.time
-        t, line, fraction, corner, near = call_at(address, NO_LINE_HIT, arguments)
+        t, line, fraction, corner, near = call_late(scope.slots.boxes, NO_LINE_HIT, arguments)
     else:
         t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
     if t < hit.time:
@@ -194,10 +187,7 @@ def nearest_piece(scope, own, px, py, vx, vy):
         # of no piece in particular
         hit = Hit(min(contact, hit.time), BEZIER, -1, 0.0, 1)
     if nearby or near:
-        address = address_at(scope.slots.nearby)
-        if address == 0:
-            return Hit(hit.time, hit.kind, hit.number, hit.s, DOUBTFUL), corner
-        close_by = call_at(address, hit, (scope, own, px, py, vx, vy))
+        close_by = call_late(scope.slots.nearby, hit, (scope, own, px, py, vx, vy))
         if close_by.time < hit.time:
             hit = close_by
     return hit, corner
@@ -387,11 +377,8 @@ def trace_ray(scope, entry, theta, limit, labelled, with_path, path):
         if not with_path:
             hits = np.int64(0)
             if may_run(scope.tables, hit, own, px, py, vx, vy):
-                address = address_at(scope.slots.run)
-                if address == 0:
-                    return shift + px, vx, vy, bounces, CORNER, label, steps
                 arguments = scope, hit, own, px, py, vx, vy, limit - bounces - 1
-                px, py, vx, vy, hits = call_at(address, NO_RUN, arguments)
+                px, py, vx, vy, hits = call_late(scope.slots.run, NO_RUN, arguments)
                 bounces += hits
                 # no segment of a run passes a piece from behind
                 flown = 0.0 if hits > 0 else flown
@@ -472,12 +459,8 @@ def _late_functions() -> tuple[Late, ...]:
 
 TABLES, NO_SLOTS = kind_of(NO_TABLES.values), Slots(0, 0, 0, 0, 0, 0)
 LATE = _late_functions()
+# For functions that are compiled apart from `trace_rays`.
+TRACE = Late(trace_rays, *[types.int64] * 6)
 SLOTS = Struct(Slots(*(function.slot for function in LATE)))
 tables_at, slots_at = reader_of(TABLES), reader_of(kind_of(NO_SLOTS))
 rays_at, details_at = reader_of(kind_of(NO_RAYS)), reader_of(kind_of(NO_DETAILS.values))
-
-
-@cache
-def trace_rays_address() -> int:
-    """Return the address of `trace_rays`, for all walls, with or without velocities and itineraries."""
-    return address_of(trace_rays, *[types.int64] * 6)
