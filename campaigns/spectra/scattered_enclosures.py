@@ -22,6 +22,7 @@ from asperity import spectral as spec
 from asperity.core.checks import Floats
 from asperity.errors import InputError
 from asperity.estimates import Estimate
+from asperity.kernels.expectations.conditionals import Conditionals
 from asperity.spectral.bounds.enclosure import Enclosure
 from campaigns.engine import Campaign, Judged
 
@@ -57,10 +58,10 @@ class FewDirections(ker.Law):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.law.sample(theta, rng)
 
-    def _apply(self, function, theta):  # type: ignore[no-untyped-def]
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         out = np.pi * (np.arange(self.directions) + 0.5) / self.directions
-        weight = self.law.density(theta[..., None], out)
-        return np.tensordot(weight / weight.sum(axis=-1, keepdims=True), function(out), axes=1)
+        weight = self.law.density(theta[:, None], out)
+        return Conditionals.of_atoms(np.broadcast_to(out, weight.shape), weight / weight.sum(axis=1)[:, None], np.nan)
 
 
 def draw_diagonal(number: int) -> Case:

@@ -11,7 +11,7 @@ from ...core.checks import Floats, finite_number, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ..bases.measure import gauss_rule
-from ..laws.law import Law
+from ..laws.law import Law, is_atomic
 
 # Equal panels over the lit half of the rim, besides those at breakpoints of the law, and Gauss nodes on each. The finer
 # rule halves every panel.
@@ -91,11 +91,12 @@ def spin_force(law: Law, spin: float, radius: float = 1.0) -> SpinForce:
     if not isinstance(law, Law) or law.frame != "paper":
         raise InputError(f"law: expected one in the paper's convention, got {law!r}")
     rate, size = finite_number("spin", spin), positive_number("radius", radius)
-    breakpoints, left_out = law.breakpoints(BREAKPOINTS if law.exact_apply else FEW_BREAKPOINTS)
+    exact = is_atomic(law)
+    breakpoints, left_out = law.breakpoints(BREAKPOINTS if exact else FEW_BREAKPOINTS)
     edges = _edges(breakpoints, rate)
     finer = np.sort(np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))))
     coarse, fine = _forces(law, rate, edges), _forces(law, rate, finer)
-    rounding = (1e-13 if law.exact_apply else TRACED) * (2.0 + abs(rate))
+    rounding = (1e-13 if exact else TRACED) * (2.0 + abs(rate))
     errors = SAFETY * np.abs(fine.reshape(3, -1, 2).sum(axis=2) - coarse).sum(axis=1) + rounding
     if math.isfinite(left_out):
         errors = errors + _grazing(left_out, rate, finer)

@@ -26,8 +26,8 @@ NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
 # Breakpoints that accumulate at grazing are listed until the omitted fraction is negligible or their use would take
 # more than about a second.
 FEWEST_BREAKPOINTS, BREAKPOINT_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
-# Limit on nodes times branches in memory at a time.
-CHUNK = 2**22
+# Limit on nodes times branches in memory at a time, and angles at which branches are counted.
+CHUNK, PROBES = 2**22, np.linspace(0.1, 3.0, 30)
 
 
 class Branching(Protocol):
@@ -35,8 +35,6 @@ class Branching(Protocol):
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
     def breakpoints(self, limit: int) -> tuple[Floats, float]: ...
-    @property
-    def evaluations(self) -> int: ...
 
 
 class Isometries:
@@ -71,7 +69,8 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     worst = 2.0 * largest_square_sum(basis)
     limit = FEWEST_BREAKPOINTS
     breakpoints, omitted = law.breakpoints(limit)
-    most = BREAKPOINT_WORK // law.evaluations**2
+    branches = law.branches(PROBES)[0].shape[-1]
+    most = BREAKPOINT_WORK // branches**2
     if not basis.is_partition:
         most = min(most, FUNCTION_WORK // basis.size)
     while omitted * worst > tolerance and 2 * limit <= most:
@@ -91,8 +90,8 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
         tame = width * basis.nodes_per_interval < np.diff(basis.edges).min()
         narrow, order_narrow = narrow & tame, NODES_NARROW + 2
     for chosen, nodes in ((narrow, order_narrow), (~narrow, order)):
-        _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], nodes, total)
-    for middle in np.array_split(0.5 * (edges[1:] + edges[:-1]), 1 + edges.size * law.evaluations // CHUNK):
+        _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], nodes, total, CHUNK // (nodes * branches))
+    for middle in np.array_split(0.5 * (edges[1:] + edges[:-1]), 1 + edges.size * branches // CHUNK):
         _add_cuts(law, basis, middle, displacement)
     return total, omitted * worst + rounding(basis) + displacement.bound()
 
@@ -105,9 +104,11 @@ def _add_cuts(law: Branching, basis: Basis, middle: Floats, displacement: Displa
         displacement.add(middle, image, density * probability[:, slot], source, basis.index(image))
 
 
-def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:
+def _add_pieces(
+    law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats, pieces: int
+) -> None:
     # Large steps, because every step adds whole matrices.
-    step = max(CHUNK // (order * law.evaluations), 1)
+    step = max(pieces, 1)
     for start in range(0, low.size, step):
         angle, weight = gauss_on_intervals(low[start : start + step], high[start : start + step], order)
         _add_nodes(law, basis, angle, weight, total)

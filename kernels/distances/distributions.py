@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...core.checks import Floats
-from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..discretisation.discretisation import discretise
+from ..expectations.conditionals import Conditionals
 from ..laws.distribution import Distribution
 from ..laws.law import ENTRY_POINTS, Combination, Composition, Law, Power, SpecularFrame, atoms_of
 from ..matrices.matrix import KernelMatrix
@@ -107,8 +107,8 @@ class _HalfOfEntries(Law):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.law.sample(theta, rng)
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        return self.law.apply(function, theta)
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        return self.law._conditionals(theta, tolerance, degree, edges)
 
 
 @dataclass(frozen=True, repr=False)

@@ -5,17 +5,21 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ..bases.basis import AngleFunction, Basis
+from ..bases.basis import Basis
 from ..bases.measure import gauss_rule
 from ..bases.mirror import reflection_matrix
 from ..bases.panels import Panels
 
+# Incoming angle and tolerance at which a law is asked whether its errors are known.
+PROBE, PROBE_TOLERANCE = np.array([1.0]), 1e-2
+# Incoming angles at a time.
+ANGLES_AT_ONCE = 512
 # Limit on the values of functions in memory at a time.
 VALUES_AT_ONCE = 2_000_000
 # Angles on an interval at which the largest absolute value of functions is sought.
@@ -71,21 +75,31 @@ class Expectations(ABC):
 
 
 @dataclass(frozen=True)
-class ByApply(Expectations):
-    """Expectations by `Law.apply`, without known errors, at ``evaluations`` outgoing angles for each incoming angle."""
+class ByConditionals(Expectations):
+    """Expectations from the conditional distributions of a law, whose errors one incoming angle shows to be known."""
 
-    apply: Callable[[AngleFunction, ArrayLike], Floats]
-    evaluations: int
+    conditionals: Callable[[Floats, float, int, Floats], Any]
     traced: bool = False
+
+    @property
+    def has_errors(self) -> bool:
+        return not np.isnan(self.conditionals(PROBE, PROBE_TOLERANCE, 0, np.empty(0)).error).any()
 
     @property
     def is_traced(self) -> bool:
         return self.traced
 
     def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        step = max(1, VALUES_AT_ONCE // (self.basis.size * max(self.evaluations, 1)))
-        parts = [self.apply(self.basis.evaluate, theta[start : start + step]) for start in range(0, theta.size, step)]
-        return np.concatenate(parts), np.full(theta.size, np.nan)
+        basis = self.basis
+        edges, degree = np.empty(0), max(1, basis.size - 1)
+        if not basis.is_polynomial:
+            edges, degree = basis.edges[1:-1], 0 if basis.is_partition else basis.nodes_per_interval
+        images, errors = [], []
+        for start in range(0, theta.size, ANGLES_AT_ONCE):
+            found = self.conditionals(theta[start : start + ANGLES_AT_ONCE], tolerance, degree, edges)
+            images.append(found.in_basis(basis))
+            errors.append(found.error)
+        return np.concatenate(images), np.concatenate(errors)
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from ...core.checks import Floats, common_shape, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
-from ..bases.basis import AngleFunction
 from ..bases.given import Vectorised
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
+from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from .distribution import Distribution
 from .law import Law, set_properties
 
@@ -35,9 +35,8 @@ GAUSS_NODES = 16
 CHECK_NODES = 8
 # Gauss nodes on a cell of a grid, or on a panel of the law if that is narrower.
 CELL_NODES = 6
-# The mean of a function has converged if two rules differ by at most this fraction of the function's largest value.
-# Each panel is cut into at most MOST_PARTS parts. Means of discontinuous functions do not converge by this.
-CONVERGED, MOST_PARTS = 1e-13, 8
+# Stiffness of a density on one of its panels, where 16 Gauss nodes reach rounding; see `gauss_nodes`.
+PANEL_STIFFNESS = 12.0
 # Cells on each panel in the table of the cdf that is sampled.
 CELLS_PER_PANEL = 16
 PROBES = 24
@@ -84,7 +83,6 @@ class DensityLaw(Law):
 
     outgoing_breakpoints: Floats = frozen(())
     sampling_error: float = 0.0
-    evaluations = PANEL_COUNTS[0] * GAUSS_NODES
     _function: DensityFunction
     _panel_count: int = PANEL_COUNTS[0]
 
@@ -95,7 +93,6 @@ class DensityLaw(Law):
         inside = frozen(points[(points > 0.0) & (points < np.pi)])
         set_properties(self, _function=density, outgoing_breakpoints=inside)
         set_properties(self, _panel_count=self._panels_needed())
-        set_properties(self, evaluations=(self._grid(self._panel_count).size - 1) * GAUSS_NODES)
         reversible, mirror_symmetric = self._measured_symmetries()
         set_properties(self, reversible=reversible, mirror_symmetric=mirror_symmetric)
         set_properties(self, sampling_error=self._measured_sampling_error())
@@ -174,41 +171,18 @@ class DensityLaw(Law):
                 f"{self!r} does not preserve sin(theta) d theta, so its adjoint is not a law ({reason})"
             ) from reason
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        flat = theta.reshape(-1)
-        if not flat.size:
-            # Only the function determines the shape of its values.
-            value = np.asarray(function(np.empty(theta.shape)), dtype=np.float64)
-            return np.empty(theta.shape + value.shape[theta.ndim :])
-        step = max(1, CHUNK // self.evaluations)
-        starts = range(0, flat.size, step)
-        parts = [self._apply_chunk(function, flat[start : start + step]) for start in starts]
-        total = np.concatenate(parts)
-        return total.reshape(theta.shape + total.shape[1:])
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """Gauss rules between the edges of the law's panels and the given ones.
 
-    def _apply_chunk(self, function: AngleFunction, theta: Floats) -> Floats:
-        found, height = self._means(function, theta, 1)
-        unconverged, parts = np.arange(theta.size), 2
-        while unconverged.size and parts <= MOST_PARTS:
-            # Keeps the number of values in memory at its value for the coarsest panels.
-            step = max(1, theta.size // parts)
-            starts = range(0, unconverged.size, step)
-            finer = [self._means(function, theta[unconverged[start : start + step]], parts) for start in starts]
-            value = np.concatenate([one for one, _ in finer])
-            height = max(height, *(most for _, most in finer))
-            change = np.abs(value - found[unconverged]).reshape(unconverged.size, -1).max(axis=1, initial=0.0)
-            found[unconverged] = value
-            unconverged = unconverged[change > CONVERGED * height]
-            parts *= 2
-        return found
-
-    def _means(self, function: AngleFunction, theta: Floats, parts: int) -> tuple[Floats, float]:
-        """The means with each panel cut into ``parts`` parts, and the largest absolute value of the function."""
-        outgoing, weight = self._conditional_quadrature(split_panels(self.panels(theta), parts), GAUSS_NODES)
-        weight = weight * self.density(theta[:, None], outgoing)
-        weight /= np.sum(weight, axis=1, keepdims=True)
-        value = np.asarray(function(outgoing), dtype=np.float64)
-        return np.asarray(np.einsum("ij,ij...->i...", weight, value)), float(np.abs(value).max(initial=0.0))
+        The error is the distance from 1 of the integral of the density, which shows what the panels do not resolve.
+        """
+        whole = np.concatenate(([0.0], edges, [np.pi]))
+        row, low, high, fraction = cut_by_edges(self.panels(theta), whole)
+        stiffness = PANEL_STIFFNESS * fraction + stiffness_between(edges, degree, low, high)
+        owner, outgoing, weight = gauss_nodes(row, low, high, stiffness)
+        weight *= self.density(theta[owner], outgoing)
+        error = np.abs(np.bincount(owner, weights=weight, minlength=theta.size) - 1.0)
+        return Conditionals.of_lists(owner, outgoing, weight, error)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         flat, draw = theta.reshape(-1), rng.random(theta.size)

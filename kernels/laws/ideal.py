@@ -36,6 +36,10 @@ class LambertianLaw(DensityLaw):
         density = SINE.density(theta_out)
         return np.broadcast_to(density, common_shape(theta=finite_array("theta", theta), theta_out=density))
 
+    def panels(self, theta: Floats) -> Floats:
+        """One panel."""
+        return np.broadcast_to([0.0, np.pi], (*finite_array("theta", theta).shape, 2))
+
     def _density_cuts(self, theta: Floats) -> Floats:
         """None are needed, because the density is smooth."""
         return np.empty((theta.size, 0))

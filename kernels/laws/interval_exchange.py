@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, angles, frozen
 from ...core.errors import InputError
 from ..bases.angles import clipped_inside
-from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE
+from ..expectations.conditionals import Conditionals
 from ..matrices.matrix import KernelMatrix
 from .distribution import Distribution
 from .law import Law
@@ -69,8 +69,6 @@ class IntervalExchangeLaw(Law):
     partner: NDArray[np.int64] = field(init=False, repr=False)
 
     reversible = True
-    exact_apply = True
-    evaluations = 1
 
     def __post_init__(self) -> None:
         flux, edges = self._checked_flux(), self.matrix.basis.edges
@@ -108,8 +106,8 @@ class IntervalExchangeLaw(Law):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.image(theta)
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        return np.asarray(function(self.image(theta)), dtype=np.float64)
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        return Conditionals.of_atoms(self.image(theta)[:, None], np.ones((theta.size, 1)))
 
     def _checked_flux(self) -> Floats:
         matrix = self.matrix

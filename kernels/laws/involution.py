@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
 from ..bases.angles import clipped_inside
-from ..bases.basis import AngleFunction
 from ..bases.intervals import bisected
 from ..bases.measure import SINE
+from ..expectations.conditionals import Conditionals
 from .distribution import Distribution
 from .law import Law, RandomMap
 
@@ -65,7 +65,6 @@ class InvolutionLaw(Law):
     map: Callable[[Floats], Floats]
 
     reversible = True
-    exact_apply = True
 
     def __post_init__(self) -> None:
         if not callable(self.map):
@@ -130,8 +129,8 @@ class InvolutionLaw(Law):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self._mapped(theta)
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        return np.asarray(function(self._mapped(theta)), dtype=np.float64)
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        return Conditionals.of_atoms(self._mapped(theta)[:, None], np.ones((theta.size, 1)))
 
     def __repr__(self) -> str:
         # The user's function may be any callable.

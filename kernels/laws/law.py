@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -17,6 +18,7 @@ from ...core.checks import (
     angles,
     common_shape,
     finite_array,
+    finite_number,
     foreign,
     generator,
     instance,
@@ -27,12 +29,14 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
+from ...core.rounding import EPS
 from ...core.tables import html_table
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.given import Vectorised, seed_by_name
 from ..bases.mirror import is_mirror_symmetric
-from ..expectations.basis_means import ByApply, Expectations, Mirrored, Weighted
+from ..expectations.basis_means import ByConditionals, Expectations, Mirrored, Weighted
+from ..expectations.conditionals import Conditionals, degree_of
 from .branches import chained, chained_breakpoints, joined, merged
 from .distribution import Distribution
 from .isometry_table import IsometryTable
@@ -43,10 +47,18 @@ SMALLEST_DRAW = 2.0**-54
 SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 # Decimal weights such as 0.1, ..., 0.4 sum to 1 within a few roundings; a sum with a forgotten term differs by more.
 WEIGHT_TOLERANCE = 1e-12
-# `apply` of a composition takes at most this many values of its function. A density takes some 200 ns for each.
+# Limit on the outgoing angles of a composition at all incoming angles. A density takes some 200 ns for each.
 MOST_VALUES = 10**8
-# Entry points of a driven law that `distribution` uses, each an atom.
+# Entry points of a driven law, each an atom.
 ENTRY_POINTS = 4096
+# The tolerance of `apply`, the incoming angles with which it begins, and outgoing angles in memory at a time.
+TOLERANCE, FIRST_ANGLES, NODES_AT_ONCE = 1e-8, 16, 2**20
+# Degree of the functions that `conditionals` averages by default.
+DEGREE = 8
+# Breakpoints of laws at which the means under the law before them are cut.
+CUTS = 64
+# Incoming angle, tolerance and degrees of the test whether conditional distributions depend on the degree.
+PROBE, PROBE_TOLERANCE, PROBE_DEGREES = np.array([1.0]), 1e-2, (0, 64)
 # Edges begin at 0 and end at pi within a few roundings.
 ENDS_TOLERANCE = 1e-14
 # Limit on nested calls of `apply`; more would exceed Python's recursion limit.
@@ -71,11 +83,6 @@ class Law(ABC):
         Whether P~ commutes with J f(theta) = f(pi - theta); None if unknown.
     frame : {"paper", "specular"}
         ``"specular"`` after `in_specular_frame`, where specular reflection is the identity (Feres' convention).
-    evaluations : int
-        Number of outgoing angles at which `apply` evaluates its function for one incoming angle; this is its cost.
-    exact_apply : bool
-        Whether `apply` gives expectations of any function to rounding. It is False if `apply` uses a quadrature;
-        `asperity.spectral.enclosures` then needs error bounds from another source.
 
     Notes
     -----
@@ -88,9 +95,6 @@ class Law(ABC):
     reversible: bool | None = None
     mirror_symmetric: bool | None = None
     frame: Frame = "paper"
-    evaluations: int = 1
-    exact_apply: bool = False
-
     # A law is an operator, not an array: with None, numpy leaves ``np.float64(0.3) * law`` to this class.
     __array_ufunc__ = None
 
@@ -106,8 +110,65 @@ class Law(ABC):
         return self._sample(angles("theta", theta), source)
 
     def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
-        """The expectation E[f(Theta') | theta] of a vectorised f, whose values have shape ``theta.shape + extra``."""
-        return self._apply(Vectorised.of(function), angles("theta", theta))
+        """The expectation E[f(Theta') | theta] of a vectorised f, whose values have shape ``theta.shape + extra``.
+
+        It is computed from `conditionals`, for the degree that the function shows at some points of (0, pi).
+        """
+        given, incoming = Vectorised.of(function), angles("theta", theta)
+        flat, found = incoming.ravel(), []
+        if not flat.size:
+            # Only the function determines the shape of its values.
+            return np.empty(incoming.shape + given(np.empty(incoming.shape)).shape[incoming.ndim :])
+        degree, start, step = degree_of(given), 0, FIRST_ANGLES
+        while start < flat.size:
+            part = self._conditionals(flat[start : start + step], TOLERANCE, degree, np.empty(0))
+            found.append(part.mean(given))
+            start += step
+            step = max(1, NODES_AT_ONCE * part.error.size // part.nodes.size)
+        mean = np.concatenate(found)
+        return mean.reshape(incoming.shape + mean.shape[1:])
+
+    def conditionals(
+        self, theta: ArrayLike, tolerance: float = TOLERANCE, degree: int = DEGREE, edges: ArrayLike = ()
+    ) -> Conditionals:
+        """The conditional distributions P~(theta_k, .) as weighted outgoing angles, each with its error.
+
+        Parameters
+        ----------
+        theta : array_like
+            Incoming angles in (0, pi), radians, in any order.
+        tolerance : float
+            Wanted error of the mean of a function of sup norm 1. Rough walls may not reach it.
+        degree : int
+            Highest degree of the functions to be averaged, as trigonometric polynomials, or as polynomials between
+            the edges; 0 if they are constant there.
+        edges : array_like
+            Outgoing angles where these functions are not smooth, in increasing order.
+
+        Returns
+        -------
+        Conditionals
+            One conditional distribution per angle, in the order of ``theta``, with the error reached.
+
+        Raises
+        ------
+        AccuracyError
+            If more than a fraction of 1e-4 of the rays of a wall did not escape.
+
+        Examples
+        --------
+        >>> from asperity.kernels import maxwell
+        >>> conditionals = maxwell(0.25).conditionals([0.5, 1.5])
+        >>> conditionals.mean(np.cos).round(12).tolist() == (-0.75 * np.cos([0.5, 1.5])).round(12).tolist()
+        True
+        """
+        incoming, given = np.atleast_1d(angles("theta", theta)).ravel(), finite_array("edges", edges)
+        if finite_number("tolerance", tolerance) < EPS:
+            raise InputError(f"tolerance: expected a number of at least {EPS:.2g}, the rounding, got {tolerance!r}")
+        whole_number("degree", degree, 0)
+        if given.ndim != 1 or np.any(np.diff(given) < 0.0):
+            raise InputError(f"edges: expected increasing angles, got {shortened(edges)}")
+        return self._conditionals(incoming, tolerance, degree, given)
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles of a law made of isometries theta' = +-theta + const.
@@ -124,8 +185,8 @@ class Law(ABC):
         """`sample` for checked arguments."""
 
     @abstractmethod
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        """`apply` for checked arguments."""
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """`conditionals` for checked arguments."""
 
     def _repr_html_(self) -> str:
         known = {True: "yes", False: "no", None: "not known"}
@@ -214,13 +275,12 @@ class Law(ABC):
         return self._distribution(angle, cells)
 
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """`distribution` for checked arguments; the default computes the expectations of indicator functions."""
-        below = self.apply(lambda angle: (angle[..., None] < edges).astype(np.float64), theta)
-        return Distribution.without_atoms(np.maximum.accumulate(below, axis=1))
+        """`distribution` for checked arguments; the default adds up the masses of conditional distributions."""
+        return Distribution.of_cells(self._conditionals(theta, TOLERANCE, 0, edges[1:-1]).masses(edges))
 
     def expectations(self, basis: Basis) -> Expectations:
-        """E[e_j(Theta') | theta] for all functions of a basis, with errors if known; the default uses `apply`."""
-        return ByApply(basis, self.apply, self.evaluations)
+        """E[e_j(Theta') | theta] for all functions of a basis, with errors if known; by default from conditionals."""
+        return ByConditionals(basis, self._conditionals)
 
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
@@ -267,7 +327,6 @@ class BranchLaw(Law):
     """
 
     reversible = True
-    exact_apply = True
 
     @property
     def is_isometric(self) -> bool:
@@ -304,21 +363,17 @@ class BranchLaw(Law):
         choice = np.argmax(x[..., None] * cumulative[..., -1:] < cumulative, axis=-1)
         return np.asarray(np.take_along_axis(outgoing, choice[..., None], axis=-1)[..., 0])
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         probability, outgoing = self.branches(theta)
-        value = np.asarray(function(outgoing), dtype=np.float64)
-        weight = probability.reshape(probability.shape + (1,) * (value.ndim - probability.ndim))
-        return np.asarray(np.sum(weight * value, axis=theta.ndim))
+        return Conditionals.of_atoms(outgoing, probability)
 
 
 class DrivenLaw(Law):
     """A law theta' = reflect(X, theta) with X uniform in (0, 1): the reflection of a ray that enters at random.
 
-    Subclasses define `reflect`. By default expectations are midpoint sums over ``evaluations`` entry points. Their
-    error is proportional to 1/evaluations if `reflect` jumps and to 1/evaluations^2 otherwise.
+    Subclasses define `reflect`. By default conditional distributions have one atom for each of 4096 equally spaced
+    entry points, without a known error.
     """
-
-    evaluations = 256
 
     @abstractmethod
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
@@ -330,17 +385,19 @@ class DrivenLaw(Law):
 
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """One atom for each of 4096 equally spaced entry points."""
-        x = (np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS
-        outgoing = self.reflect(x, theta[:, None])
+        outgoing = self.reflect(_entry_points(), theta[:, None])
         return Distribution.of_atoms(edges, outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.reflect(np.maximum(rng.random(theta.shape), SMALLEST_DRAW), theta)
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        x = (np.arange(self.evaluations) + 0.5) / self.evaluations
-        outgoing = self.reflect(x.reshape((-1,) + (1,) * theta.ndim), theta)
-        return np.asarray(np.mean(np.asarray(function(outgoing), dtype=np.float64), axis=0))
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        outgoing = self.reflect(_entry_points(), theta[:, None])
+        return Conditionals.of_atoms(outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS), np.nan)
+
+
+def _entry_points() -> Floats:
+    return np.asarray((np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS)
 
 
 def as_weight(weight: object) -> float | None:
@@ -420,7 +477,7 @@ class Combination(Law):
             if not math.isfinite(weight):
                 raise InputError(f"terms: expected finite weights, got {weight!r} for {law!r}")
         laws = [law for _, law in self.terms]
-        set_properties(self, frame=common_frame(laws, "add"), evaluations=sum(law.evaluations for law in laws))
+        set_properties(self, frame=common_frame(laws, "add"))
         used = [law for weight, law in self.terms if weight]
         set_properties(self, reversible=_sum_property([law.reversible for law in used]))
         set_properties(self, mirror_symmetric=_sum_property([law.mirror_symmetric for law in used]))
@@ -507,9 +564,10 @@ class Combination(Law):
                 outgoing[chosen] = law.sample(theta[chosen], rng)
         return outgoing
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        parts = [weight * law.apply(function, theta) for weight, law in self.terms_checked()]
-        return np.asarray(sum(parts[1:], parts[0]))
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        terms = [(weight, law) for weight, law in self.terms_checked() if weight > 0.0]
+        wanted = theta, tolerance, degree, edges
+        return Conditionals.mixed([(weight, law._conditionals(*wanted)) for weight, law in terms])
 
     def __repr__(self) -> str:
         return " + ".join(f"{weight:.12g}*{as_factor(law)}" for weight, law in self.terms)
@@ -573,7 +631,6 @@ class Composition(Law):
         palindrome = all(law is back or law == back for law, back in zip(flat, reversed(flat), strict=True))
         set_properties(self, reversible=True if palindrome and all(law.reversible for law in flat) else None)
         set_properties(self, mirror_symmetric=True if all(law.mirror_symmetric for law in flat) else None)
-        set_properties(self, evaluations=math.prod(law.evaluations for law in flat))
 
     @staticmethod
     def of(first: Law, second: Law) -> Law:
@@ -611,11 +668,8 @@ class Composition(Law):
             theta = law.sample(theta, rng)
         return theta
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        function = _at_bounded_cost(self, function, theta.size)
-        for law in reversed(self.laws[1:]):
-            function = _pulled_back(law, function)
-        return self.laws[0].apply(function, theta)
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        return _conditionals_of_chain(self, self.laws, theta, tolerance, degree, edges)
 
     def __repr__(self) -> str:
         return " @ ".join(as_factor(law) for law in self.laws)
@@ -644,8 +698,9 @@ def _is_identity(law: Law) -> bool:
 class Power(Law):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
-    `apply` evaluates its function at about ``law.evaluations ** n`` angles for each incoming one. It raises InputError
-    above 10^8 in all, or for n > 100; use ``discretise(law, basis) ** n`` then.
+    The number of outgoing angles of its conditional distributions grows like a power with exponent n, unless isometries
+    merge. `apply` and `conditionals` raise InputError above 10^8 in all, or for n > 100; use
+    ``discretise(law, basis) ** n`` then.
 
     Examples
     --------
@@ -664,9 +719,6 @@ class Power(Law):
             self, frame=self.law.frame, mirror_symmetric=self.law.mirror_symmetric or self.exponent == 0 or None
         )
         set_properties(self, reversible=self.law.reversible or self.exponent == 0 or None)
-        # Computed in float64: the exact integer can have 10^5 digits.
-        grown = math.exp(min(self.exponent * math.log(self.law.evaluations), 700.0))
-        set_properties(self, evaluations=round(grown))
 
     def adjoint(self) -> Law:
         """(P^n)* = (P*)^n."""
@@ -691,14 +743,9 @@ class Power(Law):
             theta = self.law.sample(theta, rng)
         return theta.copy() if self.exponent == 0 else theta
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        if self.exponent == 0:
-            return np.asarray(function(theta), dtype=np.float64)
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         _check_length("apply", self.exponent, DEEPEST_POWER)
-        function = _at_bounded_cost(self, function, theta.size)
-        for _ in range(self.exponent - 1):
-            function = _pulled_back(self.law, function)
-        return self.law.apply(function, theta)
+        return _conditionals_of_chain(self, (self.law,) * self.exponent, theta, tolerance, degree, edges)
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)} ** {self.exponent}"
@@ -718,21 +765,42 @@ def as_base(law: Law) -> str:
     return f"({law!r})" if isinstance(law, Power) else as_factor(law)
 
 
-def _at_bounded_cost(law: Law, function: AngleFunction, incoming: int) -> AngleFunction:
-    """The function, of which no more than `MOST_VALUES` values are taken: some angles need more than is declared."""
-    advice = "use discretise() and compose the matrices, or fewer angles at a time"
-    if law.evaluations * incoming > MOST_VALUES:
-        raise InputError(f"apply: {law!r} needs {law.evaluations:.1e} values for each of {incoming} angles; {advice}")
-    taken = 0
+def is_atomic(law: Law) -> bool:
+    """Whether the conditional distributions of a law are finitely many atoms, which average any function exactly."""
+    few, many = (_probe(law, degree) for degree in PROBE_DEGREES)
+    return not np.isnan(few.error).any() and np.array_equal(few.nodes, many.nodes)
 
-    def bounded(angle: Floats) -> Floats:
-        nonlocal taken
-        taken += angle.size
-        if taken > MOST_VALUES:
-            raise InputError(f"apply: {law!r} needs over {MOST_VALUES:.0e} values for {incoming} angles; {advice}")
-        return function(angle)
 
-    return bounded
+def _probe(law: Law, degree: int) -> Conditionals:
+    return law._conditionals(PROBE, PROBE_TOLERANCE, degree, np.empty(0))
+
+
+def _conditionals_of_chain(
+    law: Law, laws: Sequence[Law], theta: Floats, tolerance: float, degree: int, edges: Floats
+) -> Conditionals:
+    """The conditional distributions of composed laws; means under a law are cut at the next law's breakpoints."""
+    try:
+        probability, outgoing = chained(laws, theta)
+        error = {part: float(_probe(part, 0).error[0]) for part in set(laws)}
+        return Conditionals.of_atoms(outgoing, probability, sum(error[part] for part in laws))
+    except InputError:
+        # not isometries, or too many of them
+        found, exact = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1))), True
+    for index, part in enumerate(laws):
+        cuts, later = edges, laws[index + 1 :]
+        if later:
+            # all breakpoints of the later laws together, or else of the next one
+            known, left_out = chained_breakpoints(later, CUTS)
+            cuts = known if math.isfinite(left_out) else later[0].breakpoints(CUTS)[0]
+        each = part._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
+        if each * found.nodes.size > MOST_VALUES:
+            raise InputError(
+                f"apply: {law!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
+                "discretise() and compose the matrices, or fewer angles at a time"
+            )
+        after = partial(part._conditionals, tolerance=tolerance, degree=degree, edges=cuts)
+        found, exact = found.followed_by(after, exact), exact and is_atomic(part)
+    return found
 
 
 def _check_length(method: str, exponent: int, most: int) -> None:
@@ -740,10 +808,6 @@ def _check_length(method: str, exponent: int, most: int) -> None:
         raise InputError(
             f"{method}: expected a power of at most {most}, got {exponent}; use discretise(law, basis) ** n"
         )
-
-
-def _pulled_back(law: Law, function: AngleFunction) -> AngleFunction:
-    return lambda angle: law.apply(function, angle)
 
 
 @dataclass(frozen=True, repr=False)
@@ -768,9 +832,7 @@ class SpecularFrame(Law):
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.lambertian()")
         mirror = self.law.mirror_symmetric
-        set_properties(
-            self, frame=_other_frame(self.law.frame), mirror_symmetric=mirror, evaluations=self.law.evaluations
-        )
+        set_properties(self, frame=_other_frame(self.law.frame), mirror_symmetric=mirror)
         set_properties(self, reversible=mirror if self.law.reversible else None)
 
     @staticmethod
@@ -837,8 +899,8 @@ class SpecularFrame(Law):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return mirrored_angle(self.law.sample(theta, rng))
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        return self.law.apply(lambda angle: function(mirrored_angle(angle)), theta)
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        return self.law._conditionals(theta, tolerance, degree, np.pi - edges[::-1]).mirrored()
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)}.in_specular_frame()"
@@ -860,7 +922,6 @@ class IsometryLaw(BranchLaw):
     retro: bool
 
     mirror_symmetric = True
-    evaluations = 1
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """One branch, of probability 1."""

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...core.checks import Floats, finite_array
 from ..bases.angles import clipped_inside
-from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE, gauss_on_intervals
+from ..expectations.conditionals import Conditionals
 from .distribution import Distribution
 from .law import Law
 
@@ -54,8 +54,6 @@ class LeastResistanceLaw(Law):
 
     reversible = True
     mirror_symmetric = True
-    exact_apply = True
-    evaluations = 2
 
     @property
     def split_ends(self) -> float:
@@ -131,11 +129,9 @@ class LeastResistanceLaw(Law):
         probability, outgoing = self.images(theta)
         return np.where(rng.random(theta.shape) < probability[..., 0], outgoing[..., 0], outgoing[..., 1])
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         probability, outgoing = self.images(theta)
-        value = np.asarray(function(outgoing), dtype=np.float64)
-        weight = probability.reshape(probability.shape + (1,) * (value.ndim - probability.ndim))
-        return np.asarray(np.sum(weight * value, axis=theta.ndim))
+        return Conditionals.of_atoms(outgoing, probability)
 
 
 def partners(size: Floats, b: float) -> Floats:

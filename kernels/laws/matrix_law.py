@@ -12,12 +12,12 @@ from ...core.checks import Floats, common_shape, finite_array, frozen, shortened
 from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
-from ..bases.basis import AngleFunction, Basis, Frame
+from ..bases.basis import Basis, Frame
 from ..bases.bins import Bins
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from .density import GAUSS_NODES, NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw, split_panels
+from .density import NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw, split_panels
 from .distribution import Distribution
 from .ideal import LambertianLaw
 from .law import IsometryLaw, Law, set_properties
@@ -61,8 +61,8 @@ class MatrixLaw(DensityLaw):
     >>> law = MatrixLaw([[0.25, 0.75], [0.75, 0.25]])
     >>> round(float(law.apply(lambda theta: theta < np.pi / 2, 1.0)), 14)
     0.25
-    >>> law.reversible, law.evaluations
-    (True, 32)
+    >>> law.reversible
+    True
     """
 
     array: Floats
@@ -98,7 +98,7 @@ class MatrixLaw(DensityLaw):
         array = array / sums[:, None]
         set_properties(self, array=frozen(array), edges=frozen(edges), _masses=masses)
         set_properties(self, outgoing_breakpoints=frozen(edges[1:-1]))
-        set_properties(self, frame=frame, evaluations=array.shape[0] * GAUSS_NODES)
+        set_properties(self, frame=frame)
         flux = masses[:, None] * array
         close = max(SYMMETRY_TOLERANCE, rounding)
         set_properties(self, reversible=bool(np.max(np.abs(flux - flux.T)) <= close * np.max(flux)))
@@ -117,6 +117,10 @@ class MatrixLaw(DensityLaw):
     def panels(self, theta: Floats) -> Floats:
         """The edges of the bins."""
         return np.broadcast_to(self.edges, (*finite_array("theta", theta).shape, self.edges.size))
+
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        """The inner edges of the bins; none are left out."""
+        return self.edges[1:-1], 0.0
 
     def _density_cuts(self, theta: Floats) -> Floats:
         """The edges of the bins."""
@@ -142,14 +146,6 @@ class MatrixLaw(DensityLaw):
         law = object.__new__(MatrixLaw)
         law._fill(reverse, self.edges, self.frame)
         return law
-
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        angle, weight = SINE.quadrature(self.edges, GAUSS_NODES)
-        value = np.asarray(function(angle), dtype=np.float64)
-        shape = (self._masses.size, GAUSS_NODES)
-        weight = weight.reshape(shape) / weight.reshape(shape).sum(axis=1, keepdims=True)
-        means = np.einsum("ij,ij...->i...", weight, value.reshape(shape + value.shape[1:]))
-        return np.asarray(np.tensordot(self.array, means, axes=1)[cell_among(self.edges, theta)])
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         cumulative = np.cumsum(self.array, axis=1)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, common_shape, finite_array, number_between, shaped, whole_number
 from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.measure import SINE
-from .density import GAUSS_NODES, DensityLaw
+from .density import DensityLaw
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,7 +53,6 @@ class HenyeyGreensteinLaw(DensityLaw):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "g", number_between("g", self.g, -1.0, 1.0))
-        object.__setattr__(self, "evaluations", (2 * self._doublings() + 4) * GAUSS_NODES)
 
     def eigenvalue(self, degree: int) -> float:
         """The eigenvalue g^l of the Legendre polynomial of degree l in cos(theta)."""

@@ -11,11 +11,12 @@ from ...core.checks import Floats, angles, number_between, whole_number
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
 from ..bases.basis import AngleFunction, Basis
 from ..bases.given import Vectorised
-from ..bases.intervals import joined_lists
+from ..bases.intervals import between_cuts, edges_inside, joined_lists
 from ..bases.measure import SINE, gauss_on_intervals
 from ..bases.panels import Panels
 from ..expectations.arcs import ArcMeans, ArcPieces, PiecesOfAngles, arc_images, outgoing_lines
 from ..expectations.basis_means import Expectations, Means
+from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entries
 
@@ -73,7 +74,6 @@ class CircularArcLaw(DrivenLaw):
 
     reversible = True
     mirror_symmetric = True
-    evaluations = 8 * NODES
 
     def __post_init__(self) -> None:
         checked = number_between("half_angle", self.half_angle, 0.0, 0.5 * np.pi, closed="high")
@@ -138,8 +138,27 @@ class CircularArcLaw(DrivenLaw):
         # The bound is exact; without it rounding could turn the single hit of a grazing ray into none.
         return right, base, chord, np.maximum(np.ceil((self.half_angle + base - chord) / (2.0 * chord)), 1.0)
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        return self.means(function, theta)
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """Gauss rules in delta between the changes of N and the edges; the error is that of rays with more hits."""
+        lines = outgoing_lines(self.half_angle, self.pieces(theta, followed_hits(tolerance)), theta)
+        long = np.flatnonzero(~lines.single)
+        offset, slope, lower, upper = lines.offset[long], lines.slope[long], lines.lower[long], lines.upper[long]
+        ends = offset + slope * lower, offset + slope * upper
+        cut, edge = edges_inside(edges, np.minimum(*ends), np.maximum(*ends))
+        inside = np.clip((edge - offset[cut]) / slope[cut], lower[cut], upper[cut])
+        every = np.arange(long.size)
+        piece, low, high = between_cuts(np.concatenate((every, every, cut)), np.concatenate((lower, upper, inside)))
+        ends = offset[piece] + slope[piece] * low, offset[piece] + slope[piece] * high
+        stiffness = high - low + stiffness_between(edges, degree, np.minimum(*ends), np.maximum(*ends))
+        piece, chord, weight = gauss_nodes(piece, low, high, stiffness)
+        outgoing, single = offset[piece] + slope[piece] * chord, lines.single
+        left = lines.of_angles(np.where(lines.rest, lines.mass, 0.0), theta.size)
+        return Conditionals.of_lists(
+            np.concatenate((lines.ray[long][piece], lines.ray[single])),
+            np.concatenate((outgoing, lines.angle[single])),
+            np.concatenate((weight * SINE.density(chord), lines.mass[single])),
+            2.0 * left / lines.of_angles(lines.mass, theta.size),
+        )
 
     def means(self, function: AngleFunction, theta: Floats, nodes: int = NODES, most_hits: int = MOST_HITS) -> Floats:
         """E[f(Theta') | theta] by Gauss rules with ``nodes`` nodes where N is constant, for N up to ``most_hits``."""

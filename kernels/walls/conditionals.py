@@ -232,6 +232,13 @@ class WallConditionals:
         return np.unique([angle for angle, _ in found])
 
 
+def traced_conditionals(wall: Wall, degree: int, edges: Floats) -> WallConditionals:
+    """The conditional distributions for functions of a degree, as trigonometric polynomials or between edges."""
+    if not edges.size:
+        return WallConditionals(wall, degree, edges)
+    return WallConditionals(wall, min(degree, 1), edges, PANEL_LEVEL if degree else 0)
+
+
 @dataclass(frozen=True)
 class TracedExpectations(Expectations):
     """Conditional expectations of a wall with few pieces, by adaptive quadrature in the entry point."""
@@ -247,16 +254,14 @@ class TracedExpectations(Expectations):
         return True
 
     @cached_property
-    def _rows(self) -> WallConditionals:
-        basis = self.basis
-        inside, degree, level = np.empty(0), max(1, basis.size - 1), 0
-        if not basis.is_polynomial:
-            inside = basis.edges[1:-1]
-            degree, level = (0, 0) if basis.is_partition else (1, PANEL_LEVEL)
-        return WallConditionals(self.wall, degree, inside, level)
+    def _conditionals(self) -> WallConditionals:
+        edges, degree = np.empty(0), max(1, self.basis.size - 1)
+        if not self.basis.is_polynomial:
+            edges, degree = self.basis.edges[1:-1], 0 if self.basis.is_partition else 1
+        return traced_conditionals(self.wall, degree, edges)
 
     def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        found = self._rows(theta, tolerance)
+        found = self._conditionals(theta, tolerance)
         means = means_of_basis(self.basis, found.nodes, found.weights, found.starts)
         return means, found.error + 2.0 * found.unresolved
 

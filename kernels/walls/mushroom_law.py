@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, instance
 from ...core.errors import AccuracyError
 from ...geometry import MushroomGenerations
-from ..bases.angles import mirrored_angle
-from ..bases.basis import AngleFunction
+from ..expectations.conditionals import Conditionals
 from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, RandomMap, entries
 from .traced_map import UNRESOLVED_TOLERANCE, traced_reflection
@@ -94,9 +93,12 @@ class MushroomLaw(DrivenLaw):
         flat = factor * (found.mass - (1.0 - (right - left))) + (1.0 - self.wall.opened)
         return Distribution(factor * found.below, found.position, flat)
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """Those of generation 1, with its flat tops reduced to those of the last generation."""
         left, right = self.wall.opening
-        factor = self.wall.opened / (right - left)
-        level = np.asarray(function(mirrored_angle(theta)), dtype=np.float64)
-        inside = WallLaw(self.wall.mushroom).apply(function, theta) - (1.0 - (right - left)) * level
-        return np.asarray(factor * inside + (1.0 - self.wall.opened) * level)
+        found = WallLaw(self.wall.mushroom)._conditionals(theta, tolerance, degree, edges)
+        factor, level = self.wall.opened / (right - left), found.nodes == (np.pi - theta)[found.owner]
+        weights = np.where(level, 0.0, factor * found.weights)
+        # the flat top is the last node
+        weights[found.starts[1:] - 1] = 1.0 - self.wall.opened
+        return found._replace(weights=weights, error=factor * found.error)

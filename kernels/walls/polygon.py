@@ -14,6 +14,7 @@ from ...core.checks import Floats, finite_number, instance, positive_number, who
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...geometry import Wall
+from ..expectations.conditionals import Conditionals
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw
 from .traced_map import traced_angles
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from ...geometry.polygons.beams import Beams
 
 BEAM_TOLERANCE, MOST_BEAMS = 1e-13, 200_000
-# Angles at which branches are counted. The count is the cost of `apply` and need not be exact.
-MOST_PROBES = 512
 
 
 @dataclass(frozen=True)
@@ -172,16 +171,14 @@ class PolygonLaw(BranchLaw):
         fraction = self._table.unresolved
         return Estimate(fraction, fraction, "bound", f"beams of at most {self.max_beams} a hollow")
 
-    @cached_property
-    def evaluations(self) -> int:  # type: ignore[override]
-        """The largest number of branches at an angle, among up to `MOST_PROBES` angles spread over (0, pi)."""
-        edges = np.concatenate([[0.0], self._table.ends, [np.pi]])
-        edges = edges[:: edges.size // MOST_PROBES + 1]
-        return int(self._table.conditionals(0.5 * (edges[:-1] + edges[1:]))[0].shape[-1])
-
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles, merged by isometry, shape ``theta.shape + (branches,)``."""
         return self._table.branches(theta)
+
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """The branches. Unresolved rays, a fraction s, change means by at most 2 s^(1/2) in L^2(sin(theta)/2)."""
+        found = super()._conditionals(theta, tolerance, degree, edges)
+        return found._replace(error=np.full(theta.size, 2.0 * math.sqrt(self._table.unresolved)))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return self._table.breakpoints(limit)

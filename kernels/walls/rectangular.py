@@ -55,7 +55,6 @@ class RectangularTeethLaw(BranchLaw):
     height_to_width: float
 
     mirror_symmetric = True
-    evaluations = 2
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "height_to_width", positive_number("height_to_width", self.height_to_width))

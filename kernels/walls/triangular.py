@@ -62,7 +62,6 @@ class TriangularTeethLaw(BranchLaw):
     angle: float
 
     mirror_symmetric = True
-    evaluations = 4
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "angle", number_between("angle", self.angle, 0.0, np.pi))

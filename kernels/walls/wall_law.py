@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, instance
+from ...core.checks import Floats, instance
 from ...core.errors import AccuracyError
 from ...core.rounding import EPS
 from ...geometry import Wall
-from ..bases.basis import AngleFunction, Basis
+from ..bases.basis import Basis
 from ..bases.intervals import cell_among
-from ..expectations.basis_means import ByApply, Expectations
+from ..expectations.basis_means import ByConditionals, Expectations
+from ..expectations.conditionals import Conditionals
 from ..laws.distribution import Distribution
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import Combination, DrivenLaw, Law, RandomMap, specular
 from .circular_arc import CircularArcLaw
-from .conditionals import AdaptiveConditionals, TracedExpectations, WallConditionals, adaptive_conditionals, is_few
+from .conditionals import TracedExpectations, WallConditionals, is_few, traced_conditionals
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
 from .traced_map import UNRESOLVED_TOLERANCE, traced_angles, traced_reflection
@@ -44,9 +45,7 @@ FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
 # A wall whose hollows include more different curved ones without closed form is not taken apart: sampling each of them
 # would take longer than sampling the wall.
 MOST_CURVED = 4
-# `apply` integrates trigonometric polynomials of this degree to this fraction of their sup norm.
-APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
-# The tolerance for walls with many pieces, some ten milliseconds for an angle.
+# The least tolerance for walls with many pieces, some ten milliseconds for an angle.
 MANY_TOLERANCE = 1e-4
 # Error of the distribution function at the edges of cells.
 CELL_TOLERANCE = 1e-9
@@ -56,9 +55,8 @@ CELL_TOLERANCE = 1e-9
 class WallLaw(DrivenLaw):
     """The law P~ of a wall, for rays that enter at a uniform point of the period.
 
-    `reflect` and `reflect_with_status` trace rays. `sample` and `apply` use the closed form if there is one and trace
-    rays otherwise; `apply` of a wall with more than 64 pieces uses the exact law if there is one. `branches`,
-    `breakpoints` and `discretise` use the exact law if there is one.
+    `reflect` and `reflect_with_status` trace rays. `sample` uses the closed form if there is one and traces rays
+    otherwise. `apply`, `conditionals`, `branches`, `breakpoints` and `discretise` use the exact law if there is one.
 
     The wanted error of a traced `apply` is 1e-8 times the sup norm of the function, and 1e-4 with more than 64 pieces.
     Rough walls may not reach it; the error reached is that of `conditionals`.
@@ -114,7 +112,6 @@ class WallLaw(DrivenLaw):
         # An asymmetric cell may still have a symmetric law, hence None.
         object.__setattr__(self, "mirror_symmetric", True if self.wall.is_mirror_symmetric else None)
         if self.closed_form is not None:
-            object.__setattr__(self, "evaluations", self.closed_form.evaluations)
             object.__setattr__(self, "mirror_symmetric", self.closed_form.mirror_symmetric)
 
     @property
@@ -221,64 +218,26 @@ class WallLaw(DrivenLaw):
             if found.has_errors or self.closed_form is not None or self.is_polygonal:
                 return found
         if not is_few(self.wall):
-            return ByApply(basis, self.apply, self.evaluations, traced=True)
+            return ByConditionals(basis, self._conditionals, traced=True)
         return TracedExpectations(basis, self.wall)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return super()._sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        if self.closed_form is not None:
-            return self.closed_form.apply(function, theta)
-        few = is_few(self.wall)
-        if theta.size == 0:
-            return super()._apply(function, theta)
-        if not few and self.exact_law is not None:
-            return self.exact_law.apply(function, theta)
-        mean = self.conditionals(theta, APPLY_TOLERANCE if few else MANY_TOLERANCE).mean(function)
-        return mean.reshape(theta.shape + mean.shape[1:])
-
-    def conditionals(
-        self, theta: ArrayLike, tolerance: float = APPLY_TOLERANCE, degree: int = APPLY_DEGREE
-    ) -> AdaptiveConditionals:
-        """Conditional distributions by tracing, each with its error.
-
-        ``conditionals.mean(f)`` is a traced `apply` of f, and ``conditionals.error`` is its error; the tolerance of
-        `apply` is 1e-4 for walls with more than 64 pieces.
-
-        Parameters
-        ----------
-        theta : array_like
-            Incoming angles in (0, pi), radians.
-        tolerance : float
-            Wanted error of the mean of a function of sup norm 1.
-        degree : int
-            Highest degree, as trigonometric polynomials, of the functions to be averaged.
-
-        Returns
-        -------
-        AdaptiveConditionals
-            One conditional distribution per angle, in the order of ``theta``.
-
-        Raises
-        ------
-        AccuracyError
-            If more than a fraction of 1e-4 of the rays did not escape.
-
-        Examples
-        --------
-        >>> from asperity import geometry as geo
-        >>> conditionals = WallLaw(geo.focusing_arcs(1.2)).conditionals([0.5, 1.5])
-        >>> conditionals.mean(np.cos).round(6).tolist(), bool(conditionals.error.max() < 1e-7)
-        ([0.330126, 0.006489], True)
-        """
-        found = adaptive_conditionals(self.wall, angles("theta", theta).ravel(), tolerance, degree)
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """Those of the exact law or of the hollows, or else by tracing; rays that do not escape count in the error."""
+        known = self.exact_law or self.replacement
+        if known is not None:
+            return known._conditionals(theta, tolerance, degree, edges)
+        found = traced_conditionals(self.wall, degree, edges)(
+            theta, tolerance if is_few(self.wall) else max(tolerance, MANY_TOLERANCE)
+        )
         unresolved = float(np.mean(found.unresolved))
         if unresolved > UNRESOLVED_TOLERANCE:
             raise AccuracyError(
                 f"{self!r}: {unresolved:.2g} of the rays did not escape, more than {UNRESOLVED_TOLERANCE:g}", unresolved
             )
-        return found
+        return Conditionals(found.nodes, found.weights, found.starts, found.error + 2.0 * found.unresolved)
 
 
 def _closed_form(wall: Wall) -> Law | None:

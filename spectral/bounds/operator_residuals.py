@@ -20,7 +20,7 @@ from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import Means, height_of, weighted_means
 from ...kernels.laws.density import GAUSS_NODES, split_panels
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.law import Composition, SpecularFrame
+from ...kernels.laws.law import Composition, SpecularFrame, is_atomic
 from ...kernels.laws.structure import Rules, fold, holds_of_all, law_of, words_of
 from ...kernels.walls.circular_arc import MOST_HITS
 
@@ -210,8 +210,7 @@ def image_rule(law: Law, basis: Basis, vectors: Floats) -> Means:
     Raises
     ------
     InputError
-        If the errors are unknown: for user-defined laws without ``exact_apply``, walls with more than 64 pieces, and
-        compositions with laws that are not exact.
+        If the errors are unknown: for laws given by entry points, and compositions with laws that are not exact.
     """
     words = words_of(law)
     if words is None:
@@ -239,11 +238,11 @@ def _rule(law: Law, basis: Basis, vectors: Floats) -> Means:
     found = law.expectations(Panels(basis.edges, 0) if isinstance(basis, Bins) else basis)
     if found.has_errors:
         return found.of(vectors)
-    raise _refusal(law, "its means come without errors, and it does not promise to be exact (exact_apply)")
+    raise _refusal(law, "the errors of its conditional distributions are unknown")
 
 
 def _is_exact(law: Law) -> bool:
-    return law.exact_apply
+    return is_atomic(law)
 
 
 def _refusal(law: Law, reason: str) -> InputError:

@@ -18,7 +18,7 @@ from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
 from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
 from ...kernels.expectations.basis_means import Means
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.law import Combination, IsometryLaw
+from ...kernels.laws.law import Combination, IsometryLaw, is_atomic
 from ...kernels.laws.structure import has_chain, law_of, words_of
 from ..bounds.operator_residuals import image_rule
 from ..gap.shallow import ROUNDING, Slopes, slopes_of
@@ -224,7 +224,7 @@ class _Changes:
         self.ideal = np.array([1.0, 1.0]) if isinstance(law, LambertianLaw) else None
         if isinstance(law, IsometryLaw):
             self.ideal = np.array([2.0 if law.retro else 0.0, 0.0])
-        exact = self.ideal is not None or (law.exact_apply and slopes is None)
+        exact = self.ideal is not None or (slopes is None and is_atomic(law))
         self.kind: ErrorKind = "bound" if exact else "estimate"
         self.averages_kind: ErrorKind = self.kind
 

@@ -63,8 +63,8 @@ class Diffuse(ker.Law):
     def _sample(self, theta, rng):
         return np.where(rng.random(theta.shape) < self.share, np.arccos(rng.uniform(-1.0, 1.0, theta.shape)), theta)
 
-    def _apply(self, function, theta):
-        return self.share * 0.5 + (1.0 - self.share) * function(theta)
+    def _conditionals(self, *wanted):
+        return (self.share * ker.lambertian() + (1.0 - self.share) * ker.retroreflection()).conditionals(*wanted)
 
 
 def laws():
@@ -209,7 +209,7 @@ def test_a_changed_global_helper_module_or_class_changes_the_content(monkeypatch
     monkeypatch.setattr(own_settings, "FACTOR", 3.0)
     assert not {*found} & {content(outside), content(inside)}
     law = content(Diffuse(0.5))
-    monkeypatch.setattr(Diffuse, "_apply", lambda self, function, theta: 0.0)
+    monkeypatch.setattr(Diffuse, "_conditionals", lambda self, *wanted: None)
     assert content(Diffuse(0.5)) != law
 
 

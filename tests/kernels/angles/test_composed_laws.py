@@ -1,7 +1,5 @@
 """Matrices of composed laws: the algebra against the action on functions, and reported errors against references."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from campaigns.errors.composed_laws import arcs, crevices, teeth
@@ -9,6 +7,7 @@ from campaigns.judges.reference_operators import Expression, exchanged, flip, id
 
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.kernels.expectations.conditionals import Conditionals
 from asperity.kernels.laws.structure import law_of, words_of
 
 TEETH, CREVICES = ker.TriangularTeethLaw(0.7), ker.RectangularTeethLaw(0.8)
@@ -121,18 +120,18 @@ def test_the_reference_follows_the_kinks_of_arcs() -> None:
 
 
 class Known(ker.Law):
-    """A map of which only the action on functions is known: half of (0, pi) turned round, the other half as it is."""
+    """A map of which only conditional distributions are known: half of (0, pi) is turned round."""
 
     def _sample(self, theta: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         return exchanged(theta)
 
-    def _apply(self, function: Callable[[np.ndarray], np.ndarray], theta: np.ndarray) -> np.ndarray:
-        return np.asarray(function(exchanged(theta)))
+    def _conditionals(self, theta: np.ndarray, *_: object) -> Conditionals:
+        return Conditionals.of_atoms(exchanged(theta)[:, None], np.ones((theta.size, 1)))
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize("basis", [ker.Bins(7), ker.Panels([0.0, 0.4, 2.0, np.pi], 2)], ids=repr)
-def test_errors_of_laws_known_by_their_action_hold(basis: ker.Basis, tolerance: float) -> None:
+def test_errors_of_laws_known_by_their_conditional_distributions_hold(basis: ker.Basis, tolerance: float) -> None:
     exact = ker.discretise(ker.InvolutionLaw(exchanged), basis).symmetric
     found = ker.discretise(Known(), basis, tolerance=tolerance)
     assert 1e-14 < np.linalg.norm(found.symmetric - exact) <= float(found.error) <= tolerance

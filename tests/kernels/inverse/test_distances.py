@@ -23,6 +23,7 @@ from asperity.kernels.distances.conditional import ConditionalDistance
 from asperity.kernels.distances.distributions import cells_error, entry_error, on_cells, outgoing_distributions
 from asperity.kernels.distances.pseudometric import flux_means
 from asperity.kernels.distances.transport import Distributions, absolute_area, grid_wasserstein, wasserstein
+from asperity.kernels.expectations.conditionals import Conditionals
 from asperity.kernels.laws.distribution import Distribution
 from asperity.kernels.laws.law import DrivenLaw
 
@@ -406,8 +407,8 @@ def test_joint_distances_of_high_order_know_what_rounding_takes(order):
     assert abs(found.value - expected) <= found.error + 1e-12 and np.isfinite(found.error)
 
 
-class KnownByApply(ker.Law):
-    """A law of which nothing but its action is known."""
+class Known(ker.Law):
+    """A law of which nothing but its conditional distributions is known."""
 
     reversible = True
 
@@ -417,8 +418,8 @@ class KnownByApply(ker.Law):
     def _sample(self, theta, rng):
         return self.law.sample(theta, rng)
 
-    def _apply(self, function, theta):
-        return self.law.apply(function, theta)
+    def _conditionals(self, *wanted):
+        return self.law._conditionals(*wanted)
 
 
 @pytest.mark.slow
@@ -426,11 +427,11 @@ def test_the_error_of_a_product_counts_that_of_its_later_factors():
     # the matrix of the later factor is known to its own error only, which refining the incoming angle does not lower
     teeth, scatter = ker.RectangularTeethLaw(0.8), ker.henyey_greenstein(0.5)
     exact = ker.distance(scatter @ teeth, ker.lambertian(), tolerance=1e-2)
-    found = ker.distance(scatter @ KnownByApply(teeth), ker.lambertian(), tolerance=1e-2)
-    matrix = ker.discretise(KnownByApply(teeth), ker.Bins(256))
+    found = ker.distance(scatter @ Known(teeth), ker.lambertian(), tolerance=1e-2)
+    matrix = ker.discretise(Known(teeth), ker.Bins(256))
     assert found.error >= 0.5 * np.pi * float(matrix.error)
     assert abs(float(found) - float(exact)) <= found.error
-    inside = ker.distance((0.5 * (scatter @ KnownByApply(teeth)) + 0.5 * scatter) @ scatter, scatter, tolerance=1e-2)
+    inside = ker.distance((0.5 * (scatter @ Known(teeth)) + 0.5 * scatter) @ scatter, scatter, tolerance=1e-2)
     assert inside.error >= 0.25 * np.pi * float(matrix.error)
 
 
@@ -451,9 +452,9 @@ class Split(ker.Law):
     def _sample(self, theta, rng):
         return self.ends[(rng.random(theta.shape) > self.fraction(theta)).astype(int)]
 
-    def _apply(self, function, theta):
+    def _conditionals(self, theta, tolerance, degree, edges):
         low = self.fraction(theta)
-        return low * function(np.full_like(theta, 0.5)) + (1.0 - low) * function(np.full_like(theta, 2.5))
+        return Conditionals.of_atoms(np.broadcast_to(self.ends, (theta.size, 2)), np.stack((low, 1.0 - low), axis=1))
 
 
 class SplitByEntryPoints(DrivenLaw):

@@ -56,7 +56,6 @@ class Swap(BranchLaw):
     """Specular reflection for steep angles, retroreflection for others: two breakpoints."""
 
     steep: float
-    evaluations = 2
 
     def branches(self, theta: object) -> tuple[np.ndarray, np.ndarray]:
         theta = np.asarray(theta, dtype=np.float64)
