@@ -94,6 +94,7 @@ class ByConditionals(Expectations):
         edges, degree = np.empty(0), max(1, basis.size - 1)
         if not basis.is_polynomial:
             edges, degree = basis.edges[1:-1], 0 if basis.is_partition else basis.nodes_per_interval
+            degree = basis.degree if isinstance(basis, Panels) else degree
         images, errors = [], []
         for start in range(0, theta.size, ANGLES_AT_ONCE):
             found = self.conditionals(theta[start : start + ANGLES_AT_ONCE], tolerance, degree, edges)

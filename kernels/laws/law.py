@@ -771,6 +771,15 @@ def is_atomic(law: Law) -> bool:
     return not np.isnan(few.error).any() and np.array_equal(few.nodes, many.nodes)
 
 
+def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
+    """Breakpoints of the first of the composed laws, of as many as know theirs together."""
+    for number in range(len(laws), 0, -1):
+        found, left_out = chained_breakpoints(laws[:number], CUTS)
+        if math.isfinite(left_out):
+            return found
+    return laws[0].breakpoints(CUTS)[0]
+
+
 def _probe(law: Law, degree: int) -> Conditionals:
     return law._conditionals(PROBE, PROBE_TOLERANCE, degree, np.empty(0))
 
@@ -787,11 +796,7 @@ def _conditionals_of_chain(
         # not isometries, or too many of them
         found, exact = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1))), True
     for index, part in enumerate(laws):
-        cuts, later = edges, laws[index + 1 :]
-        if later:
-            # all breakpoints of the later laws together, or else of the next one
-            known, left_out = chained_breakpoints(later, CUTS)
-            cuts = known if math.isfinite(left_out) else later[0].breakpoints(CUTS)[0]
+        cuts = edges if index + 1 == len(laws) else _breakpoints_of_start(laws[index + 1 :])
         each = part._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
         if each * found.nodes.size > MOST_VALUES:
             raise InputError(

@@ -30,7 +30,7 @@ class LinearLaw(ker.Law):
         return np.arccos((slope + 4.0 * draw - 2.0) / (1.0 + np.sqrt((1.0 - slope) ** 2 + 4.0 * slope * draw)))
 
     def _conditionals(self, theta: np.ndarray, tolerance: float, degree: int, edges: np.ndarray) -> Conditionals:
-        outgoing, weight = gauss_rule(np.concatenate(([0.0], edges, [np.pi])), 16 + degree)
+        outgoing, weight = gauss_rule(np.concatenate(([0.0], edges, [np.pi])), 8 + degree)
         density = 0.5 * np.sin(outgoing) * (1.0 + 3.0 * self.g * np.cos(theta)[:, None] * np.cos(outgoing))
         return Conditionals.of_atoms(np.broadcast_to(outgoing, density.shape), weight * density)
 
