@@ -8,8 +8,6 @@ from .consequences.laplacian import mean_squared_slope as mean_squared_slope
 from .consequences.mixing import mixing_time as mixing_time
 from .consequences.momentum_accommodation import accommodation as accommodation
 from .consequences.random_flights import channel_paths as channel_paths
-from .eigenvalues.sparse import LeadingEigenvalues as LeadingEigenvalues
-from .eigenvalues.sparse import leading_eigenvalues as leading_eigenvalues
 from .eigenvalues.spectra import Spectrum as Spectrum
 from .essential.compactness import hilbert_schmidt_norm as hilbert_schmidt_norm
 from .essential.edge import essential_edge as essential_edge

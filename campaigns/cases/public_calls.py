@@ -210,7 +210,6 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
                                      "speed": 1.0, "arrangement": "mirror"}),
     "fit_order": (spec.fit_order, {"size": [1, 2, 4], "error": [1.0, 0.5, 0.25], "repeats": None}),
     "laplacian_comparison": (spec.laplacian_comparison, {"law": LAW, "degrees": 2, "tolerance": 0.1}),
-    "leading_eigenvalues": (spec.leading_eigenvalues, {"matrix": MATRIX, "k": 1, "rng": 0}),
     "mean_squared_slope": (spec.mean_squared_slope, {"wall": TEETH}),
     "mixing_time": (spec.mixing_time, {"kernel": MATRIX, "within": 0.25, "distance": "total variation",
                                        "density": None, "start": None, "initial": 1.0}),
@@ -241,7 +240,7 @@ PLAIN = (TypeError, ValueError, AttributeError, IndexError)
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz.
 LEFT_OUT = {
     "Basis", "Container", "DiskStatus", "double_parabola", "flat", "invisible_body", "lambertian", "Law",
-    "LeadingEigenvalues", "LeastResistanceLaw", "retroreflection", "SpectralGap", "Spectrum", "specular", "Status",
+    "LeastResistanceLaw", "retroreflection", "SpectralGap", "Spectrum", "specular", "Status",
     "SweepTable", "verify", "WorkReport", "zero_resistance_body",
 }  # fmt: skip
 

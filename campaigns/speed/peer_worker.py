@@ -127,12 +127,10 @@ def judged(out, right, seconds, version):
 
 
 def deeptime(data):
-    """The leading eigenvalues of a dense or a sparse chain."""
+    """The leading eigenvalues of a chain."""
     from deeptime.markov.tools.analysis import eigenvalues
-    from scipy.sparse import csr_matrix
 
-    dense = "matrix" in data
-    matrix = data["matrix"] if dense else csr_matrix((data["entries"], data["columns"], data["starts"]))
+    matrix = data["matrix"]
     # with reversibility and the stationary law given, deeptime uses its symmetric solver
     uniform = np.full(matrix.shape[0], 1.0 / matrix.shape[0])
     start = time.perf_counter()

@@ -1,10 +1,10 @@
 """Other programs beside asperity in the same run: ``python -m campaigns.speed.peers [FOLDER]``.
 
 Every peer is run as its best users run it, in one thread: Embree from C, one call a ray segment; Mitsuba with the whole
-loop over reflections compiled by Dr.Jit, which needs a recent LLVM; deeptime told that the chain is reversible; scipy
-with shift and inversion. Direct simulation codes such as SPARTA are not measured: their time goes into moving particles
-between cells. The peers are installed in an environment of their own in the folder; each runs in a process with a time
-limit, and one that cannot be had is a row that says so.
+loop over reflections compiled by Dr.Jit, which needs a recent LLVM; deeptime told that the chain is reversible. Direct
+simulation codes such as SPARTA are not measured: their time goes into moving particles between cells. The peers are
+installed in an environment of their own in the folder; each runs in a process with a time limit, and one that cannot
+be had is a row that says so.
 """
 
 from __future__ import annotations
@@ -13,14 +13,12 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import eigsh
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -157,22 +155,9 @@ def draw_speeds(measured: list[Speed], file: Path) -> None:
 
 # Maxwell's law in bins: an easy gap, and a gap that only an accurate solver distinguishes from 0.
 BINS, MAXWELL_GAPS = 256, (0.5, 1e-9)
-# Chains of wells whose rates give three clusters of ten eigenvalues; states of a well.
-WELLS, STATES = 30, (10, 333)
-RATES = np.repeat([1e-6, 1e-9, 1e-12], [10, 10, 9])
 # A gap is wrong if its error exceeds this fraction of it, and rounding.
 WRONG, ROUNDING = 0.1, 1e-13
 CHAIN_HEADS = "chain | solver | version | gaps wrong | largest relative error | seconds | what it says"
-
-
-def wells(states: int) -> tuple[csr_array[Any], np.ndarray[Any, Any]]:
-    """Hopping at rate 1/4 within wells and at ``RATES`` between; the gaps 1 - lambda to first order in the rates."""
-    hop = np.full(WELLS * states - 1, 0.25)
-    hop[states - 1 :: states] = RATES
-    diagonal = 1.0 - np.append(hop, 0.0) - np.append(0.0, hop)
-    coarse = np.diag(np.append(RATES, 0.0) + np.append(0.0, RATES)) - np.diag(RATES, 1) - np.diag(RATES, -1)
-    gaps = np.sort(np.linalg.eigvalsh(coarse)) / states
-    return csr_array(diags_array([hop, diagonal, hop], offsets=[-1, 0, 1])), gaps
 
 
 def solve_with_all(folder: Path, peers: PeerEnvironment) -> Iterator[tuple[object, ...]]:
@@ -185,23 +170,6 @@ def solve_with_all(folder: Path, peers: PeerEnvironment) -> Iterator[tuple[objec
         data = {"matrix": matrix.array, "wanted": 2}
         for peer in SOLVERS:
             yield _peer_row(name, peer, right, peers, folder, data)
-    ours: Mapping[str, Callable[[csr_array[Any]], tuple[Any, str]]] = {
-        "asperity.leading_eigenvalues": _leading_eigenvalues,
-        "scipy eigsh, shifted": lambda matrix: (eigsh(matrix.tocsc(), WELLS, sigma=1.0 + 1e-9)[0], "-"),
-    }
-    for states in STATES:
-        chain, right = wells(states)
-        name = f"{WELLS} wells, {chain.shape[0]} states"
-        for solver, solve in ours.items():
-            (values, words), seconds = least_time(lambda solve=solve, chain=chain: solve(chain), 1)
-            yield _row(name, solver, right, 1.0 - values, seconds, words)
-        data = {"entries": chain.data, "columns": chain.indices, "starts": chain.indptr, "wanted": WELLS}
-        yield _peer_row(name, "deeptime", right, peers, folder, data)
-
-
-def _leading_eigenvalues(matrix: csr_array[Any]) -> tuple[Any, str]:
-    found = spec.leading_eigenvalues(matrix, WELLS)
-    return found.values, f"{'complete' if found.complete else 'not complete'}, error below {found.error:.1e}"
 
 
 def _peer_row(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, choice, positive_number, shaped, whole_number
+from ...core.checks import Floats, choice, number_between, shaped, whole_number
 from ...geometry.tables.boundary import FlightStatus
 from ...geometry.tracing.tracing import numbers_of
 
@@ -25,6 +25,8 @@ Coordinates = Literal["boundary", "velocity"]
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 # Radius of a drawn disk, and length of the trace behind it in flights, relative to the picture and the mean flight.
 DRAWN_RADIUS, TRACE = 0.02, 5.0
+# Seconds that an animation may take: a day. Timers count milliseconds as integers.
+LONGEST = 86_400.0
 
 
 @dataclass(frozen=True)
@@ -221,7 +223,7 @@ class BilliardRecord:
         frames : int
             Number of pictures, equally spaced in time.
         duration : float
-            Seconds that it takes to show them.
+            Seconds that it takes to show them, at most a day.
 
         Returns
         -------
@@ -231,7 +233,7 @@ class BilliardRecord:
         Raises
         ------
         InputError
-            If a number is not positive.
+            If a number is out of range.
 
         Examples
         --------
@@ -240,7 +242,8 @@ class BilliardRecord:
         >>> record.animate(frames=12).to_jshtml().count("data:image/png")
         12
         """
-        count, seconds = whole_number("frames", frames, 2), positive_number("duration", duration)
+        count = whole_number("frames", frames, 2)
+        seconds = number_between("duration", duration, 0.0, LONGEST, closed="high")
         from matplotlib.animation import FuncAnimation
 
         axes = self.draw_paths()

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cache, cached_property
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,65 +22,15 @@ from .chunks import count_long
 from .counts import SampledArray
 from .rays import RaySums
 
+if TYPE_CHECKING:
+    from scipy.stats.qmc import Sobol
+
 # Replicates of a Sobol sequence whose spread gives the error; eight determine the spread within a quarter. With more
 # replicates each would have fewer rays and be less accurate.
 PARTS = 8
 # Binary digits of the sequences. The digits beyond are one random shift of all points, so that points hit a corner at a
 # dyadic position only by chance.
 SOBOL_BITS = 32
-
-Digits = NDArray[np.uint64]
-
-
-@dataclass(frozen=True, eq=False)
-class SobolSequence:
-    """A scrambled Sobol sequence in two dimensions, of which any block of points is computed by itself.
-
-    The digits of point n are a matrix modulo 2 times those of n, plus a shift. The matrices are those of Sobol, the
-    identity and Pascal's triangle, times random lower triangular ones (Matousek, J. Complexity 14 (1998) 527). scipy
-    draws the same points from the same generator, in another order within blocks of 2^k, and one after the other: it
-    would need seconds to reach the end of a long sequence.
-
-    Attributes
-    ----------
-    columns : ndarray of shape (2, SOBOL_BITS)
-        Of the matrices, as whole numbers.
-    shift : ndarray of shape (2,)
-    """
-
-    columns: Digits
-    shift: Digits
-
-    @staticmethod
-    def of(rng: np.random.Generator) -> SobolSequence:
-        """The sequence of a generator."""
-        own = rng.spawn(1)[0]
-        bits = np.arange(SOBOL_BITS, dtype=np.uint64)
-        shift = own.integers(2, size=(2, SOBOL_BITS), dtype=np.uint32) @ (np.uint64(1) << bits)
-        scramble = np.tril(own.integers(2, size=(2, SOBOL_BITS, SOBOL_BITS), dtype=np.uint32), -1).astype(np.int64)
-        scramble += np.eye(SOBOL_BITS, dtype=np.int64)
-        digits = (scramble @ _plain_matrices()) % 2
-        columns = np.swapaxes(digits, 1, 2).astype(np.uint64) @ (np.uint64(1) << bits[::-1])
-        return SobolSequence(columns, shift)
-
-    def block(self, start: int, number: int) -> Digits:
-        """Points ``start`` to ``start + number - 1``, shape (number, 2); a power of two that divides ``start``."""
-        first = self.shift.copy()
-        for bit in range(start.bit_length()):
-            if start >> bit & 1:
-                first ^= self.columns[:, bit]
-        found = first[None]
-        for bit in range(number.bit_length() - 1):
-            found = np.concatenate([found, found ^ self.columns[:, bit]])
-        return found
-
-
-@cache
-def _plain_matrices() -> NDArray[np.int64]:
-    """Sobol's matrices without scrambling, shape (2, SOBOL_BITS, SOBOL_BITS)."""
-    from scipy.linalg import pascal
-
-    return np.stack([np.eye(SOBOL_BITS), pascal(SOBOL_BITS, kind="upper") % 2]).astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +41,10 @@ class SobolRays:
     ----------
     law : Law
     basis : Basis
-    sequence : SobolSequence
     shifts, beyond : ndarray of shape (PARTS, 2)
         Of the digits of each part, and of the digits beyond.
     seed : tuple of int
-        Which tells sequence and shifts from others.
+        Of the sequence, which tells it and the shifts from others.
     halved : bool
         Whether all rays have theta < pi/2.
     start, end : int
@@ -107,8 +55,7 @@ class SobolRays:
 
     law: Law
     basis: Basis
-    sequence: SobolSequence
-    shifts: Digits
+    shifts: NDArray[np.uint64]
     beyond: Floats
     seed: tuple[int, ...]
     halved: bool
@@ -149,23 +96,16 @@ class SobolRays:
     def add_to(self, sums: RaySums, first: int, task: int) -> None:
         reflect = self.law.random_map()
         assert reflect is not None  # checked by the sampler
-        for digits in self._blocks(*self.range_of(task)):
+        low, high = self.range_of(task)
+        sequence = sobol_sequence(self.seed, low)
+        for start in range(low, high, self.chunk):
+            digits = (sequence.random(min(self.chunk, high - start)) * 2.0**SOBOL_BITS).astype(np.uint64)
             points = (digits ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS
             x, u = np.moveaxis(points + self.beyond[:, None], -1, 0)
             theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
             outgoing, escaped = reflect(entry_inside(x), theta)
             sums.count_unresolved(escaped)
             sums.add_rows(first, theta, outgoing)
-
-    def _blocks(self, low: int, high: int) -> Iterator[Digits]:
-        """The points of a range, at most a chunk at a time."""
-        blocks: list[Digits] = []
-        for start, number in _balanced(low, high, self.chunk):
-            if sum(map(len, blocks)) + number > self.chunk:
-                yield np.concatenate(blocks)
-                blocks = []
-            blocks.append(self.sequence.block(start, number))
-        yield np.concatenate(blocks)
 
     def identity(self) -> dict[str, Any]:
         return {
@@ -174,12 +114,12 @@ class SobolRays:
         }  # fmt: skip
 
 
-def _balanced(low: int, high: int, most: int) -> Iterator[tuple[int, int]]:
-    """Begins and lengths of blocks: the sequence is balanced in powers of two that divide the begin."""
-    while low < high:
-        number = min(most, high - low, low or high)
-        yield low, number
-        low += number
+def sobol_sequence(seed: tuple[int, ...], start: int) -> Sobol:
+    """The scrambled sequence of a seed in two dimensions, of which ``start`` points are passed over."""
+    from scipy.stats.qmc import Sobol
+
+    sequence = Sobol(2, bits=SOBOL_BITS, rng=np.random.default_rng(seed))
+    return sequence.fast_forward(start) if start else sequence
 
 
 def whole_sequences(samples: int) -> int:
@@ -221,7 +161,6 @@ class SobolSampler:
         self.halved = law.mirror_symmetric is True and is_mirror_symmetric(basis)
         self.seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
         source = np.random.default_rng(self.seed)
-        self.sequence = SobolSequence.of(source)
         self.shifts = source.integers(0, 2**SOBOL_BITS, size=(PARTS, 2), dtype=np.uint64)
         self.beyond = source.random((PARTS, 2)) * 2.0**-SOBOL_BITS
 
@@ -231,7 +170,7 @@ class SobolSampler:
         """The matrix from at least ``samples`` rays, rounded up to 8 times a power of two; see `RaySums.array`.
 
         With an ``engine`` its workers trace the rays and its checkpoint stores the sums, which are the same to the last
-        bit: a block of the sequence depends only on its place.
+        bit: the points of a task depend only on its number.
 
         Raises
         ------
@@ -246,7 +185,7 @@ class SobolSampler:
             )
         if each > self.sums.each:
             rays = SobolRays(
-                self.sums.law, self.sums.basis, self.sequence, self.shifts, self.beyond, self.seed, self.halved,
+                self.sums.law, self.sums.basis, self.shifts, self.beyond, self.seed, self.halved,
                 self.sums.each, each,
             )  # fmt: skip
             count_long(self.sums, rays, engine or {})

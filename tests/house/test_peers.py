@@ -59,13 +59,12 @@ def test_the_limits_hold(tmp_path, data, monkeypatch):
     assert "time was up" in peers.PeerEnvironment(tmp_path / "b").run("deeptime", "deeptime", data)
 
 
-def test_every_solver_finds_the_gaps_of_a_chain_of_wells(tmp_path, monkeypatch):
+def test_every_solver_has_a_row_for_every_gap(tmp_path, monkeypatch):
     monkeypatch.setattr(peers.PeerEnvironment, "run", lambda *_: "not here")
     monkeypatch.setattr(peers, "MAXWELL_GAPS", (0.5,))
-    monkeypatch.setattr(peers, "STATES", (10,))
     rows = list(peers.solve_with_all(tmp_path, peers.PeerEnvironment(tmp_path / "environment")))
-    assert [row[3] for row in rows] == [0, "-", "-", 0, 0, "-"]
-    assert [row[-1] for row in rows if row[3] == "-"] == ["not here"] * 3
+    assert [row[3] for row in rows] == [0, "-", "-"]
+    assert [row[-1] for row in rows if row[3] == "-"] == ["not here"] * 2
 
 
 def test_a_gap_that_is_missing_or_no_number_is_wrong():

@@ -61,9 +61,3 @@ def test_its_eigenvalues_are_enclosed_with_their_indices_and_parities(diagonal, 
             # the numbers are right to a few roundings, and the intervals no wider than some dozen
             assert item.width <= 100.0 * max(abs(item.value - exact[degree]), EPS)
     assert found[0].label == "indexed"
-
-
-def test_the_leading_eigenvalues_of_its_matrix_are_complete(diagonal) -> None:
-    law, exact = diagonal
-    found = spec.leading_eigenvalues(ker.discretise(law, ker.Legendre(24)), 4)
-    assert found.complete and found.values == pytest.approx(np.sort(exact[:24])[::-1][: len(found.values)], abs=1e-9)

@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from scipy.sparse import diags_array
-from scipy.sparse.linalg import LinearOperator
 from scipy.stats import binomtest
 
 from asperity import geometry as geo
@@ -215,42 +213,6 @@ def test_a_diffusivity_that_the_limit_at_grazing_does_not_bound_is_refused():
     with pytest.raises(AccuracyError, match="does not bound") as caught:
         spec.diffusivity(0.9 * ker.RectangularTeethLaw(1.0) + 0.1 * ker.lambertian())
     assert 0.1 < caught.value.defect < 2.0
-
-
-# ---- large matrices ---------------------------------------------------------------------------------------------
-def wells(barriers: np.ndarray, inside: int):
-    """A chain of wells of ``inside`` states, hopping at rate 1/4 in them and at the rates ``barriers`` between them."""
-    hop = np.full((len(barriers) + 1) * inside - 1, 0.25)
-    hop[inside - 1 :: inside] = barriers
-    return diags_array([hop, 1 - np.append(hop, 0) - np.append(0, hop), hop], offsets=[-1, 0, 1])
-
-
-@pytest.mark.parametrize("inside", [8, 40])
-def test_the_thirty_slow_eigenvalues_of_thirty_wells_are_complete(inside):
-    """To first order in the rates: 1 - lambda are the eigenvalues of the wells' own chain over ``inside``."""
-    rates = 50.0 * np.repeat([1e-6, 1e-9, 1e-12], [10, 10, 9])
-    found = spec.leading_eigenvalues(wells(rates, inside), 30)
-    assert found.complete and found.counted == len(found.values) == 30
-    coarse = np.diag(np.append(rates, 0) + np.append(0, rates)) - np.diag(rates, 1) - np.diag(rates, -1)
-    expected = np.sort(np.linalg.eigvalsh(coarse)) / inside
-    gaps = 1 - found.values
-    assert np.all(np.abs(gaps - expected) <= found.error + 4 * inside * expected * rates.max() + 1e-16)
-    assert found.error < 1e-13
-
-
-def test_copies_of_a_multiple_eigenvalue_are_all_found():
-    values = np.concatenate([np.ones(10), np.full(10, 1 - 1e-9), np.linspace(0, 0.9, 480)])
-    for asked, given in ((10, 10), (12, 20)):
-        found = spec.leading_eigenvalues(diags_array(values), asked)
-        assert found.complete and len(found.values) == given
-        assert np.allclose(found.values, values[:given], rtol=0.0, atol=1e-14)
-
-
-def test_operators_without_entries_are_not_called_complete():
-    values = np.linspace(-0.5, 1.0, 400)
-    operator = LinearOperator((400, 400), matvec=lambda v: values * v.ravel(), dtype=float)
-    found = spec.leading_eigenvalues(operator, 3)
-    assert np.allclose(found.values, values[::-1][:3]) and not found.complete and found.error == np.inf
 
 
 # ---- sampling ---------------------------------------------------------------------------------------------------

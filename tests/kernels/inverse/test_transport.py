@@ -210,7 +210,7 @@ def test_involutions_converge_to_the_least_law():
     assert rows[1] < 0.6 * rows[0] < 0.06 and weak[1] < 0.3 * weak[0]
 
 
-def test_two_mirrors_swap_two_intervals_and_lose_in_proportion_to_the_opening():
+def test_two_mirrors_swap_narrow_intervals_and_lose_in_proportion_to_the_opening():
     near = np.array([1.18, 1.22])
     # of the same measure, about 2.0
     far = np.arccos(np.cos(near) + np.cos(2.0) - np.cos(1.2))
