@@ -9,7 +9,7 @@ from ..bases.assembly import largest_square_sum
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..expectations.angle_panels import NODES, AnglePanels
-from ..laws.law import DrivenLaw, Law
+from ..laws.law import DrivenLaw, Law, knows_errors
 from ..laws.structure import is_compound, lists_branches
 from ..matrices.matrix import KernelMatrix
 from .method import Budget, MethodName, computed, rounding
@@ -37,8 +37,7 @@ class Actions:
             return False
         if isinstance(law, DrivenLaw) and not isinstance(basis, Legendre):
             return False
-        known = law.expectations(basis)
-        return known.has_errors and not known.is_traced
+        return knows_errors(law) and not law.expectations(basis).is_traced
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error = action_matrix(law, basis, budget.tolerance)

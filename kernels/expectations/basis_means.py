@@ -76,14 +76,18 @@ class Expectations(ABC):
 
 @dataclass(frozen=True)
 class ByConditionals(Expectations):
-    """Expectations from the conditional distributions of a law, whose errors one incoming angle shows to be known."""
+    """Expectations from the conditional distributions of a law, whose errors one incoming angle shows to be known.
+
+    Densities count as without errors: cut at the edges of many panels, they take too long, and polynomials suffice.
+    """
 
     conditionals: Callable[[Floats, float, int, Floats], Any]
     traced: bool = False
+    density: bool = False
 
     @property
     def has_errors(self) -> bool:
-        return not np.isnan(self.conditionals(PROBE, PROBE_TOLERANCE, 0, np.empty(0)).error).any()
+        return not self.density and not np.isnan(self.conditionals(PROBE, PROBE_TOLERANCE, 0, np.empty(0)).error).any()
 
     @property
     def is_traced(self) -> bool:

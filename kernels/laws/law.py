@@ -780,6 +780,11 @@ def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
     return laws[0].breakpoints(CUTS)[0]
 
 
+def knows_errors(law: Law) -> bool:
+    """Whether the errors of conditional distributions are known, as one incoming angle shows."""
+    return not np.isnan(_probe(law, 0).error).any()
+
+
 def _probe(law: Law, degree: int) -> Conditionals:
     return law._conditionals(PROBE, PROBE_TOLERANCE, degree, np.empty(0))
 
