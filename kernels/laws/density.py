@@ -13,11 +13,9 @@ from ...core.checks import Floats, common_shape, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
-from ..bases.basis import Basis
 from ..bases.given import Vectorised
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
-from ..expectations.basis_means import ByConditionals, Expectations
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from .distribution import Distribution
 from .law import Law, set_properties
@@ -185,10 +183,6 @@ class DensityLaw(Law):
         weight *= self.density(theta[owner], outgoing)
         error = np.abs(np.bincount(owner, weights=weight, minlength=theta.size) - 1.0)
         return Conditionals.of_lists(owner, outgoing, weight, error)
-
-    def expectations(self, basis: Basis) -> Expectations:
-        """Expectations from conditional distributions, as without errors."""
-        return ByConditionals(basis, self._conditionals, density=True)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         flat, draw = theta.reshape(-1), rng.random(theta.size)

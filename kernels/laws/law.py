@@ -32,10 +32,8 @@ from ...core.errors import InputError
 from ...core.rounding import EPS
 from ...core.tables import html_table
 from ..bases.angles import mirrored_angle
-from ..bases.basis import AngleFunction, Basis, Frame
+from ..bases.basis import AngleFunction, Frame
 from ..bases.given import Vectorised, seed_by_name
-from ..bases.mirror import is_mirror_symmetric
-from ..expectations.basis_means import ByConditionals, Expectations, Mirrored, Weighted
 from ..expectations.conditionals import Conditionals, degree_of
 from .branches import chained, chained_breakpoints, joined, merged
 from .distribution import Distribution
@@ -277,10 +275,6 @@ class Law(ABC):
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """`distribution` for checked arguments; the default adds up the masses of conditional distributions."""
         return Distribution.of_cells(self._conditionals(theta, TOLERANCE, 0, edges[1:-1]).masses(edges))
-
-    def expectations(self, basis: Basis) -> Expectations:
-        """E[e_j(Theta') | theta] for all functions of a basis, with errors if known; by default from conditionals."""
-        return ByConditionals(basis, self._conditionals)
 
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
@@ -548,9 +542,6 @@ class Combination(Law):
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         terms = self.terms_checked()
         return Distribution.mixed([(weight, law.distribution(theta, edges)) for weight, law in terms])
-
-    def expectations(self, basis: Basis) -> Expectations:
-        return Weighted(basis, tuple((weight, law.expectations(basis)) for weight, law in self.terms_checked()))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         terms = self.terms_checked()
@@ -899,12 +890,6 @@ class SpecularFrame(Law):
 
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         return self.law.distribution(theta, (np.pi - edges)[..., ::-1]).mirrored()
-
-    def expectations(self, basis: Basis) -> Expectations:
-        """Expectations from the inner law if the basis is mirror-symmetric, else by `apply`."""
-        if not is_mirror_symmetric(basis):
-            return super().expectations(basis)
-        return Mirrored(basis, self.law.expectations(basis), self.mirror_symmetric is True)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return mirrored_angle(self.law.sample(theta, rng))

@@ -20,9 +20,10 @@ from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import Means, height_of, weighted_means
 from ...kernels.laws.density import GAUSS_NODES, split_panels
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.law import Composition, SpecularFrame, is_atomic
+from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
 from ...kernels.laws.structure import Rules, fold, holds_of_all, law_of, words_of
 from ...kernels.walls.circular_arc import MOST_HITS
+from .expectations import expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
@@ -235,9 +236,8 @@ def _rule(law: Law, basis: Basis, vectors: Floats) -> Means:
         return _of_rules(partial(_means_of_density, law, basis, vectors), vectors.shape[1])
     if isinstance(law, CircularArcLaw) and isinstance(basis, Legendre):
         return _of_rules(partial(_means_of_arc, law, basis, vectors), vectors.shape[1])
-    found = law.expectations(Panels(basis.edges, 0) if isinstance(basis, Bins) else basis)
-    if found.has_errors:
-        return found.of(vectors)
+    if knows_errors(law):
+        return expectations_of(law, Panels(basis.edges, 0) if isinstance(basis, Bins) else basis, vectors)
     raise _refusal(law, "the errors of its conditional distributions are unknown")
 
 
