@@ -55,8 +55,9 @@ TOLERANCE, FIRST_ANGLES, NODES_AT_ONCE = 1e-8, 16, 2**20
 DEGREE = 8
 # Breakpoints of laws at which the means under the law before them are cut.
 CUTS = 64
-# Incoming angle, tolerance and degrees of the test whether conditional distributions depend on the degree.
-PROBE, PROBE_TOLERANCE, PROBE_DEGREES = np.array([1.0]), 1e-2, (0, 64)
+# Incoming angle, tolerance, and degrees with edges of the test whether conditional distributions depend on these.
+PROBE, PROBE_TOLERANCE = np.array([1.0]), 1e-2
+PROBE_FUNCTIONS = (0, np.empty(0)), (64, np.linspace(0.05, 3.09, 32))
 # Edges begin at 0 and end at pi within a few roundings.
 ENDS_TOLERANCE = 1e-14
 # Limit on nested calls of `apply`; more would exceed Python's recursion limit.
@@ -758,8 +759,8 @@ def as_base(law: Law) -> str:
 
 def is_atomic(law: Law) -> bool:
     """Whether the conditional distributions of a law are finitely many atoms, which average any function exactly."""
-    few, many = (_probe(law, degree) for degree in PROBE_DEGREES)
-    return not np.isnan(few.error).any() and np.array_equal(few.nodes, many.nodes)
+    whole, cut = (law._conditionals(PROBE, PROBE_TOLERANCE, degree, edges) for degree, edges in PROBE_FUNCTIONS)
+    return not np.isnan(whole.error).any() and np.array_equal(whole.nodes, cut.nodes)
 
 
 def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
@@ -773,11 +774,11 @@ def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
 
 def knows_errors(law: Law) -> bool:
     """Whether the errors of conditional distributions are known, as one incoming angle shows."""
-    return not np.isnan(_probe(law, 0).error).any()
+    return not np.isnan(_probe(law).error).any()
 
 
-def _probe(law: Law, degree: int) -> Conditionals:
-    return law._conditionals(PROBE, PROBE_TOLERANCE, degree, np.empty(0))
+def _probe(law: Law) -> Conditionals:
+    return law._conditionals(PROBE, PROBE_TOLERANCE, 0, np.empty(0))
 
 
 def _conditionals_of_chain(
@@ -786,7 +787,7 @@ def _conditionals_of_chain(
     """The conditional distributions of composed laws; means under a law are cut at the next law's breakpoints."""
     try:
         probability, outgoing = chained(laws, theta)
-        error = {part: float(_probe(part, 0).error[0]) for part in set(laws)}
+        error = {part: float(_probe(part).error[0]) for part in set(laws)}
         return Conditionals.of_atoms(outgoing, probability, sum(error[part] for part in laws))
     except InputError:
         # not isometries, or too many of them

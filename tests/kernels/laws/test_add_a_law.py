@@ -6,12 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.kernels.bases.measure import gauss_rule
 from asperity.kernels.expectations.conditionals import Conditionals
 from asperity.kernels.laws.distribution import Distribution
+from asperity.kernels.laws.law import is_atomic
 
 G = 0.2
 
@@ -46,6 +48,21 @@ class KnownLinearLaw(LinearLaw):
 
 LAWS = [LinearLaw(G), KnownLinearLaw(G)]
 KNOWN = LAWS[1]
+
+
+@pytest.mark.parametrize(
+    ("law", "atomic"),
+    [
+        (LAWS[0], False), (ker.specular(), True), (ker.LeastResistanceLaw(), True), (ker.lambertian(), False),
+        (ker.TriangularTeethLaw(0.7) @ ker.RectangularTeethLaw(0.8), True), (ker.CircularArcLaw(1.2), False),
+        (ker.DensityLaw(lambda u, v: 0.5 * np.sin(v) * (1.0 + 0.5 * (np.abs(np.cos(u) - np.cos(v)) - 0.5 * (
+            2.0 + np.cos(u) ** 2 + np.cos(v) ** 2) + 2.0 / 3.0))), False),
+        (ker.WallLaw(geo.dispersing_arcs(1.0)), False), (ker.henyey_greenstein(0.999), False),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_only_finitely_many_atoms_average_any_function_exactly(law: ker.Law, atomic: bool) -> None:
+    assert is_atomic(law) == atomic
 
 
 def second(law: ker.Law) -> float:
