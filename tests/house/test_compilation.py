@@ -158,7 +158,7 @@ def test_ctrl_c_during_a_late_compilation_is_not_lost(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(pointers, "address_of", interrupted)
-    late = pointers.Late(None, ())
+    late = pointers.Late(None)
     # compiled code gets 0 from this call, and goes on
     with pytest.raises(KeyboardInterrupt):
         pointers.checked(lambda: late.load())

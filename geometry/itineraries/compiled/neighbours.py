@@ -7,7 +7,7 @@ import numpy as np
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
 from ...tracing.compiled.options import compiled, linked
-from .changes import probe, task_of
+from .changes import probe, setting_at, task_of
 
 # Number of positions, at most the last width away from the expected middle, at which a piece is searched. Near a
 # critical angle the width is proportional to the distance from this angle or to its square root; both cases are found.
@@ -27,22 +27,23 @@ def label_at(x, task):
 
 
 @compiled
-def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree, found):
+def find_missed(thetas, least_widths, pieces, starts, linked, setting, found):
     """Return entry points whose ray has another label than the piece around them.
 
     The candidates are the middles of the pieces at a neighbouring angle: angles ``k`` and ``k + 1`` are compared if
-    ``linked[k]``. Pieces no wider than ``least_widths`` of the other angle are ignored. ``found`` are arrays
-    to fill, with the numbers of the angles, with the positions, and with the number of ray segments; each piece may be
-    found twice. Returns the numbers of positions and of rays.
+    ``linked[k]``. Pieces no wider than ``least_widths`` of the other angle are ignored. Of the setting the address is
+    given. ``found`` are arrays to fill, with the numbers of the angles and with the positions; each piece may be found
+    twice. Returns the numbers of positions and of rays.
     """
+    setting = setting_at(setting)
     lows, highs, labels = pieces
-    owners, entries, segments = found
+    owners, entries = found
     count, rays = np.int64(0), np.int64(0)
     for k in range(thetas.shape[0] - 1):
         if not linked[k]:
             continue
         for here, there in ((k, k + 1), (k + 1, k)):
-            task = task_of(setting, thetas[there], degree, segments)
+            task = task_of(setting, thetas[there])
             m, end = starts[there], starts[there + 1]
             for p in range(starts[here], starts[here + 1]):
                 if highs[p] - lows[p] <= least_widths[there]:
@@ -79,18 +80,19 @@ def edge_from(x, step, label, task):
 
 
 @compiled
-def find_critical(label, present, absent, low, high, drift, setting, degree, spent):
+def find_critical(label, present, absent, low, high, drift, setting):
     """Return the critical angle between ``present`` and ``absent`` of the piece [low, high] at the angle ``present``.
 
-    ``drift`` is the estimated derivative of the piece's middle by the angle; ``spent``, with one entry, is work space.
+    ``drift`` is the estimated derivative of the piece's middle by the angle; of the setting the address is given.
     """
+    setting = setting_at(setting)
     hollow = setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]
     for _ in range(MOST_STEPS):
         if abs(present - absent) <= SAME_ANGLE:
             break
         angle = 0.5 * (present + absent)
-        task = task_of(setting, angle, degree, spent)
+        task = task_of(setting, angle)
         width, before = high - low, 0.5 * (low + high)
         centre = before + drift * (angle - present)
         found = np.nan

@@ -11,11 +11,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from ...scene.records import Record
+from ...scene.compiled.tables import ROW, Table, named, reader_of
+from ...scene.structs import Struct
 from ...tracing.compiled.options import linked
 from .changes import BLOCK, FIRST_LABEL, is_spent, outcome, probe, size_at, trace_block
 
@@ -24,8 +26,6 @@ LEVELS = 5
 MOST_POSITIONS = 2 ** (LEVELS + 1) - 1
 # Limit on the nodes of one incoming angle.
 MOST_NODES = 1 << 17
-# Further nodes for margins and gaps.
-SPARE = 4
 # Least ratio of differences in the error estimate of a rule, 2 x last difference x last ratio of differences:
 # smaller ratios, which also occur by chance, underestimate the error.
 LEAST_RATIO = 0.03
@@ -34,8 +34,9 @@ NARROWEST = 1e-9
 # Width, as a fraction of the opening, below which one ray checks a piece on which the functions are constant.
 NARROW = 1.0 / 32.0
 MOST_HALVINGS = 40
-# Size of the arrays of nodes: a stack of intervals lies behind the nodes, so that nothing is allocated.
-NODE_ROOM = MOST_NODES + SPARE + MOST_HALVINGS + 2
+# A stack of intervals lies behind the nodes and those of margins and gaps, so that nothing is allocated.
+STACK = MOST_NODES + 4
+NODE_ROOM = STACK + MOST_HALVINGS + 2
 # Least fraction of the tolerance for the rules of one piece, however narrow.
 LEAST_FRACTION = 0.05
 
@@ -51,7 +52,18 @@ class Rules(NamedTuple):
     least: int
 
 
-def nested_rules(least: int) -> Record:
+class Nodes(NamedTuple):
+    """Outgoing angles and masses of nodes."""
+
+    angles: Floats
+    masses: Floats
+
+
+NODES = named(Nodes, ROW, ROW)
+rules_at = reader_of(named(Rules, ROW, Table(MOST_POSITIONS), types.int64))
+
+
+def nested_rules(least: int) -> Struct:
     """Return the rules after the substitution, to be used from number ``least`` on."""
     positions, weights = np.empty(0), np.zeros((LEVELS, MOST_POSITIONS))
     for level in range(LEVELS):
@@ -66,7 +78,7 @@ def nested_rules(least: int) -> Record:
             2.0 / intervals * np.sin(angle) * np.sum(np.sin(np.outer(angle, odd)) / odd, axis=1)
         )
     s = np.sin(0.5 * np.pi * positions) ** 2
-    return Record(Rules(s * s * (3.0 - 2.0 * s), 2.0 * weights * 3.0 * s * (1.0 - s), least))
+    return Struct(Rules(s * s * (3.0 - 2.0 * s), 2.0 * weights * 3.0 * s * (1.0 - s), least))
 
 
 @linked
@@ -79,7 +91,8 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     low, high = ends
     positions, weights, least = rules.positions, rules.weights, rules.least
     node, mass = nodes.angles, nodes.masses
-    degree = task.degree
+    setting = task.setting
+    degree, entries = setting.degree, setting.tracer.entries
     width = high - low
     old0, old1, old2, old_step = 0.0, 0.0, 0.0, 0.0
     k = max(degree, 1)
@@ -87,16 +100,15 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     traced, used = np.int64(0), np.int64(0)
     for level in range(LEVELS):
         count = (4 << level) - 1
-        if count > MOST_NODES - filled - 2 or is_spent(task):
+        if count > MOST_NODES - filled - 2 or is_spent(setting):
             break
         for first in range(traced, count, BLOCK):
             last = min(first + BLOCK, count)
-            block = task.setting.tracer.entries[: last - first]
             for n in range(first, last):
-                block[n - first] = low + width * positions[n]
-            trace_block(block, task)
+                entries[n - first] = low + width * positions[n]
+            trace_block(last - first, setting)
             for n in range(first, last):
-                x = block[n - first]
+                x = entries[n - first]
                 out, here = outcome(n - first, task)
                 if strict and here != label:
                     return used, error, x, np.int64(last)
@@ -132,33 +144,33 @@ def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
     ``sample`` is the outgoing angle and label of a ray of the piece. Returns the total number of nodes, the error, a
     position where a ray has another label (nan: none), and the number of rays.
     """
-    whole = task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
+    setting = task.setting
+    whole = setting.hollow[RIGHT] - setting.hollow[LEFT]
     out, label = sample
     node, mass = nodes.angles, nodes.masses
-    low_stack, high_stack = node[MOST_NODES + SPARE :], mass[MOST_NODES + SPARE :]
-    low_stack[0], high_stack[0] = ends
-    if task.degree == 0 and ends[1] - ends[0] < NARROW * whole and strict and MOST_NODES - filled > 2:
+    node[STACK], mass[STACK] = ends
+    if setting.degree == 0 and ends[1] - ends[0] < NARROW * whole and strict and MOST_NODES - filled > 2:
         middle = 0.5 * (ends[0] + ends[1])
         out, here = probe(middle, task)
         if here != label:
             return filled, 0.0, middle, np.int64(1)
         node[filled], mass[filled] = out, ends[1] - ends[0]
         return filled + 1, 0.0, np.nan, np.int64(1)
-    size = size_at(out, task)
+    size = size_at(out, setting)
     depth, error, rays = np.int64(1), 0.0, np.int64(0)
     while depth > 0:
         depth -= 1
-        low, high = low_stack[depth], high_stack[depth]
+        low, high = node[STACK + depth], mass[STACK + depth]
         allowed = goal / size * max((high - low) / whole, LEAST_FRACTION)
         used, miss, other, spent = apply_rules((low, high), label, allowed, rules, task, nodes, filled, strict)
         rays += spent
         if not math.isnan(other):
             return filled, error, other, rays
-        able = MOST_NODES - filled - 2 >= MOST_POSITIONS and not is_spent(task)
+        able = MOST_NODES - filled - 2 >= MOST_POSITIONS and not is_spent(setting)
         if miss > allowed and depth < MOST_HALVINGS and high - low > NARROWEST * whole and able:
             middle = 0.5 * (low + high)
-            low_stack[depth], high_stack[depth] = middle, high
-            low_stack[depth + 1], high_stack[depth + 1] = low, middle
+            node[STACK + depth], mass[STACK + depth] = middle, high
+            node[STACK + depth + 1], mass[STACK + depth + 1] = low, middle
             depth += 2
             continue
         if used == 0:

@@ -95,10 +95,10 @@ def test_curves_without_waves_and_open_walls_stay_with_the_loop():
 
 
 def test_a_function_is_worth_its_compilation_once_it_is_wanted_often_or_stored():
-    late = Late(mirrored, (np.float32(1.0),))
+    late = Late(mirrored, types.float32)
     assert not late.is_worth(4, 10)
     assert not late.is_worth(5, 10)
     assert late.is_worth(1, 10)
-    used = Late(closed_forms.cross_simple, closed_forms.SIMPLE._arguments)
+    used = Late(closed_forms.cross_simple, *closed_forms.SIMPLE._kinds)
     closed_forms.SIMPLE.load()
     assert used.is_worth(1, 10)
