@@ -160,7 +160,7 @@ def enclosures(
     ------
     InputError
         If the errors of conditional expectations are unknown: for compositions with laws whose expectations are
-        computed by quadrature, and laws given by entry points.
+        computed by quadrature, walls with more than 64 pieces, and laws given by entry points.
     AccuracyError
         If the law is not symmetric within its error. If the law is self-adjoint in the other convention only, the
         message states the norm bound that holds in this one.
