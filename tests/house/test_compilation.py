@@ -252,15 +252,14 @@ class Guarded(ModuleType):
             raise Undocumented(f"{caller} uses {home}.{name}")
         return ModuleType.__getattribute__(self, name)
 
-def imported(name, *rest):
-    found = load(name, *rest)
-    if name.split(".")[0] == "numba":
+def imported(name, namespace=None, *rest):
+    found = load(name, namespace, *rest)
+    if name.split(".")[0] == "numba" and (namespace or {}).get("__name__", "").startswith("asperity."):
         for module in [module for key, module in list(sys.modules.items()) if key.split(".")[0] == "numba"]:
             module.__class__ = Guarded
     return found
 
 load, builtins.__import__ = builtins.__import__, imported
-import numba
 """
 CALLS = """
 from asperity import geometry as geo, kernels as ker, spectral as spec
