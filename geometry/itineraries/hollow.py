@@ -132,7 +132,7 @@ class HollowConditionals:
 
     def trace(self, entries: Floats, angles: Floats) -> tuple[Floats, Floats, NDArray[np.uint64]]:
         """The outgoing angles, exit points and labels of rays."""
-        from .compiled.patches import trace_points
+        from .compiled.changes import trace_points
 
         outs, exits, labels = np.empty(len(entries)), np.empty(len(entries)), np.empty(len(entries), np.uint64)
         setting = self._setting
@@ -145,8 +145,7 @@ class HollowConditionals:
         self.rays, self.segments = self.rays + rays, self.segments + int(setting.values.tracer.spent[0])
 
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
-        from .compiled.march import marched_angles
-        from .compiled.rules import nested_rules
+        from .compiled.march import marched_angles, nested_rules
 
         # the width whose error is one tolerance
         least = tolerances * self.width / self._size
@@ -192,29 +191,27 @@ class HollowConditionals:
         return together[:: 1 + 2 * len(together) // MOST_SAMPLES]
 
     def _compare(self, theta: Floats) -> set[float]:
-        """The angles among ``theta`` and their neighbours at which a piece was missed."""
-        from .compiled.neighbours import find_missed
+        """The angles among ``theta`` and their neighbours at which a piece was missed.
 
+        The entry points tried at an angle are the middles of the pieces at a neighbouring one.
+        """
         position = np.searchsorted(self._theta, theta)
         near = np.unique(np.clip(np.concatenate((position - 1, position, position + 1)), 0, len(self._theta) - 1))
         fresh = np.isin(near, position)
-        linked = (np.diff(near) == 1) & (fresh[1:] | fresh[:-1])
-        angles = self._theta[near]
-        near_pieces = [self._pieces[angle] for angle in angles.tolist()]
-        columns = zip(*((known.low, known.high, known.label) for known in near_pieces), strict=True)
-        pieces = tuple(np.concatenate(column) for column in columns)
-        starts = np.cumsum([0, *(len(known.low) for known in near_pieces)])
-        least = np.array([known.matters for known in near_pieces])
-        most = 2 * len(pieces[0])
-        found, setting = (np.empty(most, np.int64), np.empty(most)), self._setting
-        count, rays = compiled_result(
-            lambda: find_missed(angles, least, pieces, starts, linked, setting.address, found)
-        )
-        owner, entries = (part[:count] for part in found)
-        self._count(rays, setting)
-        for angle, x in zip(angles[owner].tolist(), entries.tolist(), strict=True):
+        known = [self._pieces[angle] for angle in self._theta[near].tolist()]
+        tried = [
+            there.unlike(here)
+            for k in np.flatnonzero((np.diff(near) == 1) & (fresh[1:] | fresh[:-1])).tolist()
+            for here, there in ((known[k], known[k + 1]), (known[k + 1], known[k]))
+        ]
+        if not tried:
+            return set()
+        angles, entries, labels = (np.concatenate(column) for column in zip(*tried, strict=True))
+        _, _, found = self.trace(entries, angles)
+        missed = found != labels
+        for angle, x in zip(angles[missed].tolist(), entries[missed].tolist(), strict=True):
             self.miss(angle, x)
-        return set(angles[owner].tolist())
+        return set(angles[missed].tolist())
 
     def shared(self, theta: Floats) -> Floats:
         """The fraction of the opening whose itinerary also exists at the next of these known angles."""
@@ -248,7 +245,7 @@ class HollowConditionals:
         return cuts
 
     def _located(self, label: int, present: float, absent: float, k: int) -> float:
-        from .compiled.neighbours import find_critical
+        from .compiled.critical import find_critical
 
         key = (label, min(present, absent), max(present, absent))
         for (name, low, high), angle in self._critical.items():

@@ -3,7 +3,7 @@
 At one incoming angle the map x -> theta' is analytic between changes of the itinerary. The search keeps a chain of
 samples, each with the label of its itinerary. In each round, every gap between samples of different labels is divided.
 
-The constants of one angle are in a `Task`, the samples in a `Chain`.
+The constants are in a `Setting`, the samples in a `Chain`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
 from ...scene.compiled.tables import ROW, Table, named, reader_of
 from ...scene.scene import Scene
 from ...scene.structs import Struct
-from ...tracing.compiled.options import inlined, inner, linked
-from ...tracing.compiled.pointers import Late, call_late
+from ...tracing.compiled.options import compiled, inlined, linked
+from ...tracing.compiled.pointers import call_late
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, TRACE
 from ...tracing.compiled.records import Rays, details_for, results_for
 
@@ -62,14 +62,13 @@ class Limits(NamedTuple):
 
 
 class Tracer(NamedTuple):
-    """What `trace_block` needs: addresses, and the arrays for a block of rays, of the same incoming angle.
+    """What `trace_block` needs: addresses, and the arrays for a block of rays.
 
-    The addresses are those of the slots of `trace_rays` and `halve_gaps`, and of the `Rays`, the tables, details and
-    `SLOTS`. ``spent``, with one entry, counts ray segments.
+    The addresses are those of the slot of `trace_rays`, the `Rays`, the tables, the details and `SLOTS`. ``spent``,
+    with one entry, counts ray segments.
     """
 
     trace: int
-    halve: int
     rays: Struct
     tables: Struct
     details: Struct
@@ -99,13 +98,6 @@ class Setting(NamedTuple):
     tracer: Tracer
 
 
-class Task(NamedTuple):
-    """One incoming angle: the setting and the angle."""
-
-    setting: Setting
-    theta: float
-
-
 class Chain(NamedTuple):
     """Samples in the order of their computation, and two lists of gaps, each given by the sample on its left."""
 
@@ -117,13 +109,24 @@ class Chain(NamedTuple):
     fresh: NDArray[np.int64]
 
 
+INTEGERS, LABELS = types.CPointer(types.int64), types.CPointer(types.uint64)
+TRACER = named(
+    Tracer, *[types.int64] * 5, ROW, ROW, ROW, types.CPointer(types.uint8), Table(2), LABELS, INTEGERS, INTEGERS
+)
+SETTING = named(
+    Setting, ROW, named(Limits, types.int64, types.boolean, types.int64), types.int64, types.int64, ROW, ROW, TRACER
+)
+CHAIN = named(Chain, ROW, ROW, LABELS, INTEGERS, INTEGERS, INTEGERS)
+setting_at = reader_of(SETTING)
+
+
 def setting_of(scene: Scene, hollow: int, limits: Limits, degree: int, edges: Floats, sizes: Floats) -> Struct:
     """Return the setting of hollow number ``hollow``, for use by one thread at a time."""
     entries, angles = np.empty((2, BLOCK))
     results, details = results_for(BLOCK), details_for(BLOCK, BLOCK)
     rays, (exits, _, _, status) = Struct(Rays(entries, angles, *results, np.zeros(1, np.int64))), results
     arrays = entries, angles, exits, status, *details.values[:3], np.zeros(1, np.int64)
-    tracer = Tracer(TRACE.slot, HALVE.slot, rays, scene.tables, details, SLOTS, *arrays)
+    tracer = Tracer(TRACE.slot, rays, scene.tables, details, SLOTS, *arrays)
     edges, sizes = (np.require(values, np.float64, ["C", "A", "W"]) for values in (edges, sizes))
     return Struct(Setting(scene.tables.values.hollows[hollow], limits, degree, len(edges), edges, sizes, tracer))
 
@@ -134,12 +137,11 @@ def empty_chain() -> Chain:
     return Chain(np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES, np.uint64), *counts)
 
 
-@linked
-def task_of(setting, theta):
-    """-> Task: the task of one incoming angle."""
+@inlined
+def set_angle(theta, setting):
+    """Set the incoming angle of the rays of a block."""
     for k in range(BLOCK):
         setting.tracer.angles[k] = theta
-    return Task(setting, theta)
 
 
 @inlined
@@ -165,18 +167,18 @@ def cell_of(out, edges, count):
 
 
 @inlined
-def outcome(k, task):
+def outcome(k, setting):
     """-> (angle, label): the outgoing angle of ray k of the block, and its label.
 
     The label combines the itinerary and the outgoing bin. The segments of the ray are added to those spent.
     """
-    setting, tracer = task.setting, task.setting.tracer
+    tracer = setting.tracer
     steps = tracer.segments[k]
     if setting.limits.has_runs:
         steps = min(steps, DEAR_STEPS) + max(steps - MANY_STEPS, 0) // CHEAP_STEPS
     tracer.spent[0] += steps
     if tracer.status[k] != ESCAPED:
-        return task.theta, np.uint64(tracer.status[k])
+        return tracer.angles[k], np.uint64(tracer.status[k])
     # clipped for a ray along y = 0 within rounding
     velocity = tracer.velocity
     out = min(max(math.atan2(velocity[k, POINT_Y], velocity[k, POINT_X]), 0.0), math.pi)
@@ -185,12 +187,11 @@ def outcome(k, task):
 
 
 @inlined
-def probe(x, task):
+def probe(x, setting):
     """-> (angle, label): `outcome` of one ray."""
-    setting = task.setting
     setting.tracer.entries[0] = x
     trace_block(1, setting)
-    return outcome(np.int64(0), task)
+    return outcome(np.int64(0), setting)
 
 
 @inlined
@@ -237,11 +238,11 @@ def undecided(before, setting, chain):
 
 
 @inlined
-def insert(x, before, count, task, chain):
+def insert(x, before, count, setting, chain):
     """Insert a sample at x after the sample ``before``."""
     xs, outs, labels, follow = chain.entries, chain.angles, chain.labels, chain.successors
     xs[count] = x
-    outs[count], labels[count] = probe(x, task)
+    outs[count], labels[count] = probe(x, setting)
     follow[count] = follow[before]
     follow[before] = count
 
@@ -269,10 +270,9 @@ def division(i, j, number, setting, chain):
     return x if xs[i] < x < xs[j] else middle
 
 
-@inner
-def halve_gaps(task, chain, count, gap_count, goal, most):
+@linked
+def halve_gaps(setting, chain, count, gap_count, goal, most):
     """Divide gaps until the sum of their errors is at most ``goal``; return the number of samples."""
-    setting = task.setting
     xs, labels, follow, gaps, fresh = chain.entries, chain.labels, chain.successors, chain.gaps, chain.fresh
     for number in range(MOST_ROUNDS):
         total, worst = 0.0, 0.0
@@ -297,7 +297,7 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
             if narrow or count >= most or is_spent(setting):
                 continue
             k = count
-            insert(division(i, j, number, setting, chain), i, k, task, chain)
+            insert(division(i, j, number, setting, chain), i, k, setting, chain)
             count += 1
             moved = True
             if labels[k] != labels[i]:
@@ -314,34 +314,13 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
     return count
 
 
-INTEGERS, LABELS = types.CPointer(types.int64), types.CPointer(types.uint64)
-TRACER = named(
-    Tracer, *[types.int64] * 6, ROW, ROW, ROW, types.CPointer(types.uint8), Table(2), LABELS, INTEGERS, INTEGERS
-)
-SETTING = named(
-    Setting, ROW, named(Limits, types.int64, types.boolean, types.int64), types.int64, types.int64, ROW, ROW, TRACER
-)
-TASK, CHAIN = named(Task, SETTING, types.float64), named(Chain, ROW, ROW, LABELS, INTEGERS, INTEGERS, INTEGERS)
-setting_at = reader_of(SETTING)
-
-
-HALVE = Late(halve_gaps, TASK, CHAIN, types.int64, types.int64, types.float64, types.int64)
-
-
-@inlined
-def halved(task, chain, count, gap_count, goal, most):
-    """`halve_gaps`, called by its address."""
-    return call_late(task.setting.tracer.halve, count, (task, chain, count, gap_count, goal, most))
-
-
 @linked
-def sample_entries(entries, task, chain, goal):
+def sample_entries(entries, setting, chain, goal):
     """Chain the samples at increasing positions and halve the gaps.
 
     Returns the number of samples, and the sample of largest position.
     """
     xs, outs, labels, follow, gaps = chain.entries, chain.angles, chain.labels, chain.successors, chain.gaps
-    setting = task.setting
     left, right = setting.hollow[LEFT], setting.hollow[RIGHT]
     count, gap_count = np.int64(0), np.int64(0)
     for x in entries:
@@ -357,7 +336,7 @@ def sample_entries(entries, task, chain, goal):
             setting.tracer.entries[k - first] = xs[k]
         trace_block(end - first, setting)
         for k in range(first, end):
-            outs[k], labels[k] = outcome(k - first, task)
+            outs[k], labels[k] = outcome(k - first, setting)
             if k > 0 and labels[k] != labels[k - 1]:
                 gaps[gap_count] = k - 1
                 gap_count += 1
@@ -366,16 +345,34 @@ def sample_entries(entries, task, chain, goal):
             xs[end], count = xs[count - 1], end + 1
     last = count - 1
     follow[last] = -1
-    return halved(task, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last
+    return halve_gaps(setting, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last
 
 
 @linked
-def add_change(x, first, task, chain, count, goal):
+def add_change(x, first, setting, chain, count, goal):
     """Insert a position x of another label into the piece that begins with ``first``, and find the changes around x."""
     xs, follow, gaps = chain.entries, chain.successors, chain.gaps
     before = first
     while xs[follow[before]] <= x:
         before = follow[before]
-    insert(x, before, count, task, chain)
+    insert(x, before, count, setting, chain)
     gaps[0], gaps[1] = before, count
-    return halved(task, chain, count + 1, np.int64(2), goal, np.int64(MOST_SAMPLES))
+    return halve_gaps(setting, chain, count + 1, np.int64(2), goal, np.int64(MOST_SAMPLES))
+
+
+@compiled
+def trace_points(entries, angles, setting, outs, exits, labels):
+    """Trace rays with incoming angles of their own; set their outgoing angles, exit points and labels.
+
+    Of the setting the address is given. The outgoing angle is 0 for rays that do not escape.
+    """
+    setting = setting_at(setting)
+    tracer = setting.tracer
+    for first in range(0, entries.shape[0], BLOCK):
+        last = min(first + BLOCK, entries.shape[0])
+        for n in range(first, last):
+            tracer.entries[n - first], tracer.angles[n - first] = entries[n], angles[n]
+        trace_block(last - first, setting)
+        for n in range(first, last):
+            out, labels[n] = outcome(n - first, setting)
+            outs[n], exits[n] = 0.0 if labels[n] < FIRST_LABEL else out, tracer.exits[n - first]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...tracing.compiled.options import compiled, linked
-from .changes import BLOCK, cell_of, outcome, setting_at, task_of, trace_block
+from .changes import cell_of
 
 # Steps towards a crossing of an edge, and towards an extremum of the outgoing angle.
 MOST_STEPS, EXTREMUM_STEPS = 60, 3
@@ -86,21 +86,6 @@ def room_for(cells: int, nodes: int, positions: int) -> Room:
         np.empty(most), np.empty(most + 1, np.int64), np.empty(most), np.empty(2 * most + 2), np.empty(positions),
         np.empty(nodes), np.zeros((max(NUMBERS), cells)), np.array([cells, -1]), np.empty((MOST_DEPTH + 2, 3)),
     )  # fmt: skip
-
-
-@compiled
-def trace_points(entries, angles, setting, outs, exits, labels):
-    """Trace rays with incoming angles of their own; set their outgoing angles, exit points and labels."""
-    setting = setting_at(setting)
-    task = task_of(setting, 0.0)
-    for first in range(0, entries.shape[0], BLOCK):
-        last = min(first + BLOCK, entries.shape[0])
-        for n in range(first, last):
-            setting.tracer.entries[n - first], setting.tracer.angles[n - first] = entries[n], angles[n]
-        trace_block(last - first, setting)
-        for n in range(first, last):
-            outs[n], labels[n] = outcome(n - first, task)
-            exits[n] = setting.tracer.exits[n - first]
 
 
 @linked

@@ -74,6 +74,8 @@ def _row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
 
 def named(form: Any, *kinds: Any) -> Any:
     """Return the type of a named tuple of values of some types."""
+    if len(kinds) != len(form._fields):
+        raise ValueError(f"expected {len(form._fields)} types, one for each field, got {len(kinds)}")
     return types.BaseTuple.from_types(kinds, form)
 
 

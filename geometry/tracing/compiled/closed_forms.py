@@ -293,8 +293,8 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     out_x, out_theta, bounces, status = results
     numbers, rays, others, met, heads, _, _ = room
     whole = (
-        is_crossed(hollows[0], closed, FIRST_HOLLOW, crossings)
-        and tables.hollow_count == 1
+        tables.hollow_count == 1
+        and is_crossed(hollows[0], closed, FIRST_HOLLOW, crossings)
         and hollows[0, c.LEFT] == 0.0
         and hollows[0, c.RIGHT] == cell
     )

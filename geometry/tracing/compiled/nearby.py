@@ -59,10 +59,10 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
 
 
 @inner
-def line_starts_in_front(tables, line, own, px, py, vx, vy, slack):
+def line_starts_in_front(joints, line, own, px, py, vx, vy, slack):
     """-> bool: `starts_in_front` for a ray that left a line, and another line."""
     arrival = Arrival(own.flown, slack, slack)
-    return line_in_front_of_line(tables.joints, line, own.number, extended(px), extended(py), vx, vy, arrival)
+    return line_in_front_of_line(joints, line, own.number, extended(px), extended(py), vx, vy, arrival)
 
 
 @linked
@@ -104,7 +104,7 @@ def piece_nearby(scope, piece, own, px, py, vx, vy):
     t, s, tangent, is_clear = np.inf, 0.0, 0, False
     if kind == BEZIER:
         own_number = number if is_own else -1
-        arguments = tables, number, number + 1, own_number, own.s, px, py, vx, vy, slack, np.inf
+        arguments = tables.beziers, number, number + 1, own_number, own.s, px, py, vx, vy, slack, np.inf
         _, _, _, _, near_s = call_late(scope.slots.bezier, NO_BEZIER_HIT, arguments)
         if near_s >= 0.0:
             t, s = 0.0, near_s
@@ -130,7 +130,7 @@ def nearer(scope, found, piece, own, px, py, vx, vy):
     if is_clear or not from_piece:
         return hit
     if kind == LINE and own.kind == LINE:
-        arguments = tables, number, own, px, py, vx, vy, slack
+        arguments = tables.joints, number, own, px, py, vx, vy, slack
         is_front = call_late(scope.slots.line_in_front, is_clear, arguments)
     else:
         is_front = call_late(scope.slots.in_front, is_clear, (tables, hit, own, px, py, vx, vy, slack))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene import columns as c
-from ...scene.compiled.tables import ROW, kind_of, named, reader_of
+from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.scene import NO_TABLES
 from ...scene.structs import Struct
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
@@ -162,7 +162,7 @@ def nearest_curve(scope, own, px, py, vx, vy):
     first, end = scope.beziers
     if first < end:
         own_number = own.number if own.kind == BEZIER else -1
-        arguments = tables, first, end, own_number, own.s, px, py, vx, vy, slack, time
+        arguments = tables.beziers, first, end, own_number, own.s, px, py, vx, vy, slack, time
         t, k, s, touch, near_s = call_late(scope.slots.bezier, NO_BEZIER_HIT, arguments)
         contact = min(contact, touch)
         if k >= 0:
@@ -450,10 +450,10 @@ def _late_functions() -> tuple[Late, ...]:
     return (
         Late(hit_nearby, scope, own, *ray),
         Late(starts_in_front, TABLES, hit, own, *ray, number),
-        Late(line_starts_in_front, TABLES, integer, own, *ray, number),
+        Late(line_starts_in_front, Table(c.JOINT_COLUMNS), integer, own, *ray, number),
         Late(nearest_line_in_boxes, named(Tree, TABLES, ROW, number), integer, integer, *ray, number),
         Late(skip_run, scope, hit, own, *ray, integer),
-        Late(nearest_bezier, TABLES, integer, integer, integer, number, *ray, number, number),
+        Late(nearest_bezier, Table(c.BEZIER_COLUMNS), integer, integer, integer, number, *ray, number, number),
     )
 
 
