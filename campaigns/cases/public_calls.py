@@ -288,7 +288,9 @@ METHODS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Law.__pow__": (LAW.__pow__, {"exponent": 2}),
     "Law.breakpoints": (TRIANGLES.breakpoints, {"limit": 10}),
     "Law.branches": (TRIANGLES.branches, {"theta": [1.0]}),
-    "Law.expectations": (TRIANGLES.expectations, {"basis": BINS}),
+    "Law.conditionals": (
+        TRIANGLES.conditionals, {"theta": [1.0], "tolerance": 1e-6, "degree": 4, "edges": [0.5, 1.0]},
+    ),
     "MatrixLaw.density": (ker.MatrixLaw(MATRIX).density, {"theta": [1.0], "theta_out": [1.0]}),
     "RollingCharts.nearest": (geo.RollingCharts(np.pi / 30.0, 1.0).nearest, {"alpha": [0.1]}),
     "RoughBody.sample": (ROUGH.sample, {"n": 3, "rng": 0}),

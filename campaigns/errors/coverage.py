@@ -21,7 +21,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.checks import Floats
 from asperity.kernels.aerodynamics import drag
-from asperity.kernels.discretisation.method import Budget
+from asperity.kernels.discretisation.method import Budget, MethodName
 from asperity.kernels.laws.law import DrivenLaw
 from asperity.spectral.eigenvalues.standard_errors import sampling_errors, sampling_quantile
 from asperity.study import check_tracer
@@ -53,7 +53,7 @@ def truth(law: ker.Law, basis: ker.Basis) -> Floats:
     return np.asarray(found.symmetric)
 
 
-def matrix(law: ker.Law, basis: ker.Basis, method: ker.Method, symmetrise: bool, rng: np.random.Generator) -> Errors:
+def matrix(law: ker.Law, basis: ker.Basis, method: MethodName, symmetrise: bool, rng: np.random.Generator) -> Errors:
     """A sampled matrix, in the Frobenius norm."""
     found = ker.discretise(law, basis, method, samples=RAYS, rng=rng, symmetrise=symmetrise)
     return np.linalg.norm(found.symmetric - truth(law, basis)), found.error
@@ -66,7 +66,7 @@ def pairs(basis: ker.Basis, invariant: bool, symmetrise: bool, rng: np.random.Ge
     return np.linalg.norm(found.symmetric - truth(TEETH, basis)), found.error
 
 
-def eigenvalue(law: ker.Law, basis: ker.Basis, method: ker.Method, which: str, rng: np.random.Generator) -> Errors:
+def eigenvalue(law: ker.Law, basis: ker.Basis, method: MethodName, which: str, rng: np.random.Generator) -> Errors:
     """The gap's eigenvalue, or the one of largest modulus, with its sampling error."""
     exact = truth(law, basis)
     values = np.linalg.eigvalsh(0.5 * (exact + exact.T))
@@ -92,7 +92,7 @@ def distance(order: float, kind: str, alike: bool, sampled: int, rng: np.random.
     return abs(found.value - float(ker.distance(*exact, order, kind))), found.error
 
 
-def flat_distance(law: ker.Law, method: ker.Method, rng: np.random.Generator) -> Errors:
+def flat_distance(law: ker.Law, method: MethodName, rng: np.random.Generator) -> Errors:
     """The distance of a wall from a flat one, by rays."""
     flat = ker.discretise(ker.specular(), ker.Bins(16))
     found = ker.distance(ker.discretise(law, flat.basis, method, samples=RAYS, rng=rng), flat)

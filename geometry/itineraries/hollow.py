@@ -16,8 +16,8 @@ from ..scene.columns import LEFT, RIGHT, RUN_SINE
 from .pieces import Pieces, samples_between
 
 if TYPE_CHECKING:
-    from ..scene.records import Record
     from ..scene.scene import Scene
+    from ..scene.structs import Struct
 
 Result = TypeVar("Result")
 
@@ -94,7 +94,7 @@ class HollowConditionals:
         return float(right - left)
 
     @property
-    def _setting(self) -> Record:
+    def _setting(self) -> Struct:
         """Data of the compiled functions, new for each call: an interrupted call continues to use its own."""
         from .compiled.changes import Limits, setting_of
 
@@ -103,7 +103,7 @@ class HollowConditionals:
         has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, RUN_SINE] > 0.0)))
         most = NO_LIMIT if has_channels else MOST_COLLISIONS
         limits = Limits(most, has_runs, self.most_segments)
-        return setting_of(scene, self.hollow, limits, self.edges, self.sizes)
+        return setting_of(scene, self.hollow, limits, self.degree, self.edges, self.sizes)
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Conditional], set[float]]:
         """Conditional distributions at increasing angles, and the angles of earlier calls now known to miss a piece."""
@@ -132,42 +132,36 @@ class HollowConditionals:
 
     def trace(self, entries: Floats, angles: Floats) -> tuple[Floats, Floats, NDArray[np.uint64]]:
         """The outgoing angles, exit points and labels of rays."""
-        from .compiled.patches import trace_points
+        from .compiled.changes import trace_points
 
         outs, exits, labels = np.empty(len(entries)), np.empty(len(entries)), np.empty(len(entries), np.uint64)
-        segments = np.zeros(1, np.int64)
-        compiled_result(lambda: trace_points(entries, angles, self._setting, outs, exits, labels, segments))
-        self.rays, self.segments = self.rays + len(entries), self.segments + int(segments[0])
+        setting = self._setting
+        compiled_result(lambda: trace_points(entries, angles, setting.address, outs, exits, labels))
+        self._count(len(entries), setting)
         return outs, exits, labels
 
+    def _count(self, rays: int, setting: Struct) -> None:
+        """Add the rays and ray segments of a compiled call to those of the hollow."""
+        self.rays, self.segments = self.rays + rays, self.segments + int(setting.values.tracer.spent[0])
+
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
-        from .compiled.march import marched_angles
-        from .compiled.rules import nested_rules
+        from .compiled.march import marched_angles, nested_rules
 
         # the width whose error is one tolerance
-        unit = self.width / self._size
-        seeds = [
-            self._seeds(angle, least) for angle, least in zip(theta.tolist(), (tolerances * unit).tolist(), strict=True)
-        ]
-        found = compiled_result(
-            lambda: marched_angles(
-                theta, tolerances, self._setting, self.degree, nested_rules(self.least_level),
-                np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
-            )
-        )  # fmt: skip
-        (nodes, widths), node_starts, pieces, piece_starts, errors, unresolved, rays, segments = found
-        self.rays += int(rays.sum())
-        self.segments += int(segments.sum())
-        count_time(int(segments.sum()) * self.scene.segment_time)
+        least = tolerances * self.width / self._size
+        seeds = [self._seeds(angle, width) for angle, width in zip(theta.tolist(), least.tolist(), strict=True)]
+        rules = nested_rules(self.least_level)
+        marched = compiled_result(lambda: marched_angles(theta, tolerances, self._setting, rules, seeds))
+        self.rays += sum(found.rays for found in marched)
+        segments = sum(found.segments for found in marched)
+        self.segments += segments
+        count_time(segments * self.scene.segment_time)
         found_conditionals = {}
-        for k, angle in enumerate(theta.tolist()):
-            own = slice(node_starts[k], node_starts[k + 1])
-            found_conditionals[angle] = Conditional(nodes[own], widths[own], float(errors[k]), float(unresolved[k]))
-            own = slice(piece_starts[k], piece_starts[k + 1])
-            low, high, label, out = (part[own].copy() for part in pieces)
+        for angle, width, found in zip(theta.tolist(), least.tolist(), marched, strict=True):
+            found_conditionals[angle] = Conditional(*found.nodes, found.error, found.unresolved)
             # at the limit of ray segments pieces are missing, and the error reports it: no comparison
-            matters = np.inf if segments[k] >= self.most_segments else float(tolerances[k] * unit)
-            self._pieces[angle] = Pieces.at(angle, low, high, label, out, matters)
+            matters = np.inf if found.segments >= self.most_segments else width
+            self._pieces[angle] = Pieces.at(angle, *found.pieces, matters)
         self._theta = np.union1d(self._theta, theta)
         return found_conditionals
 
@@ -197,29 +191,27 @@ class HollowConditionals:
         return together[:: 1 + 2 * len(together) // MOST_SAMPLES]
 
     def _compare(self, theta: Floats) -> set[float]:
-        """The angles among ``theta`` and their neighbours at which a piece was missed."""
-        from .compiled.neighbours import find_missed
+        """The angles among ``theta`` and their neighbours at which a piece was missed.
 
+        The entry points tried at an angle are the middles of the pieces at a neighbouring one.
+        """
         position = np.searchsorted(self._theta, theta)
         near = np.unique(np.clip(np.concatenate((position - 1, position, position + 1)), 0, len(self._theta) - 1))
         fresh = np.isin(near, position)
-        linked = (np.diff(near) == 1) & (fresh[1:] | fresh[:-1])
-        angles = self._theta[near]
-        near_pieces = [self._pieces[angle] for angle in angles.tolist()]
-        columns = zip(*((known.low, known.high, known.label) for known in near_pieces), strict=True)
-        pieces = tuple(np.concatenate(column) for column in columns)
-        starts = np.cumsum([0, *(len(known.low) for known in near_pieces)])
-        least = np.array([known.matters for known in near_pieces])
-        most = 2 * len(pieces[0])
-        found = np.empty(most, np.int64), np.empty(most), np.zeros(1, np.int64)
-        count, rays = compiled_result(
-            lambda: find_missed(angles, least, pieces, starts, linked, self._setting, self.degree, found)
-        )
-        owner, entries, segments = found[0][:count], found[1][:count], int(found[2][0])
-        self.rays, self.segments = self.rays + rays, self.segments + segments
-        for angle, x in zip(angles[owner].tolist(), entries.tolist(), strict=True):
+        known = [self._pieces[angle] for angle in self._theta[near].tolist()]
+        tried = [
+            there.unlike(here)
+            for k in np.flatnonzero((np.diff(near) == 1) & (fresh[1:] | fresh[:-1])).tolist()
+            for here, there in ((known[k], known[k + 1]), (known[k + 1], known[k]))
+        ]
+        if not tried:
+            return set()
+        angles, entries, labels = (np.concatenate(column) for column in zip(*tried, strict=True))
+        _, _, found = self.trace(entries, angles)
+        missed = found != labels
+        for angle, x in zip(angles[missed].tolist(), entries[missed].tolist(), strict=True):
             self.miss(angle, x)
-        return set(angles[owner].tolist())
+        return set(angles[missed].tolist())
 
     def shared(self, theta: Floats) -> Floats:
         """The fraction of the opening whose itinerary also exists at the next of these known angles."""
@@ -253,7 +245,7 @@ class HollowConditionals:
         return cuts
 
     def _located(self, label: int, present: float, absent: float, k: int) -> float:
-        from .compiled.neighbours import find_critical
+        from .compiled.critical import find_critical
 
         key = (label, min(present, absent), max(present, absent))
         for (name, low, high), angle in self._critical.items():
@@ -270,7 +262,7 @@ class HollowConditionals:
                 there = self._pieces[beyond]
                 middle = 0.5 * float(there.low[other[0]] + there.high[other[0]])
                 drift = (0.5 * (low + high) - middle) / (present - beyond)
-        piece = np.uint64(label), present, absent, low, high, drift
-        angle = float(compiled_result(lambda: find_critical(*piece, self._setting, self.degree, np.zeros(1, np.int64))))
+        piece, setting = (np.uint64(label), present, absent, low, high, drift), self._setting
+        angle = float(compiled_result(lambda: find_critical(*piece, setting.address)))
         self._critical[key] = angle
         return angle

@@ -57,6 +57,18 @@ class Pieces(NamedTuple):
         wanted = (self.high - self.low > least) & ~(ends[:-1] & ends[1:])
         return np.asarray(0.5 * (self.low + self.high)[wanted])
 
+    def unlike(self, other: Pieces) -> tuple[Floats, Floats, NDArray[np.uint64]]:
+        """Where a piece of another angle lies inside one with another label here, if it is wide enough to matter here.
+
+        Angles, which are this one, positions, and the labels here. Positions in gaps are left out, because the error of
+        the angle includes the gaps.
+        """
+        x = 0.5 * (other.low + other.high)
+        k = np.minimum(np.searchsorted(self.high, x, side="right"), len(self.high) - 1)
+        matters = (other.high - other.low > self.matters) & (self.label[k] != other.label)
+        found = np.flatnonzero(matters & (self.low[k] < x) & (x < self.high[k]))
+        return np.full(len(found), self.angle), x[found], self.label[k[found]]
+
     def shared(self, other: Pieces) -> float:
         """The total width of the pieces whose itinerary also exists at the other angle."""
         _, same = _places(np.sort(other.label), self.label)

@@ -27,7 +27,7 @@ from .closed_forms import MOST_PIECES, closed_form_of, closed_table
 from .columns import row_of, table_of
 from .escapes import escape_sectors
 from .facing import facing_pairs
-from .records import Record
+from .structs import Struct
 from .tolerances import NEARBY_MARGIN, SMOOTH_JOINT
 
 # Half angle below which it is computed from the chord and the radius, more exactly than from two parameters.
@@ -135,12 +135,13 @@ class Tables(NamedTuple):
     beziers: Floats
     pairs: Floats
     boxes: Floats
+    hollow_count: int
     cell: float
     is_open: bool
 
 
 # Empty tables, with the types of all tables.
-NO_TABLES = Record(
+NO_TABLES = Struct(
     Tables(
         np.empty((0, c.HOLLOW_COLUMNS)),
         np.empty((0, c.JOINT_COLUMNS)),
@@ -150,6 +151,7 @@ NO_TABLES = Record(
         np.empty((0, c.BEZIER_COLUMNS)),
         np.empty((0, c.PAIR_COLUMNS)),
         np.empty((0, TREE_COLUMNS)),
+        0,
         1.0,
         False,
     )
@@ -173,9 +175,9 @@ class Scene:
     closed: Floats | None = None
 
     @cached_property
-    def tables(self) -> Record:
+    def tables(self) -> Struct:
         """The tables with types equal for all walls, so that each function is compiled once."""
-        return Record(
+        return Struct(
             Tables(
                 hollows=_filled(self.hollows, c.HOLLOW_COLUMNS),
                 joints=_filled(self.joints, c.JOINT_COLUMNS),
@@ -187,6 +189,7 @@ class Scene:
                 beziers=_filled(self.beziers, c.BEZIER_COLUMNS),
                 pairs=_filled(self.pairs, c.PAIR_COLUMNS),
                 boxes=_filled(self.boxes, TREE_COLUMNS),
+                hollow_count=len(self.hollows),
                 cell=float(self.cell),
                 is_open=bool(self.is_open),
             )

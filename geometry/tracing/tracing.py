@@ -283,13 +283,10 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
     """
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
-        from .compiled.pointers import checked
-        from .compiled.rays import SLOTS, trace_rays
-        from .compiled.records import NO_DETAILS
+        from .compiled.rays import trace_into
 
         _check_rays(x, theta)
-        tables, places = scene.tables.address, (NO_DETAILS.address, SLOTS.address)
-        checked(lambda: trace_rays(x, theta, tables, max_collisions, stop, results, *places))
+        trace_into(results, x, theta, scene.tables, max_collisions, stop)
 
     rooms: list[Any] = []
 
@@ -361,9 +358,8 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     >>> geo.trajectory(geo.flat(), 0.5, pi / 2).tolist()
     [[0.5, 0.0], [0.5, 0.0], [0.5, 0.0]]
     """
-    from .compiled.pointers import checked
-    from .compiled.rays import SLOTS, trace_rays
-    from .compiled.records import details_for
+    from .compiled.rays import trace_into
+    from .compiled.records import details_for, results_for
 
     _check_wall(wall)
     position = finite_number("x", x)
@@ -381,11 +377,10 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
         points = np.array([[entry, 0.0]] * 3)
     else:
         start, angle = np.array([entry - base]), np.array([incoming])
-        results = np.empty(1), np.empty(1), np.empty(1, np.int64), np.empty(1, np.uint8)
-        details, stop = details_for(path=limit + 2), new_flag()
-        given = start, angle, scene.tables.address, limit, stop, results, details.address, SLOTS.address
-        interruptibly(lambda: checked(lambda: trace_rays(*given)))
-        points = details.path[np.isfinite(details.path[:, 0])]
+        details, given = details_for(path=limit + 2), (start, angle, scene.tables, limit, new_flag())
+        interruptibly(lambda: trace_into(results_for(1), *given, details))
+        path = details.values.path
+        points = path[np.isfinite(path[:, 0])]
         points[:, 0] += base
     return points if wall.origin == (0.0, 0.0) else _in_coordinates_of(wall, points, position, incoming, limit)
 

@@ -8,10 +8,12 @@ from ...core.checks import Floats
 from ..bases.assembly import largest_square_sum
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
+from ..bases.panels import Panels
 from ..expectations.angle_panels import NODES, AnglePanels
-from ..laws.law import DrivenLaw, Law
+from ..laws.law import DrivenLaw, Law, knows_errors
 from ..laws.structure import is_compound, lists_branches
 from ..matrices.matrix import KernelMatrix
+from ..walls.wall_law import WallLaw
 from .method import Budget, MethodName, computed, rounding
 
 # Limit on the values of basis functions: one or two seconds of work.
@@ -37,8 +39,7 @@ class Actions:
             return False
         if isinstance(law, DrivenLaw) and not isinstance(basis, Legendre):
             return False
-        known = law.expectations(basis)
-        return known.has_errors and not known.is_traced
+        return not isinstance(law, WallLaw) and knows_errors(law)
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error = action_matrix(law, basis, budget.tolerance)
@@ -65,11 +66,14 @@ def action_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
     error is the sum over the panels of the difference from Gauss's rule, which is safe even if P e_j jumps on a panel,
     and of the errors of the conditional distributions.
     """
-    breaks, expectations = law.breakpoints(FIRST_BREAKPOINTS)[0], law.expectations(basis)
+    breaks, inside = law.breakpoints(FIRST_BREAKPOINTS)[0], basis.edges[1:-1]
+    degree = basis.degree if isinstance(basis, Panels) else 0 if basis.is_partition else basis.nodes_per_interval
+    if basis.is_polynomial:
+        inside, degree = np.empty(0), max(1, basis.size - 1)
     edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, breaks)))
     low, high = edges[:-1], edges[1:]
     total, error, spent = np.zeros((basis.size, basis.size)), 0.0, 0
-    nodes = law.conditionals(edges[1:-1], MEAN_FRACTION * max(tolerance, CONVERGED)).nodes.size / (edges.size - 2)
+    nodes = law.conditionals(edges[1:-1], max(MEAN_FRACTION * tolerance, CONVERGED)).nodes.size / (edges.size - 2)
     values = NODES.size * int(nodes) * (1 if basis.is_partition else basis.size)
     heights = np.sqrt(largest_square_sum(basis))
     while low.size:
@@ -80,9 +84,9 @@ def action_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
         step = max(1, CHUNK // max(values, basis.size**2))
         for start in range(0, low.size, step):
             panels = AnglePanels.between(low[start : start + step], high[start : start + step], basis.size)
-            image, mean_error = expectations(panels.angle.ravel(), MEAN_FRACTION * max(tolerance, CONVERGED))
-            panels.image = image.reshape(panels.image.shape)
-            panels.mean_error = heights * mean_error.reshape(panels.angle.shape)
+            found = law.conditionals(panels.angle, max(MEAN_FRACTION * tolerance, CONVERGED), degree, inside)
+            panels.image = found.in_basis(basis).reshape(panels.image.shape)
+            panels.mean_error = heights * found.error.reshape(panels.angle.shape)
             difference = panels.differences(basis)
             done = last | (difference <= max(PANEL_FRACTION * tolerance, CONVERGED))
             converged[start : start + step] = done

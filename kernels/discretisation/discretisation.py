@@ -111,8 +111,8 @@ def discretise(
     6. ``Densities`` (quadrature): laws with a density.
     7. ``LeastResistance`` (quadrature): `LeastResistanceLaw`, in `Bins`.
     8. ``Maps`` (quadrature): deterministic laws.
-    9. ``Actions`` (quadrature): any other law that does not average over entry points; in `Legendre` also laws that do
-       and define their own ``_apply``.
+    9. ``Actions`` (quadrature): any other law whose conditional distributions have errors; laws that average over
+       entry points only in `Legendre`.
     10. ``Sobol`` (qmc): laws driven by one uniform number.
     11. ``Traced`` (quadrature): any wall.
     12. ``MonteCarlo`` (monte-carlo): any law.

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ..bases.assembly import add_products, largest_square_sum
@@ -26,15 +23,10 @@ NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
 # Breakpoints that accumulate at grazing are listed until the omitted fraction is negligible or their use would take
 # more than about a second.
 FEWEST_BREAKPOINTS, BREAKPOINT_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
+# Work of a chain, whose branches merge, as a multiple of that of a law with the branches that are left.
+WORK_OF_CHAINS = 16
 # Limit on nodes times branches in memory at a time, and angles at which branches are counted.
 CHUNK, PROBES = 2**22, np.linspace(0.1, 3.0, 30)
-
-
-class Branching(Protocol):
-    """The methods of a law that `branch_matrix` uses."""
-
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
-    def breakpoints(self, limit: int) -> tuple[Floats, float]: ...
 
 
 class Isometries:
@@ -58,7 +50,7 @@ def isometric_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, 
     return branch_matrix(law, basis, tolerance) if table is None else table_matrix(table, basis)
 
 
-def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Floats, float]:
+def branch_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:
     """<e_i, P e_j> for a law of isometries, and a bound on its Frobenius error.
 
     The interval (0, pi) is cut at the breakpoints of the law, the edges of the basis and the angles that a branch maps
@@ -70,7 +62,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     limit = FEWEST_BREAKPOINTS
     breakpoints, omitted = law.breakpoints(limit)
     branches = law.branches(PROBES)[0].shape[-1]
-    most = BREAKPOINT_WORK // branches**2
+    most = BREAKPOINT_WORK // (branches**2 * (WORK_OF_CHAINS if has_chain(law) else 1))
     if not basis.is_partition:
         most = min(most, FUNCTION_WORK // basis.size)
     while omitted * worst > tolerance and 2 * limit <= most:
@@ -96,7 +88,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     return total, omitted * worst + rounding(basis) + displacement.bound()
 
 
-def _add_cuts(law: Branching, basis: Basis, middle: Floats, displacement: Displacement) -> None:
+def _add_cuts(law: Law, basis: Basis, middle: Floats, displacement: Displacement) -> None:
     probability, outgoing = law.branches(middle)
     density, source = np.sin(middle), basis.index(middle)
     for slot in range(outgoing.shape[-1]):
@@ -104,9 +96,7 @@ def _add_cuts(law: Branching, basis: Basis, middle: Floats, displacement: Displa
         displacement.add(middle, image, density * probability[:, slot], source, basis.index(image))
 
 
-def _add_pieces(
-    law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats, pieces: int
-) -> None:
+def _add_pieces(law: Law, basis: Basis, low: Floats, high: Floats, order: int, total: Floats, pieces: int) -> None:
     # Large steps, because every step adds whole matrices.
     step = max(pieces, 1)
     for start in range(0, low.size, step):
@@ -114,7 +104,7 @@ def _add_pieces(
         _add_nodes(law, basis, angle, weight, total)
 
 
-def _add_nodes(law: Branching, basis: Basis, angle: Floats, weight: Floats, total: Floats) -> None:
+def _add_nodes(law: Law, basis: Basis, angle: Floats, weight: Floats, total: Floats) -> None:
     mass = weight * basis.measure.density(angle)
     probability, outgoing = law.branches(angle)
     for slot in range(outgoing.shape[-1]):

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +11,6 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ..bases.basis import Basis
 from ..bases.measure import gauss_rule
-from ..bases.mirror import reflection_matrix
 from ..bases.panels import Panels
 
 # Incoming angle and tolerance at which a law is asked whether its errors are known.
@@ -28,147 +25,6 @@ HEIGHT_PROBES = 5
 # A function of angles and the wanted error of expectations of functions of sup norm 1. It returns the expectations,
 # shape (angles, functions), and their errors, shape (angles,), nan if unknown.
 Means: TypeAlias = Callable[[Floats, float], tuple[Floats, Floats]]
-
-
-@dataclass(frozen=True)
-class Expectations(ABC):
-    """The conditional expectations of all functions of a basis under a law; called like `Means`.
-
-    Attributes
-    ----------
-    basis : Basis
-    has_errors : bool
-        Whether the errors are known.
-    is_traced : bool
-        Whether rays are traced. This takes about a millisecond per angle, fifty times as long as closed forms.
-    """
-
-    basis: Basis
-
-    @property
-    def has_errors(self) -> bool:
-        return False
-
-    @property
-    def is_traced(self) -> bool:
-        return False
-
-    @abstractmethod
-    def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]: ...
-
-    def are_costly(self) -> bool:
-        """Whether a thousand angles take minutes."""
-        return False
-
-    def of(self, vectors: Floats) -> Means:
-        """The expectations of functions with coefficients ``vectors``, shape (n, k), with errors for the worst one."""
-        height = height_of(self.basis, vectors)
-
-        def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-            step = max(1, VALUES_AT_ONCE // self.basis.size)
-            finer = tolerance / max(height, 1.0)
-            parts = [self(theta[start : start + step], finer) for start in range(0, theta.size, step)]
-            images = np.concatenate([image @ vectors for image, _ in parts])
-            return images, height * np.concatenate([error for _, error in parts])
-
-        return means
-
-
-@dataclass(frozen=True)
-class ByConditionals(Expectations):
-    """Expectations from the conditional distributions of a law, whose errors one incoming angle shows to be known."""
-
-    conditionals: Callable[[Floats, float, int, Floats], Any]
-    traced: bool = False
-
-    @property
-    def has_errors(self) -> bool:
-        return not np.isnan(self.conditionals(PROBE, PROBE_TOLERANCE, 0, np.empty(0)).error).any()
-
-    @property
-    def is_traced(self) -> bool:
-        return self.traced
-
-    def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        basis = self.basis
-        edges, degree = np.empty(0), max(1, basis.size - 1)
-        if not basis.is_polynomial:
-            edges, degree = basis.edges[1:-1], 0 if basis.is_partition else basis.nodes_per_interval
-        images, errors = [], []
-        for start in range(0, theta.size, ANGLES_AT_ONCE):
-            found = self.conditionals(theta[start : start + ANGLES_AT_ONCE], tolerance, degree, edges)
-            images.append(found.in_basis(basis))
-            errors.append(found.error)
-        return np.concatenate(images), np.concatenate(errors)
-
-
-@dataclass(frozen=True)
-class Unconditional(Expectations):
-    """Expectations under sin(theta)/2 d theta, the same for every incoming angle."""
-
-    @property
-    def has_errors(self) -> bool:
-        return True
-
-    def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        return np.tile(self.basis.constant, (theta.size, 1)), np.zeros(theta.size)
-
-
-@dataclass(frozen=True)
-class Weighted(Expectations):
-    """Expectations under a weighted sum of laws."""
-
-    terms: tuple[tuple[float, Expectations], ...]
-
-    @property
-    def has_errors(self) -> bool:
-        return all(term.has_errors for _, term in self.terms)
-
-    @property
-    def is_traced(self) -> bool:
-        return any(term.is_traced for _, term in self.terms)
-
-    def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        return weighted_means(self.terms)(theta, tolerance)
-
-    def are_costly(self) -> bool:
-        return any(term.are_costly() for _, term in self.terms)
-
-    def of(self, vectors: Floats) -> Means:
-        return weighted_means([(weight, term.of(vectors)) for weight, term in self.terms])
-
-
-@dataclass(frozen=True)
-class Mirrored(Expectations):
-    """Expectations under a law in the other frame, in a mirror-symmetric basis.
-
-    Attributes
-    ----------
-    inner : Expectations
-    adaptable : bool
-        Whether the law is mirror-symmetric. Panels adapted to it are then mirror-symmetric, so that errors are known.
-    """
-
-    inner: Expectations
-    adaptable: bool
-
-    @property
-    def has_errors(self) -> bool:
-        return self.adaptable and self.inner.has_errors
-
-    @property
-    def is_traced(self) -> bool:
-        return self.inner.is_traced
-
-    def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        images, errors = self.inner(theta, tolerance)
-        return images @ reflection_matrix(self.basis), errors
-
-    def are_costly(self) -> bool:
-        return self.inner.are_costly()
-
-    def of(self, vectors: Floats) -> Means:
-        return self.inner.of(reflection_matrix(self.basis) @ vectors)
 
 
 def weighted_means(terms: Sequence[tuple[float, Means]]) -> Means:

@@ -1,4 +1,4 @@
-"""Hollows to choose from: polygons below an opening of width 1, drawn at random, and curved ones by name."""
+"""Hollows to choose from: polygons below an opening of width 1, drawn at random, and a notched angle."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # A polygon that leaves more flux than this unresolved by MOST_BEAMS beams is not taken: a search meets thousands.
 MOST_BEAMS, RESOLVED = 3000, 1e-11
-# Error asked of the moments of curved hollows; polygons have theirs to rounding.
+# Error asked of the moments of curved hollows that are given; polygons have theirs to rounding.
 CURVED_TOLERANCE = 1e-9
 # Error asked of the moments of traced hollows in the search.
 TRACED_TOLERANCE = 1e-2
@@ -122,15 +122,8 @@ def simple_hollows() -> list[UnitHollow]:
     return [hollow for hollow in (*triangles, *rectangles) if hollow is not None]
 
 
-def curved_hollows() -> list[UnitHollow]:
-    """Hollows with curved mirrors that polygons approach slowly: the double parabola, nearly a retroreflector."""
-    from ...geometry import double_parabola
-
-    return [UnitHollow(double_parabola(), "double parabola")]
-
-
 def retroreflector() -> UnitHollow:
-    """A notched angle, much nearer to a retroreflector than the double parabola, with an error of its moments."""
+    """A notched angle, much nearer to a retroreflector than other polygons, with an error of its moments."""
     from ...geometry import notched_angle
 
     return UnitHollow(notched_angle(NOTCHED_ANGLE, NOTCHES), "notched angle", traced=True)

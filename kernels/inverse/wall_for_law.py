@@ -33,7 +33,7 @@ from ..laws.law import Law
 from ..laws.matrix_law import MatrixLaw
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
-from .hollows import UnitHollow, curved_hollows, flat, random_polygons, retroreflector, simple_hollows
+from .hollows import UnitHollow, flat, random_polygons, retroreflector, simple_hollows
 from .hull import few_weights, nearest_weights, possible_gain
 
 if TYPE_CHECKING:
@@ -53,11 +53,9 @@ SYMMETRIC = 1e-12
 # The moments of the wanted law are computed to this fraction of the tolerance.
 TARGET_FRACTION = 0.01
 OUTSIDE = 1e3
-# Curved hollows take seconds each, and a wall that has one is traced: worth it for laws far from those of polygons.
-CURVED_FROM = 0.1
-# The notched angle is traced with an error: it is worth it where a perfect retroreflector would leave at most this
-# fraction of the defect.
-RETROREFLECTED = 0.5
+# The notched angle takes seconds and is traced with an error: it is worth it for laws far from those of polygons, where
+# a perfect retroreflector would leave at most this fraction of the defect.
+TRACED_FROM, RETROREFLECTED = 0.1, 0.5
 # A step of the search that makes the defect smaller by less than this fraction is the last.
 LEAST_PROGRESS = 1e-3
 # Joint distances are of interest to two digits.
@@ -224,7 +222,7 @@ def wall_for(
         bound = Estimate(excess, ROUNDED * moments, "bound", f"duality gap over {len(search.hollows)} hollows")
     else:
         # traced hollows have an error, in the search and in the finished wall
-        error = float(finished.error) + abs(value - search.defect)
+        error = float(finished.error) + float(target_error) + abs(value - search.defect)
         bound = Estimate(excess, error, "estimate", "duality gap over the hollows of the last step")
     return WallForLaw(
         wall,
@@ -410,10 +408,8 @@ class _Search:
             self.add(random_polygons(DRAWN, min(2 + step // 2, MOST_VERTICES), rng))
             if self.is_done:
                 return
-        if self.defect > CURVED_FROM:
-            self.add(curved_hollows())
-            if self.with_retroreflection() < RETROREFLECTED * self.defect:
-                self.add([retroreflector()])
+        if self.defect > TRACED_FROM and self.with_retroreflection() < RETROREFLECTED * self.defect:
+            self.add([retroreflector()])
         for _ in range(DESCENTS):
             before = self.defect
             self.add([self.moved(hollow) for hollow in self.promising()])

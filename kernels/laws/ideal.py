@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, common_shape, finite_array, number_between
-from ..bases.basis import Basis
 from ..bases.measure import SINE
-from ..expectations.basis_means import Expectations, Unconditional
 from .density import DensityLaw
 from .distribution import Distribution
 from .law import Combination, specular
@@ -47,10 +45,6 @@ class LambertianLaw(DensityLaw):
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The same distribution function at every incoming angle."""
         return Distribution.without_atoms(np.broadcast_to(SINE.cdf(edges), (theta.size, edges.shape[-1])))
-
-    def expectations(self, basis: Basis) -> Expectations:
-        """The integrals of the basis functions, the same at every incoming angle."""
-        return Unconditional(basis)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return SINE.sample(theta.shape, rng)

@@ -32,10 +32,8 @@ from ...core.errors import InputError
 from ...core.rounding import EPS
 from ...core.tables import html_table
 from ..bases.angles import mirrored_angle
-from ..bases.basis import AngleFunction, Basis, Frame
+from ..bases.basis import AngleFunction, Frame
 from ..bases.given import Vectorised, seed_by_name
-from ..bases.mirror import is_mirror_symmetric
-from ..expectations.basis_means import ByConditionals, Expectations, Mirrored, Weighted
 from ..expectations.conditionals import Conditionals, degree_of
 from .branches import chained, chained_breakpoints, joined, merged
 from .distribution import Distribution
@@ -57,8 +55,9 @@ TOLERANCE, FIRST_ANGLES, NODES_AT_ONCE = 1e-8, 16, 2**20
 DEGREE = 8
 # Breakpoints of laws at which the means under the law before them are cut.
 CUTS = 64
-# Incoming angle, tolerance and degrees of the test whether conditional distributions depend on the degree.
-PROBE, PROBE_TOLERANCE, PROBE_DEGREES = np.array([1.0]), 1e-2, (0, 64)
+# Incoming angle, tolerance, and degrees with edges of the test whether conditional distributions depend on these.
+PROBE, PROBE_TOLERANCE = np.array([1.0]), 1e-2
+PROBE_FUNCTIONS = (0, np.empty(0)), (64, np.linspace(0.05, 3.09, 32))
 # Edges begin at 0 and end at pi within a few roundings.
 ENDS_TOLERANCE = 1e-14
 # Limit on nested calls of `apply`; more would exceed Python's recursion limit.
@@ -277,10 +276,6 @@ class Law(ABC):
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """`distribution` for checked arguments; the default adds up the masses of conditional distributions."""
         return Distribution.of_cells(self._conditionals(theta, TOLERANCE, 0, edges[1:-1]).masses(edges))
-
-    def expectations(self, basis: Basis) -> Expectations:
-        """E[e_j(Theta') | theta] for all functions of a basis, with errors if known; by default from conditionals."""
-        return ByConditionals(basis, self._conditionals)
 
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
@@ -549,9 +544,6 @@ class Combination(Law):
         terms = self.terms_checked()
         return Distribution.mixed([(weight, law.distribution(theta, edges)) for weight, law in terms])
 
-    def expectations(self, basis: Basis) -> Expectations:
-        return Weighted(basis, tuple((weight, law.expectations(basis)) for weight, law in self.terms_checked()))
-
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         terms = self.terms_checked()
         cumulative = np.cumsum([weight for weight, _ in terms])
@@ -767,12 +759,26 @@ def as_base(law: Law) -> str:
 
 def is_atomic(law: Law) -> bool:
     """Whether the conditional distributions of a law are finitely many atoms, which average any function exactly."""
-    few, many = (_probe(law, degree) for degree in PROBE_DEGREES)
-    return not np.isnan(few.error).any() and np.array_equal(few.nodes, many.nodes)
+    whole, cut = (law._conditionals(PROBE, PROBE_TOLERANCE, degree, edges) for degree, edges in PROBE_FUNCTIONS)
+    return not np.isnan(whole.error).any() and np.array_equal(whole.nodes, cut.nodes)
 
 
-def _probe(law: Law, degree: int) -> Conditionals:
-    return law._conditionals(PROBE, PROBE_TOLERANCE, degree, np.empty(0))
+def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
+    """Breakpoints of the first of the composed laws, of as many as know theirs together."""
+    for number in range(len(laws), 0, -1):
+        found, left_out = chained_breakpoints(laws[:number], CUTS)
+        if math.isfinite(left_out):
+            return found
+    return laws[0].breakpoints(CUTS)[0]
+
+
+def knows_errors(law: Law) -> bool:
+    """Whether the errors of conditional distributions are known, as one incoming angle shows."""
+    return not np.isnan(_probe(law).error).any()
+
+
+def _probe(law: Law) -> Conditionals:
+    return law._conditionals(PROBE, PROBE_TOLERANCE, 0, np.empty(0))
 
 
 def _conditionals_of_chain(
@@ -781,17 +787,13 @@ def _conditionals_of_chain(
     """The conditional distributions of composed laws; means under a law are cut at the next law's breakpoints."""
     try:
         probability, outgoing = chained(laws, theta)
-        error = {part: float(_probe(part, 0).error[0]) for part in set(laws)}
+        error = {part: float(_probe(part).error[0]) for part in set(laws)}
         return Conditionals.of_atoms(outgoing, probability, sum(error[part] for part in laws))
     except InputError:
         # not isometries, or too many of them
         found, exact = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1))), True
     for index, part in enumerate(laws):
-        cuts, later = edges, laws[index + 1 :]
-        if later:
-            # all breakpoints of the later laws together, or else of the next one
-            known, left_out = chained_breakpoints(later, CUTS)
-            cuts = known if math.isfinite(left_out) else later[0].breakpoints(CUTS)[0]
+        cuts = edges if index + 1 == len(laws) else _breakpoints_of_start(laws[index + 1 :])
         each = part._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
         if each * found.nodes.size > MOST_VALUES:
             raise InputError(
@@ -889,12 +891,6 @@ class SpecularFrame(Law):
 
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         return self.law.distribution(theta, (np.pi - edges)[..., ::-1]).mirrored()
-
-    def expectations(self, basis: Basis) -> Expectations:
-        """Expectations from the inner law if the basis is mirror-symmetric, else by `apply`."""
-        if not is_mirror_symmetric(basis):
-            return super().expectations(basis)
-        return Mirrored(basis, self.law.expectations(basis), self.mirror_symmetric is True)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return mirrored_angle(self.law.sample(theta, rng))

@@ -345,7 +345,7 @@ class KernelMatrix:
         choice("frame", self.frame, get_args(Frame))
         defect = self.raw_defect
         if defect is not None:
-            instance("raw_defect", defect, SymmetryDefect, "SymmetryDefect(0.1)")
+            instance("raw_defect", defect, SymmetryDefect, "matrix.symmetry_defect()")
             instance("raw_defect.norm", defect.norm, str, "'Frobenius'")
             if not (0.0 <= defect < np.inf and (defect.z_score is None or -np.inf <= defect.z_score <= np.inf)):
                 raise InputError("raw_defect: expected numbers, got NaN or a defect below 0")

@@ -9,13 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, number_between, whole_number
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
-from ..bases.basis import AngleFunction, Basis
+from ..bases.basis import AngleFunction
 from ..bases.given import Vectorised
 from ..bases.intervals import between_cuts, edges_inside, joined_lists
 from ..bases.measure import SINE, gauss_on_intervals
-from ..bases.panels import Panels
-from ..expectations.arcs import ArcMeans, ArcPieces, PiecesOfAngles, arc_images, outgoing_lines
-from ..expectations.basis_means import Expectations, Means
+from ..expectations.arcs import ArcPieces, outgoing_lines
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entries
@@ -122,12 +120,6 @@ class CircularArcLaw(DrivenLaw):
         cuts = np.zeros((theta.size, 2, number.max(initial=0)))
         cuts[ray, :, joined_lists(number)[1]] = np.clip(np.where(mirrored, np.pi - ends, ends), 0.0, np.pi).T
         return cuts.reshape(theta.size, -1)
-
-    def expectations(self, basis: Basis) -> Expectations:
-        """Conditional expectations, piece by piece and with errors for polynomials on panels, else by `apply`."""
-        if isinstance(basis, Panels):
-            return _OnPanels(basis, self.half_angle, self.pieces)
-        return super().expectations(basis)
 
     def _rotation(self, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], Floats, Floats, Floats]:
         """Whether the ray is mirrored, its (mirrored) angle, the chord's angle delta <= pi/2, and N."""
@@ -245,22 +237,3 @@ def followed_hits(tolerance: float) -> int:
     pi - xi (or xi).
     """
     return int(np.clip(np.ceil((100.0 / tolerance) ** 0.25), FEWEST_HITS, MOST_HITS))
-
-
-@dataclass(frozen=True)
-class _OnPanels(Expectations):
-    basis: Panels
-    half_angle: float
-    pieces: PiecesOfAngles
-
-    @property
-    def has_errors(self) -> bool:
-        return True
-
-    def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        lines = outgoing_lines(self.half_angle, self.pieces(theta, followed_hits(tolerance)), theta)
-        return arc_images(lines, self.basis, theta)
-
-    def of(self, vectors: Floats) -> Means:
-        means = ArcMeans(self.half_angle, self.pieces, self.basis, vectors)
-        return lambda theta, tolerance: means(theta, followed_hits(tolerance))

@@ -14,8 +14,7 @@ from ...core.rounding import EPS
 from ...geometry import Wall
 from ...geometry.itineraries.hollow import NO_LIMIT, HollowConditionals
 from ..bases.basis import AngleFunction
-from ..bases.given import Vectorised
-from ..expectations.basis_means import Expectations, means_of_basis
+from ..expectations.conditionals import Conditionals
 
 # Up to this number of pieces of a wall one conditional distribution takes a few milliseconds.
 MOST_PIECES = 64
@@ -57,11 +56,14 @@ class AdaptiveConditionals:
     rays: int
     segments: int
 
+    @property
+    def conditionals(self) -> Conditionals:
+        """The distributions, whose errors include those of rays that did not escape."""
+        return Conditionals(self.nodes, self.weights, self.starts, self.error + 2.0 * self.unresolved)
+
     def mean(self, function: AngleFunction) -> Floats:
         """E[f(Theta') | theta] for every angle, shape ``(angles,) + extra`` if f has values ``theta.shape + extra``."""
-        values = Vectorised.of(function)(self.nodes)
-        weighted = self.weights.reshape((-1,) + (1,) * (values.ndim - 1)) * values
-        return np.add.reduceat(weighted, self.starts[:-1], axis=0)
+        return self.conditionals.mean(function)
 
 
 def is_few(wall: Wall) -> bool:
@@ -239,35 +241,7 @@ def traced_conditionals(wall: Wall, degree: int, edges: Floats) -> WallCondition
     return WallConditionals(wall, min(degree, 1), edges, PANEL_LEVEL if degree else 0)
 
 
-@dataclass(frozen=True)
-class TracedExpectations(Expectations):
-    """Conditional expectations of a wall with few pieces, by adaptive quadrature in the entry point."""
-
-    wall: Wall
-
-    @property
-    def has_errors(self) -> bool:
-        return True
-
-    @property
-    def is_traced(self) -> bool:
-        return True
-
-    @cached_property
-    def _conditionals(self) -> WallConditionals:
-        edges, degree = np.empty(0), max(1, self.basis.size - 1)
-        if not self.basis.is_polynomial:
-            edges, degree = self.basis.edges[1:-1], 0 if self.basis.is_partition else 1
-        return traced_conditionals(self.wall, degree, edges)
-
-    def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        found = self._conditionals(theta, tolerance)
-        means = means_of_basis(self.basis, found.nodes, found.weights, found.starts)
-        return means, found.error + 2.0 * found.unresolved
-
-    def are_costly(self) -> bool:
-        """Whether a pilot run takes more than `MANY_SEGMENTS` ray segments per angle."""
-        conditionals = WallConditionals(self.wall, 1, np.empty(0), most_segments=MOST_PILOT_SEGMENTS)(
-            PILOT_ANGLES, PILOT_TOLERANCE
-        )
-        return conditionals.segments > MANY_SEGMENTS * PILOT_ANGLES.size
+def is_chaotic(wall: Wall) -> bool:
+    """Whether a pilot run takes more than `MANY_SEGMENTS` ray segments per angle."""
+    conditionals = WallConditionals(wall, 1, np.empty(0), most_segments=MOST_PILOT_SEGMENTS)
+    return conditionals(PILOT_ANGLES, PILOT_TOLERANCE).segments > MANY_SEGMENTS * PILOT_ANGLES.size

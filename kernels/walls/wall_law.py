@@ -14,15 +14,13 @@ from ...core.checks import Floats, instance
 from ...core.errors import AccuracyError
 from ...core.rounding import EPS
 from ...geometry import Wall
-from ..bases.basis import Basis
 from ..bases.intervals import cell_among
-from ..expectations.basis_means import ByConditionals, Expectations
 from ..expectations.conditionals import Conditionals
 from ..laws.distribution import Distribution
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import Combination, DrivenLaw, Law, RandomMap, specular
 from .circular_arc import CircularArcLaw
-from .conditionals import TracedExpectations, WallConditionals, is_few, traced_conditionals
+from .conditionals import WallConditionals, is_few, traced_conditionals
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
 from .traced_map import UNRESOLVED_TOLERANCE, traced_angles, traced_reflection
@@ -207,20 +205,6 @@ class WallLaw(DrivenLaw):
         below = Distribution.of_cells(masses.reshape(-1, cells)).below
         return Distribution(below, (np.pi - theta)[:, None], flat[:, None])
 
-    def expectations(self, basis: Basis) -> Expectations:
-        """Expectations of the exact law or of the hollows; else by adaptive quadrature in the entry point.
-
-        The hollows must all have errors in this basis. Walls with many pieces use `apply`.
-        """
-        mixture = self.exact_law or self.replacement
-        if mixture is not None:
-            found = mixture.expectations(basis)
-            if found.has_errors or self.closed_form is not None or self.is_polygonal:
-                return found
-        if not is_few(self.wall):
-            return ByConditionals(basis, self._conditionals, traced=True)
-        return TracedExpectations(basis, self.wall)
-
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return super()._sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
 
@@ -237,7 +221,7 @@ class WallLaw(DrivenLaw):
             raise AccuracyError(
                 f"{self!r}: {unresolved:.2g} of the rays did not escape, more than {UNRESOLVED_TOLERANCE:g}", unresolved
             )
-        return Conditionals(found.nodes, found.weights, found.starts, found.error + 2.0 * found.unresolved)
+        return found.conditionals
 
 
 def _closed_form(wall: Wall) -> Law | None:

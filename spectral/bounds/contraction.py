@@ -6,8 +6,8 @@ import numpy as np
 
 from ...core.errors import AccuracyError, InputError
 from ...kernels import Law
-from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.structure import lists_branches
+from .expectations import suits_panels
 
 # Angles at which the law is compared with its mirror image, and the difference of two means of cos(theta') that exceeds
 # their errors.
@@ -55,7 +55,7 @@ def refuse_unless_self_adjoint(law: Law) -> None:
 
 def why_not_self_adjoint(other: Law) -> str:
     """The reason, in words, why P J is not (or not known to be) self-adjoint for a self-adjoint P."""
-    if lists_branches(other) or other.expectations(ONE_PANEL).has_errors:
+    if lists_branches(other) or suits_panels(other):
         try:
             here, there = (other.apply(np.cos, angle) for angle in (COMPARED, np.pi - COMPARED))
         except InputError:

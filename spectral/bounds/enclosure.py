@@ -16,7 +16,6 @@ from ...core.rounding import EPS
 from ...core.tables import html_table
 from ...kernels import Basis, CollisionLaw, DensityLaw, Law, Legendre, discretise
 from ...kernels.bases.measure import SINE
-from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, Power
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
@@ -25,6 +24,7 @@ from ...kernels.laws.structure import made_of_isometries
 from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
 from ..eigenvalues.spectra import Spectrum, check_reversible, matrix_spectrum
 from .contraction import refuse_unless_self_adjoint
+from .expectations import is_traced, suits_panels
 from .operator_residuals import Residuals, image_rule, residuals
 from .separation import Separation, rest_of_spectrum
 from .trial_space import adapted_trial_space
@@ -160,7 +160,7 @@ def enclosures(
     ------
     InputError
         If the errors of conditional expectations are unknown: for compositions with laws whose expectations are
-        computed by quadrature, and laws given by entry points.
+        computed by quadrature, walls with more than 64 pieces, and laws given by entry points.
     AccuracyError
         If the law is not symmetric within its error. If the law is self-adjoint in the other convention only, the
         message states the norm bound that holds in this one.
@@ -224,14 +224,13 @@ def enclosed_trial_space(
     law: Law, k: int, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
 ) -> EnclosedTrialSpace:
     """The result of `enclosures` for a self-adjoint law, with the trial functions."""
-    known = law.expectations(ONE_PANEL) if basis is None else None
-    if known is not None and known.has_errors:
+    if basis is None and suits_panels(law):
         space = adapted_trial_space(law, k, TRIAL_FRACTION * tolerance)
         basis, values, vectors, names = space.basis, space.values, space.vectors, space.parities
         # conditional expectations dominate the cost, so the following functions use the same incoming angles
         both = residuals(
             law, basis, np.column_stack([vectors, space.following]), np.append(values, space.following_values),
-            MOST_TRACED_ANGLES if known.is_traced else MOST_EXACT_ANGLES,
+            MOST_TRACED_ANGLES if is_traced(law) else MOST_EXACT_ANGLES,
             mirrored=space.mirrored, quotient_error=TRIAL_FRACTION * tolerance, leading=len(values),
         )  # fmt: skip
         found, after = both.split(len(values))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -12,17 +11,19 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
-from ...kernels import Basis, Bins, CircularArcLaw, DensityLaw, Law, Legendre, Panels, PolygonLaw, WallLaw
+from ...kernels import Basis, Bins, CircularArcLaw, DensityLaw, Law, Legendre, Panels, WallLaw
 from ...kernels.bases.measure import SINE, gauss_on_intervals
 from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
 from ...kernels.discretisation.actions import GRAZING_EDGES
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
-from ...kernels.expectations.basis_means import Means, height_of, weighted_means
+from ...kernels.expectations.basis_means import Means, weighted_means
 from ...kernels.laws.density import GAUSS_NODES, split_panels
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.law import Composition, SpecularFrame, is_atomic
-from ...kernels.laws.structure import Rules, fold, holds_of_all, law_of, words_of
+from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
+from ...kernels.laws.structure import holds_of_all, law_of, words_of
 from ...kernels.walls.circular_arc import MOST_HITS
+from ...kernels.walls.conditionals import is_few
+from .expectations import expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
@@ -210,7 +211,8 @@ def image_rule(law: Law, basis: Basis, vectors: Floats) -> Means:
     Raises
     ------
     InputError
-        If the errors are unknown: for laws given by entry points, and compositions with laws that are not exact.
+        If the errors are unknown: for laws given by entry points, walls with more than 64 pieces, and compositions with
+        laws that are not exact.
     """
     words = words_of(law)
     if words is None:
@@ -219,7 +221,7 @@ def image_rule(law: Law, basis: Basis, vectors: Floats) -> Means:
 
 
 def _rule(law: Law, basis: Basis, vectors: Floats) -> Means:
-    if isinstance(law, Composition) and not holds_of_all(law, _is_exact):
+    if isinstance(law, Composition) and not holds_of_all(law, is_atomic):
         raise _refusal(law, "it is a composition with a law whose means are integrals by quadrature")
     if isinstance(law, SpecularFrame):
         fine, coefficients = mirror_refinement(basis)
@@ -229,20 +231,15 @@ def _rule(law: Law, basis: Basis, vectors: Floats) -> Means:
         return lambda theta, tolerance: (np.tile(mean, (theta.size, 1)), np.zeros(theta.size))
     if isinstance(law, WallLaw) and law.exact_law is not None:
         return _rule(law.exact_law, basis, vectors)
-    if holds_of_all(law, _is_exact):
-        return _exact_rule(law, basis, vectors)
     if isinstance(law, DensityLaw):
         return _of_rules(partial(_means_of_density, law, basis, vectors), vectors.shape[1])
     if isinstance(law, CircularArcLaw) and isinstance(basis, Legendre):
         return _of_rules(partial(_means_of_arc, law, basis, vectors), vectors.shape[1])
-    found = law.expectations(Panels(basis.edges, 0) if isinstance(basis, Bins) else basis)
-    if found.has_errors:
-        return found.of(vectors)
+    if isinstance(law, WallLaw) and not is_few(law.wall):
+        raise _refusal(law, "its conditional distributions take too long")
+    if knows_errors(law):
+        return expectations_of(law, Panels(basis.edges, 0) if isinstance(basis, Bins) else basis, vectors)
     raise _refusal(law, "the errors of its conditional distributions are unknown")
-
-
-def _is_exact(law: Law) -> bool:
-    return is_atomic(law)
 
 
 def _refusal(law: Law, reason: str) -> InputError:
@@ -250,21 +247,6 @@ def _refusal(law: Law, reason: str) -> InputError:
         f"law: the images of trial functions under {law!r} have no known error, for {reason}; spectrum(law) and "
         "spectral_gap(law) take its matrix"
     )
-
-
-def _exact_rule(law: Law, basis: Basis, vectors: Floats) -> Means:
-    """Images by `apply`; a fraction s of unresolved rays of a polygon changes P v by at most 2 s^(1/2) max|v|."""
-    unknown = fold(law, Rules(_unresolved, lambda terms: sum(w * s for w, s in terms), sum, lambda fraction: fraction))
-    doubt = 2.0 * math.sqrt(unknown) * height_of(basis, vectors) if unknown else 0.0
-
-    def means(theta: Floats) -> Floats:
-        return law.apply(lambda angle: expansion(basis, vectors, angle), theta)
-
-    return lambda theta, tolerance: (_in_chunks(means, theta, vectors.shape[1]), np.full(theta.size, doubt))
-
-
-def _unresolved(law: Law) -> float:
-    return float(law.unresolved) if isinstance(law, PolygonLaw) else 0.0
 
 
 def _of_rules(means: Callable[..., Floats], functions: int) -> Means:

@@ -15,9 +15,9 @@ from ...core.long_runs import progress_bar
 from ...kernels import Law, Legendre, Panels
 from ...kernels.bases.assembly import one_blas_thread
 from ...kernels.bases.measure import SINE
-from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.expectations.angle_panels import KRONROD, NODES
 from ..eigenvalues.parity import Parity
+from .expectations import expectations, is_traced
 
 # Degree on each panel, for which Kronrod's rule is exact for products of two functions.
 DEGREE = 6
@@ -88,7 +88,7 @@ def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = M
 def _adapted(law: Law, k: int, tolerance: float, most_levels: int, bar: Any) -> TrialSpace:
     """The trial functions; the bar shows their residual."""
     mirrored = bool(law.mirror_symmetric)
-    edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[law.expectations(ONE_PANEL).is_traced]
+    edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[is_traced(law)]
     history: list[tuple[int, float]] = []
     goal, before = float(np.sqrt(tolerance)), None
     while True:
@@ -134,7 +134,7 @@ class _Level:
         half = 0.5 * np.diff(edges)
         angle = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * NODES
         self.angle, self.weight = angle, half[:, None] * SINE.density(angle) * KRONROD * (2.0 if mirrored else 1.0)
-        self._images, _ = law.expectations(self.panels)(angle.ravel(), mean_tolerance)
+        self._images, _ = expectations(law, self.panels)(angle.ravel(), mean_tolerance)
         # values of each panel's functions, shape (panels, nodes, degree + 1), normalised on (0, pi) or (0, pi/2)
         self.norm = np.sqrt(0.5) if mirrored else 1.0
         self.local = self.panels.local(angle)[1] * self.norm

@@ -20,6 +20,7 @@ from ...kernels.expectations.basis_means import Means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Combination, IsometryLaw, is_atomic
 from ...kernels.laws.structure import has_chain, law_of, words_of
+from ..bounds.expectations import is_costly
 from ..bounds.operator_residuals import image_rule
 from ..gap.shallow import ROUNDING, Slopes, slopes_of
 from .channel import in_paper_frame
@@ -226,7 +227,7 @@ class _Changes:
         panels = Panels(np.linspace(0.0, np.pi, PANELS + 1), DEGREE)
         vectors = np.stack([panels.project(np.cos), panels.project(np.sin)], axis=1)
         try:
-            return None if self.law.expectations(panels).are_costly() else image_rule(self.law, panels, vectors)
+            return None if is_costly(self.law) else image_rule(self.law, panels, vectors)
         except InputError:
             return None
 

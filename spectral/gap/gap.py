@@ -12,11 +12,11 @@ from ...core.errors import AccuracyError
 from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
-from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.laws.structure import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
+from ..bounds.expectations import is_costly, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import adapted_trial_space
@@ -44,8 +44,7 @@ def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap
     if isinstance(law, DensityLaw):
         found = (_gap_of_enclosures(law, number, tolerance) for number in (ENCLOSED, 2 * ENCLOSED))
         return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
-    known = law.expectations(ONE_PANEL)
-    if not known.has_errors or known.are_costly():
+    if not suits_panels(law) or is_costly(law):
         return None
     number = _number_to_enclose(law, edge)
     gap = None if number is None else _gap_of_enclosures(law, number, tolerance)

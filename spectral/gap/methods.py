@@ -11,10 +11,10 @@ from ...core.checks import Floats, Rng, frozen
 from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, Legendre, discretise
-from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.structure import made_of_isometries
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
+from ..bounds.expectations import is_costly, suits_panels
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
 
 # Sizes of Legendre bases for laws without known errors of expectations; the first suffices for ten eigenvalues of most.
@@ -42,8 +42,7 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng, seconds: float
     if not made_of_isometries(law):
         if isinstance(law, DensityLaw):
             return _of_density(law, k, tolerance)
-        known = law.expectations(ONE_PANEL)
-        if known.has_errors and not known.are_costly():
+        if suits_panels(law) and not is_costly(law):
             with suppress(OutOfTime), time_limited(seconds):
                 return _enclosed(law, k, tolerance)
     return _by_matrices(law, k, tolerance, rng)

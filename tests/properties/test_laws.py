@@ -110,16 +110,16 @@ def test_branches_and_isometry_tables_are_merged_and_act_like_the_law(law: ker.L
 
 def test_expectations_of_polynomials_and_bins_are_those_of_apply_and_of_the_distribution(law: ker.Law) -> None:
     smooth, bins = ker.Legendre(6), ker.Bins(8)
-    means, errors = law.expectations(smooth)(THETA, 1e-8)
-    wrong = np.abs(means - law.apply(smooth.evaluate, THETA)).max(axis=1)
-    # without errors both are one computation; traced means have errors of their own
-    assert np.all(wrong <= np.where(np.isnan(errors), 1e-12, errors + 1e-8))
-    means, errors = law.expectations(bins)(THETA, 1e-8)
-    known = ~np.isnan(errors)
+    found = law.conditionals(THETA, 1e-8, smooth.size)
+    wrong = np.abs(found.in_basis(smooth) - law.apply(smooth.evaluate, THETA)).max(axis=1)
+    # traced means have errors of their own
+    assert np.all(wrong <= np.where(np.isnan(found.error), 1e-12, found.error + 1e-8))
+    found = law.conditionals(THETA, 1e-8, 0, bins.edges[1:-1])
+    known = ~np.isnan(found.error)
     if not known.any():
         return
     below = law.distribution(THETA[known], bins.edges).cumulative(bins.edges)
-    assert np.all(np.abs(means[known] / bins.normalisation - np.diff(below, axis=1)) < 1e-8)
+    assert np.all(np.abs(found.masses(bins.edges)[known] - np.diff(below, axis=1)) < 1e-8)
 
 
 def test_rows_of_isometries_are_smooth_between_breakpoints(law: ker.Law) -> None:

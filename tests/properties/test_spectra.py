@@ -6,6 +6,7 @@ import pytest
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
+from asperity.kernels.laws.law import Composition
 
 EPS = float(np.finfo(float).eps)
 
@@ -47,7 +48,7 @@ def test_its_gap_and_its_mixing_time_are_exact(diagonal) -> None:
 @pytest.mark.parametrize("trials", [None, ker.Legendre(12), ker.Bins(32)], ids=["own", "polynomials", "steps"])
 def test_its_eigenvalues_are_enclosed_with_their_indices_and_parities(diagonal, trials) -> None:
     law, exact = diagonal
-    if isinstance(law, ker.Composition):
+    if isinstance(law, Composition):
         with pytest.raises(InputError, match="no known error"):
             spec.enclosures(law, 4, trials)
         return

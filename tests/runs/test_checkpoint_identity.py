@@ -90,8 +90,8 @@ def laws():
     first, second = ker.MatrixLaw(SWAP), ker.MatrixLaw(np.eye(2))
     for one in (first, second):
         found += [
-            0.5 * one + 0.5 * ker.lambertian(), 0.25 * one + 0.75 * ker.lambertian(), one @ ker.lambertian(),
-            (one @ ker.lambertian()) ** 2, one.in_specular_frame(),
+            0.5 * one + 0.5 * ker.lambertian(), 0.25 * one + 0.75 * ker.lambertian(), one @ ker.specular(),
+            (one @ ker.specular()) ** 2, one.in_specular_frame(),
             0.5 * one + 0.5 * ker.specular(),
         ]  # fmt: skip
     return found

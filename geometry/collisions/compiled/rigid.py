@@ -70,7 +70,7 @@ class Chosen(NamedTuple):
 @inlined
 def hollow_at(hollows, entry):
     """Return the hollow whose opening contains a position of the cell, or -1 at a flat top."""
-    h = last_hollow(entry, hollows)
+    h = last_hollow(entry, hollows, hollows.shape[0])
     return h if h >= 0 and entry < hollows[h, c.RIGHT] else -1
 
 

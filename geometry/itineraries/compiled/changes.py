@@ -3,27 +3,28 @@
 At one incoming angle the map x -> theta' is analytic between changes of the itinerary. The search keeps a chain of
 samples, each with the label of its itinerary. In each round, every gap between samples of different labels is divided.
 
-The constants of one angle are in a `Task`, the samples in a `Chain`.
+The constants are in a `Setting`, the samples in a `Chain`.
 """
 
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
-from ...scene.records import Record
-from ...scene.scene import NO_TABLES, Scene
-from ...tracing.compiled.options import inlined, inner, linked
-from ...tracing.compiled.pointers import address_of, call_at
-from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, trace_rays_address
-from ...tracing.compiled.records import details_for, results_for
+from ...scene.compiled.tables import ROW, Table, named, reader_of
+from ...scene.scene import Scene
+from ...scene.structs import Struct
+from ...tracing.compiled.options import compiled, inlined, linked
+from ...tracing.compiled.pointers import call_late
+from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, TRACE
+from ...tracing.compiled.records import Rays, details_for, results_for
 
 # Start integers as np.int64(0): a literal 0 has its own type in numba, and each function that receives it would be
 # compiled twice.
@@ -61,41 +62,40 @@ class Limits(NamedTuple):
 
 
 class Tracer(NamedTuple):
-    """The addresses of `trace_rays` and `halve_gaps`, the slots of late functions, and the arrays for a block of rays.
+    """What `trace_block` needs: addresses, and the arrays for a block of rays.
 
-    The rays of a block have the same incoming angle. ``stop`` is never raised.
+    The addresses are those of the slot of `trace_rays`, the `Rays`, the tables, the details and `SLOTS`. ``spent``,
+    with one entry, counts ray segments.
     """
 
     trace: int
-    halve: int
-    slots: Record
-    angles: Floats
-    results: Record
+    rays: Struct
+    tables: Struct
+    details: Struct
+    slots: Struct
     entries: Floats
-    stop: NDArray[np.int64]
+    angles: Floats
+    exits: Floats
+    status: NDArray[np.uint8]
+    velocity: Floats
+    itinerary: NDArray[np.uint64]
+    segments: NDArray[np.int64]
+    spent: NDArray[np.int64]
 
 
 class Setting(NamedTuple):
-    """The data common to all angles: row of the hollow, tables of the wall, limits, outgoing cells, tracer.
+    """The data common to all angles: row of the hollow, limits, degree of the functions, outgoing cells, tracer.
 
     ``edges`` are the edges between the cells, and ``sizes`` bounds of the functions to integrate in each cell.
     """
 
     hollow: Floats
-    tables: Record
-    limits: Record
+    limits: Limits
+    degree: int
+    edge_count: int
     edges: Floats
     sizes: Floats
-    tracer: Record
-
-
-class Task(NamedTuple):
-    """One incoming angle: the setting, the angle, the degree of the functions to integrate, and segments spent."""
-
-    setting: Record
-    theta: float
-    degree: int
-    segments: NDArray[np.int64]
+    tracer: Tracer
 
 
 class Chain(NamedTuple):
@@ -109,45 +109,54 @@ class Chain(NamedTuple):
     fresh: NDArray[np.int64]
 
 
-def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats, sizes: Floats) -> Record:
+INTEGERS, LABELS = types.CPointer(types.int64), types.CPointer(types.uint64)
+TRACER = named(
+    Tracer, *[types.int64] * 5, ROW, ROW, ROW, types.CPointer(types.uint8), Table(2), LABELS, INTEGERS, INTEGERS
+)
+SETTING = named(
+    Setting, ROW, named(Limits, types.int64, types.boolean, types.int64), types.int64, types.int64, ROW, ROW, TRACER
+)
+CHAIN = named(Chain, ROW, ROW, LABELS, INTEGERS, INTEGERS, INTEGERS)
+setting_at = reader_of(SETTING)
+
+
+def setting_of(scene: Scene, hollow: int, limits: Limits, degree: int, edges: Floats, sizes: Floats) -> Struct:
     """Return the setting of hollow number ``hollow``, for use by one thread at a time."""
-    results, angles, stop = results_for(BLOCK, details_for(BLOCK, BLOCK)), np.empty(BLOCK), np.zeros(1, np.int64)
-    tracer = Record(Tracer(trace_rays_address(), _halve_address(), SLOTS, angles, results, np.empty(BLOCK), stop))
-    tables = scene.tables
+    entries, angles = np.empty((2, BLOCK))
+    results, details = results_for(BLOCK), details_for(BLOCK, BLOCK)
+    rays, (exits, _, _, status) = Struct(Rays(entries, angles, *results, np.zeros(1, np.int64))), results
+    arrays = entries, angles, exits, status, *details.values[:3], np.zeros(1, np.int64)
+    tracer = Tracer(TRACE.slot, rays, scene.tables, details, SLOTS, *arrays)
     edges, sizes = (np.require(values, np.float64, ["C", "A", "W"]) for values in (edges, sizes))
-    return Record(Setting(tables.hollows[hollow], tables, Record(limits), edges, sizes, tracer))
+    return Struct(Setting(scene.tables.values.hollows[hollow], limits, degree, len(edges), edges, sizes, tracer))
 
 
-def empty_chain() -> Record:
+def empty_chain() -> Chain:
     """Return an empty chain for the samples of one angle; the last sample will have the successor -1."""
     counts = np.empty((3, MOST_SAMPLES), np.int64)
-    return Record(Chain(np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES, np.uint64), *counts))
-
-
-@linked
-def task_of(setting, theta, degree, segments):
-    """-> Task: the task of one incoming angle."""
-    setting.tracer.angles[:] = theta
-    return Task(setting, theta, degree, segments)
+    return Chain(np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES, np.uint64), *counts)
 
 
 @inlined
-def trace_block(entries, task):
-    """Trace at most `BLOCK` rays into the results of the tracer."""
-    setting = task.setting
+def set_angle(theta, setting):
+    """Set the incoming angle of the rays of a block."""
+    for k in range(BLOCK):
+        setting.tracer.angles[k] = theta
+
+
+@inlined
+def trace_block(count, setting):
+    """Trace the first rays, at most `BLOCK`, of the tracer."""
     tracer = setting.tracer
-    rays = entries, tracer.angles[: entries.shape[0]]
-    limit, found = setting.limits.collisions, tracer.results
-    results = found.x, found.theta, found.collisions, found.status
-    places = found.details.address, tracer.slots.address
-    call_at(tracer.trace, None, (*rays, setting.tables.address, limit, tracer.stop, results, *places))
+    arguments = count, tracer.rays, tracer.tables, setting.limits.collisions, tracer.details, tracer.slots
+    call_late(tracer.trace, None, arguments)
 
 
 @inlined
-def cell_of(out, edges):
+def cell_of(out, edges, count):
     """Return the number of edges below an outgoing angle."""
     # instead of np.searchsorted, which would double the time of compilation of this file
-    cell, high = np.int64(0), np.int64(edges.shape[0])
+    cell, high = np.int64(0), np.int64(count)
     while cell < high:
         middle = (cell + high) // 2
         if edges[middle] < out:
@@ -158,58 +167,59 @@ def cell_of(out, edges):
 
 
 @inlined
-def outcome(k, task):
+def outcome(k, setting):
     """-> (angle, label): the outgoing angle of ray k of the block, and its label.
 
-    The label combines the itinerary and the outgoing bin. The segments of the ray are added to those of the task.
+    The label combines the itinerary and the outgoing bin. The segments of the ray are added to those spent.
     """
-    edges, results = task.setting.edges, task.setting.tracer.results
-    steps = results.details.segments[k]
-    if task.setting.limits.has_runs:
+    tracer = setting.tracer
+    steps = tracer.segments[k]
+    if setting.limits.has_runs:
         steps = min(steps, DEAR_STEPS) + max(steps - MANY_STEPS, 0) // CHEAP_STEPS
-    task.segments[0] += steps
-    if results.status[k] != ESCAPED:
-        return task.theta, np.uint64(results.status[k])
+    tracer.spent[0] += steps
+    if tracer.status[k] != ESCAPED:
+        return tracer.angles[k], np.uint64(tracer.status[k])
     # clipped for a ray along y = 0 within rounding
-    velocity = results.details.velocity
+    velocity = tracer.velocity
     out = min(max(math.atan2(velocity[k, POINT_Y], velocity[k, POINT_X]), 0.0), math.pi)
-    return out, HASH_FACTOR * (results.details.itinerary[k] + np.uint64(16)) + np.uint64(cell_of(out, edges))
+    cell = cell_of(out, setting.edges, setting.edge_count)
+    return out, HASH_FACTOR * (tracer.itinerary[k] + np.uint64(16)) + np.uint64(cell)
 
 
 @inlined
-def probe(x, task):
+def probe(x, setting):
     """-> (angle, label): `outcome` of one ray."""
-    entries = task.setting.tracer.entries[:1]
-    entries[0] = x
-    trace_block(entries, task)
-    return outcome(np.int64(0), task)
+    setting.tracer.entries[0] = x
+    trace_block(1, setting)
+    return outcome(np.int64(0), setting)
 
 
 @inlined
-def is_spent(task):
-    """Whether the task has reached its limit of ray segments."""
-    return task.segments[0] >= task.setting.limits.segments
+def is_spent(setting):
+    """Whether the limit of ray segments is reached."""
+    return setting.tracer.spent[0] >= setting.limits.segments
 
 
 @inlined
-def size_at(out, task):
+def size_at(out, setting):
     """Return the size of the functions in the cell of an outgoing angle."""
-    return task.setting.sizes[cell_of(out, task.setting.edges)]
+    return setting.sizes[cell_of(out, setting.edges, setting.edge_count)]
 
 
 @inlined
-def spread(first, second, task):
+def spread(first, second, setting):
     """Return the largest difference of the functions between two outgoing angles.
 
-    In one cell it is that of cos(angle), cos(k angle) and sin(k angle), k = ``task.degree``, times the functions' size;
+    In one cell it is that of cos(angle), cos(k angle) and sin(k angle), with the degree k, times the functions' size;
     in two cells the sum of the sizes. If the degree is 0 and there is one cell only, the itineraries themselves are
     wanted, also where a change hardly changes the angle.
     """
-    k, edges, sizes = max(task.degree, 1), task.setting.edges, task.setting.sizes
-    here, there = cell_of(first, edges), cell_of(second, edges)
+    k, sizes = max(setting.degree, 1), setting.sizes
+    here = cell_of(first, setting.edges, setting.edge_count)
+    there = cell_of(second, setting.edges, setting.edge_count)
     if here != there:
         return sizes[here] + sizes[there]
-    least = LEAST_SPREAD if task.degree == 0 and edges.shape[0] == 0 else 0.0
+    least = LEAST_SPREAD if setting.degree == 0 and setting.edge_count == 0 else 0.0
     return sizes[here] * max(
         least,
         abs(math.cos(first) - math.cos(second)),
@@ -218,28 +228,27 @@ def spread(first, second, task):
 
 
 @inlined
-def undecided(before, task, chain):
+def undecided(before, setting, chain):
     """Return the contribution to the error of the gap after the sample ``before``."""
     xs, outs, follow = chain.entries, chain.angles, chain.successors
     after = follow[before]
-    width, whole = xs[after] - xs[before], task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
-    return (
-        0.5 * width * (spread(outs[before], outs[after], task) + size_at(outs[before], task) * math.sqrt(width / whole))
-    )
+    width, whole = xs[after] - xs[before], setting.hollow[RIGHT] - setting.hollow[LEFT]
+    size = size_at(outs[before], setting)
+    return 0.5 * width * (spread(outs[before], outs[after], setting) + size * math.sqrt(width / whole))
 
 
 @inlined
-def insert(x, before, count, task, chain):
+def insert(x, before, count, setting, chain):
     """Insert a sample at x after the sample ``before``."""
     xs, outs, labels, follow = chain.entries, chain.angles, chain.labels, chain.successors
     xs[count] = x
-    outs[count], labels[count] = probe(x, task)
+    outs[count], labels[count] = probe(x, setting)
     follow[count] = follow[before]
     follow[before] = count
 
 
 @inlined
-def division(i, j, number, task, chain):
+def division(i, j, number, setting, chain):
     """Return the position in the gap from sample i to sample j at which round ``number`` divides it.
 
     Between samples of one itinerary in neighbouring cells the outgoing angle is smooth. The position is then that of
@@ -247,13 +256,13 @@ def division(i, j, number, task, chain):
     approach the edge and the width falls quadratically. Every third round, and other gaps, are divided in the middle.
     """
     xs, outs, labels = chain.entries, chain.angles, chain.labels
-    edges, hollow = task.setting.edges, task.setting.hollow
+    edges, hollow = setting.edges, setting.hollow
     width, middle = xs[j] - xs[i], 0.5 * (xs[i] + xs[j])
     step = np.int64(labels[j] - labels[i])
     if number % 3 == 2 or (step != 1 and step != -1) or outs[i] == outs[j]:
         return middle
-    cell = cell_of(min(outs[i], outs[j]), edges)
-    if cell == edges.shape[0]:
+    cell = cell_of(min(outs[i], outs[j]), edges, setting.edge_count)
+    if cell == setting.edge_count:
         return middle
     x = xs[i] + width * (edges[cell] - outs[i]) / (outs[j] - outs[i])
     margin = max(BEYOND_EDGE * width * width / (hollow[RIGHT] - hollow[LEFT]), 4.0 * EPS * abs(middle))
@@ -261,14 +270,14 @@ def division(i, j, number, task, chain):
     return x if xs[i] < x < xs[j] else middle
 
 
-@inner
-def halve_gaps(task, chain, count, gap_count, goal, most):
+@linked
+def halve_gaps(setting, chain, count, gap_count, goal, most):
     """Divide gaps until the sum of their errors is at most ``goal``; return the number of samples."""
     xs, labels, follow, gaps, fresh = chain.entries, chain.labels, chain.successors, chain.gaps, chain.fresh
     for number in range(MOST_ROUNDS):
         total, worst = 0.0, 0.0
         for g in range(gap_count):
-            matter = undecided(gaps[g], task, chain)
+            matter = undecided(gaps[g], setting, chain)
             total += matter
             worst = max(worst, matter)
         if total <= goal:
@@ -280,15 +289,15 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
         for g in range(gap_count):
             i = gaps[g]
             j = follow[i]
-            if undecided(i, task, chain) <= fair:
+            if undecided(i, setting, chain) <= fair:
                 fresh[fresh_count] = i
                 fresh_count += 1
                 continue
             narrow = xs[j] - xs[i] <= 2.0 * EPS * max(abs(xs[i]), abs(xs[j]))
-            if narrow or count >= most or is_spent(task):
+            if narrow or count >= most or is_spent(setting):
                 continue
             k = count
-            insert(division(i, j, number, task, chain), i, k, task, chain)
+            insert(division(i, j, number, setting, chain), i, k, setting, chain)
             count += 1
             moved = True
             if labels[k] != labels[i]:
@@ -305,39 +314,14 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
     return count
 
 
-def example_task() -> Task:
-    """Return a task of the types of all tasks, for which functions are compiled to be called by their address."""
-    results, stop = results_for(0), np.zeros(1, np.int64)
-    tracer = Record(Tracer(0, 0, SLOTS, np.empty(0), results, np.empty(0), stop))
-    setting = Record(Setting(np.empty(0), NO_TABLES, Record(Limits(1, False, 1)), np.empty(0), np.empty(0), tracer))
-    return Task(setting, 0.0, 0, stop)
-
-
-def example_chain() -> Record:
-    """Return a chain of the types of all chains."""
-    numbers, counts = np.empty(0), np.empty(0, np.int64)
-    return Record(Chain(numbers, numbers, np.empty(0, np.uint64), counts, counts, counts))
-
-
-@cache
-def _halve_address() -> int:
-    return address_of(halve_gaps, (example_task(), example_chain(), 0, 0, 0.0, 0))
-
-
-@inlined
-def halved(task, chain, count, gap_count, goal, most):
-    """`halve_gaps`, called by its address."""
-    return call_at(task.setting.tracer.halve, count, (task, chain, count, gap_count, goal, most))
-
-
 @linked
-def sample_entries(entries, task, chain, goal):
+def sample_entries(entries, setting, chain, goal):
     """Chain the samples at increasing positions and halve the gaps.
 
     Returns the number of samples, and the sample of largest position.
     """
     xs, outs, labels, follow, gaps = chain.entries, chain.angles, chain.labels, chain.successors, chain.gaps
-    left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
+    left, right = setting.hollow[LEFT], setting.hollow[RIGHT]
     count, gap_count = np.int64(0), np.int64(0)
     for x in entries:
         if x <= left or x >= right or (count > 0 and x <= xs[count - 1]):
@@ -348,27 +332,47 @@ def sample_entries(entries, task, chain, goal):
     end = np.int64(0)
     while end < count:
         first, end = end, min(end + BLOCK, count)
-        trace_block(xs[first:end], task)
         for k in range(first, end):
-            outs[k], labels[k] = outcome(k - first, task)
+            setting.tracer.entries[k - first] = xs[k]
+        trace_block(end - first, setting)
+        for k in range(first, end):
+            outs[k], labels[k] = outcome(k - first, setting)
             if k > 0 and labels[k] != labels[k - 1]:
                 gaps[gap_count] = k - 1
                 gap_count += 1
-        if is_spent(task) and end < count - 1:
+        if is_spent(setting) and end < count - 1:
             # between these samples and the last one there is a gap, which counts as error
             xs[end], count = xs[count - 1], end + 1
     last = count - 1
     follow[last] = -1
-    return halved(task, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last
+    return halve_gaps(setting, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last
 
 
 @linked
-def add_change(x, first, task, chain, count, goal):
+def add_change(x, first, setting, chain, count, goal):
     """Insert a position x of another label into the piece that begins with ``first``, and find the changes around x."""
     xs, follow, gaps = chain.entries, chain.successors, chain.gaps
     before = first
     while xs[follow[before]] <= x:
         before = follow[before]
-    insert(x, before, count, task, chain)
+    insert(x, before, count, setting, chain)
     gaps[0], gaps[1] = before, count
-    return halved(task, chain, count + 1, np.int64(2), goal, np.int64(MOST_SAMPLES))
+    return halve_gaps(setting, chain, count + 1, np.int64(2), goal, np.int64(MOST_SAMPLES))
+
+
+@compiled
+def trace_points(entries, angles, setting, outs, exits, labels):
+    """Trace rays with incoming angles of their own; set their outgoing angles, exit points and labels.
+
+    Of the setting the address is given. The outgoing angle is 0 for rays that do not escape.
+    """
+    setting = setting_at(setting)
+    tracer = setting.tracer
+    for first in range(0, entries.shape[0], BLOCK):
+        last = min(first + BLOCK, entries.shape[0])
+        for n in range(first, last):
+            tracer.entries[n - first], tracer.angles[n - first] = entries[n], angles[n]
+        trace_block(last - first, setting)
+        for n in range(first, last):
+            out, labels[n] = outcome(n - first, setting)
+            outs[n], exits[n] = 0.0 if labels[n] < FIRST_LABEL else out, tracer.exits[n - first]

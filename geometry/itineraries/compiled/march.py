@@ -1,37 +1,64 @@
 """Compiled march along the entry points of one angle: intervals (pieces) of equal itinerary, and nodes on each.
 
-A node with another label than its piece reveals a missed change of itinerary; it is added to the samples.
+The nodes are those of nested rules between two neighbouring changes of itinerary: Fejér's second rules in s with
+x = a + (b - a) s^2 (3 - 2 s), in which square roots at tangencies are analytic at both ends. A node with another label
+than its piece reveals a missed change of itinerary; it is added to the samples.
 """
 
 from __future__ import annotations
 
 import math
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT, SIZE
-from ...scene.records import Record
-from ...tracing.compiled.options import compiled, inner
-from ...tracing.compiled.pointers import address_of, call_at
+from ...scene.compiled.tables import ROW, Table, named, reader_of
+from ...scene.structs import Struct
+from ...tracing.compiled.options import compiled, linked
 from .changes import (
+    BLOCK,
+    CHAIN,
     FIRST_LABEL,
+    LABELS,
     MOST_SAMPLES,
+    Chain,
     add_change,
     empty_chain,
-    example_task,
     is_spent,
+    outcome,
+    probe,
     sample_entries,
+    set_angle,
+    setting_at,
+    size_at,
     spread,
-    task_of,
+    trace_block,
     undecided,
 )
-from .rules import MOST_NODES, NODE_ROOM, SPARE, integrate_piece, nested_rules
 
+# Number of rules, and of the positions of the finest.
+LEVELS = 5
+MOST_POSITIONS = 2 ** (LEVELS + 1) - 1
+# Limit on the nodes of one incoming angle.
+MOST_NODES = 1 << 17
+# Least ratio of differences in the error estimate of a rule, 2 x last difference x last ratio of differences:
+# smaller ratios, which also occur by chance, underestimate the error.
+LEAST_RATIO = 0.03
+# Width, as a fraction of the opening, below which pieces are not halved.
+NARROWEST = 1e-9
+# Width, as a fraction of the opening, below which one ray checks a piece on which the functions are constant.
+NARROW = 1.0 / 32.0
+MOST_HALVINGS = 40
+# A stack of intervals lies behind the nodes and those of margins and gaps, so that nothing is allocated.
+STACK = MOST_NODES + 4
+NODE_ROOM = STACK + MOST_HALVINGS + 2
+# Least fraction of the tolerance for the rules of one piece, however narrow.
+LEAST_FRACTION = 0.05
 # Rounding error of a mean, as a fraction of the opening, and of the position of a change, as a fraction of the hollow's
 # size. Rays have errors of a few EPS times the derivative of the map, which is seldom above some hundreds except next
 # to a change (measured, not proved).
@@ -42,22 +69,15 @@ RULE_FRACTION, GAP_FRACTION = 0.5, 0.25
 LATE_FRACTION = 0.05
 
 
-class Found(NamedTuple):
-    """What is found angle by angle.
+class Rules(NamedTuple):
+    """Nested rules: the positions in (0, 1) of the finest, the weights of every rule, and the number of the first rule.
 
-    Outgoing angles and masses of the nodes, and the start of each angle; first positions, last positions, labels
-    and first outgoing angles of the pieces, and the start of each angle; and for each angle the error, the width of
-    unresolved rays, and the numbers of rays and of ray segments.
+    The rule of number ``level`` has the first 2^(level + 2) - 1 positions.
     """
 
-    nodes: Any
-    node_starts: NDArray[np.int64]
-    pieces: Any
-    piece_starts: NDArray[np.int64]
-    errors: Floats
-    unresolved: Floats
-    rays: NDArray[np.int64]
-    segments: NDArray[np.int64]
+    positions: Floats
+    weights: Floats
+    least: int
 
 
 class Nodes(NamedTuple):
@@ -65,6 +85,126 @@ class Nodes(NamedTuple):
 
     angles: Floats
     masses: Floats
+
+
+NODES = named(Nodes, ROW, ROW)
+rules_at = reader_of(named(Rules, ROW, Table(MOST_POSITIONS), types.int64))
+
+
+def nested_rules(least: int) -> Struct:
+    """Return the rules after the substitution, to be used from number ``least`` on."""
+    positions, weights = np.empty(0), np.zeros((LEVELS, MOST_POSITIONS))
+    for level in range(LEVELS):
+        intervals = 2 ** (level + 2)
+        number = np.arange(1, intervals)
+        fresh = number if level == 0 else number[::2]
+        positions = np.append(positions, fresh / intervals)
+        # Fejer's second rule: interpolation at the inner extrema of Chebyshev's polynomials
+        odd = np.arange(1, intervals, 2)
+        angle = np.pi * positions
+        weights[level, : len(angle)] = (
+            2.0 / intervals * np.sin(angle) * np.sum(np.sin(np.outer(angle, odd)) / odd, axis=1)
+        )
+    s = np.sin(0.5 * np.pi * positions) ** 2
+    return Struct(Rules(s * s * (3.0 - 2.0 * s), 2.0 * weights * 3.0 * s * (1.0 - s), least))
+
+
+@linked
+def apply_rules(ends, label, goal, rules, setting, nodes, filled, strict):
+    """Apply rules of increasing order on an interval until the error estimate is at most ``goal``.
+
+    Returns the number of nodes, the error, a position where a ray has another label (nan: none), and the number of
+    rays. Without ``strict`` labels are ignored, and only the difference of the rules reveals a missed change.
+    """
+    low, high = ends
+    positions, weights, least = rules.positions, rules.weights, rules.least
+    node, mass = nodes.angles, nodes.masses
+    degree, entries = setting.degree, setting.tracer.entries
+    width = high - low
+    old0, old1, old2, old_step = 0.0, 0.0, 0.0, 0.0
+    k = max(degree, 1)
+    error = 2.0 * width
+    traced, used = np.int64(0), np.int64(0)
+    for level in range(LEVELS):
+        count = (4 << level) - 1
+        if count > MOST_NODES - filled - 2 or is_spent(setting):
+            break
+        for first in range(traced, count, BLOCK):
+            last = min(first + BLOCK, count)
+            for n in range(first, last):
+                entries[n - first] = low + width * positions[n]
+            trace_block(last - first, setting)
+            for n in range(first, last):
+                x = entries[n - first]
+                out, here = outcome(n - first, setting)
+                if strict and here != label:
+                    return used, error, x, np.int64(last)
+                node[filled + n] = out
+        traced = count
+        if level < least:
+            continue
+        used = count
+        new0, new1, new2 = 0.0, 0.0, 0.0
+        for n in range(count):
+            weight, out = width * weights[level, n], node[filled + n]
+            mass[filled + n] = weight
+            new0 += weight * math.cos(out)
+            new1 += weight * math.cos(k * out)
+            new2 += weight * math.sin(k * out)
+        if degree == 0 or label < FIRST_LABEL:
+            return used, 0.0, np.nan, traced
+        if level > least:
+            step = max(abs(new0 - old0), max(abs(new1 - old1), abs(new2 - old2))) + EPS * width
+            ratio = 1.0 if level == least + 1 else step / old_step
+            error = 2.0 * step * min(1.0, max(ratio, LEAST_RATIO))
+            if error <= goal:
+                break
+            old_step = step
+        old0, old1, old2 = new0, new1, new2
+    return used, error, np.nan, traced
+
+
+@linked
+def integrate_piece(ends, sample, goal, rules, setting, nodes, filled, strict):
+    """Compute nodes on a piece, which is halved until the rules reach the tolerance.
+
+    ``sample`` is the outgoing angle and label of a ray of the piece. Returns the total number of nodes, the error, a
+    position where a ray has another label (nan: none), and the number of rays.
+    """
+    whole = setting.hollow[RIGHT] - setting.hollow[LEFT]
+    out, label = sample
+    node, mass = nodes.angles, nodes.masses
+    node[STACK], mass[STACK] = ends
+    if setting.degree == 0 and ends[1] - ends[0] < NARROW * whole and strict and MOST_NODES - filled > 2:
+        middle = 0.5 * (ends[0] + ends[1])
+        out, here = probe(middle, setting)
+        if here != label:
+            return filled, 0.0, middle, np.int64(1)
+        node[filled], mass[filled] = out, ends[1] - ends[0]
+        return filled + 1, 0.0, np.nan, np.int64(1)
+    size = size_at(out, setting)
+    depth, error, rays = np.int64(1), 0.0, np.int64(0)
+    while depth > 0:
+        depth -= 1
+        low, high = node[STACK + depth], mass[STACK + depth]
+        allowed = goal / size * max((high - low) / whole, LEAST_FRACTION)
+        used, miss, other, spent = apply_rules((low, high), label, allowed, rules, setting, nodes, filled, strict)
+        rays += spent
+        if not math.isnan(other):
+            return filled, error, other, rays
+        able = MOST_NODES - filled - 2 >= MOST_POSITIONS and not is_spent(setting)
+        if miss > allowed and depth < MOST_HALVINGS and high - low > NARROWEST * whole and able:
+            middle = 0.5 * (low + high)
+            node[STACK + depth], mass[STACK + depth] = middle, high
+            node[STACK + depth + 1], mass[STACK + depth + 1] = low, middle
+            depth += 2
+            continue
+        if used == 0:
+            node[filled], mass[filled] = out, high - low
+            used = 1
+        filled += used
+        error += size * miss
+    return filled, error, np.nan, rays
 
 
 class Pieces(NamedTuple):
@@ -79,38 +219,57 @@ class Pieces(NamedTuple):
 class Room(NamedTuple):
     """Work space for one angle: its samples, nodes and pieces."""
 
-    chain: Record
-    nodes: Record
-    pieces: Record
+    chain: Chain
+    nodes: Nodes
+    pieces: Pieces
 
 
-@inner
-def march_angle(task, goal, rules, entries, room):
+class Found(NamedTuple):
+    """What is found at one angle.
+
+    Nodes and pieces, the error, the width of unresolved rays, and the numbers of rays and of ray segments.
+    """
+
+    nodes: Nodes
+    pieces: Pieces
+    error: float
+    unresolved: float
+    rays: int
+    segments: int
+
+
+room_at = reader_of(named(Room, CHAIN, NODES, named(Pieces, ROW, ROW, LABELS, ROW)))
+
+
+@compiled
+def march_angle(theta, goal, setting, rules, entries, room):
     """Compute the nodes and masses of the conditional distribution at one incoming angle.
 
     Returns the number of nodes, the error, the width of unresolved rays, and the numbers of pieces and of rays. If the
-    limit of ray segments is reached, the error includes the gaps that remain. ``pieces`` receives the first and last
-    position, the label and the first outgoing angle of every piece.
+    limit of ray segments is reached, the error includes the gaps that remain. ``entries`` are the first samples, which
+    increase; of the setting, the rules and the room the addresses are given.
     """
+    setting, rules, room = setting_at(setting), rules_at(rules), room_at(room)
+    set_angle(theta, setting)
     chain, nodes, pieces = room.chain, room.nodes, room.pieces
     xs, outs, labels, follow = chain.entries, chain.angles, chain.labels, chain.successors
     node, mass = nodes.angles, nodes.masses
     lows, highs, names, firsts = pieces.low, pieces.high, pieces.label, pieces.out
-    hollow = task.setting.hollow
+    hollow = setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]
     whole = right - left
-    task.segments[0] = 0
-    count, last = sample_entries(entries, task, chain, GAP_FRACTION * goal)
+    setting.tracer.spent[0] = 0
+    count, last = sample_entries(entries, setting, chain, GAP_FRACTION * goal)
     rays = np.int64(0)
     # the first and the last sample represent the margins
     node[0], mass[0] = outs[0], xs[0] - left
     node[1], mass[1] = outs[last], right - xs[last]
     filled, number, unresolved = np.int64(2), np.int64(0), 0.0
     largest = 0.0
-    for size in task.setting.sizes:
-        largest = max(largest, size)
+    for cell in range(setting.edge_count + 1):
+        largest = max(largest, setting.sizes[cell])
     error = ROUNDING * largest * whole
-    error += mass[0] * spread(outs[0], outs[1], task) + mass[1] * spread(outs[last], outs[last - 1], task)
+    error += mass[0] * spread(outs[0], outs[1], setting) + mass[1] * spread(outs[last], outs[last - 1], setting)
     i = np.int64(0)
     while i >= 0:
         j = i
@@ -118,13 +277,13 @@ def march_angle(task, goal, rules, entries, room):
             j = follow[j]
         if j != i:
             ready, miss, other, spent = integrate_piece(
-                (xs[i], xs[j]), (outs[i], labels[i]), RULE_FRACTION * goal, rules, task, nodes, filled,
-                count < MOST_SAMPLES - 4 and not is_spent(task),
+                (xs[i], xs[j]), (outs[i], labels[i]), RULE_FRACTION * goal, rules, setting, nodes, filled,
+                count < MOST_SAMPLES - 4 and not is_spent(setting),
             )  # fmt: skip
             rays += spent
             if not math.isnan(other):
                 # a missed change: add it to the samples, and repeat the piece
-                count = add_change(other, i, task, chain, count, LATE_FRACTION * GAP_FRACTION * goal)
+                count = add_change(other, i, setting, chain, count, LATE_FRACTION * GAP_FRACTION * goal)
                 continue
             filled, error = ready, error + miss
             if labels[i] < FIRST_LABEL:
@@ -142,102 +301,26 @@ def march_angle(task, goal, rules, entries, room):
             else:
                 mass[filled - 1] += width
                 error += 2.0 * largest * width
-            error += undecided(j, task, chain) + EDGE_ROUNDING * hollow[SIZE] * spread(outs[j], outs[following], task)
+            change = EDGE_ROUNDING * hollow[SIZE] * spread(outs[j], outs[following], setting)
+            error += undecided(j, setting, chain) + change
         i = following
     return filled, error, unresolved, number, rays + count
 
 
-@cache
-def march_address() -> int:
-    """Return the address of `march_angle`."""
-    return address_of(march_angle, (example_task(), 0.0, nested_rules(0), np.empty(0), _room(0, 0)))
-
-
-@compiled
-def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts, march, first, room, found):
-    """Compute the conditional distributions at incoming angles from number ``first`` on; see `marched_angles`.
-
-    Returns the number of the angle before which an array of ``found`` is too small, or the number of angles.
-    ``march`` is `march_address`.
-    """
-    node_starts, piece_starts = found.node_starts, found.piece_starts
-    angles, masses, all_angles, all_masses = (
-        room.nodes.angles,
-        room.nodes.masses,
-        found.nodes.angles,
-        found.nodes.masses,
-    )
-    own_pieces, pieces = room.pieces, found.pieces
-    lows, highs, labels, outs = own_pieces.low, own_pieces.high, own_pieces.label, own_pieces.out
-    all_lows, all_highs, all_labels, all_outs = pieces.low, pieces.high, pieces.label, pieces.out
-    hollow = setting.hollow
-    whole = hollow[RIGHT] - hollow[LEFT]
-    for k in range(first, thetas.shape[0]):
-        begin, start = node_starts[k], piece_starts[k]
-        if begin + MOST_NODES + SPARE > all_angles.shape[0] or start + MOST_SAMPLES > all_lows.shape[0]:
-            return np.int64(k)
-        task = task_of(setting, thetas[k], degree, found.segments[k : k + 1])
-        goal = tolerances[k] * whole
-        own = seeds[seed_starts[k] : seed_starts[k + 1]]
-        filled, found.errors[k], found.unresolved[k], number, found.rays[k] = call_at(
-            march, (np.int64(0), 0.0, 0.0, np.int64(0), np.int64(0)), (task, goal, rules, own, room)
-        )
-        for i in range(filled):
-            all_angles[begin + i], all_masses[begin + i] = angles[i], masses[i]
-        for i in range(number):
-            all_lows[start + i], all_highs[start + i], all_labels[start + i] = lows[i], highs[i], labels[i]
-            all_outs[start + i] = outs[i]
-        node_starts[k + 1], piece_starts[k + 1] = begin + filled, start + number
-    return np.int64(thetas.shape[0])
-
-
-def _room(nodes: int, pieces: int) -> Record:
-    arrays = _arrays(nodes, float, float), _arrays(pieces, float, float, np.uint64, float)
-    return Record(Room(empty_chain(), Record(Nodes(*arrays[0])), Record(Pieces(*arrays[1]))))
-
-
-def _record(found: Found) -> Record:
-    return Record(found._replace(nodes=Record(Nodes(*found.nodes)), pieces=Record(Pieces(*found.pieces))))
-
-
-def _arrays(size: int, *kinds: Any) -> tuple[NDArray[Any], ...]:
-    return tuple(np.empty(size, kind) for kind in kinds)
-
-
 def marched_angles(
-    thetas: Floats,
-    tolerances: Floats,
-    setting: Record,
-    degree: int,
-    rules: Record,
-    seeds: Floats,
-    seed_starts: NDArray[np.int64],
-) -> Found:
+    thetas: Floats, tolerances: Floats, setting: Struct, rules: Struct, seeds: list[Floats]
+) -> list[Found]:
     """Compute the conditional distributions at incoming angles. The seeds are the first samples, which increase."""
-    count = len(thetas)
-    room = _room(NODE_ROOM, MOST_SAMPLES)
-    found = Found(
-        (np.empty(0), np.empty(0)), np.zeros(count + 1, np.int64),
-        (np.empty(0), np.empty(0), np.empty(0, np.uint64), np.empty(0)), np.zeros(count + 1, np.int64),
-        *_arrays(count, float, float, np.int64, np.int64),
-    )  # fmt: skip
-    done = 0
-    while done < count:
-        used, number = int(found.node_starts[done]), int(found.piece_starts[done])
-        found = found._replace(
-            nodes=_longer(found.nodes, used, 2 * used + MOST_NODES + SPARE),
-            pieces=_longer(found.pieces, number, 2 * number + MOST_SAMPLES),
-        )
-        done = march_angles(
-            thetas, tolerances, setting, degree, rules, seeds, seed_starts, march_address(), done, room, _record(found)
-        )
-    used, number = int(found.node_starts[-1]), int(found.piece_starts[-1])
-    return found._replace(nodes=_longer(found.nodes, used, used), pieces=_longer(found.pieces, number, number))
-
-
-def _longer(arrays: tuple[NDArray[Any], ...], used: int, size: int) -> tuple[NDArray[Any], ...]:
-    """Return copies with ``size`` entries, of which the first ``used`` are set."""
-    longer = _arrays(size, *(array.dtype for array in arrays))
-    for old, new in zip(arrays, longer, strict=True):
-        new[:used] = old[:used]
-    return longer
+    nodes = Nodes(*np.empty((2, NODE_ROOM)))
+    low, high, out = np.empty((3, MOST_SAMPLES))
+    pieces = Pieces(low, high, np.empty(MOST_SAMPLES, np.uint64), out)
+    room, found = Struct(Room(empty_chain(), nodes, pieces)), []
+    hollow, spent = setting.values.hollow, setting.values.tracer.spent
+    places = setting.address, rules.address
+    for theta, tolerance, entries in zip(thetas.tolist(), tolerances.tolist(), seeds, strict=True):
+        goal = tolerance * float(hollow[RIGHT] - hollow[LEFT])
+        filled, error, unresolved, number, rays = march_angle(theta, goal, *places, entries, room.address)
+        own_nodes = Nodes._make(part[:filled].copy() for part in nodes)
+        own_pieces = Pieces._make(part[:number].copy() for part in pieces)
+        found.append(Found(own_nodes, own_pieces, error, unresolved, rays, int(spent[0])))
+    return found

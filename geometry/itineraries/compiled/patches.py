@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...tracing.compiled.options import compiled, linked
-from .changes import BLOCK, cell_of, outcome, task_of, trace_block
+from .changes import cell_of
 
 # Steps towards a crossing of an edge, and towards an extremum of the outgoing angle.
 MOST_STEPS, EXTREMUM_STEPS = 60, 3
@@ -86,20 +86,6 @@ def room_for(cells: int, nodes: int, positions: int) -> Room:
         np.empty(most), np.empty(most + 1, np.int64), np.empty(most), np.empty(2 * most + 2), np.empty(positions),
         np.empty(nodes), np.zeros((max(NUMBERS), cells)), np.array([cells, -1]), np.empty((MOST_DEPTH + 2, 3)),
     )  # fmt: skip
-
-
-@compiled
-def trace_points(entries, angles, setting, outs, exits, labels, segments):
-    """Trace rays with incoming angles of their own; set their outgoing angles, exit points and labels."""
-    task = task_of(setting, 0.0, np.int64(0), segments)
-    for first in range(0, entries.shape[0], BLOCK):
-        last = min(first + BLOCK, entries.shape[0])
-        for n in range(first, last):
-            setting.tracer.angles[n - first] = angles[n]
-        trace_block(entries[first:last], task)
-        for n in range(first, last):
-            outs[n], labels[n] = outcome(n - first, task)
-            exits[n] = setting.tracer.results.x[n - first]
 
 
 @linked
@@ -208,7 +194,7 @@ def find_crossings(grid, values, edges, room):
     marks, found, cells, slopes = room.marks, room.found, room.cells, room.slopes
     number = set_marks(grid, values, room)
     count, most = np.int64(0), found.shape[0]
-    cell = cell_of(marks[VALUE, FIRST], edges)
+    cell = cell_of(marks[VALUE, FIRST], edges, edges.shape[0])
     cells[0] = cell
     for i in range(1, number):
         last, at_last, t, at_t = marks[PLACE, i - 1], marks[VALUE, i - 1], marks[PLACE, i], marks[VALUE, i]
@@ -239,7 +225,9 @@ def ends_at(ends, k):
 @linked
 def sizes_at_ends(grid, values, cells):
     """-> (first, last): the norms of the functions in the cells of the outgoing angles at both ends."""
-    first, last = cell_of(value_at(0.0, grid, values), cells.edges), cell_of(value_at(1.0, grid, values), cells.edges)
+    edges, count = cells.edges, cells.edges.shape[0]
+    first = cell_of(value_at(0.0, grid, values), edges, count)
+    last = cell_of(value_at(1.0, grid, values), edges, count)
     return cells.sizes[first], cells.sizes[last]
 
 

@@ -12,14 +12,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...scene import columns as c
-from ...scene.scene import NO_TABLES
 from .options import compiled, inlined, inner
-from .pointers import Late, address_at, call_at
-from .rays import TOP_CORNER, last_hollow, opening_at, tables_at
+from .pointers import Late, call_late
+from .rays import TABLES, TOP_CORNER, last_hollow, opening_at, tables_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 from .waves import cross_simple
 from .work import LISTS, NATURAL, WORK
@@ -173,11 +173,11 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
 
 
 def _crossings() -> tuple[Late, Late, Late]:
-    form, work = np.empty(1), np.empty(1)
+    numbers, integer = types.float64[::1], types.int64
     return (
-        Late(cross_wedge, (form, *[work] * 6)),
-        Late(cross_arc, (form, *[work] * 5)),
-        Late(cross_simple, (NO_TABLES, 0, 0, *[work] * 4, np.empty(1, np.int64))),
+        Late(cross_wedge, *[numbers] * 7),
+        Late(cross_arc, *[numbers] * 6),
+        Late(cross_simple, TABLES, integer, integer, *[numbers] * 4, integer[::1]),
     )
 
 
@@ -191,30 +191,24 @@ def cross(form, entry, angle, hits, room, crossings):
     """Reflect rays by one hollow with a closed form; ``room`` is work space."""
     count = entry.shape[0]
     wedge, arc, _ = crossings
-    address = address_at(wedge if form[c.FORM] == c.WEDGE else arc)
     first, second = room.numbers[0, :count], room.numbers[1, :count]
-    if address == 0:
-        for j in range(count):
-            hits[j] = 0.0
-    elif form[c.FORM] == c.WEDGE:
-        call_at(address, None, (form, entry, angle, hits, first, second, room.numbers[2, :count]))
+    if form[c.FORM] == c.WEDGE:
+        call_late(wedge, None, (form, entry, angle, hits, first, second, room.numbers[2, :count]))
     else:
-        call_at(address, None, (form, entry, angle, hits, first, second))
+        call_late(arc, None, (form, entry, angle, hits, first, second))
 
 
 @inlined
 def cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings):
     """Reflect rays by hollow number h: by its closed form if it has one, else in waves."""
+    _, _, simple = crossings
     if closed.shape[0] > 0 and closed[h, c.FORM] != c.NO_FORM:
         cross(closed[h], entry, angle, hits, room, crossings)
-        return
-    _, _, simple = crossings
-    address = address_at(simple) if simple != 0 else 0
-    if address == 0:
+    elif simple != 0:
+        call_late(simple, None, (tables, h, limit, entry, angle, hits, room.waves, room.lists))
+    else:
         for j in range(entry.shape[0]):
             hits[j] = 0.0
-    else:
-        call_at(address, None, (tables, h, limit, entry, angle, hits, room.waves, room.lists))
 
 
 @inlined
@@ -242,15 +236,16 @@ def count_invalid(x, theta):
 
 
 @inlined
-def put_into_hollows(starts, theta, hollows, cell, results, room):
+def put_into_hollows(starts, theta, tables, results, room):
     """-> int: the number of hollows that the rays of a block meet; list the rays of each, after those of flat tops.
 
-    The last list, of number ``hollows.shape[0]``, has the rays that meet a flat top or a corner. Their results are
+    The last list, of number ``tables.hollow_count``, has the rays that meet a flat top or a corner. Their results are
     stored, and overwritten where a ray meets a hollow. Rays are spread, so the processor could not predict branches.
     """
     ends, gone, bounces, status = results
+    hollows, cell = tables.hollows, tables.cell
     bases, others, met, heads = room.numbers[BASES], room.others, room.met, room.heads
-    count, flat, kinds = starts.shape[0], hollows.shape[0], 0
+    count, flat, kinds = starts.shape[0], tables.hollow_count, 0
     for j in range(count):
         bases[j] = cell_of(starts[j], cell)
     for j in range(count):
@@ -270,11 +265,11 @@ def put_into_hollows(starts, theta, hollows, cell, results, room):
     for j in range(count if flat > 0 else 0):
         entry, h = starts[j] - bases[j], 0
         if flat > 1:
-            h = max(last_hollow(entry, hollows), 0) if searched else int(places[j]) & NATURAL
+            h = max(last_hollow(entry, hollows, flat), 0) if searched else int(places[j]) & NATURAL
         left, right = hollows[h, c.LEFT], hollows[h, c.RIGHT]
         place = h if (left < entry) & (entry < right) else flat
         if (entry == left) | (entry == right):
-            h = opening_at(entry, hollows)
+            h = opening_at(entry, hollows, flat)
             place = h if h >= 0 else flat
             if h == TOP_CORNER:
                 status[j] = UNDECIDED
@@ -298,12 +293,12 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     out_x, out_theta, bounces, status = results
     numbers, rays, others, met, heads, _, _ = room
     whole = (
-        is_crossed(hollows[0], closed, FIRST_HOLLOW, crossings)
-        and hollows.shape[0] == 1
+        tables.hollow_count == 1
+        and is_crossed(hollows[0], closed, FIRST_HOLLOW, crossings)
         and hollows[0, c.LEFT] == 0.0
         and hollows[0, c.RIGHT] == cell
     )
-    block, flat = numbers.shape[1], hollows.shape[0]
+    block, flat = numbers.shape[1], tables.hollow_count
     for first in range(0, x.shape[0], block):
         end = min(first + block, x.shape[0])
         starts, incoming, count = x[first:end], theta[first:end], end - first
@@ -324,7 +319,7 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
                 collisions[j] = int(hits[j])
                 states[j] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
             continue
-        kinds = put_into_hollows(starts, incoming, hollows, cell, (ends, gone, collisions, states), room)
+        kinds = put_into_hollows(starts, incoming, tables, (ends, gone, collisions, states), room)
         bases = numbers[BASES]
         for k in range(kinds):
             h = met[k]

@@ -7,10 +7,10 @@ itself contains no call.
 from __future__ import annotations
 
 import numpy as np
+from numba import carray  # type: ignore[attr-defined]
 
 from ...scene import columns as c
 from ...scene.boxes import BOXES, CONTENT
-from ...scene.compiled.records import array_of
 from ...scene.tolerances import NEARBY_SLACKS
 from ..double_double.arcs import refined_arcs
 from ..double_double.numbers import extended
@@ -20,7 +20,7 @@ from ..double_double.records import LINE as STRAIGHT
 from ..double_double.sides import Arrival, Face, in_front_at, line_in_front_of_line
 from .options import allocating, inner, linked, linked_allocating
 from .pieces import NO_BEZIER_HIT, arc_time, line_at, line_hit, line_sides, on_arc
-from .pointers import address_at, call_at
+from .pointers import call_late
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
 from .tree import first_boxes, next_leaf
 
@@ -37,10 +37,10 @@ def face_of(tables, kind, number, s):
     form = STRAIGHT
     # numba would compile a function for the operator `in`
     if kind == CIRCLE or kind == ELLIPSE:  # noqa: SIM109
-        arcs = tables.circles if kind == CIRCLE else tables.ellipses
-        form, arc = ARC, refined_arcs(array_of(arcs)[number : number + 1])[0]
+        row = tables.circles[number] if kind == CIRCLE else tables.ellipses[number]
+        form, arc = ARC, refined_arcs(carray(row, (1, c.ARC_COLUMNS)))[0]
     if kind == BEZIER:
-        form, curve = CURVE, array_of(tables.beziers)[number]
+        form, curve = CURVE, carray(tables.beziers[number], c.BEZIER_COLUMNS)
     return Face(form, number, arc, curve, extended(s))
 
 
@@ -51,7 +51,7 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
     At least one of the pieces is a curve.
     """
     return in_front_at(
-        array_of(tables.joints),
+        tables.joints,
         face_of(tables, hit.kind, hit.number, hit.s),
         face_of(tables, own.kind, own.number, own.s),
         extended(px), extended(py), vx, vy, Arrival(own.flown, slack, slack),
@@ -59,10 +59,10 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
 
 
 @inner
-def line_starts_in_front(tables, line, own, px, py, vx, vy, slack):
+def line_starts_in_front(joints, line, own, px, py, vx, vy, slack):
     """-> bool: `starts_in_front` for a ray that left a line, and another line."""
     arrival = Arrival(own.flown, slack, slack)
-    return line_in_front_of_line(array_of(tables.joints), line, own.number, extended(px), extended(py), vx, vy, arrival)
+    return line_in_front_of_line(joints, line, own.number, extended(px), extended(py), vx, vy, arrival)
 
 
 @linked
@@ -103,13 +103,11 @@ def piece_nearby(scope, piece, own, px, py, vx, vy):
     is_own = own.kind == kind and own.number == number
     t, s, tangent, is_clear = np.inf, 0.0, 0, False
     if kind == BEZIER:
-        address = address_at(scope.slots.bezier)
-        if address != 0:
-            own_number = number if is_own else -1
-            arguments = tables, number, number + 1, own_number, own.s, px, py, vx, vy, slack, np.inf
-            _, _, _, _, near_s = call_at(address, NO_BEZIER_HIT, arguments)
-            if near_s >= 0.0:
-                t, s = 0.0, near_s
+        own_number = number if is_own else -1
+        arguments = tables.beziers, number, number + 1, own_number, own.s, px, py, vx, vy, slack, np.inf
+        _, _, _, _, near_s = call_late(scope.slots.bezier, NO_BEZIER_HIT, arguments)
+        if near_s >= 0.0:
+            t, s = 0.0, near_s
     elif not is_own and kind == LINE:
         t, s, is_clear = line_nearby(tables, number, px, py, vx, vy, slack)
     elif not is_own:
@@ -131,14 +129,11 @@ def nearer(scope, found, piece, own, px, py, vx, vy):
     # no piece lies above the opening or beyond a side, so a piece within rounding of them is hit there
     if is_clear or not from_piece:
         return hit
-    both_lines = kind == LINE and own.kind == LINE
-    address = address_at(scope.slots.line_in_front if both_lines else scope.slots.in_front)
-    if address == 0:
-        return Hit(0.0, kind, number, s, DOUBTFUL)
-    if both_lines:
-        is_front = call_at(address, is_clear, (tables, number, own, px, py, vx, vy, slack))
+    if kind == LINE and own.kind == LINE:
+        arguments = tables.joints, number, own, px, py, vx, vy, slack
+        is_front = call_late(scope.slots.line_in_front, is_clear, arguments)
     else:
-        is_front = call_at(address, is_clear, (tables, hit, own, px, py, vx, vy, slack))
+        is_front = call_late(scope.slots.in_front, is_clear, (tables, hit, own, px, py, vx, vy, slack))
     return hit if is_front else found
 
 

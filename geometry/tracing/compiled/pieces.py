@@ -605,7 +605,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
 
 
 @inner
-def nearest_bezier(tables, first, end, own_number, own_s, px, py, vx, vy, slack, time):
+def nearest_bezier(beziers, first, end, own_number, own_s, px, py, vx, vy, slack, time):
     """-> (t, number, s, contact, near_s): the first hit before ``time`` on the pieces from ``first`` to ``end``.
 
     ``contact`` is the time to the first tangent hit, which is not counted, or inf. ``near_s`` is that of the last piece
@@ -614,7 +614,7 @@ def nearest_bezier(tables, first, end, own_number, own_s, px, py, vx, vy, slack,
     """
     number, hit_s, contact, near = -1, 0.0, np.inf, -1.0
     for k in range(first, end):
-        curve = tables.beziers[k]
+        curve = beziers[k]
         # no short circuit, because the processor guesses its branches wrong
         if (k != own_number) & (not meets_circle(curve, px, py, vx, vy, time)):
             continue

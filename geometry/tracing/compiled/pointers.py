@@ -13,7 +13,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from llvmlite import ir
-from numba import typeof, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
@@ -22,28 +22,20 @@ from ....core.compilation import is_stored
 Result = TypeVar("Result")
 
 
-def address_of(function: Any, arguments: tuple[Any, ...]) -> int:
-    """Return the address of a function compiled for the types of ``arguments``; compile or load it if necessary."""
-    kinds = tuple(typeof(argument) for argument in arguments)
-    function.compile(kinds)
-    version = function.overloads[kinds]
-    return int(version.library.get_pointer_to_function(version.fndesc.llvm_func_name))
-
-
 class Late:
-    """A function that is compiled or loaded when compiled code first calls it.
+    """A function that is compiled or loaded, for arguments of some types, when compiled code first calls it.
 
     ``slot`` is the address of two numbers in memory: the address of the function, 0 before the first call, and the
     address of the call into Python that finds it.
 
-    Compiled code cannot pass on an exception of that call, as of Ctrl-C during the compilation. `address_at` returns 0
-    then, and `checked` raises the exception.
+    Compiled code cannot pass on an exception of that call, as of Ctrl-C during the compilation. It goes on with wrong
+    results then, and `checked` raises the exception.
     """
 
     failures: ClassVar[list[BaseException]] = []
 
-    def __init__(self, function: Any, arguments: tuple[Any, ...]) -> None:
-        self._function, self._arguments = function, arguments
+    def __init__(self, function: Any, *kinds: Any) -> None:
+        self._function, self._kinds = function, kinds
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64)(self.load)
         self._words = np.array([0, ctypes.cast(self._callback, ctypes.c_void_p).value], np.int64)
         self._uses, self._stored = 0, False
@@ -60,11 +52,14 @@ class Late:
         return bool(self._words[0] != 0 or self._stored or self._uses >= enough)
 
     def load(self) -> int:
-        """Compile or load the function now; return its address, 0 if that failed."""
-        try:
-            self._words[0] = address_of(self._function, self._arguments)
-        except BaseException as reason:
-            self.failures.append(reason)
+        """Compile or load the function now; return its address, 0 if that failed, now or before `checked`."""
+        if not self.failures:
+            try:
+                self._function.compile(self._kinds)
+                version = self._function.overloads[self._kinds]
+                self._words[0] = version.library.get_pointer_to_function(version.fndesc.llvm_func_name)
+            except BaseException as reason:
+                self.failures.append(reason)
         return int(self._words[0])
 
 
@@ -77,52 +72,46 @@ def checked(call: Callable[[], Result]) -> Result:
 
 
 @intrinsic
-def address_at(context, slot):
-    """Return the address of the function of a `Late`, compiled or loaded if necessary; 0 if that failed."""
+def call_late(context, slot, failed, arguments):
+    """Call the function of a `Late` with a tuple of arguments, of the types for which it is compiled.
 
-    def read(context, builder, signature, values):
-        word = ir.IntType(64)
+    ``failed`` is returned, and has the type of the result, if the function could not be loaded.
+    """
+    kinds = tuple(arguments)
+
+    def call(context, builder, signature, values):
+        word, convention = ir.IntType(64), context.call_conv
         words = builder.inttoptr(values[0], word.as_pointer())
         found = cgutils.alloca_once_value(builder, builder.load_atomic(words, "acquire", 8))
         with cgutils.if_unlikely(builder, builder.icmp_unsigned("==", builder.load(found), word(0))):
             finder = builder.load(builder.gep(words, [word(1)]))
             builder.store(builder.call(builder.inttoptr(finder, ir.FunctionType(word, []).as_pointer()), []), found)
-        return builder.load(found)
+        result = cgutils.alloca_once_value(builder, values[1])
+        with cgutils.if_likely(builder, builder.icmp_unsigned("!=", builder.load(found), word(0))):
+            kind = convention.get_function_type(failed, kinds).as_pointer()
+            parts = cgutils.unpack_tuple(builder, values[2], len(kinds))
+            function = builder.inttoptr(builder.load(found), kind)
+            status, value = convention.call_function(builder, function, failed, kinds, parts)
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            builder.store(value, result)
+        return builder.load(result)
 
-    return types.intp(types.intp), read
-
-
-@intrinsic
-def call_at(context, address, result, arguments):
-    """Call the function at ``address`` with a tuple of arguments; it returns a value of the type of ``result``.
-
-    The types must be those for which the function was compiled; they are not checked.
-    """
-    kinds = tuple(arguments)
-
-    def call(context, builder, signature, values):
-        convention = context.call_conv
-        kind = convention.get_function_type(result, kinds)
-        function = builder.inttoptr(values[0], kind.as_pointer())
-        parts = cgutils.unpack_tuple(builder, values[2], len(kinds))
-        status, value = convention.call_function(builder, function, result, kinds, parts)
-        with cgutils.if_unlikely(builder, status.is_error):
-            convention.return_status_propagate(builder, status)
-        return value
-
-    return result(types.intp, result, arguments), call
+    return failed(types.intp, failed, arguments), call
 
 
 @intrinsic
 def is_raised(context, flag):
-    """Whether the first number of an array of integers is not 0, read from memory at every call.
+    """Whether the first number of an array of integers, or at a pointer, is not 0, read from memory at every call.
 
     The compiler would move an ordinary read out of a loop that does not write to the array.
     """
 
     def read(context, builder, signature, arguments):
-        array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        number = builder.load_atomic(array.data, "monotonic", 8)
+        [data] = arguments
+        if isinstance(flag, types.Array):
+            data = context.make_array(flag)(context, builder, data).data
+        number = builder.load_atomic(data, "monotonic", 8)
         return builder.icmp_signed("!=", number, number.type(0))
 
     return types.boolean(flag), read

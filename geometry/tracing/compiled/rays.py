@@ -12,15 +12,18 @@ stable, and no epsilon decides which piece is hit:
 from __future__ import annotations
 
 import math
-from functools import cache
+from typing import Any
 
 import numpy as np
+from numba import types
+from numpy.typing import NDArray
 
+from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene import columns as c
-from ...scene.compiled.records import ROW, Typed, place_of
-from ...scene.records import Record
+from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.scene import NO_TABLES
+from ...scene.structs import Struct
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
 from ..double_double.formulas import arc_normal, mirror, with_length_one
 from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
@@ -45,8 +48,24 @@ from .pieces import (
     on_arc_after,
     opening_met,
 )
-from .pointers import Late, address_at, address_of, call_at, is_raised
-from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_DETAILS, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots, Tree
+from .pointers import Late, call_late, checked, is_raised
+from .records import (
+    BEZIER,
+    CIRCLE,
+    ELLIPSE,
+    LINE,
+    NO_DETAILS,
+    NO_PIECE,
+    NO_RAYS,
+    OPENING,
+    SIDE,
+    Hit,
+    Own,
+    Rays,
+    Scope,
+    Slots,
+    Tree,
+)
 from .runs import skip_chords, skip_crossings
 from .tree import NO_LINE_HIT, nearest_line_in_boxes
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
@@ -65,9 +84,9 @@ BEND_SHIFT = 40
 
 
 @inlined
-def last_hollow(entry, hollows):
+def last_hollow(entry, hollows, count):
     """-> int: number of the last hollow with left end <= entry, -1 if there is none."""
-    low, high = 0, hollows.shape[0]
+    low, high = 0, count
     while low < high:
         middle = (low + high) // 2
         if hollows[middle, c.LEFT] <= entry:
@@ -78,9 +97,9 @@ def last_hollow(entry, hollows):
 
 
 @inlined
-def opening_at(entry, hollows):
+def opening_at(entry, hollows, count):
     """-> int: number of the hollow whose opening contains a position of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
-    h = last_hollow(entry, hollows)
+    h = last_hollow(entry, hollows, count)
     if h < 0 or entry >= hollows[h, c.RIGHT] or (entry == hollows[h, c.LEFT] and hollows[h, c.LEFT_EDGE] != c.NO_EDGE):
         # a flat top or its edge; an edge between two hollows is a corner
         at_left = h >= 0 and entry == hollows[h, c.LEFT] and hollows[h, c.LEFT_EDGE] == c.CORNER_EDGE
@@ -142,12 +161,9 @@ def nearest_curve(scope, own, px, py, vx, vy):
             time, kind, number = t, of_kind, k
     first, end = scope.beziers
     if first < end:
-        address = address_at(scope.slots.bezier)
-        if address == 0:
-            return Hit(0.0, BEZIER, first, 0.0, DOUBTFUL), np.inf, False
         own_number = own.number if own.kind == BEZIER else -1
-        arguments = tables, first, end, own_number, own.s, px, py, vx, vy, slack, time
-        t, k, s, touch, near_s = call_at(address, NO_BEZIER_HIT, arguments)
+        arguments = tables.beziers, first, end, own_number, own.s, px, py, vx, vy, slack, time
+        t, k, s, touch, near_s = call_late(scope.slots.bezier, NO_BEZIER_HIT, arguments)
         contact = min(contact, touch)
         if k >= 0:
             time, kind, number, hit_s = t, BEZIER, k, s
@@ -160,12 +176,9 @@ def nearest_piece(scope, own, px, py, vx, vy):
     """-> (Hit, corner): the first hit on a piece, and the time to the first corner within the slack of the ray."""
     hit, contact, nearby = nearest_curve(scope, own, px, py, vx, vy)
     if scope.has_tree:
-        address = address_at(scope.slots.boxes)
-        if address == 0:
-            return Hit(0.0, NO_PIECE, -1, 0.0, DOUBTFUL), np.inf
         tree = Tree(scope.tables, scope.hollow, scope.slack)
         arguments = tree, own.number if own.kind == LINE else -1, own.bounces, px, py, vx, vy, hit.time
-        t, line, fraction, corner, near = call_at(address, NO_LINE_HIT, arguments)
+        t, line, fraction, corner, near = call_late(scope.slots.boxes, NO_LINE_HIT, arguments)
     else:
         t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
     if t < hit.time:
@@ -174,10 +187,7 @@ def nearest_piece(scope, own, px, py, vx, vy):
         # of no piece in particular
         hit = Hit(min(contact, hit.time), BEZIER, -1, 0.0, 1)
     if nearby or near:
-        address = address_at(scope.slots.nearby)
-        if address == 0:
-            return Hit(hit.time, hit.kind, hit.number, hit.s, DOUBTFUL), corner
-        close_by = call_at(address, hit, (scope, own, px, py, vx, vy))
+        close_by = call_late(scope.slots.nearby, hit, (scope, own, px, py, vx, vy))
         if close_by.time < hit.time:
             hit = close_by
     return hit, corner
@@ -320,7 +330,7 @@ def piece_label(tables, hit, vx):
 
 
 @inlined
-def trace_ray(scope, entry, theta, limit, labelled, path):
+def trace_ray(scope, entry, theta, limit, labelled, with_path, path):
     """-> (x, vx, vy, bounces, status, label, steps): trace one ray through one hollow.
 
     In an open wall x is unfolded. ``label`` is the hash of `Details.itinerary`, if ``labelled``; ``steps`` are
@@ -329,7 +339,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
     sine, cosine = sine_cosine(theta)
     px, py, vx, vy, shift = entry, 0.0, -cosine, -sine, 0.0
     own = Own(OPENING, -1, -1.0, 0.0, -1, 0)
-    steps, label, with_path = 0, np.uint64(0), path.shape[0] > 0
+    steps, label = 0, np.uint64(0)
     if with_path:
         path[0, c.POINT_X], path[0, c.POINT_Y] = px, py
     while True:
@@ -367,11 +377,8 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
         if not with_path:
             hits = np.int64(0)
             if may_run(scope.tables, hit, own, px, py, vx, vy):
-                address = address_at(scope.slots.run)
-                if address == 0:
-                    return shift + px, vx, vy, bounces, CORNER, label, steps
                 arguments = scope, hit, own, px, py, vx, vy, limit - bounces - 1
-                px, py, vx, vy, hits = call_at(address, NO_RUN, arguments)
+                px, py, vx, vy, hits = call_late(scope.slots.run, NO_RUN, arguments)
                 bounces += hits
                 # no segment of a run passes a piece from behind
                 flown = 0.0 if hits > 0 else flown
@@ -386,20 +393,19 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
 
 
 @compiled
-def trace_rays(x, theta, tables, limit, stop, results, details, slots):
-    """Trace a block of rays until ``stop`` is raised.
+def trace_rays(count, rays, tables, limit, details, slots):
+    """Trace a block of rays until its flag is raised.
 
-    ``results`` are four arrays to fill: x, theta, collisions, status. Of the tables, of the `Details` to fill and of
-    `SLOTS` the addresses are given.
+    Of the `Rays`, of the tables, of the `Details` to fill and of `SLOTS` the addresses are given.
     """
-    out_x, out_theta, collisions, status = results
+    x, theta, out_x, out_theta, collisions, status, stop = rays_at(rays)
     tables, details, slots = tables_at(tables), details_at(details), slots_at(slots)
-    hollows, cell, labelled = tables.hollows, tables.cell, details.itinerary.shape[0] > 0
-    for i in range(x.shape[0]):
+    cell, labelled = tables.cell, details.with_itinerary
+    for i in range(count):
         if is_raised(stop):
             break
         base = math.floor(x[i] / cell) * cell
-        h = opening_at(x[i] - base, hollows)
+        h = opening_at(x[i] - base, tables.hollows, tables.hollow_count)
         if h == FLAT_TOP:
             out_x[i], out_theta[i], collisions[i], status[i] = x[i], mirrored(theta[i]), 1, ESCAPED
             continue
@@ -408,41 +414,53 @@ def trace_rays(x, theta, tables, limit, stop, results, details, slots):
             continue
         scope = scope_of(tables, h, slots)
         end, vx, vy, collisions[i], status[i], label, steps = trace_ray(
-            scope, x[i] - base, theta[i], limit, labelled, details.path
+            scope, x[i] - base, theta[i], limit, labelled, details.with_path, details.path
         )
         out_x[i] = base + end
         angle = direction_angle(vx, vy)
         out_theta[i] = min(angle, LAST_ANGLE) if status[i] == ESCAPED else angle
         if labelled:
             details.itinerary[i], details.segments[i] = label, steps
-        velocity = details.velocity
-        if velocity.shape[0] > 0:
-            velocity[i, c.POINT_X], velocity[i, c.POINT_Y] = vx, vy
+        if details.with_velocity:
+            details.velocity[i, c.POINT_X], details.velocity[i, c.POINT_Y] = vx, vy
+
+
+def trace_into(
+    results: tuple[NDArray[Any], ...],
+    x: Floats,
+    theta: Floats,
+    tables: Struct,
+    limit: int,
+    stop: NDArray[np.int64],
+    details: Struct = NO_DETAILS,
+) -> None:
+    """Trace rays: see `Rays` for the arrays to fill, x, theta, collisions and status, and for ``stop``."""
+    out_x, out_theta, collisions, status = results
+    rays = Struct(Rays(x, theta, out_x, out_theta, collisions, status, stop))
+    checked(lambda: trace_rays(len(x), rays.address, tables.address, limit, details.address, SLOTS.address))
 
 
 def _late_functions() -> tuple[Late, ...]:
     """Return the functions of `Slots`, for all walls."""
-    own, numbers = Own(OPENING, -1, -1.0, 0.0, -1, 0), (0.0, 0.0, 0.0, 0.0)
-    slots, hit = Record(Slots(0, 0, 0, 0, 0, 0)), Hit(0.0, LINE, 0, 0.0, 0)
-    scope = Scope(NO_TABLES, Typed(ROW), 0.0, 0.0, 0.0, (0, 0), (0, 0), (0, 0), (0, 0), False, slots)
+    number, integer, truth = types.float64, types.int64, types.boolean
+    own = named(Own, integer, integer, number, number, integer, integer)
+    hit = named(Hit, number, integer, integer, number, integer)
+    scope = named(Scope, TABLES, ROW, *[number] * 3, *[types.UniTuple(integer, 2)] * 4, truth, kind_of(NO_SLOTS))
+    ray = number, number, number, number
     return (
-        Late(hit_nearby, (scope, own, *numbers)),
-        Late(starts_in_front, (NO_TABLES, hit, own, *numbers, 0.0)),
-        Late(line_starts_in_front, (NO_TABLES, 0, own, *numbers, 0.0)),
-        Late(nearest_line_in_boxes, (Tree(NO_TABLES, Typed(ROW), 0.0), 0, 0, *numbers, 0.0)),
-        Late(skip_run, (scope, hit, own, *numbers, 0)),
-        Late(nearest_bezier, (NO_TABLES, 0, 0, 0, 0.0, *numbers, 0.0, 0.0)),
+        Late(hit_nearby, scope, own, *ray),
+        Late(starts_in_front, TABLES, hit, own, *ray, number),
+        Late(line_starts_in_front, Table(c.JOINT_COLUMNS), integer, own, *ray, number),
+        Late(nearest_line_in_boxes, named(Tree, TABLES, ROW, number), integer, integer, *ray, number),
+        Late(skip_run, scope, hit, own, *ray, integer),
+        Late(nearest_bezier, Table(c.BEZIER_COLUMNS), integer, integer, integer, number, *ray, number, number),
     )
 
 
+TABLES, NO_SLOTS = kind_of(NO_TABLES.values), Slots(0, 0, 0, 0, 0, 0)
 LATE = _late_functions()
-SLOTS = Record(Slots(*(function.slot for function in LATE)))
-tables_at, details_at, slots_at = place_of(NO_TABLES), place_of(NO_DETAILS), place_of(SLOTS)
-
-
-@cache
-def trace_rays_address() -> int:
-    """Return the address of `trace_rays`, for all walls, with or without velocities and itineraries."""
-    numbers, stop = np.empty(0), np.zeros(1, np.int64)
-    results = numbers, numbers, stop, np.empty(0, np.uint8)
-    return address_of(trace_rays, (numbers, numbers, 0, 1, stop, results, 0, 0))
+# For functions that are compiled apart from `trace_rays`.
+TRACE = Late(trace_rays, *[types.int64] * 6)
+SLOTS = Struct(Slots(*(function.slot for function in LATE)))
+tables_at, slots_at = reader_of(TABLES), reader_of(kind_of(NO_SLOTS))
+rays_at, details_at = reader_of(kind_of(NO_RAYS)), reader_of(kind_of(NO_DETAILS.values))

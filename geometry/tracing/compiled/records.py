@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
-from ...scene.records import Record
+from ...scene.structs import Struct
 
 # Kinds of obstacles; OPENING is the opening of the hollow, SIDE a side of an open wall.
 NO_PIECE, OPENING, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
@@ -37,7 +37,7 @@ class Scope(NamedTuple):
     its lines have a tree, and the slots of late functions.
     """
 
-    tables: Record
+    tables: Any
     hollow: Any
     left: float
     right: float
@@ -47,13 +47,13 @@ class Scope(NamedTuple):
     ellipses: tuple[int, int]
     beziers: tuple[int, int]
     has_tree: bool
-    slots: Record
+    slots: Any
 
 
 class Tree(NamedTuple):
     """What the search in a tree of boxes needs of a scope: few numbers to pass in a call by address."""
 
-    tables: Record
+    tables: Any
     hollow: Any
     slack: float
 
@@ -88,14 +88,19 @@ class Hit(NamedTuple):
     doubt: int
 
 
-class Results(NamedTuple):
-    """The arrays that `trace_rays` fills, one row for each ray; ``details`` are `Details`."""
+class Rays(NamedTuple):
+    """The arrays of `trace_rays`, one entry for each ray: position and angle, and the results to fill.
+
+    A ``stop`` that is not 0 ends the call.
+    """
 
     x: Floats
     theta: Floats
+    out_x: Floats
+    out_theta: Floats
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
-    details: Record
+    stop: NDArray[np.int64]
 
 
 class Details(NamedTuple):
@@ -111,19 +116,26 @@ class Details(NamedTuple):
     itinerary: NDArray[np.uint64]
     segments: NDArray[np.int64]
     path: Floats
+    with_velocity: bool
+    with_itinerary: bool
+    with_path: bool
 
 
-def details_for(velocity: int = 0, itinerary: int = 0, path: int = 0) -> Record:
+def details_for(velocity: int = 0, itinerary: int = 0, path: int = 0) -> Struct:
     """Return arrays with the given numbers of rows."""
     labels, segments = np.zeros(itinerary, np.uint64), np.zeros(itinerary, np.int64)
-    return Record(Details(np.empty((velocity, 2)), labels, segments, np.full((path, 2), np.nan)))
+    arrays = np.empty((velocity, 2)), labels, segments, np.full((path, 2), np.nan)
+    return Struct(Details(*arrays, velocity > 0, itinerary > 0, path > 0))
 
 
 # The details, if only the ends of the rays are wanted.
 NO_DETAILS = details_for()
 
 
-def results_for(count: int, details: Record = NO_DETAILS) -> Record:
-    """Return results for ``count`` rays."""
-    arrays = np.empty(count), np.empty(count), np.empty(count, np.int64), np.empty(count, np.uint8)
-    return Record(Results(*arrays, details))
+def results_for(count: int) -> tuple[Floats, Floats, NDArray[np.int64], NDArray[np.uint8]]:
+    """Return the results in `Rays`, to fill."""
+    return np.empty(count), np.empty(count), np.empty(count, np.int64), np.empty(count, np.uint8)
+
+
+# The types of the arrays of all rays.
+NO_RAYS = Rays(np.empty(0), np.empty(0), *results_for(0), np.empty(0, np.int64))

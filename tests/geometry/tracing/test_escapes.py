@@ -89,7 +89,7 @@ def test_long_hollows_have_no_sectors():
 
 def test_most_rays_leave_a_flat_profile_in_a_sector():
     wall = geo.Wall.from_vertices(rough(400, 4) * (1.0, 0.1))
-    lines, joints = wall.scene.tables.lines, wall.scene.joints
+    lines, joints = wall.scene.lines, wall.scene.joints
     assert np.mean(lines[:-1, [ESCAPE_LEFT, ESCAPE_RIGHT]] > 0.0) == 1.0
     sectors = escape_sectors(joints[:, [JOINT_X, JOINT_Y]], 1.0)
     assert np.array_equal(sectors, lines[:-1, [ESCAPE_RIGHT, ESCAPE_LEFT]])

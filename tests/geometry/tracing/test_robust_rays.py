@@ -9,8 +9,8 @@ import pytest
 from campaigns.rays.aimed_rays import WALLS, explained, follow_twin
 
 from asperity import geometry as geo
-from asperity.geometry.tracing.compiled.rays import SLOTS, trace_rays
-from asperity.geometry.tracing.compiled.records import NO_DETAILS, results_for
+from asperity.geometry.tracing.compiled.rays import trace_into
+from asperity.geometry.tracing.compiled.records import results_for
 from asperity.geometry.tracing.refinement import refined_trace
 from asperity.geometry.tracing.threads import new_flag
 
@@ -31,12 +31,12 @@ def test_rays_over_many_bezier_pieces_hit_what_the_double_double_twin_hits():
     rng = np.random.default_rng(12)
     x, theta = rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
     found = results_for(RAYS)
-    arrays = found.x, found.theta, found.collisions, found.status
-    trace_rays(x, theta, wall.scene.tables.address, 1000, new_flag(), arrays, NO_DETAILS.address, SLOTS.address)
+    trace_into(found, x, theta, wall.scene.tables, 1000, new_flag())
+    _, out_theta, collisions, status = found
     twin = refined_trace(wall.scene, x, theta)
-    assert (found.status == geo.Status.ESCAPED).all() and found.collisions.max() > 3
-    assert np.array_equal(found.collisions, twin.collisions)
-    assert np.abs(found.theta - twin.theta[:, 0]).max() < 1e-11
+    assert (status == geo.Status.ESCAPED).all() and collisions.max() > 3
+    assert np.array_equal(collisions, twin.collisions)
+    assert np.abs(out_theta - twin.theta[:, 0]).max() < 1e-11
 
 
 @pytest.mark.parametrize(

@@ -249,16 +249,3 @@ def test_a_wall_that_was_traced_can_be_copied_and_sent_to_another_process():
     assert len({one.scene.tables.address for one in (wall, *twins)}) == 3
     del wall
     assert all(geo.trace(twin, 0.3, 1.0).x == ray.x for twin in twins)
-
-
-def test_a_trace_passes_no_records_from_python():
-    # each would take 4 us, a sixth of the time of a trace of one ray
-    from asperity.geometry.scene.compiled.records import RecordType
-    from asperity.geometry.tracing.compiled.closed_forms import trace_closed
-    from asperity.geometry.tracing.compiled.rays import trace_rays
-
-    geo.trace(geo.mushrooms(0.3), 0.3, 1.0)
-    geo.trace(geo.triangular_teeth(0.7), 0.3, 1.0)
-    for function in (trace_rays, trace_closed):
-        assert function.signatures
-        assert not any(isinstance(kind, RecordType) for kinds in function.signatures for kind in kinds)

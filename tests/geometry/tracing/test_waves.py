@@ -79,6 +79,14 @@ def test_rays_that_enter_at_a_corner_are_flagged_in_waves(wall, monkeypatch):
     assert np.all(geo.trace(wall, np.zeros(999), np.linspace(0.01, 3.13, 999)).status == geo.Status.CORNER)
 
 
+def test_a_wall_without_hollows_reflects_all_rays_of_a_wave(monkeypatch):
+    # its tables are empty, without an address
+    monkeypatch.setattr(tracing, "_goes_in_waves", lambda scene, rays: True)
+    x, theta = rays(geo.flat())
+    found = geo.trace(geo.flat(), x, theta)
+    assert np.array_equal(found.x, x) and np.all(found.collisions == 1) and found.escaped.all()
+
+
 def test_waves_end_at_a_raised_flag_as_the_loop_does():
     wall, stop = geo.mushrooms(0.3, 0.5), new_flag()
     stop[0] = 1
@@ -95,10 +103,10 @@ def test_curves_without_waves_and_open_walls_stay_with_the_loop():
 
 
 def test_a_function_is_worth_its_compilation_once_it_is_wanted_often_or_stored():
-    late = Late(mirrored, (np.float32(1.0),))
+    late = Late(mirrored, types.float32)
     assert not late.is_worth(4, 10)
     assert not late.is_worth(5, 10)
     assert late.is_worth(1, 10)
-    used = Late(closed_forms.cross_simple, closed_forms.SIMPLE._arguments)
+    used = Late(closed_forms.cross_simple, *closed_forms.SIMPLE._kinds)
     closed_forms.SIMPLE.load()
     assert used.is_worth(1, 10)

@@ -12,11 +12,11 @@ from campaigns.judges.reference_rows import references
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.kernels.bases.measure import SINE
-from asperity.kernels.bases.panels import ONE_PANEL
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import KRONROD_FRACTION, traced_matrix
 from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES, NULL_RULES, STUDENT, AnglePanels
 from asperity.kernels.walls.conditionals import adaptive_conditionals
+from asperity.spectral.bounds.expectations import is_costly
 
 ARCS = geo.focusing_arcs(1.2)
 # <u, P u>/<u, u> of ARCS, from an independent tracer and high-precision quadrature; its last digit rounds.
@@ -125,8 +125,8 @@ def test_rows_that_fall_short_are_kept_where_they_know_more_than_rays():
 def test_a_look_at_some_rows_tells_a_chaotic_hollow_in_sums_and_in_the_other_convention_too():
     chaotic, tame = (ker.WallLaw(random_curved_wall(kind)) for kind in (13, 15))
     costly, cheap = (0.5 * chaotic + 0.5 * ker.lambertian(), chaotic.in_specular_frame()), (tame, ker.specular())
-    assert all(law.expectations(ONE_PANEL).are_costly() for law in costly)
-    assert not any(law.expectations(ONE_PANEL).are_costly() for law in cheap)
+    assert all(map(is_costly, costly))
+    assert not any(map(is_costly, cheap))
 
 
 def test_rows_of_channels_without_bottom_in_sight_are_those_of_the_closed_form():

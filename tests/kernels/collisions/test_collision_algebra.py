@@ -121,12 +121,13 @@ def test_powers_of_a_sum_multiply_out():
 
 
 def test_the_adjoint_reverses_products_and_moves_to_the_other_side():
-    law = TEETH @ DIFFUSE @ SMOOTH
+    scatter = ker.CollisionLaw(ker.henyey_greenstein(0.5), DISK)
+    law = TEETH @ scatter @ SMOOTH
     turned = law.adjoint()
     assert np.allclose(turned.operator(*ANGLES).dense(), law.operator(*ANGLES).dense().T, atol=1e-9)
     assert TEETH.adjoint() is TEETH and TEETH.reversible
     assert law.reversible is None
-    sum_of_both = 0.5 * law + 0.5 * (TEETH @ DIFFUSE)
+    sum_of_both = 0.5 * law + 0.5 * (TEETH @ scatter)
     expected = sum_of_both.operator(*ANGLES).dense().T
     assert np.allclose(sum_of_both.adjoint().operator(*ANGLES).dense(), expected, atol=1e-9)
 

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.kernels.bases.measure import gauss_rule
 from asperity.kernels.expectations.conditionals import Conditionals
 from asperity.kernels.laws.distribution import Distribution
+from asperity.kernels.laws.law import is_atomic
 
 G = 0.2
 
@@ -30,7 +32,7 @@ class LinearLaw(ker.Law):
         return np.arccos((slope + 4.0 * draw - 2.0) / (1.0 + np.sqrt((1.0 - slope) ** 2 + 4.0 * slope * draw)))
 
     def _conditionals(self, theta: np.ndarray, tolerance: float, degree: int, edges: np.ndarray) -> Conditionals:
-        outgoing, weight = gauss_rule(np.concatenate(([0.0], edges, [np.pi])), 16 + degree)
+        outgoing, weight = gauss_rule(np.concatenate(([0.0], edges, [np.pi])), 8 + degree)
         density = 0.5 * np.sin(outgoing) * (1.0 + 3.0 * self.g * np.cos(theta)[:, None] * np.cos(outgoing))
         return Conditionals.of_atoms(np.broadcast_to(outgoing, density.shape), weight * density)
 
@@ -46,6 +48,21 @@ class KnownLinearLaw(LinearLaw):
 
 LAWS = [LinearLaw(G), KnownLinearLaw(G)]
 KNOWN = LAWS[1]
+
+
+@pytest.mark.parametrize(
+    ("law", "atomic"),
+    [
+        (LAWS[0], False), (ker.specular(), True), (ker.LeastResistanceLaw(), True), (ker.lambertian(), False),
+        (ker.TriangularTeethLaw(0.7) @ ker.RectangularTeethLaw(0.8), True), (ker.CircularArcLaw(1.2), False),
+        (ker.DensityLaw(lambda u, v: 0.5 * np.sin(v) * (1.0 + 0.5 * (np.abs(np.cos(u) - np.cos(v)) - 0.5 * (
+            2.0 + np.cos(u) ** 2 + np.cos(v) ** 2) + 2.0 / 3.0))), False),
+        (ker.WallLaw(geo.dispersing_arcs(1.0)), False), (ker.henyey_greenstein(0.999), False),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_only_finitely_many_atoms_average_any_function_exactly(law: ker.Law, atomic: bool) -> None:
+    assert is_atomic(law) == atomic
 
 
 def second(law: ker.Law) -> float:
@@ -97,7 +114,8 @@ def test_what_a_law_does_not_say_has_a_default() -> None:
     points, left_out = law.breakpoints(8)
     assert points.size == law.outgoing_breakpoints.size == 0 and left_out == math.inf
     basis = ker.Legendre(2)
-    means, errors = law.expectations(basis)(np.array([1.0]), 1e-6)
-    assert means @ basis.project(np.cos) == pytest.approx([G * math.cos(1.0)]) and np.all(errors == 0.0)
+    found = law.conditionals(1.0)
+    assert found.in_basis(basis) @ basis.project(np.cos) == pytest.approx([G * math.cos(1.0)])
+    assert found.error.tolist() == [0.0]
     with pytest.raises(InputError, match="no method 'qmc'"):
         ker.discretise(law, ker.Bins(4), "qmc")

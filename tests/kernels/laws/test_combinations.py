@@ -200,7 +200,7 @@ METHODS = {
     "breakpoints": lambda law: law.breakpoints(8),
     "distribution": lambda law: law.distribution(ANGLES, EDGES),
     "isometry_table": lambda law: law.isometry_table(),
-    "expectations": lambda law: law.expectations(ker.Bins(4))(ANGLES, 1e-3),
+    "conditionals": lambda law: law.conditionals(ANGLES, 1e-3, 0, EDGES[1:-1]),
     "adjoint": lambda law: law.adjoint(),
     "in_specular_frame": lambda law: law.in_specular_frame(),
     "repr": repr,
