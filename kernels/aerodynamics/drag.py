@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -130,6 +131,11 @@ def resistance(
     error = _error(matrix, coefficients) + missed
     how = f"{matrix.method} on {basis!r} ({matrix.error.method})"
     return Estimate(value, error, matrix.error.kind, how)
+
+
+def scaled(found: Estimate, factor: float) -> Estimate:
+    """The estimate of ``factor`` times the quantity."""
+    return replace(found, value=factor * found.value, error=factor * found.error)
 
 
 def _error(matrix: KernelMatrix, coefficients: Floats) -> float:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
 from ..bases.bins import Bins
 from ..bases.measure import SINE, gauss_on_intervals
-
-CostFunction = Callable[[Floats, Floats], Floats]
+from .drag import CostFunction
 
 # Gauss nodes per cell for means of an angle; on the narrow cells of a grid the error is rounding.
 NODES = 8
@@ -43,13 +40,18 @@ def dual_bound(potential: Floats, cost: CostFunction, curvature: float) -> float
 
 def hat_masses(nodes: Floats) -> Floats:
     """Integrals of the piecewise linear hat functions against sin(theta)/2 d theta."""
-    angle, weight = gauss_on_intervals(nodes[:-1], nodes[1:], NODES)
-    mass = (weight * SINE.density(angle)).reshape(-1, NODES)
-    fraction = (angle.reshape(-1, NODES) - nodes[:-1, None]) / np.diff(nodes)[:, None]
+    angle, mass = _masses(nodes)
+    fraction = (angle - nodes[:-1, None]) / np.diff(nodes)[:, None]
     hats = np.zeros(nodes.size)
     hats[:-1] += np.sum(mass * (1.0 - fraction), axis=1)
     hats[1:] += np.sum(mass * fraction, axis=1)
     return hats
+
+
+def _masses(edges: Floats) -> tuple[Floats, Floats]:
+    """Angles in every interval between edges and their masses under sin(theta)/2 d theta, shape (intervals, NODES)."""
+    angle, weight = gauss_on_intervals(edges[:-1], edges[1:], NODES)
+    return angle.reshape(-1, NODES), (weight * SINE.density(angle)).reshape(-1, NODES)
 
 
 def transport_plan(cost: CostFunction, cells: Bins, curvature: float) -> tuple[Floats, Floats, float]:
@@ -60,11 +62,11 @@ def transport_plan(cost: CostFunction, cells: Bins, curvature: float) -> tuple[F
     """
     import ot
 
-    edges, weights = cells.edges, cells.weights
-    angle, weight = gauss_on_intervals(edges[:-1], edges[1:], NODES)
-    mass = (weight * SINE.density(angle)).reshape(-1, NODES) / weights[:, None]
-    mean = np.sum(mass * angle.reshape(-1, NODES), axis=1)
-    variance = np.sum(mass * (angle.reshape(-1, NODES) - mean[:, None]) ** 2, axis=1)
+    weights = cells.weights
+    angle, mass = _masses(cells.edges)
+    mass = mass / weights[:, None]
+    mean = np.sum(mass * angle, axis=1)
+    variance = np.sum(mass * (angle - mean[:, None]) ** 2, axis=1)
     table = np.ascontiguousarray(cost(mean[:, None], mean))
     plan, log = ot.emd(weights, weights, table, numItermax=MOST_PIVOTS, log=True)
     if log["warning"]:
@@ -72,4 +74,4 @@ def transport_plan(cost: CostFunction, cells: Bins, curvature: float) -> tuple[F
     flux = 0.5 * (plan + plan.T)
     upper = float(np.sum(flux * table)) + curvature * float(weights @ variance)
     # the duals of a symmetric problem may be averaged; any interpolation between the means is allowed
-    return flux, np.interp(edges, mean, 0.5 * (log["u"] + log["v"])), upper
+    return flux, np.interp(cells.edges, mean, 0.5 * (log["u"] + log["v"])), upper

@@ -17,8 +17,8 @@ from ..laws.law import Law, retroreflection
 from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.matrix_law import MatrixLaw
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from .drag import air_resistance
-from .dual_bounds import CostFunction, dual_bound, transport_plan
+from .drag import CostFunction, air_resistance
+from .dual_bounds import dual_bound, transport_plan
 
 # Bound of the second derivatives of the air resistance.
 AIR_CURVATURE = 0.75
@@ -139,11 +139,8 @@ def _by_transport(n: int, which: str, cost: CostFunction, curvature: float | Non
     flux, potential, upper = transport_plan(signed, cells, bound)
     lower = dual_bound(potential, signed, bound)
     bounds = (lower, upper) if which == "min" else (-upper, -lower)
-    plan = _matrix(flux, cells, "optimal transport on the cells")
-    return ExtremalResistance(*bounds, plan, MatrixLaw(plan))
-
-
-def _matrix(flux: Floats, cells: Bins, law: str) -> KernelMatrix:
     symmetric = flux * cells.normalisation[:, None] * cells.normalisation
     error = frobenius_error(ROUNDING * cells.size, "bound", "masses of intervals, to rounding")
-    return KernelMatrix(symmetric, cells, error, method="exact", law=law, reversible=True)
+    name = "optimal transport on the cells"
+    plan = KernelMatrix(symmetric, cells, error, method="exact", law=name, reversible=True)
+    return ExtremalResistance(*bounds, plan, MatrixLaw(plan))

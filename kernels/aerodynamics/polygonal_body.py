@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,12 +18,14 @@ from ...core.checks import (
     generator,
     instance,
     positive_number,
+    shaped,
     whole_number,
 )
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, mean_of_strata
 from ...geometry import Arc, Container
 from ..bases.measure import SINE
+from .drag import scaled
 
 # Reflections of a particle at most.
 MOST_REFLECTIONS = 100_000
@@ -114,13 +116,14 @@ class PolygonalBody:
         AccuracyError
             If a particle has not left after 10^5 reflections.
         """
-        at, moving = finite_array("position", position).copy(), finite_array("velocity", velocity)
-        if at.ndim != 2 or at.shape[1:] != (2,) or moving.shape != at.shape:
-            raise InputError(f"position, velocity: expected two arrays of shape (n, 2), got {at.shape}, {moving.shape}")
+        at = shaped("position", position, "n", 2).copy()
+        moving = shaped("velocity", velocity, len(at), 2)
         size = np.hypot(moving[:, 0], moving[:, 1])
         if np.any(size == 0.0):
             raise InputError("velocity: expected vectors other than 0")
         moving = moving / size[:, None]
+        lengths = np.hypot(self._sides[:, 0], self._sides[:, 1])
+        normals = np.stack([self._sides[:, 1], -self._sides[:, 0]], axis=1) / lengths[:, None]
         counts, last = np.zeros(len(at), dtype=np.int64), np.full(len(at), -1)
         inside = np.arange(len(at))
         for _ in range(MOST_REFLECTIONS):
@@ -130,18 +133,12 @@ class PolygonalBody:
             if not inside.size:
                 return Scattering(frozen(at), frozen(moving), counts)
             at[inside] += time[:, None] * moving[inside]
-            normal = self._normals[side]
+            normal = normals[side]
             moving[inside] -= 2.0 * np.sum(moving[inside] * normal, axis=1)[:, None] * normal
             moving[inside] /= np.hypot(*moving[inside].T)[:, None]
             counts[inside] += 1
             last[inside] = side
         raise AccuracyError(f"{inside.size} particles have not left the body", inside.size / len(at))
-
-    @property
-    def _normals(self) -> Floats:
-        """Outer unit normals of the sides."""
-        lengths = np.hypot(self._sides[:, 0], self._sides[:, 1])
-        return np.stack([self._sides[:, 1], -self._sides[:, 0]], axis=1) / lengths[:, None]
 
     def _next(self, at: Floats, moving: Floats, last: NDArray[np.int64]) -> tuple[Floats, NDArray[np.intp]]:
         """Times to the first side met from outside, and its number; inf if there is none. No side is met twice."""
@@ -186,19 +183,14 @@ class PolygonalBody:
         start = before * stream + strips[:, None] * across
         out = self.scatter(start, np.broadcast_to(stream, start.shape))
         push = stream - out.velocity
-        width = high - low
-        components = [self._mean(push @ axis, width, number) for axis in (stream, across)]
+        width, how = high - low, f"{number} stratified rays"
+        # means over the strips
+        along, aside = (scaled(mean_of_strata(push @ axis, 2.0, how), width) for axis in (stream, across))
         # where the outgoing line passes, against the incoming one
         shift = np.abs((out.position - start) @ across)
         bent = np.hypot(push[:, 0], push[:, 1])
         unchanged = float(np.mean((bent < UNCHANGED) & (shift < UNCHANGED * max(width, 1.0))))
-        return BodyForce(components[0], components[1], width, unchanged)
-
-    @staticmethod
-    def _mean(push: Floats, width: float, number: int) -> Estimate:
-        """The mean over strips, times the width."""
-        mean = mean_of_strata(push, 2.0, f"{number} stratified rays")
-        return replace(mean, value=width * mean.value, error=width * mean.error)
+        return BodyForce(along, aside, width, unchanged)
 
     def scatter_in_circle(
         self, n: int, rng: Rng = None, centre: ArrayLike = (0.0, 0.0), radius: float | None = None
@@ -225,9 +217,7 @@ class PolygonalBody:
             If the circle does not contain the body.
         """
         whole_number("n", n, 1)
-        source, middle = generator(rng), finite_array("centre", centre)
-        if middle.shape != (2,):
-            raise InputError(f"centre: expected a point, got shape {middle.shape}")
+        source, middle = generator(rng), shaped("centre", centre, 2)
         reach = float(np.hypot(*(self._starts - middle).T).max())
         size = reach if radius is None else positive_number("radius", radius)
         if size < reach:
@@ -235,12 +225,9 @@ class PolygonalBody:
         # a little outside, so that a corner on the circle is no obstacle
         size *= 1.0 + 1e-12
         position, theta = 2.0 * math.pi * source.random(n), SINE.sample(n, source)
-        return np.stack([position, theta], axis=1), self._through(position, theta, middle, size)
-
-    def _through(self, position: Floats, theta: Floats, centre: Floats, radius: float) -> Floats:
-        """Polar angle and angle of exit of the particles that enter the circle at (position, theta)."""
-        circle = Container.from_curves([Arc(centre, radius, 0.0, 2.0 * math.pi)])
-        return self._through_region(np.stack([radius * position, theta], axis=1), circle) / [radius, 1.0]
+        circle = Container.from_curves([Arc(middle, size, 0.0, 2.0 * math.pi)])
+        after = self._through_region(np.stack([size * position, theta], axis=1), circle) / [size, 1.0]
+        return np.stack([position, theta], axis=1), after
 
     def scatter_in(self, region: Container, n: int, rng: Rng = None) -> tuple[Floats, Floats]:
         """Draw states from the scattering measure of the body B in a convex set C around it: the law P^{B,C}.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -16,8 +16,8 @@ from ...core.estimates import ErrorKind, Estimate
 from ..bases.basis import AngleFunction
 from ..bases.measure import SINE
 from ..laws.law import Law
-from ..matrices.defects import SymmetryDefect, relative_asymmetry, reversibility_z_score
-from .drag import resistance
+from ..matrices.defects import SymmetryDefect, defect_of_pairs
+from .drag import resistance, scaled
 
 # Boundary elements of a smooth body. Means over all directions converge geometrically in their number n. The force for
 # one direction, with half of the boundary in the shade, converges like n^-2.
@@ -75,7 +75,9 @@ class RoughBody:
 
     normals: Floats
     lengths: Floats
-    law: Law | Sequence[Law] | LawOfNormal
+    law: Laws
+    # every law with the numbers of its elements
+    _groups: tuple[tuple[Law, NDArray[np.intp]], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         normals = np.atleast_1d(finite_array("normals", self.normals))
@@ -87,14 +89,20 @@ class RoughBody:
         gap = np.hypot(lengths @ np.cos(normals), lengths @ np.sin(normals))
         if gap > 1e-9 * lengths.sum():
             raise InputError(f"normals: expected the boundary of a body, got one that misses itself by {gap:.3g}")
-        each = _laws(self.law, normals)
-        if not isinstance(self.law, Law):
+        laws = self.law
+        if isinstance(laws, Law):
+            each = (laws,) * normals.size
+        else:
+            each = tuple(map(laws, normals.tolist())) if callable(laws) else tuple(laws)
             object.__setattr__(self, "law", each)
             if len(each) != normals.size:
                 raise InputError(f"law: expected one or {normals.size}, one for every element, got {len(each)}")
-        for law in each:
+        groups: dict[int, list[int]] = {}
+        for k, law in enumerate(each):
             if not isinstance(law, Law) or law.frame != "paper":
                 raise InputError(f"law: expected one in the paper's convention, got {law!r}")
+            groups.setdefault(id(law), []).append(k)
+        object.__setattr__(self, "_groups", tuple((each[here[0]], np.array(here)) for here in groups.values()))
         object.__setattr__(self, "normals", frozen(normals))
         object.__setattr__(self, "lengths", frozen(lengths))
 
@@ -128,16 +136,6 @@ class RoughBody:
         """The length of the boundary."""
         return float(self.lengths.sum())
 
-    def _groups(self) -> list[tuple[Law, NDArray[np.intp]]]:
-        """Every law with the numbers of its elements."""
-        if isinstance(self.law, Law):
-            return [(self.law, np.arange(self.normals.size))]
-        each = _laws(self.law, self.normals)
-        numbers: dict[int, list[int]] = {}
-        for k, law in enumerate(each):
-            numbers.setdefault(id(law), []).append(k)
-        return [(each[indices[0]], np.array(indices)) for indices in numbers.values()]
-
     def resistance(
         self, tolerance: float = 1e-8, *, cost: DirectionCost | None = None, directions: AngleFunction | None = None
     ) -> Estimate:
@@ -163,7 +161,7 @@ class RoughBody:
         >>> round(3 * float(body.resistance(directions=lambda u: 0 * u + 0.5 / np.pi)), 9)
         8.0
         """
-        found = [self._part(law, here, tolerance, cost, directions) for law, here in self._groups()]
+        found = [self._part(law, here, tolerance, cost, directions) for law, here in self._groups]
         if len(found) == 1:
             return found[0]
         kind: ErrorKind = "bound" if all(one.kind == "bound" for one in found) else "estimate"
@@ -181,7 +179,7 @@ class RoughBody:
         """The integral over the elements ``here``, which have the same law."""
         tangents, length = self.normals[here] - 0.5 * np.pi, float(self.lengths[here].sum())
         if cost is None and directions is None:
-            return _scaled(resistance(law, tolerance), SINE_MASS * length / 0.75)
+            return scaled(resistance(law, tolerance), SINE_MASS * length / 0.75)
         chosen = _momentum if cost is None else cost
 
         def averaged(theta: Floats, outgoing: Floats) -> Floats:
@@ -191,7 +189,7 @@ class RoughBody:
                 total = total + (value if directions is None else value * directions(tangent + theta))
             return np.asarray(total)
 
-        return _scaled(resistance(law, tolerance, cost=averaged), SINE_MASS * length)
+        return scaled(resistance(law, tolerance, cost=averaged), SINE_MASS * length)
 
     def force(self, direction: float) -> Floats:
         """The force on the body of a stream of particles with velocity -u, as components along and across -u.
@@ -201,7 +199,7 @@ class RoughBody:
         """
         theta = np.mod(finite_number("direction", direction) - self.normals + 0.5 * np.pi, 2.0 * np.pi)
         total = np.zeros(2)
-        for law, here in self._groups():
+        for law, here in self._groups:
             lit = here[(theta[here] > 0.0) & (theta[here] < np.pi)]
             incoming = theta[lit]
             level, up = (law.apply(function, incoming) for function in (np.cos, np.sin))
@@ -219,7 +217,7 @@ class RoughBody:
         element = source.choice(self.normals.size, size=n, p=self.lengths / self.perimeter)
         normal, incoming = self.normals[element], SINE.sample(n, source)
         outgoing = np.empty(n)
-        for law, here in self._groups():
+        for law, here in self._groups:
             own = np.isin(element, here)
             outgoing[own] = law.sample(incoming[own], source)
         tangent = normal - 0.5 * np.pi
@@ -230,23 +228,9 @@ class RoughBody:
         """How far nu is from symmetric in u and u', from ``n`` samples, with the z-score of the difference."""
         u, v, _ = self.sample(n, rng)
         scale = DIRECTION_BINS / (2.0 * np.pi)
-        row, column = (np.minimum((angle * scale).astype(np.int64), DIRECTION_BINS - 1) for angle in (u, v))
-        counts = np.bincount(row * DIRECTION_BINS + column, minlength=DIRECTION_BINS**2)
-        table = counts.reshape(DIRECTION_BINS, DIRECTION_BINS)
-        return SymmetryDefect(relative_asymmetry(table.astype(np.float64)), z_score=reversibility_z_score(table))
-
-
-def _scaled(found: Estimate, factor: float) -> Estimate:
-    return Estimate(factor * found.value, factor * found.error, found.kind, found.method)
+        return defect_of_pairs(u * scale, v * scale, DIRECTION_BINS)
 
 
 def _momentum(incoming: Floats, outgoing: Floats) -> Floats:
     """1 + u . u', the momentum transfer along the stream."""
     return np.asarray(1.0 + np.cos(outgoing - incoming))
-
-
-def _laws(law: Laws, normals: Floats) -> tuple[Law, ...]:
-    """The law of every element, or the only law."""
-    if isinstance(law, Law):
-        return (law,)
-    return tuple(law(float(normal)) for normal in normals) if callable(law) else tuple(law)

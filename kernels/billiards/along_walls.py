@@ -94,20 +94,3 @@ class CollisionAlongWall:
             along = (position - container.points[wall]) @ container.tangents[wall]
             return np.asarray(first + np.mod(along - first, last - first))
         return np.clip(container.length_on(wall, position), first, last)
-
-
-@dataclass(frozen=True)
-class Located:
-    """A law along a wall at known positions (n,): what reflects n disks there."""
-
-    law: CollisionAlongWall
-    x: Floats
-
-    @property
-    def disk(self) -> Disk:
-        """The disk of the law."""
-        return self.law.disk
-
-    def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
-        """Outgoing velocities, one for each position."""
-        return self.law.sample_at(self.x, velocity, rng=rng)

@@ -17,7 +17,7 @@ from ...core.version import __version__
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.satellite_law import SatelliteLaw
 from ..laws.law import Law
-from .along_walls import CollisionAlongWall, Located
+from .along_walls import CollisionAlongWall
 from .record import BilliardRecord
 
 if TYPE_CHECKING:
@@ -108,7 +108,10 @@ def play(
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     whole_number("collisions", collisions, 1)
     check_memory("collisions", "the record", 8 * collisions)
-    each = _laws_at_positions(container, laws)
+    each = laws_of_walls(container, laws, CollisionAlongWall)
+    for k, law in enumerate(each):
+        if isinstance(law, CollisionAlongWall):
+            law.check_wall(container, k)
     disk = each[0].disk
     located, moving = _starts(container, position, velocity)
     job = _Disks(container, tuple(each), located, moving, collisions, root)
@@ -157,7 +160,8 @@ class _Disks:
         n = len(located)
         time, angle, last = np.zeros(n), np.zeros(n), np.full(n, -1)
         made, status = np.zeros(n, dtype=np.int64), np.full(n, FlightStatus.FLYING, dtype=np.uint8)
-        states = [(time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy())]
+        state = (time, located, angle, moving, last)
+        states = [tuple(map(np.copy, state))]
         for _ in range(self.collisions):
             rows = np.flatnonzero(status == FlightStatus.FLYING)
             flight, wall, status[rows] = self.container.next_wall(located[rows], moving[rows], last[rows])
@@ -168,15 +172,17 @@ class _Disks:
                     continue
                 point = self.container.touch(k, located[here] + moving[here, :2] * step[:, None])
                 if isinstance(law, CollisionAlongWall):
-                    law = Located(law, law.coordinate(self.container, k, point.position))
-                after = reflected(point, law, moving[here], rng)
+                    x = law.coordinate(self.container, k, point.position)
+                    after = point.outgoing(law.sample_at(x, point.incoming(moving[here]), rng=rng))
+                else:
+                    after = reflected(point, law, moving[here], rng)
                 found = np.all(np.isfinite(after), axis=1)
                 status[here[~found]] = FlightStatus.UNREFLECTED
                 here, step = here[found], step[found]
                 time[here], angle[here] = time[here] + step, angle[here] + moving[here, 2] * step
                 located[here], moving[here], last[here] = point.position[found], after[found], k
                 made[here] += 1
-            states.append((time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy()))
+            states.append(tuple(map(np.copy, state)))
         columns = [np.stack(column) for column in zip(*states, strict=True)]
         return {
             "time": columns[0], "position": columns[1], "angle": columns[2], "velocity": columns[3],
@@ -184,22 +190,11 @@ class _Disks:
         }  # fmt: skip
 
 
-def _laws_at_positions(
-    container: Container, laws: Reflector | CollisionAlongWall | Sequence[Reflector | CollisionAlongWall]
-) -> list[Reflector | CollisionAlongWall]:
-    """Return the law of every wall, as `laws_of_walls` does, which may depend on the position."""
-    each = list(laws) if isinstance(laws, Sequence) else [laws] * container.wall_count
-    # the first collision law of each piece stands for all of them: they have the same disk
-    plain = [law.parts[0] if isinstance(law, CollisionAlongWall) else law for law in each]
-    laws_of_walls(container, plain)
-    for k, law in enumerate(each):
-        if isinstance(law, CollisionAlongWall):
-            law.check_wall(container, k)
-    return each
+def laws_of_walls(container: Container, laws: Any, *others: type) -> list[Any]:
+    """The law of every wall, a `Reflector` or of one of the other types.
 
-
-def laws_of_walls(container: Container, laws: Reflector | Sequence[Reflector]) -> list[Reflector]:
-    """Return the law of every wall; raise an InputError if they do not match the walls or belong to two disks."""
+    Raises an InputError if they do not match the walls or belong to two disks.
+    """
     walls = container.wall_count
     each = list(laws) if isinstance(laws, Sequence) else [laws] * walls
     for law in each:
@@ -209,7 +204,7 @@ def laws_of_walls(container: Container, laws: Reflector | Sequence[Reflector]) -
                 f"pass ker.CollisionLaw(law, disk), or ker.smooth(disk) and ker.no_slip(disk) for specular reflection "
                 "and retroreflection"
             )
-    if not all(isinstance(law, Reflector) for law in each):
+    if not all(isinstance(law, (Reflector, *others)) for law in each):
         raise InputError(f"laws: expected collision laws such as ker.CollisionLaw(law, disk), got {shortened(laws)}")
     if len(each) != walls:
         raise InputError(f"laws: expected one law or one for each of the {walls} walls, got {len(each)}")
@@ -226,10 +221,15 @@ def _starts(container: Container, position: ArrayLike, velocity: ArrayLike) -> t
     n = len(located) if len(located) != 1 or moving.ndim != 2 else len(moving)
     if moving.ndim not in (1, 2) or moving.shape[-1] != 3 or (moving.ndim == 2 and len(moving) not in (1, n)):
         raise InputError(f"velocity: expected shape ({n}, 3) for (v1, v2, omega), got {moving.shape}")
-    inside = container.contains(located)
-    if not inside.all():
-        raise InputError(f"position: expected centres in the container, got {located[int(np.argmin(inside))].tolist()}")
+    check_inside(container, located)
     return np.broadcast_to(located, (n, 2)).copy(), np.broadcast_to(moving, (n, 3)).copy()
+
+
+def check_inside(container: Container, centres: Floats) -> None:
+    """Raise an InputError unless all centres are in the container."""
+    inside = container.contains(centres)
+    if not inside.all():
+        raise InputError(f"position: expected centres in the container, got {centres[int(np.argmin(inside))].tolist()}")
 
 
 def reflected(point: Touch, law: Reflector, moving: Floats, rng: np.random.Generator) -> Floats:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, check_memory, finite_array, generator, instance, number_between, whole_number
+from ...core.checks import Floats, Rng, check_memory, generator, instance, number_between, shaped, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.collision_law import smooth
-from .billiard import Reflector, laws_of_walls, reflected
+from .billiard import Reflector, check_inside, laws_of_walls, reflected
 from .pair_law import PairLaw
 from .record import BilliardRecord
 
@@ -183,14 +183,11 @@ def play_gas(
 
 def _start(container: Container, position: ArrayLike, velocity: ArrayLike, diameter: float) -> tuple[Floats, Floats]:
     """Return copies of centres (n, 2) and velocities (n, 3) of disks that do not overlap."""
-    located, moving = finite_array("position", position).copy(), finite_array("velocity", velocity).copy()
-    if located.ndim != 2 or located.shape[1] != 2 or not len(located):
-        raise InputError(f"position: expected shape (n, 2), got {located.shape}")
-    if moving.shape != (len(located), 3):
-        raise InputError(f"velocity: expected shape ({len(located)}, 3) for (v1, v2, omega), got {moving.shape}")
-    inside = container.contains(located)
-    if not inside.all():
-        raise InputError(f"position: expected centres in the container, got {located[int(np.argmin(inside))].tolist()}")
+    located = shaped("position", position, "n", 2).copy()
+    moving = shaped("velocity", velocity, len(located), 3).copy()
+    if not len(located):
+        raise InputError("position: expected the centre of one disk at least, got none")
+    check_inside(container, located)
     apart = np.hypot(*np.moveaxis(located[:, None] - located[None, :], -1, 0)) + np.diag(np.full(len(located), np.inf))
     if apart.min() < diameter * (1.0 - OVERLAP):
         first, second = (int(i) for i in np.unravel_index(np.argmin(apart), apart.shape))
@@ -218,16 +215,8 @@ class _Gas:
 
     def state(self) -> tuple[Floats, ...]:
         """Copies of what a record stores of an event."""
-        n = len(self.position)
-        time = np.full(n, self.now)
-        return (
-            time,
-            self.position.copy(),
-            self.angle.copy(),
-            self.velocity.copy(),
-            self.wall.copy(),
-            self.partner.copy(),
-        )
+        time = np.full(len(self.position), self.now)
+        return tuple(map(np.copy, (time, self.position, self.angle, self.velocity, self.wall, self.partner)))
 
     def predict(self, disks: NDArray[np.int64]) -> None:
         """Compute the next collisions of these disks."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, common_shape, finite_array, instance, positive_number
+from ...core.checks import Floats, Rng, common_shape, instance, positive_number, shaped
 from ...core.errors import InputError
 from ...geometry import Disk, Wall
 from ..bases.given import seed_by_name
@@ -67,9 +67,7 @@ class PairLaw:
         if self.second is None:
             object.__setattr__(self, "second", self.first)
         instance("second", self.second, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
-        radii = finite_array("radii", self.radii)
-        if radii.shape != (2,):
-            raise InputError(f"radii: expected two numbers, got shape {radii.shape}")
+        radii = shaped("radii", self.radii, 2)
         object.__setattr__(self, "radii", tuple(positive_number("radii", radius) for radius in radii))
         # refuses what is no law of angles, and other frames
         _ = self.reduced_law
@@ -148,13 +146,8 @@ class PairLaw:
 
     @staticmethod
     def _checked(normal: ArrayLike, first: ArrayLike, second: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        up, one, two = (
-            finite_array(name, value)
-            for name, value in (("normal", normal), ("first_velocity", first), ("second_velocity", second))
-        )
-        for name, array, width in (("normal", up, 2), ("first_velocity", one, 3), ("second_velocity", two, 3)):
-            if array.ndim == 0 or array.shape[-1] != width:
-                raise InputError(f"{name}: expected shape (..., {width}), got {array.shape}")
+        up = shaped("normal", normal, "...", 2)
+        one, two = shaped("first_velocity", first, "...", 3), shaped("second_velocity", second, "...", 3)
         if np.any(np.abs(np.hypot(up[..., 0], up[..., 1]) - 1.0) > UNIT_TOLERANCE):
             raise InputError("normal: expected unit vectors from the second to the first centre")
         shape = common_shape(normal=up[..., 0], first_velocity=one[..., 0], second_velocity=two[..., 0])

@@ -42,11 +42,9 @@ class CollisionOperator(LinearOperator):
             raise InputError("theta_basis: expected a basis for sin(theta), got one with weight 'sin2'")
         if psi_basis.measure.name != "sin2":
             raise InputError("psi_basis: expected a basis for sin(psi)^2, such as Legendre(n, weight='sin2')")
-        self.flipped = theta_matrix
-        self.unflipped = unflipped
-        self.psi_basis = psi_basis
+        self.flipped, self.unflipped = theta_matrix, unflipped
+        self.theta_basis, self.psi_basis = parts[0].basis, psi_basis
         self.flip = reflection_matrix(psi_basis)
-        self.theta_basis = parts[0].basis
         size = self.theta_basis.size * psi_basis.size
         super().__init__(np.dtype(np.float64), (size, size))  # type: ignore[call-arg]
 
@@ -62,15 +60,12 @@ class CollisionOperator(LinearOperator):
         terms = [] if self.flipped is None else [(self.flipped.symmetric, self.flip)]
         return terms if self.unflipped is None else [*terms, (self.unflipped.symmetric, np.eye(self.psi_basis.size))]
 
-    def _split(self, vector: Floats) -> Floats:
-        return np.asarray(vector).reshape(self.theta_basis.size, self.psi_basis.size)
-
     def _matvec(self, vector: Floats) -> Floats:
-        table = self._split(vector)
+        table = vector.reshape(self.theta_basis.size, self.psi_basis.size)
         return np.asarray(sum(first @ table @ second.T for first, second in self._terms())).ravel()
 
     def _rmatvec(self, vector: Floats) -> Floats:
-        table = self._split(vector)
+        table = vector.reshape(self.theta_basis.size, self.psi_basis.size)
         return np.asarray(sum(first.T @ table @ second for first, second in self._terms())).ravel()
 
     def dense(self) -> Floats:
@@ -84,5 +79,5 @@ class CollisionOperator(LinearOperator):
         """
         if self.flipped is not None and self.unflipped is not None:
             return SymmetryDefect(relative_asymmetry(self.dense()))
-        (only,) = [part for part in (self.flipped, self.unflipped) if part is not None]
+        only = self.theta_matrix if self.unflipped is None else self.unflipped
         return only.symmetry_defect()

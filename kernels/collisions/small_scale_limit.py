@@ -12,7 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checkpoints import Stored
-from ...core.checks import Floats, Rng, angles, check_memory, choice, finite_array, frozen, generator, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    angles,
+    check_memory,
+    choice,
+    finite_array,
+    frozen,
+    generator,
+    shaped,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...core.frames import data_frame
@@ -198,12 +209,10 @@ def limit_study(
     from ...geometry.collisions.configuration_space import ConfigurationSpace
 
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
-    eps = np.atleast_1d(finite_array("scales", scales))
-    if eps.ndim != 1:
-        raise InputError(f"scales: expected a list of numbers, got an array of shape {eps.shape}")
-    rolls = np.atleast_1d(angles("psi", psi))
-    if rolls.ndim != 1 or not rolls.size:
-        raise InputError(f"psi: expected one angle or a list of angles, got an array of shape {rolls.shape}")
+    eps = shaped("scales", np.atleast_1d(finite_array("scales", scales)), "n")
+    rolls = shaped("psi", np.atleast_1d(angles("psi", psi)), "n")
+    if not rolls.size:
+        raise InputError("psi: expected one angle or a list of angles, got none")
     for name, number in zip(("angles", "rotations", "positions"), samples, strict=True):
         whole_number(f"samples ({name})", number, 1)
     whole_number("repetitions", repetitions, 2)
@@ -260,61 +269,55 @@ class _Repetitions:
     def measured(self, part: int) -> dict[str, Any]:
         """Columns and processor seconds of one repetition, whose random numbers depend on its number alone."""
         rng = np.random.default_rng([*self.root, part])
-        size = self.sizes[part // self.repetitions]
-        each = [_measured(self.disk, self.wall, self.target, size, psi, self.samples, rng) for psi in self.psi]
+        scale, spacing = self.sizes[part // self.repetitions]
+        each = [self._measured(scale, spacing, psi, rng) for psi in self.psi]
         return {"columns": [columns for columns, _ in each], "seconds": sum(seconds for _, seconds in each)}
 
+    def _measured(
+        self, scale: float, spacing: float, psi: float, rng: np.random.Generator
+    ) -> tuple[list[float], float]:
+        """The columns of one repetition in the order of COLUMNS, and the processor seconds."""
+        from ...geometry import collide, collide_cylinder, collide_modified, trace
 
-def _measured(
-    disk: Disk,
-    wall: Wall,
-    target: Wall,
-    size: tuple[float, float],
-    psi: float,
-    samples: tuple[int, int, int],
-    rng: np.random.Generator,
-) -> tuple[list[float], float]:
-    """The columns of one repetition in the order of COLUMNS, and the processor seconds."""
-    from ...geometry import collide, collide_cylinder, collide_modified, trace
-
-    scale, spacing = size
-    directions, turns, starts = samples
-    u = -1.0 + 2.0 * _strata(directions, rng)
-    theta = np.arccos(-u)
-    alpha = spacing * (_strata(turns, rng, (directions,)) - 0.5)
-    x1 = scale * wall.period * _strata(starts, rng, (directions, turns))
-    position = np.stack([x1, np.broadcast_to(alpha[..., None], x1.shape)], axis=-1).reshape(-1, 2)
-    velocity = -np.repeat(disk.from_angles(theta, psi), turns * starts, axis=0)
-    begin = time.process_time()
-    true = collide(disk, wall, scale, position, velocity, spacing)
-    spent = time.process_time() - begin
-    outgoing, rolled = disk.to_angles(true.velocity)
-    straight, _ = disk.to_angles(collide_cylinder(disk, target.unforeshorten(disk), scale, position, velocity).velocity)
-    # the same samples in the coordinates of the cylinder
-    modified = collide_modified(disk, wall, scale, position, velocity, spacing)
-    cylinder = collide_cylinder(disk, wall, scale, position, velocity)
-    per_angle = turns * starts
-    # midpoints of equal parts of the cell give quantiles of the limit, with an error of order 1/per_angle
-    entry = target.period * (np.arange(per_angle) + 0.5) / per_angle
-    limit = np.sort(trace(target, entry, theta[:, None]).theta, axis=1)
-    shape = (directions, per_angle)
-    psi_defect = float(np.mean(np.abs(rolled - (math.pi - psi))))
-    away = float(np.mean(np.abs(np.sort(outgoing.reshape(shape), axis=1) - limit)))
-    moved = np.abs(true.position - position)
-    differ = np.abs(modified.velocity - cylinder.velocity).max(axis=1) > 0.1
-    # E[u^2] = 1/3 under sin(theta)/2 d theta
-    shift = 3.0 * float(np.mean(u[:, None] * (np.cos(limit) - np.cos(outgoing.reshape(shape)))))
-    columns = [
-        away + psi_defect,
-        away + psi_defect + float(moved.sum(axis=1).mean()),
-        float(np.mean(np.abs(np.sort(straight.reshape(shape), axis=1) - limit))),
-        psi_defect,
-        float(true.two_satellites.mean()),
-        float(differ.mean()),
-        float(moved.max(axis=1).mean()),
-        shift,
-    ]
-    return columns, spent
+        disk, wall, target = self.disk, self.wall, self.target
+        directions, turns, starts = self.samples
+        per_angle = turns * starts
+        u = -1.0 + 2.0 * _strata(directions, rng)
+        theta = np.arccos(-u)
+        alpha = spacing * (_strata(turns, rng, (directions,)) - 0.5)
+        x1 = scale * wall.period * _strata(starts, rng, (directions, turns))
+        position = np.stack([x1, np.broadcast_to(alpha[..., None], x1.shape)], axis=-1).reshape(-1, 2)
+        velocity = -np.repeat(disk.from_angles(theta, psi), per_angle, axis=0)
+        begin = time.process_time()
+        true = collide(disk, wall, scale, position, velocity, spacing)
+        spent = time.process_time() - begin
+        outgoing, rolled = disk.to_angles(true.velocity)
+        limit_wall = target.unforeshorten(disk)
+        straight, _ = disk.to_angles(collide_cylinder(disk, limit_wall, scale, position, velocity).velocity)
+        # the same samples in the coordinates of the cylinder
+        modified = collide_modified(disk, wall, scale, position, velocity, spacing)
+        cylinder = collide_cylinder(disk, wall, scale, position, velocity)
+        # midpoints of equal parts of the cell give quantiles of the limit, with an error of order 1/per_angle
+        entry = target.period * (np.arange(per_angle) + 0.5) / per_angle
+        limit = np.sort(trace(target, entry, theta[:, None]).theta, axis=1)
+        shape = (directions, per_angle)
+        psi_defect = float(np.mean(np.abs(rolled - (math.pi - psi))))
+        away = float(np.mean(np.abs(np.sort(outgoing.reshape(shape), axis=1) - limit)))
+        moved = np.abs(true.position - position)
+        differ = np.abs(modified.velocity - cylinder.velocity).max(axis=1) > 0.1
+        # E[u^2] = 1/3 under sin(theta)/2 d theta
+        shift = 3.0 * float(np.mean(u[:, None] * (np.cos(limit) - np.cos(outgoing.reshape(shape)))))
+        columns = [
+            away + psi_defect,
+            away + psi_defect + float(moved.sum(axis=1).mean()),
+            float(np.mean(np.abs(np.sort(straight.reshape(shape), axis=1) - limit))),
+            psi_defect,
+            float(true.two_satellites.mean()),
+            float(differ.mean()),
+            float(moved.max(axis=1).mean()),
+            shift,
+        ]
+        return columns, spent
 
 
 def _strata(n: int, rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Floats:

@@ -18,6 +18,7 @@ from ...core.checks import (
     frozen,
     generator,
     positive_number,
+    shaped,
     shortened,
     whole_number,
 )
@@ -181,9 +182,9 @@ def weak_limit(
     """
     from ...geometry.collisions.configuration_space import ConfigurationSpace
 
-    eps = np.atleast_1d(finite_array("scales", scales))
-    if eps.ndim != 1 or not eps.size:
-        raise InputError(f"scales: expected a list of numbers, got an array of shape {eps.shape}")
+    eps = shaped("scales", np.atleast_1d(finite_array("scales", scales)), "n")
+    if not eps.size:
+        raise InputError("scales: expected one number or a list of numbers, got none")
     positive_number("window", window)
     power = math.ceil(math.log2(whole_number("samples", samples, 1)))
     whole_number("repetitions", repetitions, 2)
@@ -256,10 +257,11 @@ def _tested_once(
         (straight.position, *_angles(disk, straight.velocity, resolved)),
         (position, np.where(resolved, limit.theta, theta), math.pi - psi),
     ]
+    places = [(at, np.all(np.abs(at) <= window, axis=-1)) for at in (position, shifted, position)]
     volume = 4.0 * float(np.prod(reach))
     found, largest = np.empty((2, len(pairs))), np.empty(len(pairs))
     for j, (f, g) in enumerate(pairs):
-        weights = [np.where(_inside(at, window), g(at, theta, psi), 0.0) for at in (position, shifted, position)]
+        weights = [np.where(inside, g(at, theta, psi), 0.0) for at, inside in places]
         terms = [np.where(resolved, f(*state) * weight, 0.0) for state, weight in zip(states, weights, strict=True)]
         found[:, j] = volume * np.mean(terms[0] - terms[1]), volume * np.mean(terms[0] - terms[2])
         largest[j] = volume * max(float(np.abs(term).max()) for term in terms)
@@ -271,7 +273,3 @@ def _angles(disk: Disk, velocity: Floats, resolved: Any) -> tuple[Floats, Floats
     upright = disk.from_angles(0.5 * math.pi, 0.5 * math.pi)
     theta, psi = disk.to_angles(np.where(resolved[:, None], velocity, upright))
     return theta, psi
-
-
-def _inside(position: Floats, window: float) -> Any:
-    return np.all(np.abs(position) <= window, axis=-1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -74,17 +74,6 @@ def pooled_rows(first: KernelMatrix, second: KernelMatrix) -> Floats:
     return rows_of_counts(first.counts + second.counts, stochastic_rows(first))
 
 
-def resampled(counts: Counts, rows: Floats, number: int, rng: np.random.Generator) -> Iterator[Counts]:
-    """``number`` resamples of the counts by the kernel ``rows``, with the same row sums, in chunks of (., n, n)."""
-    total = counts.sum(axis=1)
-    size = len(total)
-    chunk = max(1, CHUNK // size**2)
-    probability = np.maximum(rows, 0.0)
-    probability = probability / probability.sum(axis=1, keepdims=True)
-    for start in range(0, number, chunk):
-        yield rng.multinomial(total, probability, size=(min(chunk, number - start), size))
-
-
 def noise_floor(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> float | None:
     """The mean distance of samples of these sizes from one law; None if neither matrix has counts."""
     if first.counts is None and second.counts is None:
@@ -102,24 +91,38 @@ def null_distances(
     rng: np.random.Generator,
 ) -> Floats:
     """Distances between resamples of both matrices from a common kernel, which replaces a matrix without counts."""
-    between = distance_of_rows(first, *measured)
-    found = []
     draws = [_draws(matrix, common, number, rng) for matrix in (first, second)]
-    with progress_bar(number, "sample", "distance") as bar:
-        for one, other in zip(*draws, strict=True):
-            found.append(np.atleast_1d(between(one, other)))
+    return all_distances(distance_of_rows(first, *measured), zip(*draws, strict=True), number, "sample", "distance")
+
+
+def all_distances(
+    between: RowsDistance, pairs: Iterable[tuple[Floats, Floats]], number: int, unit: str, title: str
+) -> Floats:
+    """The distances of all pairs of tables, shape (number,), with a progress bar."""
+    found = []
+    with progress_bar(number, unit, title) as bar:
+        for one, other in pairs:
+            found.append(between(one, other))
             bar.update(found[-1].size)
     return np.concatenate(found)
 
 
 def _draws(matrix: KernelMatrix, common: Floats, number: int, rng: np.random.Generator) -> Iterator[Floats]:
-    if matrix.counts is not None:
-        for counts in resampled(matrix.counts, common, number, rng):
-            yield rows_of_counts(counts, common)
-        return
-    chunk = max(1, CHUNK // common.size)
-    for start in range(0, number, chunk):
-        yield np.broadcast_to(common, (min(chunk, number - start), *common.shape))
+    """Kernels of ``number`` resamples of a matrix's counts by a common kernel, with the same row sums, in chunks."""
+    for size in chunks(number, common.size):
+        if matrix.counts is None:
+            yield np.broadcast_to(common, (size, *common.shape))
+        else:
+            probability = np.maximum(common, 0.0)
+            probability = probability / probability.sum(axis=1, keepdims=True)
+            drawn = rng.multinomial(matrix.counts.sum(axis=1), probability, size=(size, len(common)))
+            yield rows_of_counts(drawn, common)
+
+
+def chunks(number: int, size: int) -> list[int]:
+    """How many tables of a size are computed at a time, of ``number`` in total."""
+    most = max(1, CHUNK // size)
+    return [min(most, number - start) for start in range(0, number, most)]
 
 
 def matrices_error(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> float:
@@ -140,13 +143,8 @@ def matrices_error(first: KernelMatrix, second: KernelMatrix, order: float, sup:
         own, rays = stochastic_rows(matrix), matrix.counts.sum(axis=1)
         missed += float(np.pi * missed_fraction(max(int(rays.min() if sup else rays.sum()), 1)) ** (1.0 / order))
         between = distance_of_rows(matrix, order, sup)
-        draws = resampled(matrix.counts, own, RESAMPLES, np.random.default_rng(SEED))
-        parts = []
-        with progress_bar(RESAMPLES, "sample", "distance: error") as bar:
-            for counts in draws:
-                parts.append(between(rows_of_counts(counts, own), own))
-                bar.update(parts[-1].size)
-        found = np.concatenate(parts)
+        draws = ((rows, own) for rows in _draws(matrix, own, RESAMPLES, np.random.default_rng(SEED)))
+        found = all_distances(between, draws, RESAMPLES, "sample", "distance: error")
         mean += float(np.mean(found))
         variance += float(np.var(found, ddof=1))
     spread = mean + (DEVIATIONS_OF_SUPREMUM if sup else DEVIATIONS) * float(np.sqrt(variance))

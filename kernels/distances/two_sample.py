@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...core.checks import Floats, Rng, check_memory, choice, generator, number_between, whole_number
 from ...core.errors import InputError
-from ...core.long_runs import progress_bar
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
 from .resampling import (
-    CHUNK,
+    all_distances,
     check_comparable,
+    chunks,
     distance_of_rows,
     null_distances,
     pooled_rows,
@@ -108,14 +109,14 @@ def difference_test(
         raise InputError("difference_test: expected counts in one matrix at least; of exact laws take the distance")
     common, measured = pooled_rows(first, second), (wasserstein_order(order), kind == "sup")
     if first.counts is None or second.counts is None:
-        pair = [
-            stochastic_rows(matrix) if matrix.counts is None else rows_of_counts(matrix.counts, common)
-            for matrix in (first, second)
-        ]
         null = null_distances(first, second, common, measured, number, source)
     else:
-        pair = [rows_of_counts(counts, common) for counts in (first.counts, second.counts)]
-        null = _permuted(first, second.counts, measured, number, source)
+        pairs = _permuted(first.counts, second.counts, stochastic_rows(first), number, source)
+        null = all_distances(distance_of_rows(first, *measured), pairs, number, "permutation", "test")
+    pair = [
+        stochastic_rows(matrix) if matrix.counts is None else rows_of_counts(matrix.counts, common)
+        for matrix in (first, second)
+    ]
     statistic = float(distance_of_rows(first, *measured)(*pair))
     # distances of equal tables may differ by rounding and count as equal
     not_smaller = int(np.count_nonzero(null >= statistic * (1.0 - 1e-12)))
@@ -123,25 +124,15 @@ def difference_test(
 
 
 def _permuted(
-    first: KernelMatrix, other: Counts, measured: tuple[float, bool], number: int, rng: np.random.Generator
-) -> Floats:
-    """Distances after redistributing the pairs of each incoming cell between the two samples."""
-    assert first.counts is not None  # the caller looked
-    pooled = first.counts + other
-    common = rows_of_counts(pooled, stochastic_rows(first))
-    between, sizes = distance_of_rows(first, *measured), first.counts.sum(axis=1)
-    chunk = max(1, CHUNK // pooled.size)
-    found = []
-    with progress_bar(number, "permutation", "test") as bar:
-        for start in range(0, number, chunk):
-            size = min(chunk, number - start)
-            dealt = np.stack(
-                [
-                    rng.multivariate_hypergeometric(row, int(drawn), size=size, method="marginals")
-                    for row, drawn in zip(pooled, sizes, strict=True)
-                ],
-                axis=1,
-            )
-            found.append(between(rows_of_counts(dealt, common), rows_of_counts(pooled - dealt, common)))
-            bar.update(size)
-    return np.concatenate(found)
+    counts: Counts, other: Counts, rows: Floats, number: int, rng: np.random.Generator
+) -> Iterator[tuple[Floats, Floats]]:
+    """Pairs of kernels after redistributing the pairs of each incoming cell between the two samples."""
+    pooled, sizes = counts + other, counts.sum(axis=1)
+    common = rows_of_counts(pooled, rows)
+    for size in chunks(number, pooled.size):
+        dealt = [
+            rng.multivariate_hypergeometric(row, int(drawn), size=size, method="marginals")
+            for row, drawn in zip(pooled, sizes, strict=True)
+        ]
+        first = np.stack(dealt, axis=1)
+        yield rows_of_counts(first, common), rows_of_counts(pooled - first, common)

@@ -124,6 +124,13 @@ def reversibility_z_score(counts: NDArray[np.int64]) -> float:
     return _cube_root_score(float(np.sum(difference**2 / pair)), pair.size, float(np.sum(2.0 - 2.0 / pair)))
 
 
+def defect_of_pairs(first: Floats, second: Floats, cells: int) -> SymmetryDefect:
+    """The asymmetry of the counts of pairs of numbers from 0 to ``cells`` in cells of width 1, with its z-score."""
+    row, column = (np.minimum(level.astype(np.int64), cells - 1) for level in (first, second))
+    counts = np.bincount(row * cells + column, minlength=cells**2).reshape(cells, cells)
+    return SymmetryDefect(relative_asymmetry(counts.astype(np.float64)), z_score=reversibility_z_score(counts))
+
+
 def replicate_z_score(antisymmetric: list[Floats]) -> float:
     """The z-score of the mean antisymmetric part from the parts A_r of several replicates, for dependent counts.
 

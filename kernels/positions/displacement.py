@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, finite_number, frozen, generator, instance, positive_number, whole_number
+from ...core.checks import Floats, Rng, frozen, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, fraction_estimate
 from ...geometry import Wall
@@ -51,9 +51,7 @@ class Displacements:
         InputError
             If the distance is negative or the scale is not greater than 0.
         """
-        least = finite_number("distance", distance)
-        if least < 0.0:
-            raise InputError(f"distance: expected a number of at least 0, got {least!r}")
+        least = number_between("distance", distance, 0.0, math.inf, closed="low")
         factor = positive_number("scale", scale)
         found = float(np.mean(factor * np.abs(self.values) > least))
         if factor * self.longest_possible <= least:

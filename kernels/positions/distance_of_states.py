@@ -14,7 +14,6 @@ from ..bases.legendre import Legendre
 from ..bases.measure import SINE
 from ..discretisation.discretisation import discretise
 from ..distances.pseudometric import flux_means
-from ..laws.law import Law
 from .position_law import PositionLaw
 
 # Means of products of four cosines of orders up to this one at most are compared; the rest is less than 1.3e-4.
@@ -71,7 +70,8 @@ def position_distance(
     >>> float(ker.position_distance(halves, other)) > 0.01
     True
     """
-    orders = _orders(positive_number("tolerance", tolerance))
+    # cosines of each variable for which the rest is below the tolerance
+    orders = min(max(math.ceil(math.log2(8.0 / positive_number("tolerance", tolerance))), 2), MOST_ORDERS)
     power = math.ceil(math.log2(whole_number("rays", rays, 1)))
     source = generator(rng)
     spans = [_span(one) for one in (first, second)]
@@ -84,11 +84,6 @@ def position_distance(
     rest = 2.0 * (1.0 - (1.0 - 0.5**orders) ** 4)
     noise = float(np.sum(joint * (errors[0] + errors[1])))
     return Estimate(value, noise + rest, "estimate", f"cosines of order below {orders} in x, theta, theta', x'")
-
-
-def _orders(tolerance: float) -> int:
-    """The number of cosines of each variable for which the rest is below the tolerance, if it is not too large."""
-    return min(max(math.ceil(math.log2(8.0 / tolerance)), 2), MOST_ORDERS)
 
 
 def _span(one: PositionLaw | Wall) -> float:
@@ -116,16 +111,12 @@ def _means_of_law(law: PositionLaw, orders: int) -> tuple[Floats, Floats]:
     total, error = np.zeros((orders,) * 4), np.zeros((orders,) * 4)
     for k, part in enumerate(law.laws):
         if id(part) not in tables:
-            tables[id(part)] = _angular(part, orders)
+            matrix = discretise(part, Legendre(orders), tolerance=1e-6)
+            tables[id(part)] = flux_means(matrix, orders - 1), float(matrix.error)
         means, doubt = tables[id(part)]
         total += np.einsum("jm,kl->jklm", in_space[k], means)
         error += np.abs(in_space[k])[:, None, None, :] * doubt
     return total, error
-
-
-def _angular(law: Law, orders: int) -> tuple[Floats, float]:
-    matrix = discretise(law, Legendre(orders), tolerance=1e-6)
-    return flux_means(matrix, orders - 1), float(matrix.error)
 
 
 def _cosine_integrals(ends: Floats, orders: int) -> Floats:

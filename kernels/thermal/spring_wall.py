@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ...core.checks import (
     Floats,
@@ -14,8 +14,8 @@ from ...core.checks import (
     angles,
     broadcast,
     finite_array,
-    finite_number,
     generator,
+    number_between,
     positive_number,
     shaped,
     whole_number,
@@ -24,7 +24,7 @@ from ...core.errors import AccuracyError, InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.rounding import EPS
 from ..bases.given import seed_by_name
-from ..matrices.defects import SymmetryDefect, relative_asymmetry, reversibility_z_score
+from ..matrices.defects import SymmetryDefect, defect_of_pairs
 
 # A contact is found when the distance of plate and particle is this many roundings of the size of the motion.
 CONTACT = 16.0 * EPS
@@ -85,12 +85,8 @@ class SpringWall:
     depth: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("mass_ratio", "frequency"):
-            object.__setattr__(self, name, positive_number(name, getattr(self, name)))
-        for name in ("temperature", "depth"):
-            value = finite_number(name, getattr(self, name))
-            if value < 0.0:
-                raise InputError(f"{name}: expected a number of at least 0, got {value!r}")
+        for name, closed in (("mass_ratio", ""), ("frequency", ""), ("temperature", "low"), ("depth", "low")):
+            value = number_between(name, getattr(self, name), 0.0, math.inf, closed=closed)
             object.__setattr__(self, name, value)
         if self.temperature == 0.0 and self.depth == 0.0:
             raise InputError("depth: expected a number greater than 0 for a plate at rest, got 0")
@@ -151,8 +147,8 @@ class SpringWall:
 
     def _plate(self, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
         """Displacement from rest and velocity of the plate at the entry: Gibbs, with the plate below y = 0."""
-        pace = math.sqrt(self.temperature * self.mass_ratio) * rng.standard_normal(n)
-        width = math.sqrt(self.temperature * self.mass_ratio) / self.frequency
+        spread = math.sqrt(self.temperature * self.mass_ratio)
+        pace, width = spread * rng.standard_normal(n), spread / self.frequency
         position = width * rng.standard_normal(n)
         for _ in range(MOST_DRAWS):
             above = np.flatnonzero(position >= self.depth)
@@ -207,13 +203,8 @@ class SpringWall:
         """
         before = self.equilibrium(whole_number("n", n, CELLS**2), rng := generator(rng))
         after = self.sample(before, rng)
-        rows, columns = (self._cell(velocity[:, 1]) for velocity in (before, after))
-        counts = np.bincount(rows * CELLS + columns, minlength=CELLS**2).reshape(CELLS, CELLS)
-        return SymmetryDefect(relative_asymmetry(counts.astype(np.float64)), z_score=reversibility_z_score(counts))
-
-    def _cell(self, v: Floats) -> NDArray[np.int64]:
-        level = np.exp(-0.5 * v * v / self.temperature)
-        return np.minimum((level * CELLS).astype(np.int64), CELLS - 1)
+        first, second = (np.exp(-0.5 * v * v / self.temperature) * CELLS for v in (before[:, 1], after[:, 1]))
+        return defect_of_pairs(first, second, CELLS)
 
     def energy_accommodation(self, gas_temperature: float, n: int = 100_000, rng: Rng = None) -> Estimate:
         """The coefficient (E_in - E_out)/(E_in - T) of the energy of motion along y, for a gas at another temperature.

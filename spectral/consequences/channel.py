@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Unpack, get_args
+from typing import Any, Literal, Unpack, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.checkpoints import Stored
 from ...core.checks import (
@@ -27,12 +27,13 @@ from ...core.version import __version__
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.matrix_law import not_a_law
-from .diffusion import Arrangement
+
+Arrangement = Literal["mirror", "half-turn"]
 
 # Smallest angle; below half of it, pi - theta would round to pi.
 SMALLEST = float(np.spacing(np.pi))
-# Limit on the crossings of a particle; a law that retroreflects for ever reaches it.
-MOST_CROSSINGS = 1_000_000
+# Limit on the flights of a particle; a law that retroreflects for ever reaches it.
+MOST_FLIGHTS = 1_000_000
 # Larger radii and speeds overflow in products with lengths.
 LARGEST = 1e150
 # Particles of a part: their random numbers depend on its number alone.
@@ -131,7 +132,7 @@ def exit_times(
     Raises
     ------
     InputError
-        If the lengths do not increase, or a particle has not left after 10^6 crossings; if the checkpoint is of another
+        If the lengths do not increase, or a particle has not left after 10^6 flights; if the checkpoint is of another
         simulation.
 
     Examples
@@ -141,20 +142,36 @@ def exit_times(
     >>> bool(found.means[0] < found.means[1])
     True
     """
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
-    levels = finite_array("lengths", lengths).ravel()
-    if levels.size < 3 or levels[0] <= 0.0 or np.any(np.diff(levels) <= 0.0):
-        raise InputError(f"lengths: expected at least three increasing positive lengths, got {lengths!r}")
-    choice("arrangement", arrangement, get_args(Arrangement))
-    whole_number("particles", particles, 2)
-    check_memory("particles", "all exit times", 2 * levels.size * particles)
+    paper, levels = checked(law, "lengths", lengths, arrangement, particles)
     width, pace = 2.0 * number_between("radius", radius, 0.0, LARGEST), number_between("speed", speed, 0.0, LARGEST)
-    paper = law.in_specular_frame() if law.frame == "specular" else law
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     job = _Particles(paper, levels, particles, root, width, pace, arrangement)
     parts = all_parts(job.times, -(-particles // TOGETHER), job.identity(), engine, job.stored)
     return ExitTimes(frozen(levels), frozen(np.concatenate([part["times"] for part in parts])), 0.5 * width, pace)
+
+
+def in_paper_frame(law: Law) -> Law:
+    """The law in the paper's convention; an InputError if it is no law."""
+    if not isinstance(law, Law):
+        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    return law.in_specular_frame() if law.frame == "specular" else law
+
+
+def checked(law: Law, name: str, levels: ArrayLike, arrangement: str, particles: int) -> tuple[Law, Floats]:
+    """The law in the paper's convention and increasing levels, at which each particle gives a number."""
+    paper, found = in_paper_frame(law), finite_array(name, levels).ravel()
+    if found.size < 3 or found[0] <= 0.0 or np.any(np.diff(found) <= 0.0):
+        raise InputError(f"{name}: expected at least three increasing positive {name}, got {levels!r}")
+    choice("arrangement", arrangement, get_args(Arrangement))
+    check_memory("particles", f"the table of {name}", 2 * found.size * whole_number("particles", particles, 2))
+    return paper, found
+
+
+def passed(levels: Floats, reached: NDArray[np.int64], ends: Floats) -> tuple[NDArray[np.int64], ...]:
+    """Particles and the levels that their flights to these ends pass, as index pairs; then all numbers of levels."""
+    after = np.maximum(reached, np.searchsorted(levels, ends, side="right"))
+    particle = np.repeat(np.arange(len(ends)), after - reached)
+    return particle, np.arange(len(particle)) - np.repeat(np.cumsum(after - reached) - after, after - reached), after
 
 
 @dataclass(frozen=True)
@@ -185,36 +202,27 @@ class _Particles:
     def times(self, part: int) -> dict[str, Floats]:
         """Exit times of the particles of one part, which depend on its number alone."""
         rng = np.random.default_rng([*self.root, part])
-        return {"times": self._simulated(min(TOGETHER, self.particles - part * TOGETHER), rng)}
-
-    def _simulated(self, particles: int, rng: np.random.Generator) -> Floats:
-        levels = self.levels
-        times = np.full((particles, levels.size), np.nan)
-        inside = np.arange(particles)
-        x, clock, reached = np.zeros(particles), np.zeros(particles), np.zeros(particles, dtype=np.int64)
+        count, levels = min(TOGETHER, self.particles - part * TOGETHER), self.levels
+        times, inside = np.full((count, levels.size), np.nan), np.arange(count)
+        x, clock, reached = np.zeros(count), np.zeros(count), np.zeros(count, dtype=np.int64)
         # angle at which a particle leaves a wall, in the frame of this wall, and the sign of its x axis in the channel
-        theta, sign = SINE.sample(particles, rng), 1.0
+        theta, sign = SINE.sample(count, rng), 1.0
         half_turn = self.arrangement == "half-turn"
-        for _ in range(MOST_CROSSINGS):
+        for _ in range(MOST_FLIGHTS):
             shift = sign * self.width * np.cos(theta) / np.sin(theta)
             duration = self.width / (self.speed * np.sin(theta))
             target = x + shift
-            crossing = np.flatnonzero(np.abs(target) >= levels[reached])
-            while crossing.size:
-                # fraction of the ray segment up to |x| = L
-                ahead = np.copysign(levels[reached[crossing]], target[crossing]) - x[crossing]
-                moment = clock[crossing] + ahead / shift[crossing] * duration[crossing]
-                times[inside[crossing], reached[crossing]] = moment
-                reached[crossing] += 1
-                crossing = crossing[reached[crossing] < levels.size]
-                crossing = crossing[np.abs(target[crossing]) >= levels[reached[crossing]]]
+            out, level, reached = passed(levels, reached, np.abs(target))
+            # fraction of the ray segment up to |x| = L
+            ahead = np.copysign(levels[level], target[out]) - x[out]
+            times[inside[out], level] = clock[out] + ahead / shift[out] * duration[out]
             stays = reached < levels.size
             if not stays.any():
-                return times
+                return {"times": times}
             inside, reached, x, clock = inside[stays], reached[stays], target[stays], (clock + duration)[stays]
             incoming = theta[stays] if half_turn else np.pi - theta[stays]
             theta = self.law.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
             sign = -sign if half_turn else sign
         raise InputError(
-            f"law: {self.law!r} keeps {x.size} particles within L = {levels[-1]:g} after {MOST_CROSSINGS} flights"
+            f"law: {self.law!r} keeps {x.size} particles within L = {levels[-1]:g} after {MOST_FLIGHTS} flights"
         )

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
-from ...core.checks import Floats, choice, positive_number
+from ...core.checks import choice, positive_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.rounding import EPS
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.laws.law import IsometryLaw
-from ...kernels.laws.matrix_law import not_a_law
 from ...kernels.laws.structure import holds_of_all
 from ..essential.edge import grazing_symbol
-
-Arrangement = Literal["mirror", "half-turn"]
+from .channel import Arrangement, in_paper_frame
 
 # Sign of the displacement of rays that leave near theta = 0 and near theta = pi.
 DIRECTION = np.array([1.0, -1.0])
@@ -117,12 +115,12 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     >>> round(found.eta, 12), round(found.value * np.pi, 12)
     (3.0, 12.0)
     """
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    paper = in_paper_frame(law)
     scale = 4.0 * positive_number("radius", radius) * positive_number("speed", speed) / np.pi
     choice("arrangement", arrangement, get_args(Arrangement))
-    symbol = grazing_symbol(law.in_specular_frame() if law.frame == "specular" else law)
-    step = _step(symbol.matrix, arrangement)
+    symbol = grazing_symbol(paper)
+    # F, from one long displacement to the next, in the frame of the channel
+    step = symbol.matrix[:, ::-1] if arrangement == "mirror" else -symbol.matrix
     zeta = float(0.5 * DIRECTION @ step @ DIRECTION)
     doubt = 2.0 * symbol.entry_error
     known = doubt <= LARGEST_DOUBT
@@ -146,7 +144,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
             "change of the angle. exit_times(law, ...) simulates the times to leave a channel",
             doubt,
         )
-    eta = _eta(step)
+    eta = float(0.5 * DIRECTION @ (2.0 * np.linalg.inv(np.eye(2) - step) - np.eye(2)) @ DIRECTION)
     # from the derivative of (1 + zeta)/(1 - zeta) at the worst end of the interval of zeta
     eta_error = 2.0 * doubt / max(1.0 - zeta - doubt, BALLISTIC) ** 2
     kind: ErrorKind = "bound" if exact else "estimate"
@@ -155,15 +153,14 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
         doubt = 4.0 * EPS
     method = f"limit of the persistence of grazing flights, upper wall as {arrangement}"
     method += ", by the law's structure or the shape of the wall at y = 0" if exact else ", at decreasing angles"
-    onset = 2.0 * radius * _onset(law, zeta)
+    onset = 2.0 * radius * _onset(paper, zeta)
     return Diffusivity(eta * scale, eta_error * scale, kind, method, eta, eta_error, zeta, doubt, arrangement, onset)
 
 
 def _onset(law: Law, zeta: float) -> float:
     """The cotangent of the largest of some angles below which the persistence is near its limit zeta."""
-    paper = law.in_specular_frame() if law.frame == "specular" else law
     angle = np.concatenate((ONSET_ANGLES, np.pi - ONSET_ANGLES))
-    outgoing = paper.sample(np.broadcast_to(angle, (ONSET_RAYS, angle.size)), np.random.default_rng(0))
+    outgoing = law.sample(np.broadcast_to(angle, (ONSET_RAYS, angle.size)), np.random.default_rng(0))
     means = (np.tan(angle) / np.tan(outgoing)).mean(axis=0).reshape(2, -1).mean(axis=0)
     far = np.abs(means + zeta) > NEAR_LIMIT
     first = int(np.flatnonzero(far)[-1]) + 1 if far.any() else 0
@@ -177,13 +174,3 @@ def _keeps_sines(law: Law) -> bool:
         steps = [np.subtract(piece.end, piece.start) for loop in (wall.pieces, *wall.islands) for piece in loop]
         return wall.is_polygonal and all(np.count_nonzero(step) == 1 for step in steps)
     return isinstance(law, (IsometryLaw, RectangularTeethLaw))
-
-
-def _step(symbol: Floats, arrangement: Arrangement) -> Floats:
-    """The matrix F from one long displacement to the next, in the frame of the channel."""
-    return symbol[:, ::-1] if arrangement == "mirror" else -symbol
-
-
-def _eta(step: Floats) -> float:
-    resolvent = np.linalg.inv(np.eye(2) - step)
-    return float(0.5 * DIRECTION @ (2.0 * resolvent - np.eye(2)) @ DIRECTION)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def mean_squared_slope(wall: Wall) -> float:
     return float((fine[0] + (fine[0] - coarse[0]) / 3.0) / wall.period)
 
 
-def _slope_sum(wall: Any, chords: int) -> tuple[float, float]:
+def _slope_sum(wall: Wall, chords: int) -> tuple[float, float]:
     """The integral of the squared slope of the chords of a wall's pieces, and the largest slope."""
     total, steepest = 0.0, 0.0
     for piece in wall.pieces:

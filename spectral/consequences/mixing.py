@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-from ...core.checks import Floats, choice, finite_number, number_between
+from ...core.checks import Floats, choice, number_between
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.rounding import EPS
@@ -18,7 +18,6 @@ from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..gap.gap import modulus_gap
 
 Distance = Literal["L2", "total variation", "chi-square"]
-DISTANCES: tuple[Distance, ...] = ("L2", "total variation", "chi-square")
 
 # Number of eigenvalues computed for a matrix, and wanted error of the gap of a law.
 SOUGHT, TOLERANCE = 6, 1e-4
@@ -110,10 +109,8 @@ def mixing_time(
     (7, 7, 1.4427)
     """
     within = number_between("within", within, 0.0, np.inf)
-    choice("distance", distance, DISTANCES)
-    steps_before, size = 0, finite_number("initial", initial)
-    if size < 0.0:
-        raise InputError(f"initial: expected a norm, at least 0, got {initial!r}")
+    choice("distance", distance, get_args(Distance))
+    steps_before, size = 0, number_between("initial", initial, 0.0, np.inf, closed="low")
     if density is not None:
         size = _distance_of(density)
     elif start is not None:
@@ -126,9 +123,10 @@ def mixing_time(
         raise AccuracyError(
             f"the law is not known to have a gap: 1 - slem = {gap}, so no mixing time can be given", 1.0 - least
         )
-    target = {"L2": within, "total variation": 2.0 * within, "chi-square": float(np.sqrt(within))}[distance]
-    steps = steps_before + _steps(least, target / size if size else np.inf)
-    earliest = 0 if distance == "total variation" else _steps(most, target / size if size else np.inf)
+    norm = {"L2": within, "total variation": 2.0 * within, "chi-square": float(np.sqrt(within))}[distance]
+    target = norm / size if size else np.inf
+    earliest = 0 if distance == "total variation" else _steps(most, target)
+    steps = steps_before + _steps(least, target)
     return MixingTime(steps, earliest, relaxation_time(gap), slem, distance, size, slem.kind)
 
 

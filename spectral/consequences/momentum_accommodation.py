@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, angles, frozen, generator, instance, positive_number
+from ...core.checks import Floats, Rng, angles, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, ErrorKind, Estimate
 from ...core.rounding import EPS
@@ -23,6 +23,7 @@ from ...kernels.laws.structure import has_chain, law_of, words_of
 from ..bounds.images import is_costly
 from ..bounds.operator_residuals import image_rule
 from ..gap.shallow import ROUNDING, Slopes, slopes_of
+from .channel import in_paper_frame
 
 # cos(theta) and sin(theta) are polynomials of this degree on so many panels, to 1e-14.
 PANELS, DEGREE = 4, 10
@@ -146,10 +147,10 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
     0.0 0.0 0.0 0.0
     2.0 2.0 0.0 0.0
     """
-    instance("law", law, Law, "ker.lambertian()")
     wanted = positive_number("tolerance", tolerance)
-    incoming = _default_angles() if theta is None else _checked(theta)
-    paper = law.in_specular_frame() if law.frame == "specular" else law
+    midpoints = SINE.quantile((np.arange(DEFAULT_ANGLES) + 0.5) / DEFAULT_ANGLES)
+    incoming = midpoints if theta is None else _checked(theta)
+    paper = in_paper_frame(law)
     parts = _parts(paper, wanted, generator(rng, 0))
     tangential, normal, fraction = _averaged(parts)
     values, errors, missed = _coefficients(parts, incoming, wanted)
@@ -161,10 +162,6 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
         tangential, normal, fraction, misfit, frozen(incoming), tangential_at, tangential_errors, missed[:, 0],
         normal_at, normal_errors, missed[:, 1], kind,
     )  # fmt: skip
-
-
-def _default_angles() -> Floats:
-    return SINE.quantile((np.arange(DEFAULT_ANGLES) + 0.5) / DEFAULT_ANGLES)
 
 
 def _checked(theta: ArrayLike) -> Floats:
@@ -206,14 +203,9 @@ def _averaged(parts: list[tuple[float, _Changes]]) -> tuple[Estimate, Estimate, 
     return tangential, normal, Estimate(min(max(mean, 0.0), 1.0), spread, kind, f"nearest mean velocities; {how}")
 
 
-def _cosine(theta: Floats) -> Floats:
-    """Normalised for sin(theta)/2 d theta."""
-    return np.asarray(np.sqrt(3.0) * np.cos(theta))
-
-
-def _sine(theta: Floats) -> Floats:
-    """Orthogonal to the constants and normalised."""
-    return np.asarray((np.sin(theta) - MEAN_SINE) / SINE_NORM)
+def _complete(theta: Floats) -> Floats:
+    """The changes by complete accommodation, shape (angles, 2)."""
+    return np.stack([np.cos(theta), np.sin(theta) - MEAN_SINE], axis=1)
 
 
 class _Changes:
@@ -241,7 +233,7 @@ class _Changes:
 
     def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         """The changes and their errors, both of shape (angles, 2)."""
-        complete = np.stack([np.cos(theta), np.sin(theta) - MEAN_SINE], axis=1)
+        complete = _complete(theta)
         if self.ideal is not None:
             return self.ideal * complete, 4.0 * EPS * np.abs(self.ideal * complete)
         found, errors = np.zeros_like(complete), np.zeros_like(complete)
@@ -260,8 +252,7 @@ class _Changes:
             found = np.stack([np.cos(theta) + means[:, 0], np.sin(theta) - means[:, 1]], axis=1)
             # rounding of the sums over branches or panels, and the panels' own miss
             errors = np.nan_to_num(doubt, nan=np.inf)[:, None] + np.full(found.shape, PANELS_MISS + 16.0 * EPS)
-        drawn = self.slopes is not None or not np.isfinite(errors).all()
-        if drawn:
+        if self.slopes is not None or not np.isfinite(errors).all():
             each = self._drawn(np.repeat(theta[:, None], DRAWS, axis=1))
             doubt = NORMAL_95 * each.std(axis=1, ddof=1) / np.sqrt(DRAWS) + 4.0 * EPS
             better = doubt < errors
@@ -286,7 +277,9 @@ class _Changes:
                 return values, errors, how
         basis: Basis = Panels(np.linspace(0.0, np.pi, PANELS + 1), DEGREE) if has_chain(self.law) else Directions()
         matrix = discretise(self.law, basis, tolerance=self.tolerance, rng=self.rng)
-        along, across = (basis.project(function) for function in (_cosine, _sine))
+        # normalised for sin(theta)/2 d theta; the second is orthogonal to the constants
+        along = basis.project(lambda theta: np.sqrt(3.0) * np.cos(theta))
+        across = basis.project(lambda theta: (np.sin(theta) - MEAN_SINE) / SINE_NORM)
         entries = np.array([1.0 + along @ matrix.symmetric @ along, 1.0 - across @ matrix.symmetric @ across])
         # both have norm 1: the projections are exact to rounding
         error = float(matrix.error) + PANELS_MISS
@@ -319,7 +312,7 @@ def _coefficients(
     parts: list[tuple[float, _Changes]], theta: Floats, wanted: float
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """The coefficients, their errors, and where an error exceeds the wanted one, relative to the coefficient."""
-    complete = np.stack([np.cos(theta), np.sin(theta) - MEAN_SINE], axis=1)
+    complete = _complete(theta)
     changes, errors = _summed(parts, theta, RULE_SHARE * wanted)
     missed = errors > wanted * np.abs(changes)
     again = missed.any(axis=1)
@@ -347,8 +340,8 @@ def _misfit(law: Law, parts: list[tuple[float, _Changes]], fraction: Estimate, w
         edges = np.unique(np.concatenate([uniform, breakpoints, graded, np.pi - graded]))
         angle, weight = SINE.quadrature(edges, MISFIT_NODES)
         changes, errors = _summed(parts, angle, RULE_SHARE * wanted)
-        complete = np.stack([np.cos(angle), np.sin(angle) - MEAN_SINE], axis=1)
-        least.append(float(np.sqrt(weight @ np.sum((changes - fraction.value * complete) ** 2, axis=1))))
+        difference = changes - fraction.value * _complete(angle)
+        least.append(float(np.sqrt(weight @ np.sum(difference**2, axis=1))))
     # a norm: what the means are wrong by, and what the fraction is, change it by no more than their own norms
     doubt = float(np.sqrt(weight @ np.sum(errors**2, axis=1)))
     doubt += fraction.error * float(np.sqrt(WEIGHTS.sum()))

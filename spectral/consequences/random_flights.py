@@ -4,37 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import (
-    Floats,
-    Rng,
-    check_memory,
-    choice,
-    finite_array,
-    frozen,
-    generator,
-    positive_number,
-    whole_number,
-)
+from ...core.checks import Floats, Rng, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
-from ...kernels.laws.matrix_law import not_a_law
-from .channel import MOST_CROSSINGS, SMALLEST
-from .diffusion import Arrangement
+from .channel import MOST_FLIGHTS, SMALLEST, Arrangement, checked, passed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Groups of particles, left out one by one, for the standard error of a function of means.
 GROUPS = 32
-# Times from which a rate and its drift, or a slope, can be taken.
-FEWEST_TIMES = 3
 
 
 @dataclass(frozen=True)
@@ -219,22 +205,15 @@ def channel_paths(
     >>> bool(np.allclose(smooth.positions[:, 2], 4.0 * smooth.positions[:, 0]))
     True
     """
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
-    moments = finite_array("times", times).ravel()
-    if moments.size < FEWEST_TIMES or moments[0] <= 0.0 or np.any(np.diff(moments) <= 0.0):
-        raise InputError(f"times: expected at least {FEWEST_TIMES} increasing positive times, got {times!r}")
-    choice("arrangement", arrangement, get_args(Arrangement))
-    check_memory("particles", "all positions", 2 * moments.size * whole_number("particles", particles, 2))
+    paper, moments = checked(law, "times", times, arrangement, particles)
     half, pace = positive_number("radius", radius), positive_number("speed", speed)
     middle = math.inf if isinstance(bend, float) and bend == math.inf else positive_number("bend", bend)
     if not middle > half:
         raise InputError(f"bend: expected a number greater than the radius {half:g}, got {bend!r}")
-    paper = law.in_specular_frame() if law.frame == "specular" else law
-    channel = _Channel(half, middle, -1.0 if arrangement == "half-turn" else 1.0)
-    latest = MOST_CROSSINGS * channel.longest / pace
+    channel = _Channel(half, middle, arrangement == "half-turn")
+    latest = MOST_FLIGHTS * channel.longest / pace
     if not moments[-1] <= latest:
-        raise InputError(f"times: expected at most {latest:.3g} ({MOST_CROSSINGS} flights), got {moments[-1]:.3g}")
+        raise InputError(f"times: expected at most {latest:.3g} ({MOST_FLIGHTS} flights), got {moments[-1]:.3g}")
     positions = _simulated(paper, channel, pace * moments, particles, generator(rng))
     return ChannelPaths(frozen(moments), frozen(positions), half, pace, middle)
 
@@ -249,8 +228,8 @@ class _Channel:
 
     half: float
     bend: float
-    # sign of the x axis of the upper wall's frame in the channel
-    upper: float
+    # whether the x axis of the upper wall's frame runs against the channel
+    turned: bool
 
     @property
     def is_straight(self) -> bool:
@@ -264,7 +243,7 @@ class _Channel:
 
     def framed(self, angle: Floats, wall: Floats) -> Floats:
         """The angle in the frame of the wall, from that in the channel, and the other way round."""
-        return np.where((wall > 0) & (self.upper < 0.0), math.pi - angle, angle)
+        return np.where((wall > 0) & self.turned, math.pi - angle, angle)
 
     def flight(self, direction: Floats, wall: Floats) -> tuple[Floats, Floats, Floats]:
         """Length of the flight, the wall at its end, and the angle of the same direction with this wall."""
@@ -298,16 +277,11 @@ def _simulated(law: Law, channel: _Channel, paths: Floats, particles: int, rng: 
     wall = (rng.random(particles) < share).astype(np.float64)
     x, run, reached = np.zeros(particles), np.zeros(particles), np.zeros(particles, dtype=np.int64)
     direction = channel.framed(SINE.sample(particles, rng), wall)
-    for _ in range(MOST_CROSSINGS):
+    for _ in range(MOST_FLIGHTS):
         length, after, arriving = channel.flight(direction, wall)
-        passing = np.flatnonzero(run + length >= paths[reached])
-        while passing.size:
-            part = paths[reached[passing]] - run[passing]
-            here = x[passing] + channel.advance(direction[passing], wall[passing], part)
-            positions[going[passing], reached[passing]] = here
-            reached[passing] += 1
-            passing = passing[reached[passing] < paths.size]
-            passing = passing[(run + length)[passing] >= paths[reached[passing]]]
+        who, level, reached = passed(paths, reached, run + length)
+        part = paths[level] - run[who]
+        positions[going[who], level] = x[who] + channel.advance(direction[who], wall[who], part)
         stays = reached < paths.size
         if not stays.any():
             return positions
@@ -316,4 +290,4 @@ def _simulated(law: Law, channel: _Channel, paths: Floats, particles: int, rng: 
         incoming = math.pi - channel.framed(arriving[stays], wall)
         outgoing = law.sample(np.clip(incoming, SMALLEST, math.pi - SMALLEST), rng)
         direction = channel.framed(outgoing, wall)
-    raise InputError(f"law: {law!r} keeps {len(x)} particles in flight after {MOST_CROSSINGS} collisions")
+    raise InputError(f"law: {law!r} keeps {len(x)} particles in flight after {MOST_FLIGHTS} collisions")

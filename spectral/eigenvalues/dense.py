@@ -46,7 +46,10 @@ def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
     """
     from scipy.linalg import eigh
 
-    reflector = _householder(constant)
+    # I - 2 v v^T maps the unit vector to plus or minus the first axis
+    reflector = np.array(constant, dtype=np.float64)
+    reflector[0] += 1.0 if reflector[0] >= 0.0 else -1.0
+    reflector /= np.linalg.norm(reflector)
     reflected = _reflect(reflector, _reflect(reflector, array).T)
     values, inner = eigh(0.5 * (reflected + reflected.T)[1:, 1:])
     vectors = np.vstack([np.zeros((1, inner.shape[1])), inner])
@@ -111,13 +114,6 @@ def symmetric_half(array: Floats) -> Floats:
         found[here, there] = 0.5 * (array[here, there] + array[there, here].T)
         found[there, here] = found[here, there].T
     return found
-
-
-def _householder(unit: Floats) -> Floats:
-    """The unit vector v for which I - 2 v v^T maps ``unit`` to plus or minus the first axis."""
-    v = np.array(unit, dtype=np.float64)
-    v[0] += 1.0 if v[0] >= 0.0 else -1.0
-    return np.asarray(v / np.linalg.norm(v))
 
 
 def _reflect(v: Floats, array: Floats) -> Floats:

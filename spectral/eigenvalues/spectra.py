@@ -266,13 +266,14 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
     exact = matrix.beyond is not None
     changes = np.zeros(len(values)) if exact else margin * np.append(0.0, two_grid_changes(matrix, rest))
 
-    total = _errors(matrix, values, vectors, algebraic, changes)
+    algebraic = algebraic + matrix.basis.size * EPS
+    # errors of entries change an eigenvalue by at most their Frobenius norm; sampling errors are separate
+    discretisation = changes + (0.0 if matrix.samples else float(matrix.error))
+    sampling, quantile = sampling_errors(matrix, vectors, values), sampling_quantile(matrix)
 
     def errors_of(indices: NDArray[np.intp]) -> SpectrumErrors:
-        algebraic, discretisation, sampling = (
-            frozen(part[indices]) for part in (total.algebraic, total.discretisation, total.sampling)
-        )
-        return SpectrumErrors(algebraic, discretisation, sampling, total.quantile)
+        parts = [frozen(part[indices]) for part in (algebraic, discretisation, sampling)]
+        return SpectrumErrors(parts[0], parts[1], parts[2], quantile)
 
     # without a second function the gap is 1 by convention, with unknown error
     unknown = frozen([np.inf])
@@ -281,7 +282,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
         gap_errors = errors_of(np.array([1]))
         gap, slem = float(1.0 - rest.values[0]), float(np.abs(rest.values).max())
     if matrix.beyond is not None:
-        gap_errors = errors_of(np.array([1 if len(rest.values) else 0]))
+        gap_errors = gap_errors if len(rest.values) else errors_of(np.array([0]))
         gap, slem = min(gap, 1.0 - max(matrix.beyond)), max(slem, *np.abs(matrix.beyond).tolist())
     indices = np.append(0, 1 + chosen)
     return Spectrum(
@@ -299,19 +300,6 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
         parity=("none" if "none" in names or not names else "even", *(names[i] for i in chosen)),
         completeness=rest.method,
         evidence=("the matrix of a law in bins beyond which the law is known",) if exact else (UNREFINED,),
-    )
-
-
-def _errors(
-    matrix: KernelMatrix, values: Floats, vectors: Floats, algebraic: Floats, changes: Floats
-) -> SpectrumErrors:
-    rounding = matrix.basis.size * EPS
-    return SpectrumErrors(
-        algebraic=frozen(algebraic + rounding),
-        # errors of entries change an eigenvalue by at most their Frobenius norm; sampling errors are separate
-        discretisation=frozen(changes + (0.0 if matrix.samples else float(matrix.error))),
-        sampling=frozen(sampling_errors(matrix, vectors, values)),
-        quantile=sampling_quantile(matrix),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +11,6 @@ from ...core.estimates import NORMAL_95, student_95
 from ...kernels.sampling.counts import missed_fraction
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
     from ...kernels import KernelMatrix
 
 
@@ -30,7 +28,7 @@ def sampling_errors(matrix: KernelMatrix, vectors: Floats, values: Floats) -> Fl
     """
     errors = np.zeros(len(values))
     if len(matrix.replicates) > 1:
-        each = np.array([_quadratic_forms(replicate, vectors) for replicate in matrix.replicates])
+        each = np.array([np.sum(vectors * (replicate @ vectors), axis=0) for replicate in matrix.replicates])
         errors = np.asarray(each.std(axis=0, ddof=1) / np.sqrt(len(each)))
     elif matrix.counts is not None:
         errors = np.sqrt(_count_variances(matrix, vectors))
@@ -38,10 +36,6 @@ def sampling_errors(matrix: KernelMatrix, vectors: Floats, values: Floats) -> Fl
         return errors
     beside = np.maximum(1.0 - (matrix.basis.constant @ vectors) ** 2, 0.0)
     return np.maximum(errors, 2.0 * missed_fraction(matrix.samples) * beside / sampling_quantile(matrix))
-
-
-def _quadratic_forms(symmetric: Floats | csr_array[Any], vectors: Floats) -> Floats:
-    return np.asarray(np.sum(vectors * (symmetric @ vectors), axis=0))
 
 
 def _count_variances(matrix: KernelMatrix, vectors: Floats) -> Floats:

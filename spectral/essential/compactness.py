@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...core.checks import instance, positive_number
-from ...core.estimates import Estimate
-from ...kernels import DensityLaw, InvolutionLaw, Law, Legendre, MatrixLaw, WallLaw, discretise
+from ...core.estimates import ErrorKind, Estimate
+from ...kernels import DensityLaw, InvolutionLaw, Law, Legendre, discretise
 from ...kernels.laws.structure import Rules, fold
 from .edge import essential_edge
 
@@ -84,7 +85,7 @@ def hilbert_schmidt_norm(law: Law, tolerance: float = 1e-6) -> HilbertSchmidtNor
     """
     instance("law", law, Law, "ker.lambertian()")
     wanted = positive_number("tolerance", tolerance)
-    if _contains(law, InvolutionLaw):
+    if _contains_involution(law):
         return _none("bound", ("a part of the law is deterministic, f -> f o T, and preserves norms",))
     edge = essential_edge(law)
     if edge.low > 0.0:
@@ -120,25 +121,23 @@ def _rest(norms: list[float]) -> float:
     return last * factor / (1.0 - factor) + last if factor < FALLING else math.inf
 
 
-def _none(kind: str, reasons: tuple[str, ...]) -> HilbertSchmidtNorm:
-    bound = "bound" if kind == "bound" else "estimate"
-    return HilbertSchmidtNorm(math.inf, 0.0, bound, "structure of the law", False, reasons)  # type: ignore[arg-type]
+def _none(kind: ErrorKind, reasons: tuple[str, ...]) -> HilbertSchmidtNorm:
+    return HilbertSchmidtNorm(math.inf, 0.0, kind, "structure of the law", False, reasons)
 
 
-def _contains(law: Law, kind: type[Law]) -> bool:
-    rules = Rules(
-        lambda leaf: isinstance(leaf, kind), lambda terms: any(fact for _, fact in terms), lambda parts: all(parts),
-        lambda fact: fact,
-    )  # fmt: skip
-    return fold(law, rules)
+def _contains_involution(law: Law) -> bool:
+    """Whether a term of the law is an involution, or a product of involutions."""
+
+    def of_any(terms: Sequence[tuple[float, bool]]) -> bool:
+        return any(fact for _, fact in terms)
+
+    return fold(law, Rules(lambda leaf: isinstance(leaf, InvolutionLaw), of_any, all, lambda fact: fact))
 
 
 def _contains_only_densities(law: Law) -> bool:
     """Whether the law is compact by its parts: sums of densities, and products with at least one."""
-    rules = Rules(
-        lambda leaf: isinstance(leaf, (DensityLaw, MatrixLaw)) and not isinstance(leaf, WallLaw),
-        lambda terms: all(fact for _, fact in terms),
-        lambda parts: any(parts),
-        lambda fact: fact,
-    )
-    return fold(law, rules)
+
+    def of_all(terms: Sequence[tuple[float, bool]]) -> bool:
+        return all(fact for _, fact in terms)
+
+    return fold(law, Rules(lambda leaf: isinstance(leaf, DensityLaw), of_all, any, lambda fact: fact))

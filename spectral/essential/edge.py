@@ -115,7 +115,9 @@ def _leaf(law: Law) -> _Part:
     if isinstance(law, (LambertianLaw, HenyeyGreensteinLaw, MatrixLaw)):
         return _Part((0.0, 0.0), np.zeros((2, 2)), 0.0, 0.0, True, (f"{law!r} is compact",))
     if made_of_isometries(law):
-        limit = _ideal_limit(law) if isinstance(law, IsometryLaw) else grazing_limit(law)
+        if isinstance(law, IsometryLaw):
+            return replace(_isometric(law), grazing=np.eye(2) if law.retro else SWAP)
+        limit = grazing_limit(law)
         # the grazing limit of an isometric law matters in sums with other laws only
         return replace(_isometric(law), grazing=limit.matrix, error=limit.error, entry_error=limit.entry_error)
     limit = grazing_limit(law)
@@ -149,10 +151,6 @@ def _isometric(law: Law) -> _Part:
     """The part of an isometric law, which has the edge 1, without its grazing limit."""
     note = f"{law!r} is made of isometries theta' = +-theta + const: cos(n theta) is nearly kept for suitable n"
     return _Part((1.0, 1.0), np.zeros((2, 2)), 0.0, 0.0, True, (note,), 1.0)
-
-
-def _ideal_limit(law: IsometryLaw) -> GrazingLimit:
-    return GrazingLimit(np.eye(2) if law.retro else SWAP, 0.0, 0.0)
 
 
 def _mixture(terms: Sequence[tuple[float, _Part]]) -> _Part:

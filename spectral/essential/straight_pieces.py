@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,8 +102,7 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     return StraightPart(fraction, low - ROUNDING, float(min(high, max(found.fractions.max() + 2.0 / POINTS, low), 1.0)))
 
 
-@dataclass(frozen=True)
-class _Orbits:
+class _Orbits(NamedTuple):
     """For each initial angle the largest eigenvalue of its orbit, its change by the last layer, and the fraction."""
 
     roots: Floats
@@ -116,7 +115,7 @@ def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, bar: Any, halv
     orbits = [[_node(theta)] for theta in starts]
     angles = {_node(theta): float(theta) for theta in starts}
     roots = np.zeros((LAYERS, len(starts)))
-    fresh = list(dict.fromkeys(node for orbit in orbits for node in orbit))
+    fresh = list(angles)
     for layer in range(LAYERS):
         conditionals |= _conditionals(law, [(node, angles[node]) for node in fresh], points, halved)
         fresh = []
@@ -125,7 +124,7 @@ def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, bar: Any, halv
             if layer == LAYERS - 1:
                 continue
             reached = {_node(out): float(out) for node in orbit for out in conditionals[node][1]}
-            new = [node for node in reached if not _near(node, orbit)]
+            new = [node for node in reached if _index(node, orbit) is None]
             if len(orbit) + len(new) <= MOST_NODES:
                 for node in new:
                     angles.setdefault(node, reached[node])
@@ -141,8 +140,9 @@ def _node(theta: float) -> int:
     return round(float(theta) / SAME_NODE)
 
 
-def _near(node: int, orbit: list[int]) -> bool:
-    return any(abs(node - other) <= 1 for other in orbit)
+def _index(node: int, orbit: list[int]) -> int | None:
+    """The index of the first node of an orbit that is within rounding of a node."""
+    return next((j for j, other in enumerate(orbit) if abs(other - node) <= 1), None)
 
 
 def _root(orbit: list[int], conditionals: dict[int, tuple[Floats, Floats]], angles: dict[int, float]) -> float:
@@ -150,9 +150,7 @@ def _root(orbit: list[int], conditionals: dict[int, tuple[Floats, Floats]], angl
     matrix = np.zeros((len(orbit), len(orbit)))
     for i, node in enumerate(orbit):
         for weight, out in zip(*conditionals[node], strict=True):
-            target = _node(out)
-            j = next((j for j, other in enumerate(orbit) if abs(other - target) <= 1), None)
-            if j is not None:
+            if (j := _index(_node(out), orbit)) is not None:
                 matrix[i, j] += weight * np.sqrt(np.sin(angles[node]) / np.sin(angles[orbit[j]]))
     return float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
 
@@ -161,12 +159,10 @@ def _conditionals(
     law: WallLaw, nodes: list[tuple[int, float]], points: int, halved: bool
 ) -> dict[int, tuple[Floats, Floats]]:
     """Weights and outgoing angles of the straight rays for the angle of each node."""
-    if not nodes:
-        return {}
     theta = np.array([angle for _, angle in nodes])
     x = np.broadcast_to((np.arange(points) + 0.5) / points, (len(nodes), points))
     out = _straight(law, x.ravel(), np.repeat(theta, points)).reshape(len(nodes), points)
-    labels = np.rint(np.nan_to_num(out, nan=-1.0) / SAME_NODE).astype(np.int64)
+    labels = _labels(out)
     row, entry = np.nonzero(np.abs(np.diff(labels, axis=1)) > 1)
     low, high = x[row, entry], x[row, entry + 1]
     if halved:
@@ -183,12 +179,16 @@ def _conditionals(
     return found
 
 
+def _labels(out: Floats) -> NDArray[np.int64]:
+    """The nodes of outgoing angles, and one number for all other rays."""
+    return np.rint(np.nan_to_num(out, nan=-1.0) / SAME_NODE).astype(np.int64)
+
+
 def _changes(law: WallLaw, theta: Floats, low: Floats, high: Floats, label: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """Intervals, bisected to rounding, that contain the first change of the label to the right of ``low``."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        here = np.rint(np.nan_to_num(_straight(law, middle, theta), nan=-1.0) / SAME_NODE).astype(np.int64)
-        same = np.abs(here - label) <= 1
+        same = np.abs(_labels(_straight(law, middle, theta)) - label) <= 1
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     return low, high
 
@@ -204,7 +204,7 @@ def _straight(law: WallLaw, x: Floats, theta: Floats) -> Floats:
 def _has_straight_pieces_below(wall: Wall) -> bool:
     from ...geometry import Segment
 
-    if not wall.closes:
-        return any(isinstance(piece, Segment) for loop in (wall.pieces, *wall.islands) for piece in loop)
-    below = [piece for hollow in wall.hollows for piece in wall.cell.pieces[hollow.first : hollow.last]]
-    return any(isinstance(piece, Segment) for piece in below)
+    loops = [wall.pieces, *wall.islands]
+    if wall.closes:
+        loops = [wall.cell.pieces[hollow.first : hollow.last] for hollow in wall.hollows]
+    return any(isinstance(piece, Segment) for loop in loops for piece in loop)

@@ -83,7 +83,9 @@ def test_scattering_in_a_convex_region_is_an_involution_that_preserves_the_flux(
     n, centre, radius = 20_000, (0.5, 0.6), 4.0
     if region == "circle":
         before, after = body.scatter_in_circle(n, RNG, centre, radius)
-        again = body._through(after[:, 0], after[:, 1], np.array(centre), radius * (1.0 + 1e-12))
+        size = radius * (1.0 + 1e-12)
+        around = geo.Container.from_curves([geo.Arc(centre, size, 0.0, 2.0 * np.pi)])
+        again = body._through_region(after * [size, 1.0], around) / [size, 1.0]
         period = 2.0 * np.pi
     else:
         around = REGIONS[region].closed()

@@ -32,7 +32,9 @@ def test_a_wrong_temperature_is_not_in_balance():
     before = wall.equilibrium(60_000, rng)
     after = hot.sample(before, rng)
     assert np.mean(after[:, 1] ** 2) > 1.05 * np.mean(before[:, 1] ** 2)
-    counts = np.histogram2d(wall._cell(before[:, 1]), wall._cell(after[:, 1]), bins=12)[0]
+    # cells of equal measure under the flux of Maxwell's distribution at the wall's temperature
+    levels = [np.exp(-0.5 * velocity[:, 1] ** 2 / wall.temperature) for velocity in (before, after)]
+    counts = np.histogram2d(*levels, bins=12, range=[[0.0, 1.0], [0.0, 1.0]])[0]
     upper = np.triu_indices(12, 1)
     forth, back = counts[upper], counts.T[upper]
     assert np.sum((forth - back) ** 2 / (forth + back)) > 66.0 + 8.0 * np.sqrt(132.0)
