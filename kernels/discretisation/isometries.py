@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...core.checks import Floats
@@ -11,7 +13,7 @@ from ..bases.displacement import Displacement
 from ..bases.measure import gauss_on_intervals
 from ..laws.branches import preimages
 from ..laws.law import Law
-from ..laws.structure import has_chain, lists_branches
+from ..laws.structure import Rules, fold, has_chain, lists_branches
 from ..matrices.matrix import KernelMatrix
 from .isometry_tables import bounded, table_matrix
 from .method import Budget, MethodName, rounding
@@ -23,10 +25,12 @@ NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
 # Breakpoints that accumulate at grazing are listed until the omitted fraction is negligible or their use would take
 # more than about a second.
 FEWEST_BREAKPOINTS, BREAKPOINT_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
-# Work of a chain, whose branches merge, as a multiple of that of a law with the branches that are left.
-WORK_OF_CHAINS = 16
 # Limit on nodes times branches in memory at a time, and angles at which branches are counted.
 CHUNK, PROBES = 2**22, np.linspace(0.1, 3.0, 30)
+# Number of branches that are computed before those of a chain merge.
+BRANCHES_COMPUTED = Rules(
+    lambda law: law.branches(PROBES)[0].shape[-1], lambda terms: sum(n for _, n in terms), math.prod, lambda n: n
+)
 
 
 class Isometries:
@@ -62,7 +66,7 @@ def branch_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
     limit = FEWEST_BREAKPOINTS
     breakpoints, omitted = law.breakpoints(limit)
     branches = law.branches(PROBES)[0].shape[-1]
-    most = BREAKPOINT_WORK // (branches**2 * (WORK_OF_CHAINS if has_chain(law) else 1))
+    most = BREAKPOINT_WORK // fold(law, BRANCHES_COMPUTED) ** 2
     if not basis.is_partition:
         most = min(most, FUNCTION_WORK // basis.size)
     while omitted * worst > tolerance and 2 * limit <= most:
