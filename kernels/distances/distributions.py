@@ -12,7 +12,7 @@ from ..bases.measure import SINE
 from ..discretisation.discretisation import discretise
 from ..expectations.conditionals import Conditionals
 from ..laws.distribution import Distribution
-from ..laws.law import ENTRY_POINTS, Combination, Composition, Law, Power, SpecularFrame, atoms_of
+from ..laws.law import ENTRY_POINTS, Combination, Composition, Law, Power, SpecularFrame, is_atomic
 from ..matrices.matrix import KernelMatrix
 from .transport import Distributions, power_mean, wasserstein
 
@@ -119,9 +119,8 @@ class _OnCells(Composition):
     last: KernelMatrix | None = field(default=None, compare=False, repr=False)
 
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        atoms = atoms_of(self, theta, edges)
-        if atoms is not None:
-            return atoms
+        if is_atomic(self):
+            return super()._distribution(theta, edges)
         first, *rest = self.laws
         found = first.distribution(theta, edges)
         if not rest:

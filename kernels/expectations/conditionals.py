@@ -12,7 +12,7 @@ from ...core.checks import Floats
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction, Basis
 from ..bases.given import Vectorised
-from ..bases.intervals import cell_among
+from ..bases.intervals import cell_among, joined_lists
 from ..bases.measure import gauss_on_intervals
 from .basis_means import means_of_basis
 
@@ -75,6 +75,14 @@ class Conditionals(NamedTuple):
     def owner(self) -> NDArray[np.intp]:
         """The index of the incoming angle of each node."""
         return np.repeat(np.arange(self.error.size), np.diff(self.starts))
+
+    def atoms(self) -> tuple[Floats, Floats]:
+        """Nodes and weights, shape (angles, nodes); unused slots have weight 0 and the first node."""
+        owner, slot = joined_lists(np.diff(self.starts))
+        nodes = np.repeat(self.nodes[self.starts[:-1]], slot.max(initial=0) + 1).reshape(self.error.size, -1)
+        weights = np.zeros(nodes.shape)
+        nodes[owner, slot], weights[owner, slot] = self.nodes, self.weights
+        return nodes, weights
 
     def mean(self, function: AngleFunction) -> Floats:
         """E[f(Theta') | theta] for every angle, shape ``(angles,) + extra`` if f has values ``theta.shape + extra``."""

@@ -14,10 +14,8 @@ from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.given import Vectorised
-from ..bases.intervals import cell_among
-from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
+from ..bases.measure import SINE, gauss_on_intervals
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
-from .distribution import Distribution
 from .law import Law, set_properties
 
 DensityFunction = Callable[[Floats, Floats], Floats]
@@ -33,8 +31,6 @@ SYMMETRY_TOLERANCE = 1e-9
 PANEL_COUNTS = (16, 32, 64, 128, 256, 512, 1024)
 GAUSS_NODES = 16
 CHECK_NODES = 8
-# Gauss nodes on a cell of a grid, or on a panel of the law if that is narrower.
-CELL_NODES = 6
 # Stiffness of a density on one of its panels, where 16 Gauss nodes reach rounding; see `gauss_nodes`.
 PANEL_STIFFNESS = 12.0
 # Cells on each panel in the table of the cdf that is sampled.
@@ -133,25 +129,6 @@ class DensityLaw(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The outgoing breakpoints, which by detailed balance are incoming ones too; there may be others."""
         return self.outgoing_breakpoints, math.inf
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """Cell masses by Gauss rules between the edges; if the law's panels are narrower, their edges cut the cells."""
-        step = max(1, CHUNK // (CELL_NODES * edges.size))
-        parts = [self._cell_masses(theta[start : start + step], edges) for start in range(0, theta.size, step)]
-        below = Distribution.of_cells(np.concatenate(parts)).below
-        return Distribution.without_atoms(below / below[:, -1:])
-
-    def _cell_masses(self, theta: Floats, edges: Floats) -> Floats:
-        cells = edges.size - 1
-        if self.resolution >= float(np.diff(edges).max()):
-            angle, weight = gauss_rule(edges, CELL_NODES)
-            masses = self.density(theta[:, None], angle) * weight
-            return np.asarray(masses.reshape(theta.size, cells, CELL_NODES).sum(axis=2))
-        row, low, high, _ = cut_by_edges(self.panels(theta), edges)
-        angle, weight = (part.reshape(-1, CELL_NODES) for part in gauss_on_intervals(low, high, CELL_NODES))
-        mass = (self.density(theta[row, None], angle) * weight).sum(axis=1)
-        cell = row * cells + cell_among(edges, 0.5 * (low + high))
-        return np.asarray(np.bincount(cell, weights=mass, minlength=theta.size * cells).reshape(-1, cells))
 
     # ---- sampling, expectations and adjoint ------------------------------------------------------------------
     def adjoint(self) -> Law:

@@ -14,7 +14,6 @@ from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..expectations.conditionals import Conditionals
 from ..matrices.matrix import KernelMatrix
-from .distribution import Distribution
 from .law import Law
 
 # Fluxes that differ by less than this fraction of a cell are equal; fluxes below NO_MASS are rounding errors.
@@ -98,10 +97,6 @@ class IntervalExchangeLaw(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """All angles between two pieces; none are left out."""
         return np.asarray(SINE.quantile(self.starts[1:])), 0.0
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """One atom at the image of each angle."""
-        return Distribution.of_atoms(edges, self.image(theta)[:, None], np.ones((theta.size, 1)))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.image(theta)

@@ -14,7 +14,6 @@ from ..bases.angles import clipped_inside
 from ..bases.intervals import bisected
 from ..bases.measure import SINE
 from ..expectations.conditionals import Conditionals
-from .distribution import Distribution
 from .law import Law, RandomMap
 
 PROBES = 4096
@@ -116,11 +115,6 @@ class InvolutionLaw(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The angles where the map jumps or reverses direction, as far as 4096 probes show them."""
         return jumps_of_map(self.map), 0.0
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """One atom at the image of each angle."""
-        image = np.asarray(self.map(theta), dtype=np.float64)
-        return Distribution.of_atoms(edges, clipped_inside(image)[:, None], np.ones((theta.size, 1)))
 
     def random_map(self) -> RandomMap:
         """The map T, independent of the uniform number."""

@@ -51,6 +51,8 @@ MOST_VALUES = 10**8
 ENTRY_POINTS = 4096
 # The tolerance of `apply`, the incoming angles with which it begins, and outgoing angles in memory at a time.
 TOLERANCE, FIRST_ANGLES, NODES_AT_ONCE = 1e-8, 16, 2**20
+# Cells of outgoing angles in memory at a time; each has some nodes.
+CELLS_AT_ONCE = 2**17
 # Degree of the functions that `conditionals` averages by default.
 DEGREE = 8
 # Breakpoints of laws at which the means under the law before them are cut.
@@ -274,8 +276,13 @@ class Law(ABC):
         return self._distribution(angle, cells)
 
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """`distribution` for checked arguments; the default adds up the masses of conditional distributions."""
-        return Distribution.of_cells(self._conditionals(theta, TOLERANCE, 0, edges[1:-1]).masses(edges))
+        """`distribution` for checked arguments, by default from conditional distributions."""
+        if is_atomic(self):
+            return Distribution.of_atoms(edges, *self._conditionals(theta, TOLERANCE, 0, np.empty(0)).atoms())
+        steps = range(0, theta.size, max(1, CELLS_AT_ONCE // edges.size))
+        some = (theta[start : start + steps.step] for start in steps)
+        masses = [self._conditionals(part, TOLERANCE, 0, edges[1:-1]).masses(edges) for part in some]
+        return Distribution.of_cells(np.concatenate([np.empty((0, edges.size - 1)), *masses]))
 
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
@@ -346,11 +353,6 @@ class BranchLaw(Law):
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self._branch_taken(rng.random(theta.shape), theta)
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The branches as atoms."""
-        probability, outgoing = self.branches(theta)
-        return Distribution.of_atoms(edges, outgoing, probability)
 
     def _branch_taken(self, x: Floats, theta: Floats) -> Floats:
         probability, outgoing = self.branches(theta)
@@ -651,10 +653,6 @@ class Composition(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return chained_breakpoints(self.laws, limit)
 
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The branches, if there are any that can be listed, as atoms; else by `apply`."""
-        return atoms_of(self, theta, edges) or super()._distribution(theta, edges)
-
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         for law in self.laws:
             theta = law.sample(theta, rng)
@@ -725,10 +723,6 @@ class Power(Law):
             return np.empty(0), math.inf
         return chained_breakpoints((self.law,) * self.exponent, limit)
 
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The branches, if there are any that can be listed, as atoms; else by `apply`."""
-        return atoms_of(self, theta, edges) or super()._distribution(theta, edges)
-
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         _check_length("sample", self.exponent, LONGEST_SAMPLE)
         for _ in range(self.exponent):
@@ -741,15 +735,6 @@ class Power(Law):
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)} ** {self.exponent}"
-
-
-def atoms_of(law: Law, theta: Floats, edges: Floats) -> Distribution | None:
-    """The branches of a law as atoms; None if it cannot list branches or has too many."""
-    try:
-        probability, outgoing = law.branches(theta)
-    except InputError:
-        return None
-    return Distribution.of_atoms(edges, outgoing, probability)
 
 
 def as_base(law: Law) -> str:

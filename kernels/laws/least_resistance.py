@@ -12,7 +12,6 @@ from ..bases.angles import clipped_inside
 from ..bases.bins import Bins
 from ..bases.measure import SINE, gauss_on_intervals
 from ..expectations.conditionals import Conditionals
-from .distribution import Distribution
 from .law import Law
 
 # Rays are split from this x = theta - pi/2 on, at which the partner 3 x - pi is grazing.
@@ -74,11 +73,6 @@ class LeastResistanceLaw(Law):
         """The angles where the formula changes; none are left out."""
         x = np.array([SPLIT_BEGINS, self.split_ends, np.pi - 3.0 * self.split_ends])
         return 0.5 * np.pi + np.concatenate((-x[::-1], x)), 0.0
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """Two atoms at each incoming angle."""
-        probability, outgoing = self.images(theta)
-        return Distribution.of_atoms(edges, outgoing, probability)
 
     def potential(self, theta: Floats) -> Floats:
         """The potential phi: phi(theta) + phi(theta') <= cos(theta' - theta), with equality on the law's support."""

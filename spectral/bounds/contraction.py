@@ -7,7 +7,7 @@ import numpy as np
 from ...core.errors import AccuracyError, InputError
 from ...kernels import Law
 from ...kernels.laws.structure import lists_branches
-from .expectations import suits_panels
+from .images import suits_panels
 
 # Angles at which the law is compared with its mirror image, and the difference of two means of cos(theta') that exceeds
 # their errors.

@@ -24,7 +24,7 @@ from ...kernels.laws.structure import made_of_isometries
 from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
 from ..eigenvalues.spectra import Spectrum, check_reversible, matrix_spectrum
 from .contraction import refuse_unless_self_adjoint
-from .expectations import is_traced, suits_panels
+from .images import is_traced, suits_panels
 from .operator_residuals import Residuals, image_rule, residuals
 from .separation import Separation, rest_of_spectrum
 from .trial_space import adapted_trial_space

@@ -23,7 +23,7 @@ from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_err
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
 from ...kernels.walls.circular_arc import MOST_HITS
 from ...kernels.walls.conditionals import is_few
-from .expectations import expectations_of
+from .images import expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9

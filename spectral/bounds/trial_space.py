@@ -17,7 +17,7 @@ from ...kernels.bases.assembly import one_blas_thread
 from ...kernels.bases.measure import SINE
 from ...kernels.expectations.angle_panels import KRONROD, NODES
 from ..eigenvalues.parity import Parity
-from .expectations import expectations, is_traced
+from .images import expectations, is_traced
 
 # Degree on each panel, for which Kronrod's rule is exact for products of two functions.
 DEGREE = 6

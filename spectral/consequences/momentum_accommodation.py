@@ -20,7 +20,7 @@ from ...kernels.expectations.basis_means import Means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Combination, IsometryLaw, is_atomic
 from ...kernels.laws.structure import has_chain, law_of, words_of
-from ..bounds.expectations import is_costly
+from ..bounds.images import is_costly
 from ..bounds.operator_residuals import image_rule
 from ..gap.shallow import ROUNDING, Slopes, slopes_of
 from .channel import in_paper_frame

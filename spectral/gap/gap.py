@@ -16,7 +16,7 @@ from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.laws.structure import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
-from ..bounds.expectations import is_costly, suits_panels
+from ..bounds.images import is_costly, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import adapted_trial_space

@@ -14,7 +14,7 @@ from ...kernels import DensityLaw, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.structure import made_of_isometries
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
-from ..bounds.expectations import is_costly, suits_panels
+from ..bounds.images import is_costly, suits_panels
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
 
 # Sizes of Legendre bases for laws without known errors of expectations; the first suffices for ten eigenvalues of most.

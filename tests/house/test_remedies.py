@@ -159,7 +159,8 @@ def test_what_is_given_as_an_example_is_one():
     names = {
         **{name: getattr(room, name) for room in (geo, ker) for name in dir(room)},
         "Estimate": Estimate, "geo": geo, "ker": ker, "spec": spec, "wall": WALL, "law": LAW, "disk": DISK, "n": 3,
-        "container": geo.Container.circle(), "laws": ker.smooth(DISK), "matrix": ker.discretise(ker.lambertian(), ker.Bins(4)), "position": [0.5, 0.0], "collisions": 3,
+        "container": geo.Container.circle(), "laws": ker.smooth(DISK),
+        "matrix": ker.discretise(ker.lambertian(), ker.Bins(4)), "position": [0.5, 0.0], "collisions": 3,
         "velocity": [0.0, 1.0, 0.0],
     }  # fmt: skip
     examples = {

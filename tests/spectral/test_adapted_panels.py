@@ -9,7 +9,7 @@ from asperity import spectral as spec
 from asperity.kernels.bases.measure import gauss_rule
 from asperity.kernels.discretisation.arcs import arc_matrix
 from asperity.kernels.expectations.angle_panels import NODES
-from asperity.spectral.bounds.expectations import expectations, expectations_of, suits_panels
+from asperity.spectral.bounds.images import expectations, expectations_of, suits_panels
 from asperity.spectral.bounds.trial_space import adapted_trial_space
 
 ANGLES = np.concatenate([0.05 + 0.3 * np.arange(10.0), [1e-6, 1.2, np.pi - 1e-6]])

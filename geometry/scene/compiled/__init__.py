@@ -1,1 +1,1 @@
-"""The types of records and tables in compiled functions."""
+"""Tables and named tuples in compiled functions."""

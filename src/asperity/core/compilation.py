@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from types import CellType, FunctionType
+from types import FunctionType
 from typing import Any
 from weakref import WeakSet
 
@@ -39,8 +39,11 @@ def jit(*, linked: bool = False, **options: Any) -> Callable[[Any], Any]:
 
     def compiled(function: Any) -> Any:
         own = {name: value for name, value in wanted.items() if name not in UNDOCUMENTED or has_option(name)}
+        if not linked:
+            # numba finds a stored function by this name, and does not notice a change in the functions that it calls
+            function.__qualname__ += f"_{digest():016x}"
         try:
-            dispatcher = njit(cache=not linked, **own)(function if linked else _with_digest(function))
+            dispatcher = njit(cache=not linked, **own)(function)
         except RuntimeError:
             _warn_of_no_folder()
             dispatcher = njit(**own)(function)
@@ -81,18 +84,6 @@ def digest() -> int:
     return int.from_bytes(hashlib.sha256(b"".join(source.read_bytes() for source in sources)).digest()[:8], "big")
 
 
-def _with_digest(function: Any) -> Any:
-    """Return the function with the digest among the variables of its closure.
-
-    numba finds a stored function by its own source and by these variables, but not by the functions that it calls.
-    """
-    code = function.__code__.replace(co_freevars=(*function.__code__.co_freevars, "digest"))
-    closure = (*(function.__closure__ or ()), CellType(digest()))
-    made = FunctionType(code, function.__globals__, function.__name__, function.__defaults__, closure)
-    made.__module__, made.__qualname__, made.__doc__ = function.__module__, function.__qualname__, function.__doc__
-    return made
-
-
 @cache
 def _warn_of_no_folder() -> None:
     logger.warning("no folder is writable, so compiled functions are not stored; set NUMBA_CACHE_DIR")
@@ -123,7 +114,7 @@ def announce() -> None:
 
 
 def is_stored(function: Any) -> bool:
-    """Return whether a compiled function has been stored on disk, perhaps from other sources."""
-    folder = function.stats.cache_path
-    name = f"{Path(function.py_func.__code__.co_filename).stem}.{function.py_func.__name__}-"
+    """Return whether a compiled function has been stored on disk."""
+    folder, python = function.stats.cache_path, function.py_func
+    name = f"{Path(python.__code__.co_filename).stem}.{python.__qualname__}-"
     return folder is not None and any(path.name.startswith(name) for path in Path(folder).glob("*.nbi"))

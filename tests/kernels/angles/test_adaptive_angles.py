@@ -16,7 +16,7 @@ from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import KRONROD_FRACTION, traced_matrix
 from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES, NULL_RULES, STUDENT, AnglePanels
 from asperity.kernels.walls.conditionals import adaptive_conditionals
-from asperity.spectral.bounds.expectations import is_costly
+from asperity.spectral.bounds.images import is_costly
 
 ARCS = geo.focusing_arcs(1.2)
 # <u, P u>/<u, u> of ARCS, from an independent tracer and high-precision quadrature; its last digit rounds.
