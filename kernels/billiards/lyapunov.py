@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,9 +25,10 @@ from .equilibrium import equilibrium_starts
 if TYPE_CHECKING:
     from ...geometry.tables.boundary import Touch
 
-# The exponent is measured between these fractions of the collisions, and for comparison between the earlier ones. A
-# perturbation that grows like the p-th power of the time gives p ln 4 over 3/4 of the time, then four times as much.
-LATE, EARLY = (0.25, 1.0), (0.0625, 0.25)
+# The exponent is measured between the last two of these fractions of the collisions, and for comparison between the
+# first two. A perturbation that grows like the p-th power of the time gives p ln 4 over 3/4 of the time, and four times
+# as much between the first two.
+MARKS = (0.0625, 0.25, 1.0)
 # Fraction of the difference between both that is added to the error: of a growth by powers, whose exponent is 0, it is
 # 1.5 times the value.
 DRIFT = 0.5
@@ -106,20 +108,17 @@ def lyapunov_exponent(
     rng = generator(rng)
     spinning = not all(law.law == IsometryLaw(retro=False) for law in each if isinstance(law, CollisionLaw))
     pencil = Pencil.around(*equilibrium_starts(container, each[0].disk, n, spinning, rng), rng)
-    marks = {round(part * collisions) for part in (*EARLY, *LATE)}
-    growth, time = {}, {}
+    marks, marked = [round(part * collisions) for part in MARKS], []
     for step in range(1, collisions + 1):
         pencil = pencil.after_collision(container, matrices)
         if step in marks:
-            growth[step], time[step] = pencil.growth, pencil.time
+            marked.append(pencil)
     kept = pencil.resolved
     if kept.sum() < LEAST_TRAJECTORIES:
         raise AccuracyError(
             f"{n - kept.sum()} of {n} trajectories ended at a corner, or along a wall; take another rng", math.inf
         )
-    growth, time = ({step: values[kept] for step, values in table.items()} for table in (growth, time))
-    late, spread = _rate(growth, time, [round(part * collisions) for part in LATE])
-    early, _ = _rate(growth, time, [round(part * collisions) for part in EARLY])
+    (early, _), (late, spread) = (_rate(first, last, kept) for first, last in pairwise(marked))
     method = (
         f"{kept.sum()} trajectories of {collisions} collisions, the last three quarters; 95 % from their scatter "
         f"({spread:.2g}), plus {DRIFT:g} of the difference to an earlier quarter; {n - kept.sum()} not resolved"
@@ -127,10 +126,9 @@ def lyapunov_exponent(
     return Estimate(late, spread + DRIFT * abs(late - early), "estimate", method)
 
 
-def _rate(growth: dict[int, Floats], time: dict[int, Floats], window: Sequence[int]) -> tuple[float, float]:
-    """The ratio of the mean growth to the mean time between two numbers of collisions, with the 95 % half width."""
-    first, last = window
-    grown, passed = growth[last] - growth[first], time[last] - time[first]
+def _rate(first: Pencil, last: Pencil, kept: NDArray[np.bool_]) -> tuple[float, float]:
+    """The ratio of the mean growth to the mean time between two collisions, with the 95 % half width."""
+    grown, passed = (last.growth - first.growth)[kept], (last.time - first.time)[kept]
     rate = float(grown.sum() / passed.sum())
     deviation = float(np.std(grown - rate * passed, ddof=1)) / (float(passed.mean()) * math.sqrt(len(grown)))
     return rate, student_95(len(grown)) * deviation

@@ -47,7 +47,7 @@ def two_grid_changes(matrix: KernelMatrix, found: ExtremalEigenvalues) -> Floats
     A refinement can leave an eigenvalue unchanged by chance, so a fraction of the previous change is a lower limit.
     ``inf`` if the coarser basis has no such eigenvalue.
     """
-    grids = _coarser_grids(matrix, found.top, len(found.values) - found.top, levels=2)
+    grids = _coarser_grids(matrix, found.top, len(found.values) - found.top)
     changes = np.abs(np.diff([found.values, *grids], axis=0))
     if not len(changes):
         return np.full(len(found.values), np.inf)
@@ -55,13 +55,13 @@ def two_grid_changes(matrix: KernelMatrix, found: ExtremalEigenvalues) -> Floats
     return np.asarray(np.fmax(last, EARLIER_FRACTION * changes[1]) if len(changes) > 1 else last)
 
 
-def _coarser_grids(matrix: KernelMatrix, top: int, bottom: int, levels: int) -> list[Floats]:
-    """The eigenvalues of these ranks on successively coarser bases; NaN if there is none."""
+def _coarser_grids(matrix: KernelMatrix, top: int, bottom: int) -> list[Floats]:
+    """The eigenvalues of these ranks on two successively coarser bases, if there are; NaN for missing eigenvalues."""
     from scipy.sparse import csr_array
 
     found: list[Floats] = []
     basis, array = matrix.basis, matrix.symmetric
-    for _ in range(levels):
+    for _ in range(2):
         if isinstance(basis, Bins) and basis.size > 1:
             # a large matrix of zeros would take longer than its products
             joined, owner, entries = basis.joined()

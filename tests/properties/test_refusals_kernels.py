@@ -374,7 +374,7 @@ REFUSED = {
         (lambda: spec.curvature_gap_bounds(1.0, 10), "bins"),
         *((lambda angle=angle: spec.accommodation(DIFFUSE, theta=[1.0, angle]), "take one beside it")
           for angle in (np.pi / 2, np.arcsin(np.pi / 4), np.pi - np.arcsin(np.pi / 4))),
-        (lambda: spec.accommodation(FLAT), "law: expected a Law such as"),
+        (lambda: spec.accommodation(FLAT), "law: expected a law such as WallLaw"),
         (lambda: spec.mixing_time(ker.maxwell(0.5), start=1.0), "start: expected a law with a density"),
         (lambda: spec.diffusivity(MIRROR), "infinite"),
         (lambda: spec.diffusivity(DIFFUSE, arrangement="glide"), "arrangement"),
