@@ -11,7 +11,7 @@ from campaigns.judges.plain_tracer import trace_plainly
 from campaigns.rays.aimed_rays import AimedRays, aimed_rays, grazing_rays, judge
 
 from asperity import geometry as geo
-from asperity.geometry.scene.columns import RUN_SINE
+from asperity.geometry.scene.columns import FIRST_PAIR, PAIRS_END, RUN_SINE
 
 EPS = np.finfo(float).eps
 # Rays on a wall; between an island of a curve and the floor some are nearly caught.
@@ -185,11 +185,12 @@ def test_the_tracer_agrees_with_a_plain_one(wall, request):
 def hit_by_hit(wall):
     """The same wall without its closed forms, and with the marks that allow runs taken off its tables."""
     plain = geo.Wall(wall.pieces, wall.period, wall.islands)
-    circles = plain.scene.circles
+    circles, lines = (None if table is None else table.copy() for table in (plain.scene.circles, plain.scene.lines))
     if circles is not None:
-        circles = circles.copy()
         circles[:, RUN_SINE] = 0.0
-    plain.__dict__["scene"] = replace(plain.scene, pairs=None, circles=circles, closed=None)
+    if lines is not None:
+        lines[:, [FIRST_PAIR, PAIRS_END]] = 0.0
+    plain.__dict__["scene"] = replace(plain.scene, pairs=None, lines=lines, circles=circles, closed=None)
     return plain
 
 
