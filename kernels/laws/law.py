@@ -6,7 +6,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -785,9 +784,13 @@ def _conditionals_of_chain(
                 f"apply: {law!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
                 "discretise() and compose the matrices, or fewer angles at a time"
             )
-        after = partial(part._conditionals, tolerance=tolerance, degree=degree, edges=cuts)
-        found, exact = found.followed_by(after, exact), exact and is_atomic(part)
+        found = found.followed_by(_conditionals_of(part, tolerance, degree, cuts), exact)
+        exact = exact and is_atomic(part)
     return found
+
+
+def _conditionals_of(law: Law, tolerance: float, degree: int, edges: Floats) -> Callable[[Floats], Conditionals]:
+    return lambda theta: law._conditionals(theta, tolerance, degree, edges)
 
 
 def _check_length(method: str, exponent: int, most: int) -> None:

@@ -58,9 +58,9 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     --------
     The mean number of reflections of a law:
 
-    >>> from asperity.kernels import retroreflection, specular
+    >>> from asperity.kernels import TriangularTeethLaw, specular
     >>> count = Rules(lambda law: 1.0, lambda terms: sum(w * n for w, n in terms), sum, lambda n: n)
-    >>> fold(0.5 * specular() + 0.5 * (specular() @ retroreflection()) ** 2, count)
+    >>> fold(0.5 * specular() + 0.5 * (specular() @ TriangularTeethLaw(1.0)) ** 2, count)
     2.5
     """
     if isinstance(law, Combination):
