@@ -13,7 +13,7 @@ from ..expectations.angle_panels import NODES, AnglePanels
 from ..laws.law import DrivenLaw, Law, knows_errors
 from ..laws.structure import is_compound, lists_branches
 from ..matrices.matrix import KernelMatrix
-from ..walls.wall_law import WallLaw
+from ..walls.wall_law import traced_wall
 from .method import Budget, MethodName, computed, rounding
 
 # Limit on the values of basis functions: one or two seconds of work.
@@ -37,9 +37,8 @@ class Actions:
     def accepts(self, law: Law, basis: Basis) -> bool:
         if is_compound(law) or _has_too_many_breakpoints(law):
             return False
-        if isinstance(law, DrivenLaw) and not isinstance(basis, Legendre):
-            return False
-        return not isinstance(law, WallLaw) and knows_errors(law)
+        driven = isinstance(law, DrivenLaw) and law.isometry_table() is None
+        return traced_wall(law) is None and (isinstance(basis, Legendre) or not driven) and knows_errors(law)
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error = action_matrix(law, basis, budget.tolerance)

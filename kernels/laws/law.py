@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -190,30 +191,22 @@ class Law(ABC):
 
     def _repr_html_(self) -> str:
         known = {True: "yes", False: "no", None: "not known"}
+        whole = self if isinstance(self, Combination) else sum_of(self.parts)
         lines = {
             "convention": self.frame, "reversible": known[self.reversible],
-            "mirror-symmetric": known[self.mirror_symmetric], "closed form": self.closed_form,
+            "mirror-symmetric": known[self.mirror_symmetric], "sum": None if whole is self else whole,
         }  # fmt: skip
         return html_table(f"Law {self!r}", lines)
 
     # ---- optional properties, each with a default -------------------------------------------------------------
     @property
-    def closed_form(self) -> Law | None:
-        """The same law as an object with closed formulas; None if there is none or if this object is it.
+    def parts(self) -> tuple[tuple[float, Law], ...]:
+        """The law as a sum of simpler laws with positive weights; by default this law itself with weight 1.
 
-        It is None for compound laws; `asperity.kernels.laws.structure.fold` replaces their parts by closed forms.
+        `sum_of` makes one law of them. Compositions, powers and laws in the other frame are no sums;
+        `asperity.kernels.laws.structure.fold` divides the laws in them.
         """
-        return None
-
-    @property
-    def replacement(self) -> Law | None:
-        """The same law as a simpler one by which `fold` replaces it: the closed form, or a sum of simpler laws."""
-        return self.closed_form
-
-    @property
-    def exact_law(self) -> Law | None:
-        """The closed form, or else the same law as a table of isometries, whose computation may take a second."""
-        return self.closed_form
+        return ((1.0, self),)
 
     @property
     def is_isometric(self) -> bool:
@@ -488,7 +481,8 @@ class Combination(Law):
         """Whether the weights sum to 1 within 1e-12."""
         return abs(math.fsum(weight for weight, _ in self.terms) - 1.0) <= WEIGHT_TOLERANCE
 
-    def terms_checked(self) -> tuple[tuple[float, Law], ...]:
+    @property
+    def parts(self) -> tuple[tuple[float, Law], ...]:
         """The terms; raises InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
         for index, (weight, law) in enumerate(self.terms):
             if weight < 0.0:
@@ -498,7 +492,7 @@ class Combination(Law):
             raise InputError(
                 f"weights: expected a sum of 1, got {total!r} for {self!r}; scale the weights or add the missing law"
             )
-        return self.terms
+        return tuple(term for term in self.terms if term[0])
 
     def __add__(self, other: Law) -> Combination:
         if not isinstance(other, Law):
@@ -515,16 +509,16 @@ class Combination(Law):
 
     def adjoint(self) -> Law:
         """The combination of the adjoints, with the same weights."""
-        terms = self.terms_checked()
-        return self if self.reversible else Combination(tuple((weight, law.adjoint()) for weight, law in terms))
+        parts = self.parts
+        return self if self.reversible else Combination(tuple((weight, law.adjoint()) for weight, law in parts))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        parts = [(weight, *law.branches(theta)) for weight, law in self.terms_checked() if weight > 0.0]
+        parts = [(weight, *law.branches(theta)) for weight, law in self.parts]
         probability = np.concatenate([weight * fraction for weight, fraction, _ in parts], axis=-1)
         return merged(probability, np.concatenate([angle for _, _, angle in parts], axis=-1))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        return joined([law.breakpoints(limit) for weight, law in self.terms_checked() if weight > 0.0])
+        return joined([law.breakpoints(limit) for weight, law in self.parts])
 
     @property
     def outgoing_breakpoints(self) -> Floats:
@@ -537,16 +531,15 @@ class Combination(Law):
 
     def isometry_table(self) -> IsometryTable | None:
         """The sum of the terms' tables; None if a term has none."""
-        terms = [(weight, law.isometry_table()) for weight, law in self.terms_checked() if weight > 0.0]
+        terms = [(weight, law.isometry_table()) for weight, law in self.parts]
         tables = [table.scaled(weight) for weight, table in terms if table is not None]
         return IsometryTable.joined(tables) if len(tables) == len(terms) else None
 
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        terms = self.terms_checked()
-        return Distribution.mixed([(weight, law.distribution(theta, edges)) for weight, law in terms])
+        return Distribution.mixed([(weight, law.distribution(theta, edges)) for weight, law in self.parts])
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        terms = self.terms_checked()
+        terms = self.parts
         cumulative = np.cumsum([weight for weight, _ in terms])
         choice = np.searchsorted(cumulative, rng.random(theta.shape) * cumulative[-1], side="right")
         choice = np.minimum(choice, len(terms) - 1)
@@ -558,12 +551,16 @@ class Combination(Law):
         return outgoing
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        terms = [(weight, law) for weight, law in self.terms_checked() if weight > 0.0]
         wanted = theta, tolerance, degree, edges
-        return Conditionals.mixed([(weight, law._conditionals(*wanted)) for weight, law in terms])
+        return Conditionals.mixed([(weight, law._conditionals(*wanted)) for weight, law in self.parts])
 
     def __repr__(self) -> str:
         return " + ".join(f"{weight:.12g}*{as_factor(law)}" for weight, law in self.terms)
+
+
+def sum_of(parts: tuple[tuple[float, Law], ...]) -> Law:
+    """The weighted sum of the parts of a law, or the only part."""
+    return parts[0][1] if len(parts) == 1 else Combination(parts)
 
 
 def common_frame(laws: Sequence[Law], verb: str) -> Frame:
@@ -591,8 +588,49 @@ def as_factor(law: Law) -> str:
     return f"({law!r})" if isinstance(law, (Combination, Composition)) else repr(law)
 
 
+class _Chain(Law):
+    """Laws applied one after the other."""
+
+    @abstractmethod
+    def _factors(self) -> tuple[Law, ...]:
+        """The laws in their order of application."""
+
+    @cached_property
+    def _error_of_atoms(self) -> float:
+        """The sum of the errors of the laws, if all are made of isometries."""
+        errors = {law: float(_probe(law).error[0]) for law in set(self._factors())}
+        return sum(errors[law] for law in self._factors())
+
+    @cached_property
+    def _atomic_factors(self) -> int:
+        """The number of laws with finitely many atoms before the first other one."""
+        laws = self._factors()
+        return next((k for k, law in enumerate(laws) if not is_atomic(law)), len(laws))
+
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """The conditional distributions; means under a law are cut at the next law's breakpoints."""
+        laws = self._factors()
+        try:
+            probability, outgoing = chained(laws, theta)
+            return Conditionals.of_atoms(outgoing, probability, self._error_of_atoms)
+        except InputError:
+            # not isometries, or too many of them
+            found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)))
+        for index, law in enumerate(laws):
+            cuts = edges if index + 1 == len(laws) else _breakpoints_of_start(laws[index + 1 :])
+            each = law._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
+            if each * found.nodes.size > MOST_VALUES:
+                raise InputError(
+                    f"apply: {self!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
+                    "discretise() and compose the matrices, or fewer angles at a time"
+                )
+            exact = index <= self._atomic_factors
+            found = found.followed_by(_conditionals_of(law, tolerance, degree, cuts), exact)
+        return found
+
+
 @dataclass(frozen=True, repr=False)
-class Composition(Law):
+class Composition(_Chain):
     """Laws applied one after the other, ``first @ second``; as an operator, f -> P_first P_second f.
 
     Parameters
@@ -646,6 +684,9 @@ class Composition(Law):
         """(P Q)* = Q* P*."""
         return self if self.reversible else Composition(tuple(law.adjoint() for law in reversed(self.laws)))
 
+    def _factors(self) -> tuple[Law, ...]:
+        return self.laws
+
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         return chained(self.laws, angles("theta", theta))
 
@@ -656,9 +697,6 @@ class Composition(Law):
         for law in self.laws:
             theta = law.sample(theta, rng)
         return theta
-
-    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        return _conditionals_of_chain(self, self.laws, theta, tolerance, degree, edges)
 
     def __repr__(self) -> str:
         return " @ ".join(as_factor(law) for law in self.laws)
@@ -684,7 +722,7 @@ def _is_identity(law: Law) -> bool:
 
 
 @dataclass(frozen=True, repr=False)
-class Power(Law):
+class Power(_Chain):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
     The number of outgoing angles of its conditional distributions grows like a power with exponent n, unless isometries
@@ -713,14 +751,17 @@ class Power(Law):
         """(P^n)* = (P*)^n."""
         return self if self.reversible else Power(self.law.adjoint(), self.exponent)
 
+    def _factors(self) -> tuple[Law, ...]:
+        return (self.law,) * self.exponent
+
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         _check_length("branches", self.exponent, LONGEST_CHAIN)
-        return chained((self.law,) * self.exponent, angles("theta", theta))
+        return chained(self._factors(), angles("theta", theta))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         if self.exponent > DEEPEST_POWER:
             return np.empty(0), math.inf
-        return chained_breakpoints((self.law,) * self.exponent, limit)
+        return chained_breakpoints(self._factors(), limit)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         _check_length("sample", self.exponent, LONGEST_SAMPLE)
@@ -730,7 +771,7 @@ class Power(Law):
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         _check_length("apply", self.exponent, DEEPEST_POWER)
-        return _conditionals_of_chain(self, (self.law,) * self.exponent, theta, tolerance, degree, edges)
+        return super()._conditionals(theta, tolerance, degree, edges)
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)} ** {self.exponent}"
@@ -763,30 +804,6 @@ def knows_errors(law: Law) -> bool:
 
 def _probe(law: Law) -> Conditionals:
     return law._conditionals(PROBE, PROBE_TOLERANCE, 0, np.empty(0))
-
-
-def _conditionals_of_chain(
-    law: Law, laws: Sequence[Law], theta: Floats, tolerance: float, degree: int, edges: Floats
-) -> Conditionals:
-    """The conditional distributions of composed laws; means under a law are cut at the next law's breakpoints."""
-    try:
-        probability, outgoing = chained(laws, theta)
-        error = {part: float(_probe(part).error[0]) for part in set(laws)}
-        return Conditionals.of_atoms(outgoing, probability, sum(error[part] for part in laws))
-    except InputError:
-        # not isometries, or too many of them
-        found, exact = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1))), True
-    for index, part in enumerate(laws):
-        cuts = edges if index + 1 == len(laws) else _breakpoints_of_start(laws[index + 1 :])
-        each = part._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
-        if each * found.nodes.size > MOST_VALUES:
-            raise InputError(
-                f"apply: {law!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
-                "discretise() and compose the matrices, or fewer angles at a time"
-            )
-        found = found.followed_by(_conditionals_of(part, tolerance, degree, cuts), exact)
-        exact = exact and is_atomic(part)
-    return found
 
 
 def _conditionals_of(law: Law, tolerance: float, degree: int, edges: Floats) -> Callable[[Floats], Conditionals]:

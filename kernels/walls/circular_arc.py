@@ -13,7 +13,7 @@ from ..bases.basis import AngleFunction
 from ..bases.given import Vectorised
 from ..bases.intervals import between_cuts, edges_inside, joined_lists
 from ..bases.measure import SINE, gauss_on_intervals
-from ..expectations.arcs import ArcPieces, outgoing_lines
+from ..expectations.arcs import ArcLines, ArcPieces, outgoing_lines
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entries
@@ -132,7 +132,7 @@ class CircularArcLaw(DrivenLaw):
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Gauss rules in delta between the changes of N and the edges; the error is that of rays with more hits."""
-        lines = outgoing_lines(self.half_angle, self.pieces(theta, followed_hits(tolerance)), theta)
+        lines = self.lines(theta, tolerance)
         long = np.flatnonzero(~lines.single)
         offset, slope, lower, upper = lines.offset[long], lines.slope[long], lines.lower[long], lines.upper[long]
         ends = offset + slope * lower, offset + slope * upper
@@ -207,6 +207,10 @@ class CircularArcLaw(DrivenLaw):
         outgoing = np.where(rest[:, None], np.pi - self.half_angle, outgoing)
         weight = weight * SINE.density(chord) + np.where(alone & ~rest, 1.0, 0.0)[:, None]
         return ray, mirrored, outgoing, weight
+
+    def lines(self, theta: Floats, tolerance: float) -> ArcLines:
+        """The pieces of constant N as lines in delta, up to the number of hits that the tolerance needs."""
+        return outgoing_lines(self.half_angle, self.pieces(theta, followed_hits(tolerance)), theta)
 
     def pieces(self, theta: Floats, most_hits: int = MOST_HITS) -> ArcPieces:
         """The intervals of delta on which N is constant, for every theta and both sides, sorted by incoming angle."""
