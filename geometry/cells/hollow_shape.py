@@ -92,8 +92,8 @@ class HollowShape:
         return -depth if level and max(abs(left), abs(right - 1.0)) <= SHAPE_TOLERANCE else None
 
 
-def distinct_hollows(wall: Cell, among: Sequence[Hollow] | None = None) -> list[tuple[HollowShape, list[Hollow]]]:
-    """Return the distinct shapes of the hollows of a closed wall's ``cell``, or of some, each with those of that shape.
+def distinct_hollows(wall: Cell) -> list[tuple[HollowShape, list[Hollow]]]:
+    """Return the distinct shapes of a closed wall's hollows, each with the hollows of ``wall.cell`` of that shape.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def distinct_hollows(wall: Cell, among: Sequence[Hollow] | None = None) -> list[
     """
     found: dict[tuple[str, ...], list[tuple[HollowShape, list[Hollow]]]] = {}
     cell = wall.cell
-    for hollow in cell.hollows if among is None else among:
+    for hollow in cell.hollows:
         shape = HollowShape.of(cell, hollow)
         alike = found.setdefault(shape.kinds, [])
         for known, hollows in alike:

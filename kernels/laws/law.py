@@ -209,14 +209,6 @@ class Law(ABC):
         return ((1.0, self),)
 
     @property
-    def is_isometric(self) -> bool:
-        """Whether the law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
-
-        False for compound laws; `asperity.kernels.laws.structure.made_of_isometries` examines their parts.
-        """
-        return False
-
-    @property
     def is_lambertian(self) -> bool:
         """Whether the outgoing angle has the density sin(theta')/2 for every incoming angle."""
         return False
@@ -321,11 +313,6 @@ class BranchLaw(Law):
     """
 
     reversible = True
-
-    @property
-    def is_isometric(self) -> bool:
-        """Always True."""
-        return True
 
     @abstractmethod
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...

@@ -95,16 +95,8 @@ def holds_of_all(law: Law, test: Callable[[Law], bool]) -> bool:
     return fold(law, Rules(test, lambda terms: all(fact for _, fact in terms), all, lambda fact: fact))
 
 
-def made_of_isometries(law: Law) -> bool:
-    """Whether a law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
-
-    Such laws are the laws of walls of straight pieces, specular reflection, retroreflection, and compounds of these.
-    """
-    return holds_of_all(law, lambda part: part.is_isometric)
-
-
 def lists_branches(law: Law) -> bool:
-    """Whether every part of a law lists its isometries and breakpoints; stronger than `made_of_isometries`."""
+    """Whether every part of a law lists its isometries and breakpoints; walls of straight pieces may not."""
     return holds_of_all(law, _answers)
 
 

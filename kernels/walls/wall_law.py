@@ -12,19 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, instance
 from ...core.errors import AccuracyError
 from ...core.rounding import EPS
-from ...geometry import Arc, Wall
+from ...geometry import Arc, Segment, Wall
 from ...geometry.cells.hollow import Hollow
-from ...geometry.cells.hollow_shape import HollowShape, distinct_hollows, side_by_side
+from ...geometry.cells.hollow_shape import HollowShape, side_by_side
 from ..bases.intervals import cell_among
 from ..expectations.conditionals import Conditionals
 from ..laws.distribution import Distribution
 from ..laws.isometry_table import IsometryTable
-from ..laws.law import DrivenLaw, Law, RandomMap, specular, sum_of
+from ..laws.law import BranchLaw, DrivenLaw, Law, RandomMap, specular, sum_of
+from ..laws.structure import holds_of_all
 from .circular_arc import CircularArcLaw
 from .conditionals import WallConditionals, is_few, traced_conditionals
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
-from .traced_map import UNRESOLVED_TOLERANCE, traced_angles, traced_reflection
+from .traced_map import UNRESOLVED_TOLERANCE, if_escaped, traced_reflection
 from .triangular import TriangularTeethLaw
 
 # Relative tolerance, a few roundings, for the sum of widths against the period and for an arc against a semicircle.
@@ -67,9 +68,10 @@ class WallLaw(DrivenLaw):
         The laws of flat tops and hollows, with their fractions of the period. Isosceles triangles, rectangles (in total
         not wider than the flat tops; the law of each includes a flat top of its width) and circular arcs up to a
         semicircle have closed forms. Hollows are recognised by their shape, not by the wall's constructor. Beside
-        curved hollows, the other straight hollows have one law together, and other curved ones one for each shape. The
-        only part is this law itself if the wall does not close, if a wall of straight pieces or of one shape has no
-        closed form, and if its curved shapes are too many or have no room side by side.
+        curved hollows, the other straight hollows have one law together, and the other curved ones one for each shape.
+        The only part is this law itself, without closed form, if the wall does not close; if all pieces are straight or
+        all hollows alike; if more than four shapes of curved hollows have no closed form; or if hollows wider than
+        their openings have no room side by side.
     mirror_symmetric : bool or None
         True if the wall's cell or every part is mirror-symmetric, otherwise None (not known).
 
@@ -106,11 +108,6 @@ class WallLaw(DrivenLaw):
         object.__setattr__(self, "mirror_symmetric", True if symmetric else None)
 
     @property
-    def is_isometric(self) -> bool:
-        """Whether every piece of the wall is straight."""
-        return self.wall.is_polygonal
-
-    @property
     def parts(self) -> tuple[tuple[float, Law], ...]:
         return self._divided or ((1.0, self),)
 
@@ -141,7 +138,7 @@ class WallLaw(DrivenLaw):
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
-        return traced_angles(self.wall, x, theta)
+        return if_escaped(self, *self.reflect_with_status(x, theta))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         return super().branches(theta) if self._known is None else self._known.branches(theta)
@@ -195,6 +192,19 @@ class WallLaw(DrivenLaw):
         return found._replace(error=found.error + 2.0 * unresolved)
 
 
+def made_of_isometries(law: Law) -> bool:
+    """Whether a law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
+
+    Such laws are the laws of walls of straight pieces, whether their beams resolve or not, specular reflection,
+    retroreflection, and compounds of these.
+    """
+    return holds_of_all(law, _is_isometric)
+
+
+def _is_isometric(law: Law) -> bool:
+    return law.wall.is_polygonal if isinstance(law, WallLaw) else isinstance(law, BranchLaw)
+
+
 def traced_wall(law: Law) -> Wall | None:
     """The wall of a law that is known by its rays only; None for walls with parts or isometries and for other laws."""
     return law.wall if isinstance(law, WallLaw) and law._known is None else None
@@ -206,23 +216,35 @@ def parts_of_wall(wall: Wall) -> tuple[tuple[float, Law], ...] | None:
         return None
     cell = wall.cell
     widths: dict[Law, float] = {}
-    level, rest = cell.flat_top, []
+    straight: list[Hollow] = []
+    curved: list[tuple[HollowShape, list[Hollow]]] = []
+    level = cell.flat_top
     for hollow in cell.hollows:
         law, width = hollow_law(cell, hollow), hollow.width
-        if isinstance(law, RectangularTeethLaw) and level - width >= -ROUNDED * cell.period:
-            level, width = level - width, 2.0 * width
-        elif law is None or isinstance(law, RectangularTeethLaw):
-            if cell.is_polygonal:
+        if isinstance(law, RectangularTeethLaw):
+            # with a flat top of its width, if one is left
+            law = law if level - width >= -ROUNDED * cell.period else None
+            level, width = (level, width) if law is None else (level - width, 2.0 * width)
+        if law is not None:
+            widths[law] = widths.get(law, 0.0) + width
+        elif cell.is_polygonal:
+            return None
+        elif all(isinstance(piece, Segment) for piece in cell.pieces[hollow.first : hollow.last]):
+            straight.append(hollow)
+        else:
+            shape = HollowShape.of(cell, hollow)
+            alike = next((hollows for known, hollows in curved if shape.same_as(known)), None)
+            if alike is not None:
+                alike.append(hollow)
+            elif len(curved) < MOST_CURVED:
+                curved.append((shape, [hollow]))
+            else:
                 return None
-            rest.append(hollow)
-            continue
-        widths[law] = widths.get(law, 0.0) + width
-    shapes = [(set(shape.kinds) == {"Segment"}, hollows) for shape, hollows in distinct_hollows(cell, rest)]
-    straight = [hollow for is_straight, hollows in shapes if is_straight for hollow in hollows]
-    curved = [hollows for is_straight, hollows in shapes if not is_straight]
-    if len(curved) > MOST_CURVED or (rest and len(shapes) + len(widths) < 2):
+    groups = [(straight, straight)] if straight else []
+    groups += [(hollows, hollows[:1]) for _, hollows in curved]
+    if groups and len(groups) + len(widths) < 2:
         return None
-    for hollows, shown in [(straight, straight)] * bool(straight) + [(alike, alike[:1]) for alike in curved]:
+    for hollows, shown in groups:
         alone, width = side_by_side(cell, shown), math.fsum(hollow.width for hollow in hollows)
         whole = width * (alone.period / math.fsum(hollow.width for hollow in shown))
         widths[WallLaw(alone)] = whole

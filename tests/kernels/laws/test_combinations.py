@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from asperity import InputError
 from asperity import kernels as ker
 from asperity.kernels.laws.law import Combination
-from asperity.kernels.laws.structure import made_of_isometries
+from asperity.kernels.walls.wall_law import made_of_isometries
 
 THETA = np.linspace(0.07, 3.05, 23)
 # A law that preserves the measure and is neither reversible nor mirror symmetric: a cycle of three equal bins.

@@ -11,6 +11,7 @@ from asperity.errors import AccuracyError
 from asperity.geometry.cells.hollow_shape import side_by_side
 from asperity.kernels.laws.law import Combination, sum_of
 from asperity.kernels.walls.conditionals import adaptive_conditionals
+from asperity.kernels.walls.wall_law import made_of_isometries
 from asperity.spectral.bounds.images import is_traced
 from wall_shapes import polygon
 
@@ -76,7 +77,7 @@ def test_several_hollows_make_a_combination_by_their_widths() -> None:
 def test_other_walls_have_no_closed_form(wall: geo.Wall) -> None:
     law = ker.WallLaw(wall)
     assert law.parts == ((1.0, law),) and law.has_traced_parts
-    assert law.is_isometric is wall.is_polygonal
+    assert made_of_isometries(law) is wall.is_polygonal
     if wall.is_polygonal:
         assert law.branches(1.0)[0].sum() == pytest.approx(1.0, abs=1e-14)
 
