@@ -194,7 +194,7 @@ class Law(ABC):
         whole = self if isinstance(self, Combination) else sum_of(self.parts)
         lines = {
             "convention": self.frame, "reversible": known[self.reversible],
-            "mirror-symmetric": known[self.mirror_symmetric], "sum": None if whole is self else whole,
+            "mirror-symmetric": known[self.mirror_symmetric], "parts": None if whole is self else whole,
         }  # fmt: skip
         return html_table(f"Law {self!r}", lines)
 
@@ -355,9 +355,13 @@ class DrivenLaw(Law):
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle for the entry point ``x``, a fraction of the period in (0, 1), and the angle ``theta``."""
 
+    def reflect_with_status(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_] | None]:
+        """Outgoing angles, and which rays escaped if rays are traced."""
+        return self.reflect(x, theta), None
+
     def random_map(self) -> RandomMap:
-        """The map `reflect`."""
-        return lambda x, theta: (self.reflect(x, theta), None)
+        """The map `reflect_with_status`."""
+        return self.reflect_with_status
 
     def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """One atom for each of 4096 equally spaced entry points."""
@@ -582,11 +586,16 @@ class _Chain(Law):
     def _factors(self) -> tuple[Law, ...]:
         """The laws in their order of application."""
 
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        return chained(self._factors(), angles("theta", theta))
+
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        return chained_breakpoints(self._factors(), limit)
+
     @cached_property
     def _error_of_atoms(self) -> float:
         """The sum of the errors of the laws, if all are made of isometries."""
-        errors = {law: float(_probe(law).error[0]) for law in set(self._factors())}
-        return sum(errors[law] for law in self._factors())
+        return sum(float(_probe(law).error[0]) for law in self._factors())
 
     @cached_property
     def _atomic_factors(self) -> int:
@@ -611,8 +620,7 @@ class _Chain(Law):
                     f"apply: {self!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
                     "discretise() and compose the matrices, or fewer angles at a time"
                 )
-            exact = index <= self._atomic_factors
-            found = found.followed_by(_conditionals_of(law, tolerance, degree, cuts), exact)
+            found = found.followed_by(_conditionals_of(law, tolerance, degree, cuts), index <= self._atomic_factors)
         return found
 
 
@@ -673,12 +681,6 @@ class Composition(_Chain):
 
     def _factors(self) -> tuple[Law, ...]:
         return self.laws
-
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        return chained(self.laws, angles("theta", theta))
-
-    def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        return chained_breakpoints(self.laws, limit)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         for law in self.laws:
@@ -743,12 +745,10 @@ class Power(_Chain):
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         _check_length("branches", self.exponent, LONGEST_CHAIN)
-        return chained(self._factors(), angles("theta", theta))
+        return super().branches(theta)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        if self.exponent > DEEPEST_POWER:
-            return np.empty(0), math.inf
-        return chained_breakpoints(self._factors(), limit)
+        return (np.empty(0), math.inf) if self.exponent > DEEPEST_POWER else super().breakpoints(limit)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         _check_length("sample", self.exponent, LONGEST_SAMPLE)

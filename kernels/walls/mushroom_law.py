@@ -11,7 +11,7 @@ from ...core.checks import Floats, instance
 from ...geometry import MushroomGenerations
 from ..expectations.conditionals import Conditionals
 from ..laws.distribution import Distribution
-from ..laws.law import LARGEST, DrivenLaw, RandomMap, entry_points
+from ..laws.law import LARGEST, DrivenLaw, entry_points
 from .traced_map import if_escaped, traced_reflection
 from .wall_law import WallLaw
 
@@ -63,10 +63,6 @@ class MushroomLaw(DrivenLaw):
         # above, the ray enters on the flat top to the right of the mushroom of generation 1
         entry = np.interp(entry_points(x), [0.0, self.wall.opened, 1.0], [*self.wall.opening, LARGEST])
         return traced_reflection(self.wall.mushroom, entry, theta)
-
-    def random_map(self) -> RandomMap:
-        """The map `reflect_with_status`."""
-        return self.reflect_with_status
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle for the entry point ``x`` in (0, 1), see `reflect_with_status`, and the angle ``theta``."""

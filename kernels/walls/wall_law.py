@@ -19,7 +19,7 @@ from ..bases.intervals import cell_among
 from ..expectations.conditionals import Conditionals
 from ..laws.distribution import Distribution
 from ..laws.isometry_table import IsometryTable
-from ..laws.law import BranchLaw, DrivenLaw, Law, RandomMap, specular, sum_of
+from ..laws.law import BranchLaw, DrivenLaw, Law, specular, sum_of
 from ..laws.structure import holds_of_all
 from .circular_arc import CircularArcLaw
 from .conditionals import WallConditionals, is_few, traced_conditionals
@@ -131,10 +131,6 @@ class WallLaw(DrivenLaw):
         ``x`` in (0, 1) is the entry point as a fraction of the period. Never raises an AccuracyError.
         """
         return traced_reflection(self.wall, x, theta)
-
-    def random_map(self) -> RandomMap:
-        """The map `reflect_with_status`."""
-        return self.reflect_with_status
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
