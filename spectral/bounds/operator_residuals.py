@@ -100,13 +100,15 @@ def residuals(
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
     ends = np.zeros((2, 0))
     # integrals, differences of the two rules, and effects of the errors of conditional expectations
-    total, error, doubt = (np.zeros((0, 2, len(values))) for _ in range(3))
+    total, error, uncertainty = (np.zeros((0, 2, len(values))) for _ in range(3))
     angles_used = 0
     while low.size:
         fresh = _integrals(function, values, low, high, 2.0 if mirrored else 1.0)
         angles_used += low.size * len(NODES)
         ends = np.concatenate([ends, [low, high]], axis=1)
-        total, error, doubt = (np.concatenate(both) for both in zip((total, error, doubt), fresh, strict=True))
+        total, error, uncertainty = (
+            np.concatenate(both) for both in zip((total, error, uncertainty), fresh, strict=True)
+        )
         square = total[:, 1].sum(axis=0)
         # a Kato-Temple bound adds about the square to the quotient, so the error of the quotient should be smaller
         wanted = np.stack(
@@ -124,9 +126,9 @@ def residuals(
         middle = ends[:, worst].mean(axis=0)
         low, high = np.append(ends[0, worst], middle), np.append(middle, ends[1, worst])
         rest = np.setdiff1d(np.arange(len(fraction)), worst)
-        ends, total, error, doubt = ends[:, rest], total[rest], error[rest], doubt[rest]
+        ends, total, error, uncertainty = ends[:, rest], total[rest], error[rest], uncertainty[rest]
     correction, square = total.sum(axis=0)
-    correction_error, square_error = (error + doubt).sum(axis=0)
+    correction_error, square_error = (error + uncertainty).sum(axis=0)
     return Residuals(
         values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used
     )
@@ -145,8 +147,8 @@ def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -
     (first, first_square), (second, second_square) = found
     norms = np.sqrt(np.maximum(first_square, second_square) + np.abs(first_square - second_square))
     # an error e of the images adds at most ||e|| to quotients and norms, because the trial functions are unit vectors
-    doubt = float(np.sqrt(weight @ errors**2))
-    return Residuals(values + second, np.abs(second - first) + doubt, norms + doubt, angles_used)
+    uncertainty = float(np.sqrt(weight @ errors**2))
+    return Residuals(values + second, np.abs(second - first) + uncertainty, norms + uncertainty, angles_used)
 
 
 def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
@@ -193,15 +195,21 @@ def _integrals(
     flat = angle.ravel()
     image, mean_error = function.images(flat)
     here = function(flat)
-    rest, doubt = image - here * values, mean_error[:, None]
+    rest, uncertainty = image - here * values, mean_error[:, None]
     shape = (*angle.shape, len(values))
     parts = np.stack([(here * rest).reshape(shape), (rest * rest).reshape(shape)], axis=2)
-    doubts = np.stack([(np.abs(here) * doubt).reshape(shape), ((2.0 * np.abs(rest) + doubt) * doubt).reshape(shape)], 2)
+    uncertainties = np.stack(
+        [
+            (np.abs(here) * uncertainty).reshape(shape),
+            ((2.0 * np.abs(rest) + uncertainty) * uncertainty).reshape(shape),
+        ],
+        2,
+    )
     density = copies * half[:, None] * SINE.density(angle)
     return (
         np.einsum("pq,pqjk->pjk", density * KRONROD, parts),
         np.abs(np.einsum("pq,pqjk->pjk", density * (KRONROD - GAUSS), parts)),
-        np.einsum("pq,pqjk->pjk", density * KRONROD, doubts),
+        np.einsum("pq,pqjk->pjk", density * KRONROD, uncertainties),
     )
 
 
