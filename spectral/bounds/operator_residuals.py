@@ -231,10 +231,6 @@ def _rule(law: Law, basis: Basis, vectors: Floats) -> Means:
         return lambda theta, tolerance: (np.tile(mean, (theta.size, 1)), np.zeros(theta.size))
     if isinstance(law, WallLaw) and law.exact_law is not None:
         return _rule(law.exact_law, basis, vectors)
-    if isinstance(law, DensityLaw):
-        return _of_rules(partial(_means_of_density, law, basis, vectors), vectors.shape[1])
-    if isinstance(law, CircularArcLaw) and isinstance(basis, Legendre):
-        return _of_rules(partial(_means_of_arc, law, basis, vectors), vectors.shape[1])
     if isinstance(law, WallLaw) and not is_few(law.wall):
         raise _refusal(law, "its conditional distributions take too long")
     if knows_errors(law):
