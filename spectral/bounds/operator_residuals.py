@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
-from ...kernels import Basis, Bins, CircularArcLaw, DensityLaw, Law, Legendre, Panels, WallLaw
-from ...kernels.bases.measure import SINE, gauss_on_intervals
+from ...kernels import Basis, Bins, DensityLaw, Law, Legendre, Panels, WallLaw
+from ...kernels.bases.measure import SINE
 from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
 from ...kernels.discretisation.actions import GRAZING_EDGES
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import Means, weighted_means
-from ...kernels.laws.density import GAUSS_NODES, split_panels
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
-from ...kernels.walls.circular_arc import MOST_HITS
 from ...kernels.walls.conditionals import is_few
 from .images import expectations_of
 
@@ -243,57 +239,6 @@ def _refusal(law: Law, reason: str) -> InputError:
         f"law: the images of trial functions under {law!r} have no known error, for {reason}; spectrum(law) and "
         "spectral_gap(law) take its matrix"
     )
-
-
-def _of_rules(means: Callable[..., Floats], functions: int) -> Means:
-    """Means by two Gauss rules, or by a much finer rule if they differ; the error is its distance from both."""
-
-    def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        first, second = (_in_chunks(partial(means, level=level), theta, functions) for level in (0, 1))
-        error = _largest(second - first)
-        # two similar rules may both miss a breakpoint: a much finer rule detects it
-        unconverged = np.flatnonzero(error > CONVERGED)
-        if unconverged.size:
-            finest = _in_chunks(partial(means, level=2), theta[unconverged], functions)
-            error[unconverged] = _largest(finest - first[unconverged]) + _largest(finest - second[unconverged])
-            second[unconverged] = finest
-        return second, error
-
-    return rule
-
-
-def _largest(values: Floats) -> Floats:
-    return np.asarray(np.abs(values).reshape(len(values), -1).max(axis=1, initial=0.0))
-
-
-def _in_chunks(means: Callable[[Floats], Floats], theta: Floats, functions: int) -> Floats:
-    step = max(1, CHUNK_ANGLES // (1 + functions // FEW_FUNCTIONS))
-    return np.concatenate([means(theta[start : start + step]) for start in range(0, theta.size, step)])
-
-
-def _means_of_density(law: DensityLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
-    """Means of a density, by Gauss rules on panels that resolve the density and the functions of the basis."""
-    edges = law.panels(theta)
-    if isinstance(basis, Legendre):
-        # a panel's Gauss rule resolves polynomials in cos(theta) of degree below its number of nodes over its width
-        edges = split_panels(edges, 1 + int(np.pi * basis.size / (NODES_PER_DEGREE * GAUSS_NODES)))
-    else:
-        inner = np.broadcast_to(basis.edges, (theta.size, basis.edges.size))
-        edges = np.sort(np.concatenate([edges, inner], axis=1), axis=1)
-    edges = split_panels(edges, PARTS[level])
-    nodes = GAUSS_NODES + MORE_NODES[level % 2]
-    outgoing, weight = gauss_on_intervals(edges[:, :-1].ravel(), edges[:, 1:].ravel(), nodes)
-    outgoing, weight = outgoing.reshape(theta.size, -1), weight.reshape(theta.size, -1)
-    weight = weight * law.density(theta[:, None], outgoing)
-    weight /= weight.sum(axis=1, keepdims=True)
-    return np.asarray(np.einsum("ij,ij...->i...", weight, expansion(basis, vectors, outgoing)))
-
-
-def _means_of_arc(law: CircularArcLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
-    """Means of circular arcs, whose pieces may be as long as (0, pi); finer rules also follow more hits."""
-    nodes = GAUSS_NODES + int(np.ceil(0.5 * np.pi * basis.size / NODES_PER_DEGREE)) + MORE_NODES[level % 2]
-    hits = (level + 1) * MOST_HITS
-    return law.means(lambda angle: expansion(basis, vectors, angle), theta, nodes, hits)
 
 
 def expansion(basis: Basis, vectors: Floats, theta: Floats) -> Floats:
