@@ -23,7 +23,6 @@ MOST_HITS = 500
 # Hits of the pieces whose ends are listed; the others lie within xi/24 of pi - xi (or xi).
 HITS_IN_CUTS = 24
 FEWEST_HITS = 8
-NODES = 16
 # Incoming angles at once; each has up to 2 MOST_HITS pieces of NODES outgoing angles.
 CHUNK = 2**11
 

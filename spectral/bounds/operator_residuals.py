@@ -9,7 +9,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
-from ...kernels import Basis, Bins, DensityLaw, Law, Legendre, Panels, WallLaw
+from ...kernels import Basis, Bins, DensityLaw, Law, Panels, WallLaw
 from ...kernels.bases.measure import SINE
 from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
 from ...kernels.discretisation.actions import GRAZING_EDGES
@@ -23,18 +23,10 @@ from .images import expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
-# Angles per block for up to FEW_FUNCTIONS functions.
-CHUNK_ANGLES, FEW_FUNCTIONS = 256, 16
 # A panel must begin below pi/2 by more than this to belong to the left half.
 HALF_ROUNDING = 1e-12
 # Default error of conditional expectations.
 MEAN_TOLERANCE = 1e-8
-# A Gauss rule with n nodes on a panel of width h resolves cos(l theta) to rounding for l h up to about this times n.
-NODES_PER_DEGREE = 1.2
-# Additional nodes of the two rules that are compared.
-MORE_NODES = (0, 8)
-# Parts of each panel for these two rules and for a third one, used if the two differ by more than CONVERGED.
-PARTS, CONVERGED = (1, 1, 4), 1e-12
 
 
 @dataclass(frozen=True)
@@ -87,8 +79,6 @@ def residuals(
     ``mirrored``: each function is even or odd, and the law is mirror-symmetric. Quotients are refined until their error
     is below ``quotient_error``.
     """
-    if isinstance(law, DensityLaw) and isinstance(basis, Legendre) and not law.outgoing_breakpoints.size:
-        return _smooth_residuals(law, basis, vectors, values)
     function = _TrialFunctions(law, basis, vectors, quotient_error)
     low, high = _first_panels(law, basis)
     if mirrored:
@@ -126,23 +116,6 @@ def residuals(
     return Residuals(
         values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used
     )
-
-
-def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -> Residuals:
-    """Residuals of polynomials under a smooth density, by two Gauss rules that resolve the smooth images."""
-    found, angles_used, rule = [], 0, image_rule(law, basis, vectors)
-    for more in MORE_NODES:
-        angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval + more)
-        angles_used += angle.size
-        here = expansion(basis, vectors, angle)
-        image, errors = rule(angle, MEAN_TOLERANCE)
-        rest = image - here * values
-        found.append((weight @ (here * rest), weight @ (rest * rest)))
-    (first, first_square), (second, second_square) = found
-    norms = np.sqrt(np.maximum(first_square, second_square) + np.abs(first_square - second_square))
-    # an error e of the images adds at most ||e|| to quotients and norms, because the trial functions are unit vectors
-    doubt = float(np.sqrt(weight @ errors**2))
-    return Residuals(values + second, np.abs(second - first) + doubt, norms + doubt, angles_used)
 
 
 def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
