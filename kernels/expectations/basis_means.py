@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ..bases.basis import Basis
+from ..bases.legendre import legendre_moments
 from ..bases.measure import gauss_rule
 from ..bases.panels import Panels
 
@@ -60,13 +61,11 @@ def means_of_basis(basis: Basis, nodes: Floats, weights: Floats, starts: NDArray
         mass = np.bincount(cell, weights=weights, minlength=rows * size).reshape(rows, size)
         return np.asarray(mass * basis.evaluate(0.5 * (basis.edges[1:] + basis.edges[:-1])).max(0))
     if isinstance(basis, Panels):
-        panel, values = basis.local(nodes)
-        cell = np.repeat(np.arange(rows), np.diff(starts)) * (size // (basis.degree + 1)) + panel
-        columns = [
-            np.bincount(cell, weights=weights * value, minlength=rows * size // (basis.degree + 1))
-            for value in values.T
-        ]
-        return np.asarray(np.stack(columns, axis=1).reshape(rows, size), dtype=np.float64)
+        panel, local = basis.positions(nodes)
+        panels = size // (basis.degree + 1)
+        cell = np.repeat(np.arange(rows), np.diff(starts)) * panels + panel
+        moments = legendre_moments(local, weights, basis.degree, cell, rows * panels)
+        return basis.of_legendre(moments.T.reshape(rows, panels, -1))
     found = np.empty((rows, size))
     most = max(1, VALUES_AT_ONCE // size)
     first = 0

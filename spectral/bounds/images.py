@@ -7,7 +7,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels, WallLaw
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
-from ...kernels.expectations.arcs import ArcMeans, arc_images, outgoing_lines
+from ...kernels.expectations.arcs import ArcMeans
 from ...kernels.expectations.basis_means import VALUES_AT_ONCE, Means, height_of, means_of_basis, weighted_means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Combination, Composition, Power, SpecularFrame, knows_errors
@@ -67,13 +67,6 @@ def expectations(law: Law, basis: Basis) -> Means:
     if isinstance(law, WallLaw):
         known = _known(law)
         return _of_nodes(law, basis) if known is None else expectations(known, basis)
-    if isinstance(law, CircularArcLaw) and isinstance(basis, Panels):
-
-        def of_arcs(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-            lines = outgoing_lines(law.half_angle, law.pieces(theta, followed_hits(tolerance)), theta)
-            return arc_images(lines, basis, theta)
-
-        return of_arcs
     return _of_nodes(law, basis)
 
 
