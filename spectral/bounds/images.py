@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels, WallLaw
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
 from ...kernels.expectations.arcs import ArcMeans
-from ...kernels.expectations.basis_means import VALUES_AT_ONCE, Means, height_of, means_of_basis, weighted_means
+from ...kernels.expectations.basis_means import Means, height_of, means_of_basis, weighted_means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Combination, Composition, Power, SpecularFrame, knows_errors
 from ...kernels.laws.structure import holds_of_all
@@ -78,7 +79,7 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
     height, each = height_of(basis, vectors), expectations(law, basis)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        step = max(1, VALUES_AT_ONCE // basis.size)
+        step = max(1, NUMBERS_AT_ONCE // basis.size)
         finer = tolerance / max(height, 1.0)
         parts = [each(theta[start : start + step], finer) for start in range(0, theta.size, step)]
         images = np.concatenate([image @ vectors for image, _ in parts])
