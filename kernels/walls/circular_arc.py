@@ -9,11 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, number_between, whole_number
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
-from ..bases.basis import AngleFunction
-from ..bases.given import Vectorised
 from ..bases.intervals import between_cuts, edges_inside, joined_lists
-from ..bases.measure import SINE, gauss_on_intervals
-from ..expectations.arcs import ArcLines, ArcPieces, outgoing_lines
+from ..bases.measure import SINE
+from ..expectations.arcs import ArcPieces, outgoing_lines
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entries
@@ -25,7 +23,6 @@ MOST_HITS = 500
 # Hits of the pieces whose ends are listed; the others lie within xi/24 of pi - xi (or xi).
 HITS_IN_CUTS = 24
 FEWEST_HITS = 8
-NODES = 16
 # Incoming angles at once; each has up to 2 MOST_HITS pieces of NODES outgoing angles.
 CHUNK = 2**11
 
@@ -132,7 +129,7 @@ class CircularArcLaw(DrivenLaw):
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Gauss rules in delta between the changes of N and the edges; the error is that of rays with more hits."""
-        lines = self.lines(theta, tolerance)
+        lines = outgoing_lines(self.half_angle, self.pieces(theta, followed_hits(tolerance)), theta)
         long = np.flatnonzero(~lines.single)
         offset, slope, lower, upper = lines.offset[long], lines.slope[long], lines.lower[long], lines.upper[long]
         ends = offset + slope * lower, offset + slope * upper
@@ -152,26 +149,6 @@ class CircularArcLaw(DrivenLaw):
             2.0 * left / lines.of_angles(lines.mass, theta.size),
         )
 
-    def means(self, function: AngleFunction, theta: Floats, nodes: int = NODES, most_hits: int = MOST_HITS) -> Floats:
-        """E[f(Theta') | theta] by Gauss rules with ``nodes`` nodes where N is constant, for N up to ``most_hits``."""
-        theta, function = angles("theta", theta), Vectorised.of(function)
-        whole_number("nodes", nodes, 1)
-        flat = theta.reshape(-1)
-        starts = range(0, max(flat.size, 1), CHUNK)
-        parts = [self._means(function, flat[start : start + CHUNK], nodes, most_hits) for start in starts]
-        total = np.concatenate(parts)
-        return total.reshape(theta.shape + total.shape[1:])
-
-    def _means(self, function: AngleFunction, theta: Floats, nodes: int, most_hits: int) -> Floats:
-        ray, mirrored, outgoing, weight = self._conditional_quadrature(theta, nodes, most_hits)
-        angle = clipped_inside(np.where(mirrored[:, None], np.pi - outgoing, outgoing))
-        value = np.asarray(function(angle), dtype=np.float64)
-        piece = np.einsum("ij,ij...->i...", weight, value)
-        total = np.bincount(ray, weights=weight.sum(axis=1), minlength=theta.size)
-        starts = np.searchsorted(ray, np.arange(theta.size))
-        summed = np.add.reduceat(piece, starts, axis=0)
-        return np.asarray(summed / total.reshape((-1,) + (1,) * (summed.ndim - 1)))
-
     def _below(self, theta: Floats, edges: Floats) -> Floats:
         """P(theta_k, (edges[0], edges[j])) for increasing edges, common ones or those of each angle."""
         ray, mirror, lower, upper, hits, rest, alone = self.pieces(theta)
@@ -190,27 +167,6 @@ class CircularArcLaw(DrivenLaw):
         piece = np.abs(beyond - beyond[:, :1])
         found = np.add.reduceat(piece, np.searchsorted(ray, np.arange(theta.size)), axis=0)
         return np.asarray(found / found[:, -1:])
-
-    def _conditional_quadrature(
-        self, theta: Floats, nodes: int, most_hits: int
-    ) -> tuple[NDArray[np.intp], NDArray[np.bool_], Floats, Floats]:
-        """Gauss rules in delta between the changes of N, for every theta and both sides.
-
-        Returns for each piece, sorted by incoming angle, the index of this angle and whether the piece is mirrored,
-        shape (pieces,), and the outgoing angles and their weights (not normalised), shape (pieces, nodes). A piece with
-        a single outgoing angle has this angle at all nodes.
-        """
-        ray, mirrored, lower, upper, hits, rest, alone = self.pieces(theta, most_hits)
-        base = np.where(mirrored, np.pi - theta[ray], theta[ray])
-        chord, weight = (part.reshape(-1, nodes) for part in gauss_on_intervals(lower, np.maximum(upper, lower), nodes))
-        outgoing = np.pi + base[:, None] - 2.0 * hits[:, None] * chord
-        outgoing = np.where(rest[:, None], np.pi - self.half_angle, outgoing)
-        weight = weight * SINE.density(chord) + np.where(alone & ~rest, 1.0, 0.0)[:, None]
-        return ray, mirrored, outgoing, weight
-
-    def lines(self, theta: Floats, tolerance: float) -> ArcLines:
-        """The pieces of constant N as lines in delta, up to the number of hits that the tolerance needs."""
-        return outgoing_lines(self.half_angle, self.pieces(theta, followed_hits(tolerance)), theta)
 
     def pieces(self, theta: Floats, most_hits: int = MOST_HITS) -> ArcPieces:
         """The intervals of delta on which N is constant, for every theta and both sides, sorted by incoming angle."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
-from ...kernels.expectations.arcs import ArcMeans, arc_images
-from ...kernels.expectations.basis_means import VALUES_AT_ONCE, Means, height_of, weighted_means
+from ...kernels.expectations.arcs import ArcMeans
+from ...kernels.expectations.basis_means import Means, height_of, weighted_means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.structure import holds_of_all
@@ -63,8 +64,6 @@ def expectations(law: Law, basis: Basis) -> Means:
         return mirrored
     if isinstance(law, LambertianLaw):
         return lambda theta, tolerance: (np.tile(basis.constant, (theta.size, 1)), np.zeros(theta.size))
-    if isinstance(law, CircularArcLaw) and isinstance(basis, Panels):
-        return lambda theta, tolerance: arc_images(law.lines(theta, tolerance), basis, theta)
     return _of_nodes(law, basis)
 
 
@@ -76,7 +75,7 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
     height, each = height_of(basis, vectors), expectations(law, basis)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        step = max(1, VALUES_AT_ONCE // basis.size)
+        step = max(1, NUMBERS_AT_ONCE // basis.size)
         finer = tolerance / max(height, 1.0)
         parts = [each(theta[start : start + step], finer) for start in range(0, theta.size, step)]
         images = np.concatenate([image @ vectors for image, _ in parts])
