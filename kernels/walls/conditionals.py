@@ -78,8 +78,7 @@ def adaptive_conditionals(
         raise InputError(f"tolerance: expected a number of at least {EPS:.2g}, the rounding, got {tolerance!r}")
     incoming = np.atleast_1d(angles("theta", theta)).ravel()
     conditionals = WallConditionals(wall, whole_number("degree", degree, 0), finite_array("edges", edges))
-    found, unresolved = conditionals(incoming, tolerance)
-    return found._replace(error=found.error + 2.0 * unresolved)
+    return conditionals(incoming, tolerance)[0]
 
 
 class WallConditionals:
@@ -146,7 +145,7 @@ class WallConditionals:
     def __call__(self, theta: Floats, tolerance: float | Floats) -> tuple[Conditionals, Floats]:
         """The conditional distributions at checked angles, and the probabilities of rays that did not escape.
 
-        These rays count as retroreflected; the errors do not include them.
+        These rays count as retroreflected, and in the errors.
         """
         # the compiled march takes doubles by their address
         incoming, group = np.unique(np.asarray(theta, dtype=np.float64), return_inverse=True)

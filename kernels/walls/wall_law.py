@@ -185,7 +185,7 @@ class WallLaw(DrivenLaw):
             raise AccuracyError(
                 f"{self!r}: {most:.2g} of the rays did not escape, more than {UNRESOLVED_TOLERANCE:g}", most
             )
-        return found._replace(error=found.error + 2.0 * unresolved)
+        return found
 
 
 def made_of_isometries(law: Law) -> bool:

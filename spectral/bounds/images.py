@@ -100,8 +100,7 @@ def _of_nodes(law: Law, basis: Basis) -> Means:
             if shared is None:
                 found = law.conditionals(some, tolerance, degree, edges)
             else:
-                found, unresolved = shared(some, tolerance)
-                found = found._replace(error=found.error + 2.0 * unresolved)
+                found, _ = shared(some, tolerance)
             images.append(found.in_basis(basis))
             errors.append(found.error)
         return np.concatenate(images), np.concatenate(errors)
