@@ -11,7 +11,6 @@ from ...core.checks import Floats, instance
 from ...core.errors import AccuracyError
 from ...geometry import MushroomGenerations
 from ..expectations.conditionals import Conditionals
-from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, RandomMap, entries
 from .traced_map import UNRESOLVED_TOLERANCE, traced_reflection
 from .wall_law import WallLaw
@@ -84,14 +83,6 @@ class MushroomLaw(DrivenLaw):
                 unresolved,
             )
         return outgoing
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The distributions of generation 1 by quadrature, its flat tops reduced to those of the last generation."""
-        left, right = self.wall.opening
-        found = WallLaw(self.wall.mushroom).distribution(theta, edges)
-        factor = self.wall.opened / (right - left)
-        flat = factor * (found.mass - (1.0 - (right - left))) + (1.0 - self.wall.opened)
-        return Distribution(factor * found.below, found.position, flat)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Those of generation 1, with its flat tops reduced to those of the last generation."""
