@@ -149,7 +149,7 @@ def _is_flat_top(law: Law, theta: Floats, given: Conditionals) -> NDArray[np.boo
     """Which nodes are those of flat tops, atoms of traced walls; to be deleted where `Law.parts` separates them."""
     specular = np.pi - theta
     found = mirrored_angle(specular) if isinstance(law, SpecularFrame) else specular
-    return np.asarray(given.nodes == found[given.owner])
+    return np.asarray((given.nodes == found[given.owner]) & (not law.is_lambertian))
 
 
 @lru_cache(maxsize=MATRICES)
