@@ -212,13 +212,13 @@ def adaptive_sums(table, left, right, edges):
         _, low, high, whole = heapq.heappop(panels)
         middle = 0.5 * (low + high)
         halves = [panel_sums(table, left, right, *ends, *RULE) for ends in ((low, middle), (middle, high))]
-        doubt = 0.5 * abs(whole[0] - halves[0][0] - halves[1][0])
-        heapq.heappush(panels, (-doubt, low, middle, halves[0]))
-        heapq.heappush(panels, (-doubt, middle, high, halves[1]))
+        uncertainty = 0.5 * abs(whole[0] - halves[0][0] - halves[1][0])
+        heapq.heappush(panels, (-uncertainty, low, middle, halves[0]))
+        heapq.heappush(panels, (-uncertainty, middle, high, halves[1]))
         rays += halves[0][3] + halves[1][3]
     sums = np.array([panel[3] for panel in panels])
-    doubts = -sum(panel[0] for panel in panels)
-    return math.fsum(sums[:, 0]), math.fsum(sums[:, 1]), doubts + math.fsum(sums[:, 2])
+    uncertainties = -sum(panel[0] for panel in panels)
+    return math.fsum(sums[:, 0]), math.fsum(sums[:, 1]), uncertainties + math.fsum(sums[:, 2])
 
 
 @compiled

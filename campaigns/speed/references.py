@@ -68,20 +68,20 @@ def beam_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] | 
     found = {}
     for name in names:
         exact = ker.discretise(ker.PolygonLaw(wall), BASES[name], "exact")
-        other, doubt, _ = traced_matrix(wall, BASES[name], Budget(ROW_TOLERANCE, segments=MOST_ROW_RAYS))
+        other, uncertainty, _ = traced_matrix(wall, BASES[name], Budget(ROW_TOLERANCE, segments=MOST_ROW_RAYS))
         way = "adaptive angles"
-        if doubt > ROWS_CONFIRM:
+        if uncertainty > ROWS_CONFIRM:
             rays = sampled_matrices(wall, (name,), RANDOM_RAYS)[name]
-            other, doubt, way = rays.value, 4.0 * rays.error, rays.source
-        found[name] = _confirmed(exact, other, doubt, way)
+            other, uncertainty, way = rays.value, 4.0 * rays.error, rays.source
+        found[name] = _confirmed(exact, other, uncertainty, way)
     return found
 
 
-def _confirmed(exact: ker.KernelMatrix, other: Floats, doubt: float, way: str) -> Found:
+def _confirmed(exact: ker.KernelMatrix, other: Floats, uncertainty: float, way: str) -> Found:
     """An exact matrix with its own error bound, if another method agrees; else the script ends."""
     distance = float(np.linalg.norm(exact.symmetric - other))
-    if distance > doubt + 10.0 * exact.error.value:
-        raise SystemExit(f"{exact!r} and {way} differ by {distance:.2g}, more than {doubt:.2g}")
+    if distance > uncertainty + 10.0 * exact.error.value:
+        raise SystemExit(f"{exact!r} and {way} differ by {distance:.2g}, more than {uncertainty:.2g}")
     return Found(exact.symmetric, exact.error.value, f"exact; {way} agree to {max(distance, 1e-15):.0e}")
 
 
@@ -96,14 +96,16 @@ def _beside(found: Found, matrix: ker.KernelMatrix) -> Found:
 def law_of_rows(row: Row, tolerance: float) -> Found:
     """The law in bins, from conditionals by formula of a mirror-symmetric law, by adaptive Gauss-Kronrod in theta."""
     bins = LAW_BASIS.size
-    edges, half, fluxes, doubts = np.sort(np.arccos(np.linspace(-1.0, 1.0, bins + 1))), bins // 2, [], []
+    edges, half, fluxes, uncertainties = np.sort(np.arccos(np.linspace(-1.0, 1.0, bins + 1))), bins // 2, [], []
     for low, high in pairwise(edges[: half + 1]):
-        flux, doubt = mean_over_angles(lambda theta: np.diff(row(theta).distribution(edges)), low, high, tolerance)
+        flux, uncertainty = mean_over_angles(
+            lambda theta: np.diff(row(theta).distribution(edges)), low, high, tolerance
+        )
         fluxes.append(flux)
-        doubts.append(doubt)
+        uncertainties.append(uncertainty)
     law = bins * np.array([*fluxes, *(flux[::-1] for flux in reversed(fluxes))])
     # every entry of a row may have the error of this row
-    error = bins * float(np.linalg.norm(doubts)) * (2.0 * bins) ** 0.5
+    error = bins * float(np.linalg.norm(uncertainties)) * (2.0 * bins) ** 0.5
     return Found(0.5 * (law + law.T), error, ROWS_BY_FORMULA)
 
 
@@ -114,14 +116,14 @@ def plane_of_rows(row: Row, tolerance: float) -> dict[str, Found]:
         mean = row(theta).mean()
         return np.outer([1.0, np.cos(theta), np.sin(theta)], [1.0, mean.real, mean.imag])
 
-    table, doubt = mean_over_angles(outer, tolerance=tolerance)
+    table, uncertainty = mean_over_angles(outer, tolerance=tolerance)
     probe = np.array([0.5, 1.1, 2.0])
     plane = np.stack([np.ones(3), np.cos(probe), np.sin(probe)], axis=1)
     change = np.linalg.solve(plane, RESISTANCE_BASIS.evaluate(probe))
     size = float(np.linalg.norm(change, 2)) ** 2
     return {
-        "moment": Found(np.diag([1.0, 3.0 * table[1, 1]]), 3.0 * doubt, ROWS_BY_FORMULA),
-        "resistance": Found(change.T @ table @ change, 3.0 * size * doubt, ROWS_BY_FORMULA),
+        "moment": Found(np.diag([1.0, 3.0 * table[1, 1]]), 3.0 * uncertainty, ROWS_BY_FORMULA),
+        "resistance": Found(change.T @ table @ change, 3.0 * size * uncertainty, ROWS_BY_FORMULA),
     }
 
 

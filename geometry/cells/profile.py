@@ -73,12 +73,12 @@ def _warn_of_units(profile: Profile) -> None:
     slope = float(np.abs(np.diff(height)).sum()) / width
     wide = width * METRES.get(profile.unit, 0.0) > WIDEST
     if slope > STEEPEST:
-        doubt = f"mean slope is {slope:.3g}: are the heights in a smaller unit than the positions"
+        oddity = f"mean slope is {slope:.3g}: are the heights in a smaller unit than the positions"
     elif 0.0 < change < (FLATTEST_WIDE if wide else FLATTEST) * width:
-        doubt = f"width is {width:.3g} and its heights differ by {change:.3g}: are the positions in a smaller unit"
+        oddity = f"width is {width:.3g} and its heights differ by {change:.3g}: are the positions in a smaller unit"
     else:
         return
-    warnings.warn(f"the profile's {doubt}? Give units, for example units=('mm', 'nm')", stacklevel=4)
+    warnings.warn(f"the profile's {oddity}? Give units, for example units=('mm', 'nm')", stacklevel=4)
 
 
 def rolled(x: Floats, height: Floats) -> Floats:
@@ -208,7 +208,7 @@ def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
 def _meaning(
     header: Header | None, given: tuple[str, str] | None, quantity: Quantity | None
 ) -> tuple[tuple[str, str] | None, bool]:
-    """The units of the columns, and whether the second has slopes; doubt is refused with the option that decides."""
+    """The units of the columns, and whether the second has slopes; if unclear, an error names the option."""
     line, units, slopes = header or Header("", ("", ""), False)
     first, second = given or units
     wanted = {None: slopes or is_slope(second), "slope": True, "height": False}[quantity]

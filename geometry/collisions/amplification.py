@@ -71,17 +71,17 @@ def mark_amplified(
     states: tuple[Floats, Floats],
     ends: tuple[Floats, Floats],
     status: NDArray[np.uint8],
-    doubtful: NDArray[np.bool_],
+    uncertain: NDArray[np.bool_],
     units: tuple[Any, Any],
 ) -> None:
-    """Set the status of amplified disks, among the ``doubtful`` ones that escaped, to ``AMPLIFIED``.
+    """Set the status of amplified disks, among the ``uncertain`` ones that escaped, to ``AMPLIFIED``.
 
     ``states`` are the incoming positions and velocities, one row for each disk, and ``ends`` the outgoing ones.
     ``again`` collides the disks of some rows from disturbed states, and tells which of them escaped. ``units`` are the
     sizes of positions, for their rounding errors, and the masses of the velocities.
     """
     (at, moving), (position, velocity), (sizes, masses) = states, ends, units
-    rows = np.flatnonzero((status == DiskStatus.ESCAPED) & doubtful)
+    rows = np.flatnonzero((status == DiskStatus.ESCAPED) & uncertain)
     for k in range(DISTURBED):
         if not len(rows):
             break

@@ -118,8 +118,8 @@ def collide_pair(
     spacing, ends = max(first.spacing, second.spacing), (at.reshape(-1, 6), moving.reshape(-1, 6))
     masses = np.array([m for body in (first, second) for m in (body.disk.mass, body.disk.mass, body.disk.inertia)])
     ratio = max(body.disk.mass / body.disk.inertia for body in (first, second))
-    doubtful = contacts >= fewest_contacts(spacing * (1.0 + largest_bend_of(first, second)), ratio)
-    mark_amplified(again, states, ends, arrays[-1], doubtful, (spacing, masses))
+    uncertain = contacts >= fewest_contacts(spacing * (1.0 + largest_bend_of(first, second)), ratio)
+    mark_amplified(again, states, ends, arrays[-1], uncertain, (spacing, masses))
     for array in arrays:
         array.setflags(write=False)
     return PairCollision(*arrays)

@@ -171,7 +171,7 @@ def marked(
     ``bend`` is that of `fewest_contacts`; ``sizes`` are those of x1 and alpha for rounding errors.
     """
     results, masses = collided(*states), np.array([disk.mass, disk.mass, disk.inertia])
-    doubtful = results.contacts >= fewest_contacts(bend, disk.mass / disk.inertia)
+    uncertain = results.contacts >= fewest_contacts(bend, disk.mass / disk.inertia)
 
     def again(rows: NDArray[np.intp], at: Floats, moving: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         moving[:, 1] = np.minimum(moving[:, 1], 0.5 * states[1][rows, 1])
@@ -179,7 +179,7 @@ def marked(
         return there.position, there.velocity, there.status == Status.ESCAPED
 
     ends = results.position, results.velocity
-    mark_amplified(again, states, ends, results.status, doubtful, (np.array(sizes), masses))
+    mark_amplified(again, states, ends, results.status, uncertain, (np.array(sizes), masses))
     for array in results:
         array.setflags(write=False)
     return results

@@ -14,7 +14,7 @@ KEY_FACTOR = np.uint64(6364136223846793005)
 # Distance of the samples on both sides of a predicted change from it: a fraction of the last term of the interpolation
 # by a cubic, a parabola and a line. The remainder is smaller by a factor of the angles' distance; if the samples do not
 # enclose the change, the search between its neighbours finds it.
-CUBIC_DOUBT, PARABOLA_DOUBT, LINE_DOUBT = 0.1, 0.3, 0.05
+CUBIC_UNCERTAINTY, PARABOLA_UNCERTAINTY, LINE_UNCERTAINTY = 0.1, 0.3, 0.05
 
 
 class Pieces(NamedTuple):
@@ -101,7 +101,7 @@ def samples_between(angle: float, nearest: tuple[Pieces, Pieces], farther: list[
     first, second = before.changes[same], after.changes[place[same]]
     slope = (second - first) / (after.angle - before.angle)
     line, product = first + (angle - before.angle) * slope, (angle - before.angle) * (angle - after.angle)
-    found, doubt = line, LINE_DOUBT * np.abs(second - first)
+    found, uncertainty = line, LINE_UNCERTAINTY * np.abs(second - first)
     bends = []
     for far in farther:
         place, same = far.places(keys)
@@ -110,11 +110,11 @@ def samples_between(angle: float, nearest: tuple[Pieces, Pieces], farther: list[
         bend = ((there - first) / (far.angle - before.angle) - slope) / (far.angle - after.angle)
         bends.append(bend)
         found = np.where(same, line + product * bend, found)
-        doubt = np.where(same, PARABOLA_DOUBT * np.abs(product * bend), doubt)
+        uncertainty = np.where(same, PARABOLA_UNCERTAINTY * np.abs(product * bend), uncertainty)
     if len(bends) == 2:
         rate = (bends[1] - bends[0]) / (farther[1].angle - farther[0].angle)
         both = np.isfinite(rate)
         found = np.where(both, line + product * (bends[0] + (angle - farther[0].angle) * rate), found)
-        doubt = np.where(both, CUBIC_DOUBT * np.abs(product * (bends[1] - bends[0])), doubt)
-    doubt = np.maximum(doubt, least / max(1, len(keys)))
-    return np.concatenate((found - doubt, found + doubt, *unmatched))
+        uncertainty = np.where(both, CUBIC_UNCERTAINTY * np.abs(product * (bends[1] - bends[0])), uncertainty)
+    uncertainty = np.maximum(uncertainty, least / max(1, len(keys)))
+    return np.concatenate((found - uncertainty, found + uncertainty, *unmatched))

@@ -68,10 +68,10 @@ class ExactPoints:
         first, second = along * offset[:, 1], up * offset[:, 0]
         cross = first - second
         signs: NDArray[np.int8] = np.sign(cross).astype(np.int8)
-        doubtful = np.abs(cross) <= CROSS_ULPS * UNIT_ROUNDOFF * (np.abs(first) + np.abs(second))
+        uncertain = np.abs(cross) <= CROSS_ULPS * UNIT_ROUNDOFF * (np.abs(first) + np.abs(second))
         # if both products are exact zeros, the sign is certain
-        doubtful &= (first != 0.0) | (second != 0.0)
-        for i in doubtful.nonzero()[0].tolist():
+        uncertain &= (first != 0.0) | (second != 0.0)
+        for i in uncertain.nonzero()[0].tolist():
             value = self._cross(a, b, int(others[i]))
             signs[i] = (value > 0) - (value < 0)
         return signs

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 # Distance from a joint, as a fraction of the hollow's size, or angle from the end of an arc, within which a ray is
 # traced hit by hit instead. This is far above the tolerance of a corner and above all rounding errors, so that both
 # methods agree on the number of hits and on the status. About one ray in 10^8 is concerned.
-DOUBT_FRACTION = 2.0**-30
+UNCERTAIN_FRACTION = 2.0**-30
 # Half angle, radians, below which arcs are traced hit by hit, which is more accurate for positions along flat arcs.
 FLATTEST_ARC = 0.05
 # Pieces of a hollow with a closed form: two lines, or one arc.
@@ -71,7 +71,7 @@ def _wedge_form(left: float, right: float, apex: Point, size: float) -> Floats:
     row = row_of(
         c.CHAIN + 2 * links * c.LINK_COLUMNS,
         {
-            c.FORM: c.WEDGE, c.FORM_LEFT: left, c.FORM_RIGHT: right, c.DOUBT: DOUBT_FRACTION * size,
+            c.FORM: c.WEDGE, c.FORM_LEFT: left, c.FORM_RIGHT: right, c.UNCERTAINTY: UNCERTAIN_FRACTION * size,
             c.WEDGE_X: x, c.WEDGE_Y: y, c.COPIES: copies,
         },
     )  # fmt: skip
@@ -107,7 +107,7 @@ def _arc_form(left: float, right: float, arc: Arc) -> Floats:
     return row_of(
         c.FORM_COLUMNS,
         {
-            c.FORM: c.CIRCULAR, c.FORM_LEFT: left, c.FORM_RIGHT: right, c.DOUBT: DOUBT_FRACTION,
+            c.FORM: c.CIRCULAR, c.FORM_LEFT: left, c.FORM_RIGHT: right, c.UNCERTAINTY: UNCERTAIN_FRACTION,
             c.CIRCLE_X: 0.5 * (left + right), c.CIRCLE_Y: height, c.RADIUS: radius, c.HALF_ANGLE: half,
         },
     )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, whole_number
 from .basis import Basis
@@ -123,20 +123,20 @@ class Legendre(Basis):
         return f"Legendre({self.n})" if self.measure == SINE else f"Legendre({self.n}, weight={self.weight!r})"
 
 
-def legendre_moments(local: Floats, weight: Floats, degree: int) -> Floats:
-    """Sums over the nodes of weights times L_0, ..., L_degree, shape (degree + 1, cells).
+def legendre_moments(local: Floats, weight: Floats, degree: int, cell: NDArray[np.intp], cells: int) -> Floats:
+    """Sums over the nodes in each cell of weights times L_0, ..., L_degree, shape (degree + 1, cells).
 
-    ``local`` are the nodes in (-1, 1) and ``weight`` their weights, shapes (cells, nodes). The three-term recurrence
+    ``local`` are the nodes in (-1, 1), ``weight`` their weights and ``cell`` their cells. The three-term recurrence
     (k + 1) L_(k + 1) = (2 k + 1) t L_k - k L_(k - 1) needs two polynomials in memory at a time.
 
     Examples
     --------
-    >>> legendre_moments(np.array([[-1.0, 0.5]]), np.array([[1.0, 2.0]]), 2).tolist()
-    [[3.0], [0.0], [0.75]]
+    >>> legendre_moments(np.array([-1.0, 0.5, 0.0]), np.array([1.0, 2.0, 1.0]), 2, np.array([0, 0, 1]), 2).tolist()
+    [[3.0, 1.0], [0.0, 0.0], [0.75, -0.5]]
     """
-    before, current = np.ones_like(local), local
-    moments = np.empty((degree + 1, len(local)))
+    before, current = weight, weight * local
+    moments = np.empty((degree + 1, cells))
     for k in range(degree + 1):
-        moments[k] = np.einsum("ij,ij->i", weight, before)
+        moments[k] = np.bincount(cell, weights=before, minlength=cells)
         before, current = current, ((2 * k + 3) * local * current - (k + 1) * before) / (k + 2)
     return moments

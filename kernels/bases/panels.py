@@ -159,6 +159,12 @@ class Panels(Basis):
             np.einsum("ak,aki->ai", polynomials[part], self._coefficients[owner[part]], out=values[part])
         return panel, values.reshape(*angle.shape, self.degree + 1)
 
+    def positions(self, angle: Floats) -> tuple[NDArray[np.int64], Floats]:
+        """The panel of each angle and the angle's position in it, from -1 to 1."""
+        panel = self._cells.index(angle)
+        low, high = self.edges[panel], self.edges[panel + 1]
+        return panel, (2.0 * angle - low - high) / (high - low)
+
     def legendre(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
         """The Legendre polynomials of the given panels at the angles, shape ``angle.shape + (degree + 1,)``."""
         angle, panel = finite_array("angle", angle), indices("panel", panel, self._cells.size)

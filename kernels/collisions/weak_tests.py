@@ -197,14 +197,14 @@ def weak_limit(
             f"scales: expected at least {least:.2g}, where positions resolve a period, got {eps.min():.2g}"
         )
     runs = np.empty((len(eps), repetitions, 2, len(tested)))
-    unresolved, doubt = np.zeros(len(eps)), np.zeros((len(eps), len(tested)))
+    unresolved, uncertainty = np.zeros(len(eps)), np.zeros((len(eps), len(tested)))
     for i, space in enumerate(spaces):
         for k in range(repetitions):
             found, missing, largest = _tested_once(space, list(tested.values()), window, power, source)
             runs[i, k] = found
             unresolved[i] += missing / repetitions
-            doubt[i] += 2.0 * missing * largest / repetitions
-    half = student_95(repetitions) * runs.std(axis=1, ddof=1) / math.sqrt(repetitions) + doubt[:, None]
+            uncertainty[i] += 2.0 * missing * largest / repetitions
+    half = student_95(repetitions) * runs.std(axis=1, ddof=1) / math.sqrt(repetitions) + uncertainty[:, None]
     means = runs.mean(axis=1)
     return WeakLimit(
         scales=frozen(eps),

@@ -9,18 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ..bases.intervals import cell_among, joined_lists
+from ..bases.intervals import cell_among
 from ..bases.legendre import legendre_moments
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.panels import Panels
 
-# Pieces on which theta' covers at most this fraction of a panel get half the Gauss nodes, because the error of the rule
-# for a polynomial falls by this fraction to the power of its degree.
-SHORT_FRACTION = 0.1
-# Gauss nodes beyond degree // 2 + 1 for the factor sin(delta) on a piece, at most half as long as the widest panel.
-SINE_NODES = 2
-# Limit on the pieces in memory at a time.
-CHUNK = 2**17
 # Gauss nodes beyond degree // 2 + 1 for the factor exp(i theta' / 2 N) on a panel.
 MORE_NODES = 3
 # Angles at which the variation of functions is evaluated.
@@ -82,54 +75,6 @@ def outgoing_lines(half_angle: float, pieces: ArcPieces, theta: Floats) -> ArcLi
     end = np.where(pieces.mirrored, half_angle, np.pi - half_angle)
     angle = np.where(pieces.rest, end, offset + slope * lower)
     return ArcLines(pieces.ray, slope, offset, lower, upper, mass, angle, pieces.rest | alone, pieces.rest)
-
-
-def arc_images(lines: ArcLines, panels: Panels, theta: Floats) -> tuple[Floats, Floats]:
-    r"""E[e_j(Theta') | theta] for all functions e_j on panels, shape (angles, functions), and the errors at each angle.
-
-    The outgoing angle is linear in the angle delta of the chord, which has the density sin(delta). Between two edges
-    the functions are polynomials in delta on each piece, so a Gauss rule is exact apart from the sine.
-    """
-    ray, slope, offset, lower, upper = lines[:5]
-    single = lines.single
-    ends = np.sort(np.stack([offset + slope * lower, offset + slope * upper]), axis=0)
-    first = cell_among(panels.edges, ends[0])
-    last = np.clip(np.searchsorted(panels.edges, ends[1], side="left") - 1, first, len(panels.edges) - 2)
-    gathered = np.zeros((panels.degree + 1, theta.size * (len(panels.edges) - 1)))
-    owner, rank = joined_lists(np.where(single, 0, last - first + 1))
-    for start in range(0, owner.size, CHUNK):
-        own, panel = owner[start : start + CHUNK], (first[owner] + rank)[start : start + CHUNK]
-        low, high = panels.edges[panel], panels.edges[panel + 1]
-        cuts = np.sort((np.stack([low, high]) - offset[own]) / slope[own], axis=0)
-        near, far = np.clip(cuts, lower[own], upper[own])
-        scale, shift = 2.0 * slope[own] / (high - low), (2.0 * offset[own] - low - high) / (high - low)
-        _add_moments(gathered, near, far, scale, shift, ray[own] * (len(panels.edges) - 1) + panel, panels.degree)
-    angle = lines.angle[single]
-    panel = cell_among(panels.edges, angle)
-    cell = ray[single] * (len(panels.edges) - 1) + panel
-    for column, values in zip(gathered, panels.legendre(angle, panel).T, strict=True):
-        column += np.bincount(cell, weights=lines.mass[single] * values, minlength=column.size)
-    total = lines.of_angles(lines.mass, theta.size)
-    moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
-    left = lines.of_angles(np.where(lines.rest, lines.mass, 0.0), theta.size)
-    # Two values of a function of sup norm 1 differ by at most 2.
-    return panels.of_legendre(moments.transpose(1, 2, 0)), 2.0 * left / total
-
-
-def _add_moments(
-    gathered: Floats, near: Floats, far: Floats, scale: Floats, shift: Floats, cell: Floats, degree: int
-) -> None:
-    """Add the integrals of L_k(scale delta + shift) over (near, far), k = 0 ... degree, to the columns ``cell``."""
-    full = degree // 2 + 1 + SINE_NODES
-    short = np.abs(scale) * (far - near) <= 2.0 * SHORT_FRACTION
-    for chosen, nodes in ((short, full // 2 + 1), (~short, full)):
-        if not chosen.any():
-            continue
-        delta, weight = (part.reshape(-1, nodes) for part in gauss_on_intervals(near[chosen], far[chosen], nodes))
-        weight = weight * SINE.density(delta)
-        local = scale[chosen, None] * delta + shift[chosen, None]
-        for column, moment in zip(gathered, legendre_moments(local, weight, degree), strict=True):
-            column += np.bincount(cell[chosen], weights=moment, minlength=column.size)
 
 
 class ArcMeans:
@@ -220,4 +165,5 @@ class ArcMeans:
         """Moments of the cells' Legendre polynomials, (cells, degree + 1), by nodes and weights (cells, nodes)."""
         low, high = self.edges[cell, None], self.edges[cell + 1, None]
         local = (2.0 * angle - low - high) / (high - low)
-        return legendre_moments(local, weight, self._polynomials.shape[1] - 1).T
+        owner = np.repeat(np.arange(len(local)), local.shape[1])
+        return legendre_moments(local.ravel(), weight.ravel(), self._polynomials.shape[1] - 1, owner, len(local)).T

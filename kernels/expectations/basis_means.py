@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ..bases.basis import Basis
+from ..bases.legendre import legendre_moments
 from ..bases.measure import gauss_rule
 from ..bases.panels import Panels
 
@@ -17,8 +19,6 @@ from ..bases.panels import Panels
 PROBE, PROBE_TOLERANCE = np.array([1.0]), 1e-2
 # Incoming angles at a time.
 ANGLES_AT_ONCE = 512
-# Limit on the values of functions in memory at a time.
-VALUES_AT_ONCE = 2_000_000
 # Angles on an interval at which the largest absolute value of functions is sought.
 HEIGHT_PROBES = 5
 
@@ -60,15 +60,13 @@ def means_of_basis(basis: Basis, nodes: Floats, weights: Floats, starts: NDArray
         mass = np.bincount(cell, weights=weights, minlength=rows * size).reshape(rows, size)
         return np.asarray(mass * basis.evaluate(0.5 * (basis.edges[1:] + basis.edges[:-1])).max(0))
     if isinstance(basis, Panels):
-        panel, values = basis.local(nodes)
-        cell = np.repeat(np.arange(rows), np.diff(starts)) * (size // (basis.degree + 1)) + panel
-        columns = [
-            np.bincount(cell, weights=weights * value, minlength=rows * size // (basis.degree + 1))
-            for value in values.T
-        ]
-        return np.asarray(np.stack(columns, axis=1).reshape(rows, size), dtype=np.float64)
+        panel, local = basis.positions(nodes)
+        panels = size // (basis.degree + 1)
+        cell = np.repeat(np.arange(rows), np.diff(starts)) * panels + panel
+        moments = legendre_moments(local, weights, basis.degree, cell, rows * panels)
+        return basis.of_legendre(moments.T.reshape(rows, panels, -1))
     found = np.empty((rows, size))
-    most = max(1, VALUES_AT_ONCE // size)
+    most = max(1, NUMBERS_AT_ONCE // size)
     first = 0
     while first < rows:
         last = max(first + 1, int(np.searchsorted(starts, starts[first] + most, side="right")) - 1)

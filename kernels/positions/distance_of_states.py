@@ -113,9 +113,9 @@ def _means_of_law(law: PositionLaw, orders: int) -> tuple[Floats, Floats]:
         if id(part) not in tables:
             matrix = discretise(part, Legendre(orders), tolerance=1e-6)
             tables[id(part)] = flux_means(matrix, orders - 1), float(matrix.error)
-        means, doubt = tables[id(part)]
+        means, uncertainty = tables[id(part)]
         total += np.einsum("jm,kl->jklm", in_space[k], means)
-        error += np.abs(in_space[k])[:, None, None, :] * doubt
+        error += np.abs(in_space[k])[:, None, None, :] * uncertainty
     return total, error
 
 

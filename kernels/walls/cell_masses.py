@@ -198,13 +198,13 @@ class _Panels:
         sampled, missed = sample(self.hollow, patches, self._wanted(patches, width * np.sqrt(alike)), self.edges)
         for level, strips, outs, error in sampled:
             place, _ = grid = positions(level)
-            doubts = error, _tail(weight_at(place) * outs), _tail(strips.ends)
+            uncertainties = error, _tail(weight_at(place) * outs), _tail(strips.ends)
             room = room_for(len(self.sizes), len(NODES), outs.shape[2])
             own = strips.ends, outs, strips.owner
             panels, cells = (self.low, self.high, measure), Cells(self.edges, self.sizes)
             grids = Grid(_PLACES, _WEIGHTS), Grid(*grid)
             compiled_result(
-                partial(masses_of_patches, panels, *grids, own, doubts, limits, goals, cells, tuple(found), room)
+                partial(masses_of_patches, panels, *grids, own, uncertainties, limits, goals, cells, tuple(found), room)
             )
         return missed
 

@@ -9,10 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, number_between, whole_number
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
-from ..bases.basis import AngleFunction
-from ..bases.given import Vectorised
 from ..bases.intervals import between_cuts, edges_inside, joined_lists
-from ..bases.measure import SINE, gauss_on_intervals
+from ..bases.measure import SINE
 from ..expectations.arcs import ArcPieces, outgoing_lines
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..laws.law import DrivenLaw, entries
@@ -22,9 +20,6 @@ from ..laws.law import DrivenLaw, entries
 # mean within xi/N^2. For a smooth function the error is below 1/(4 N^4) = 4e-12.
 MOST_HITS = 500
 FEWEST_HITS = 8
-NODES = 16
-# Incoming angles at once; each has up to 2 MOST_HITS pieces of NODES outgoing angles.
-CHUNK = 2**11
 
 
 @dataclass(frozen=True)
@@ -129,43 +124,6 @@ class CircularArcLaw(DrivenLaw):
             np.concatenate((weight * SINE.density(chord), lines.mass[single])),
             2.0 * left / lines.of_angles(lines.mass, theta.size),
         )
-
-    def means(self, function: AngleFunction, theta: Floats, nodes: int = NODES, most_hits: int = MOST_HITS) -> Floats:
-        """E[f(Theta') | theta] by Gauss rules with ``nodes`` nodes where N is constant, for N up to ``most_hits``."""
-        theta, function = angles("theta", theta), Vectorised.of(function)
-        whole_number("nodes", nodes, 1)
-        flat = theta.reshape(-1)
-        starts = range(0, max(flat.size, 1), CHUNK)
-        parts = [self._means(function, flat[start : start + CHUNK], nodes, most_hits) for start in starts]
-        total = np.concatenate(parts)
-        return total.reshape(theta.shape + total.shape[1:])
-
-    def _means(self, function: AngleFunction, theta: Floats, nodes: int, most_hits: int) -> Floats:
-        ray, mirrored, outgoing, weight = self._conditional_quadrature(theta, nodes, most_hits)
-        angle = clipped_inside(np.where(mirrored[:, None], np.pi - outgoing, outgoing))
-        value = np.asarray(function(angle), dtype=np.float64)
-        piece = np.einsum("ij,ij...->i...", weight, value)
-        total = np.bincount(ray, weights=weight.sum(axis=1), minlength=theta.size)
-        starts = np.searchsorted(ray, np.arange(theta.size))
-        summed = np.add.reduceat(piece, starts, axis=0)
-        return np.asarray(summed / total.reshape((-1,) + (1,) * (summed.ndim - 1)))
-
-    def _conditional_quadrature(
-        self, theta: Floats, nodes: int, most_hits: int
-    ) -> tuple[NDArray[np.intp], NDArray[np.bool_], Floats, Floats]:
-        """Gauss rules in delta between the changes of N, for every theta and both sides.
-
-        Returns for each piece, sorted by incoming angle, the index of this angle and whether the piece is mirrored,
-        shape (pieces,), and the outgoing angles and their weights (not normalised), shape (pieces, nodes). A piece with
-        a single outgoing angle has this angle at all nodes.
-        """
-        ray, mirrored, lower, upper, hits, rest, alone = self.pieces(theta, most_hits)
-        base = np.where(mirrored, np.pi - theta[ray], theta[ray])
-        chord, weight = (part.reshape(-1, nodes) for part in gauss_on_intervals(lower, np.maximum(upper, lower), nodes))
-        outgoing = np.pi + base[:, None] - 2.0 * hits[:, None] * chord
-        outgoing = np.where(rest[:, None], np.pi - self.half_angle, outgoing)
-        weight = weight * SINE.density(chord) + np.where(alone & ~rest, 1.0, 0.0)[:, None]
-        return ray, mirrored, outgoing, weight
 
     def pieces(self, theta: Floats, most_hits: int = MOST_HITS) -> ArcPieces:
         """The intervals of delta on which N is constant, for every theta and both sides, sorted by incoming angle."""

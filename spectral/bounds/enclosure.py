@@ -422,8 +422,8 @@ def _enclosed(
 
 def _temple(found: Residuals, rest: float, listed: NDArray[np.intp], position: int) -> tuple[float, float]:
     """The Kato-Temple interval, from the distances to neighbouring enclosures or to the rest of the spectrum."""
-    doubt = found.quotient_errors + QUOTIENT_ROUNDING
-    radius = found.norms + doubt
+    uncertainty = found.quotient_errors + QUOTIENT_ROUNDING
+    radius = found.norms + uncertainty
     value, norm = found.quotients[position], found.norms[position]
     others = listed[listed != position]
     near, spread = found.quotients[others], radius[others]
@@ -433,4 +433,4 @@ def _temple(found: Residuals, rest: float, listed: NDArray[np.intp], position: i
     room_below = value - float(below.max()) if below.size else np.inf
     up = min(norm**2 / room_below, radius[position]) if room_below > 0.0 else radius[position]
     down = min(norm**2 / room_above, radius[position]) if room_above > 0.0 else radius[position]
-    return float(value - down - doubt[position]), float(min(value + up + doubt[position], 1.0))
+    return float(value - down - uncertainty[position]), float(min(value + up + uncertainty[position], 1.0))

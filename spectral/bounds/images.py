@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels, WallLaw
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
-from ...kernels.expectations.arcs import ArcMeans, arc_images, outgoing_lines
-from ...kernels.expectations.basis_means import VALUES_AT_ONCE, Means, height_of, means_of_basis, weighted_means
+from ...kernels.expectations.arcs import ArcMeans
+from ...kernels.expectations.basis_means import Means, height_of, means_of_basis, weighted_means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Combination, Composition, Power, SpecularFrame, knows_errors
 from ...kernels.laws.structure import holds_of_all
@@ -67,13 +68,6 @@ def expectations(law: Law, basis: Basis) -> Means:
     if isinstance(law, WallLaw):
         known = _known(law)
         return _of_nodes(law, basis) if known is None else expectations(known, basis)
-    if isinstance(law, CircularArcLaw) and isinstance(basis, Panels):
-
-        def of_arcs(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-            lines = outgoing_lines(law.half_angle, law.pieces(theta, followed_hits(tolerance)), theta)
-            return arc_images(lines, basis, theta)
-
-        return of_arcs
     return _of_nodes(law, basis)
 
 
@@ -85,7 +79,7 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
     height, each = height_of(basis, vectors), expectations(law, basis)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        step = max(1, VALUES_AT_ONCE // basis.size)
+        step = max(1, NUMBERS_AT_ONCE // basis.size)
         finer = tolerance / max(height, 1.0)
         parts = [each(theta[start : start + step], finer) for start in range(0, theta.size, step)]
         images = np.concatenate([image @ vectors for image, _ in parts])

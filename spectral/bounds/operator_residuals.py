@@ -2,43 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
-from ...kernels import Basis, Bins, CircularArcLaw, DensityLaw, Law, Legendre, Panels, WallLaw
-from ...kernels.bases.measure import SINE, gauss_on_intervals
+from ...kernels import Basis, Bins, DensityLaw, Law, Panels, WallLaw
+from ...kernels.bases.measure import SINE
 from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
 from ...kernels.discretisation.actions import GRAZING_EDGES
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import Means, weighted_means
-from ...kernels.laws.density import GAUSS_NODES, split_panels
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
-from ...kernels.walls.circular_arc import MOST_HITS
 from ...kernels.walls.conditionals import is_few
 from .images import expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
-# Angles per block for up to FEW_FUNCTIONS functions.
-CHUNK_ANGLES, FEW_FUNCTIONS = 256, 16
 # A panel must begin below pi/2 by more than this to belong to the left half.
 HALF_ROUNDING = 1e-12
 # Default error of conditional expectations.
 MEAN_TOLERANCE = 1e-8
-# A Gauss rule with n nodes on a panel of width h resolves cos(l theta) to rounding for l h up to about this times n.
-NODES_PER_DEGREE = 1.2
-# Additional nodes of the two rules that are compared.
-MORE_NODES = (0, 8)
-# Parts of each panel for these two rules and for a third one, used if the two differ by more than CONVERGED.
-PARTS, CONVERGED = (1, 1, 4), 1e-12
 
 
 @dataclass(frozen=True)
@@ -91,8 +79,6 @@ def residuals(
     ``mirrored``: each function is even or odd, and the law is mirror-symmetric. Quotients are refined until their error
     is below ``quotient_error``.
     """
-    if isinstance(law, DensityLaw) and isinstance(basis, Legendre) and not law.outgoing_breakpoints.size:
-        return _smooth_residuals(law, basis, vectors, values)
     function = _TrialFunctions(law, basis, vectors, quotient_error)
     low, high = _first_panels(law, basis)
     if mirrored:
@@ -100,13 +86,15 @@ def residuals(
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
     ends = np.zeros((2, 0))
     # integrals, differences of the two rules, and effects of the errors of conditional expectations
-    total, error, doubt = (np.zeros((0, 2, len(values))) for _ in range(3))
+    total, error, uncertainty = (np.zeros((0, 2, len(values))) for _ in range(3))
     angles_used = 0
     while low.size:
         fresh = _integrals(function, values, low, high, 2.0 if mirrored else 1.0)
         angles_used += low.size * len(NODES)
         ends = np.concatenate([ends, [low, high]], axis=1)
-        total, error, doubt = (np.concatenate(both) for both in zip((total, error, doubt), fresh, strict=True))
+        total, error, uncertainty = (
+            np.concatenate(both) for both in zip((total, error, uncertainty), fresh, strict=True)
+        )
         square = total[:, 1].sum(axis=0)
         # a Kato-Temple bound adds about the square to the quotient, so the error of the quotient should be smaller
         wanted = np.stack(
@@ -124,29 +112,12 @@ def residuals(
         middle = ends[:, worst].mean(axis=0)
         low, high = np.append(ends[0, worst], middle), np.append(middle, ends[1, worst])
         rest = np.setdiff1d(np.arange(len(fraction)), worst)
-        ends, total, error, doubt = ends[:, rest], total[rest], error[rest], doubt[rest]
+        ends, total, error, uncertainty = ends[:, rest], total[rest], error[rest], uncertainty[rest]
     correction, square = total.sum(axis=0)
-    correction_error, square_error = (error + doubt).sum(axis=0)
+    correction_error, square_error = (error + uncertainty).sum(axis=0)
     return Residuals(
         values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used
     )
-
-
-def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -> Residuals:
-    """Residuals of polynomials under a smooth density, by two Gauss rules that resolve the smooth images."""
-    found, angles_used, rule = [], 0, image_rule(law, basis, vectors)
-    for more in MORE_NODES:
-        angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval + more)
-        angles_used += angle.size
-        here = expansion(basis, vectors, angle)
-        image, errors = rule(angle, MEAN_TOLERANCE)
-        rest = image - here * values
-        found.append((weight @ (here * rest), weight @ (rest * rest)))
-    (first, first_square), (second, second_square) = found
-    norms = np.sqrt(np.maximum(first_square, second_square) + np.abs(first_square - second_square))
-    # an error e of the images adds at most ||e|| to quotients and norms, because the trial functions are unit vectors
-    doubt = float(np.sqrt(weight @ errors**2))
-    return Residuals(values + second, np.abs(second - first) + doubt, norms + doubt, angles_used)
 
 
 def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
@@ -193,15 +164,21 @@ def _integrals(
     flat = angle.ravel()
     image, mean_error = function.images(flat)
     here = function(flat)
-    rest, doubt = image - here * values, mean_error[:, None]
+    rest, uncertainty = image - here * values, mean_error[:, None]
     shape = (*angle.shape, len(values))
     parts = np.stack([(here * rest).reshape(shape), (rest * rest).reshape(shape)], axis=2)
-    doubts = np.stack([(np.abs(here) * doubt).reshape(shape), ((2.0 * np.abs(rest) + doubt) * doubt).reshape(shape)], 2)
+    uncertainties = np.stack(
+        [
+            (np.abs(here) * uncertainty).reshape(shape),
+            ((2.0 * np.abs(rest) + uncertainty) * uncertainty).reshape(shape),
+        ],
+        2,
+    )
     density = copies * half[:, None] * SINE.density(angle)
     return (
         np.einsum("pq,pqjk->pjk", density * KRONROD, parts),
         np.abs(np.einsum("pq,pqjk->pjk", density * (KRONROD - GAUSS), parts)),
-        np.einsum("pq,pqjk->pjk", density * KRONROD, doubts),
+        np.einsum("pq,pqjk->pjk", density * KRONROD, uncertainties),
     )
 
 
@@ -231,10 +208,6 @@ def _rule(law: Law, basis: Basis, vectors: Floats) -> Means:
         return lambda theta, tolerance: (np.tile(mean, (theta.size, 1)), np.zeros(theta.size))
     if isinstance(law, WallLaw) and law.exact_law is not None:
         return _rule(law.exact_law, basis, vectors)
-    if isinstance(law, DensityLaw):
-        return _of_rules(partial(_means_of_density, law, basis, vectors), vectors.shape[1])
-    if isinstance(law, CircularArcLaw) and isinstance(basis, Legendre):
-        return _of_rules(partial(_means_of_arc, law, basis, vectors), vectors.shape[1])
     if isinstance(law, WallLaw) and not is_few(law.wall):
         raise _refusal(law, "its conditional distributions take too long")
     if knows_errors(law):
@@ -247,57 +220,6 @@ def _refusal(law: Law, reason: str) -> InputError:
         f"law: the images of trial functions under {law!r} have no known error, for {reason}; spectrum(law) and "
         "spectral_gap(law) take its matrix"
     )
-
-
-def _of_rules(means: Callable[..., Floats], functions: int) -> Means:
-    """Means by two Gauss rules, or by a much finer rule if they differ; the error is its distance from both."""
-
-    def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        first, second = (_in_chunks(partial(means, level=level), theta, functions) for level in (0, 1))
-        error = _largest(second - first)
-        # two similar rules may both miss a breakpoint: a much finer rule detects it
-        unconverged = np.flatnonzero(error > CONVERGED)
-        if unconverged.size:
-            finest = _in_chunks(partial(means, level=2), theta[unconverged], functions)
-            error[unconverged] = _largest(finest - first[unconverged]) + _largest(finest - second[unconverged])
-            second[unconverged] = finest
-        return second, error
-
-    return rule
-
-
-def _largest(values: Floats) -> Floats:
-    return np.asarray(np.abs(values).reshape(len(values), -1).max(axis=1, initial=0.0))
-
-
-def _in_chunks(means: Callable[[Floats], Floats], theta: Floats, functions: int) -> Floats:
-    step = max(1, CHUNK_ANGLES // (1 + functions // FEW_FUNCTIONS))
-    return np.concatenate([means(theta[start : start + step]) for start in range(0, theta.size, step)])
-
-
-def _means_of_density(law: DensityLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
-    """Means of a density, by Gauss rules on panels that resolve the density and the functions of the basis."""
-    edges = law.panels(theta)
-    if isinstance(basis, Legendre):
-        # a panel's Gauss rule resolves polynomials in cos(theta) of degree below its number of nodes over its width
-        edges = split_panels(edges, 1 + int(np.pi * basis.size / (NODES_PER_DEGREE * GAUSS_NODES)))
-    else:
-        inner = np.broadcast_to(basis.edges, (theta.size, basis.edges.size))
-        edges = np.sort(np.concatenate([edges, inner], axis=1), axis=1)
-    edges = split_panels(edges, PARTS[level])
-    nodes = GAUSS_NODES + MORE_NODES[level % 2]
-    outgoing, weight = gauss_on_intervals(edges[:, :-1].ravel(), edges[:, 1:].ravel(), nodes)
-    outgoing, weight = outgoing.reshape(theta.size, -1), weight.reshape(theta.size, -1)
-    weight = weight * law.density(theta[:, None], outgoing)
-    weight /= weight.sum(axis=1, keepdims=True)
-    return np.asarray(np.einsum("ij,ij...->i...", weight, expansion(basis, vectors, outgoing)))
-
-
-def _means_of_arc(law: CircularArcLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
-    """Means of circular arcs, whose pieces may be as long as (0, pi); finer rules also follow more hits."""
-    nodes = GAUSS_NODES + int(np.ceil(0.5 * np.pi * basis.size / NODES_PER_DEGREE)) + MORE_NODES[level % 2]
-    hits = (level + 1) * MOST_HITS
-    return law.means(lambda angle: expansion(basis, vectors, angle), theta, nodes, hits)
 
 
 def expansion(basis: Basis, vectors: Floats, theta: Floats) -> Floats:

@@ -120,9 +120,9 @@ def _hilbert_schmidt(law: Law, values: Floats, width: float) -> Separation | Non
         traces = [_trace(HenyeyGreensteinLaw(abs(law.g) ** (2 * power)), nodes) for nodes in TRACE_NODES]
     else:
         traces = [_squared_norm(law, nodes) for nodes in TRACE_NODES]
-    total, doubt = traces[-1], abs(traces[1] - traces[0])
+    total, uncertainty = traces[-1], abs(traces[1] - traces[0])
     listed = float(np.sum(np.maximum(np.abs(values) - width, 0.0) ** (2 * power)))
-    rest = max(total - listed, 0.0) + doubt + 16.0 * EPS * total
+    rest = max(total - listed, 0.0) + uncertainty + 16.0 * EPS * total
     radius = float(rest ** (0.5 / power))
     kind: ErrorKind = "bound" if isinstance(law, (HenyeyGreensteinLaw, LambertianLaw)) else "estimate"
     what = "P" if power == 1 else f"P^{power}"

@@ -22,7 +22,7 @@ DIRECTION = np.array([1.0, -1.0])
 # A persistence within this distance of 1 counts as 1: the particle never reverses its direction.
 BALLISTIC = 1e-12
 # With a larger error of the persistence it is not known whether the particle reverses its direction.
-LARGEST_DOUBT = 1e-3
+LARGEST_UNCERTAINTY = 1e-3
 
 # Incoming angles, and rays at each, for the length from which on the limit holds within this distance of zeta.
 ONSET_ANGLES, ONSET_RAYS, NEAR_LIMIT = 10.0 ** -np.arange(0.25, 3.1, 0.25), 2000, 0.1
@@ -122,9 +122,9 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     # F, from one long displacement to the next, in the frame of the channel
     step = symbol.matrix[:, ::-1] if arrangement == "mirror" else -symbol.matrix
     zeta = float(0.5 * DIRECTION @ step @ DIRECTION)
-    doubt = 2.0 * symbol.entry_error
-    known = doubt <= LARGEST_DOUBT
-    if known and abs(np.linalg.eigvals(step)).max() >= 1.0 - BALLISTIC and zeta > 1.0 - doubt - BALLISTIC:
+    uncertainty = 2.0 * symbol.entry_error
+    known = uncertainty <= LARGEST_UNCERTAINTY
+    if known and abs(np.linalg.eigvals(step)).max() >= 1.0 - BALLISTIC and zeta > 1.0 - uncertainty - BALLISTIC:
         raise InputError(
             f"law: {law!r} keeps the direction of grazing flights (zeta = {zeta:.6g}), so the diffusivity is infinite; "
             "expected a law that turns them round at times, as a mixture with lambertian() does"
@@ -137,24 +137,26 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
         )
     # the limit follows from the structure of the law, or from the shape of the wall at y = 0
     exact = symbol.entry_error == 0.0
-    if not exact and zeta + doubt >= 1.0 - BALLISTIC:
+    if not exact and zeta + uncertainty >= 1.0 - BALLISTIC:
         raise AccuracyError(
-            f"law: the limit of grazing rays under {law!r} is known to {doubt:.2g} only (zeta = {zeta:.3g}), which "
-            "does not bound the diffusivity; deep hollows with vertical sides turn these rays round or not with every "
-            "change of the angle. exit_times(law, ...) simulates the times to leave a channel",
-            doubt,
+            f"law: the limit of grazing rays under {law!r} is known to {uncertainty:.2g} only (zeta = {zeta:.3g}), "
+            "which does not bound the diffusivity; deep hollows with vertical sides turn these rays round or not with "
+            "every change of the angle. exit_times(law, ...) simulates the times to leave a channel",
+            uncertainty,
         )
     eta = float(0.5 * DIRECTION @ (2.0 * np.linalg.inv(np.eye(2) - step) - np.eye(2)) @ DIRECTION)
     # from the derivative of (1 + zeta)/(1 - zeta) at the worst end of the interval of zeta
-    eta_error = 2.0 * doubt / max(1.0 - zeta - doubt, BALLISTIC) ** 2
+    eta_error = 2.0 * uncertainty / max(1.0 - zeta - uncertainty, BALLISTIC) ** 2
     kind: ErrorKind = "bound" if exact else "estimate"
     if exact:
         eta_error = 8.0 * EPS * (1.0 + eta) / (1.0 - zeta)
-        doubt = 4.0 * EPS
+        uncertainty = 4.0 * EPS
     method = f"limit of the persistence of grazing flights, upper wall as {arrangement}"
     method += ", by the law's structure or the shape of the wall at y = 0" if exact else ", at decreasing angles"
     onset = 2.0 * radius * _onset(paper, zeta)
-    return Diffusivity(eta * scale, eta_error * scale, kind, method, eta, eta_error, zeta, doubt, arrangement, onset)
+    return Diffusivity(
+        eta * scale, eta_error * scale, kind, method, eta, eta_error, zeta, uncertainty, arrangement, onset
+    )
 
 
 def _onset(law: Law, zeta: float) -> float:

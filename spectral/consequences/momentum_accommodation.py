@@ -248,15 +248,15 @@ class _Changes:
     def _of_rays(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         found, errors = np.zeros((theta.size, 2)), np.full((theta.size, 2), np.inf)
         if self.rule is not None:
-            means, doubt = self.rule(theta, tolerance)
+            means, uncertainty = self.rule(theta, tolerance)
             found = np.stack([np.cos(theta) + means[:, 0], np.sin(theta) - means[:, 1]], axis=1)
             # rounding of the sums over branches or panels, and the panels' own miss
-            errors = np.nan_to_num(doubt, nan=np.inf)[:, None] + np.full(found.shape, PANELS_MISS + 16.0 * EPS)
+            errors = np.nan_to_num(uncertainty, nan=np.inf)[:, None] + np.full(found.shape, PANELS_MISS + 16.0 * EPS)
         if self.slopes is not None or not np.isfinite(errors).all():
             each = self._drawn(np.repeat(theta[:, None], DRAWS, axis=1))
-            doubt = NORMAL_95 * each.std(axis=1, ddof=1) / np.sqrt(DRAWS) + 4.0 * EPS
-            better = doubt < errors
-            found, errors = np.where(better, each.mean(axis=1), found), np.where(better, doubt, errors)
+            uncertainty = NORMAL_95 * each.std(axis=1, ddof=1) / np.sqrt(DRAWS) + 4.0 * EPS
+            better = uncertainty < errors
+            found, errors = np.where(better, each.mean(axis=1), found), np.where(better, uncertainty, errors)
         return found, errors
 
     def _drawn(self, theta: Floats) -> Floats:
@@ -343,7 +343,7 @@ def _misfit(law: Law, parts: list[tuple[float, _Changes]], fraction: Estimate, w
         difference = changes - fraction.value * _complete(angle)
         least.append(float(np.sqrt(weight @ np.sum(difference**2, axis=1))))
     # a norm: what the means are wrong by, and what the fraction is, change it by no more than their own norms
-    doubt = float(np.sqrt(weight @ np.sum(errors**2, axis=1)))
-    doubt += fraction.error * float(np.sqrt(WEIGHTS.sum()))
+    uncertainty = float(np.sqrt(weight @ np.sum(errors**2, axis=1)))
+    uncertainty += fraction.error * float(np.sqrt(WEIGHTS.sum()))
     method = f"Gauss rules on {panels} panels and half of them"
-    return Estimate(least[1], abs(least[1] - least[0]) + doubt, "estimate", method)
+    return Estimate(least[1], abs(least[1] - least[0]) + uncertainty, "estimate", method)

@@ -43,7 +43,7 @@ def in_a_child(code: str) -> str:
         "ker.lambertian().sample(1.0, MATRIX)",
         "ker.discretise(ker.lambertian(), ker.Bins(2), 'monte-carlo', samples=64, rng=MATRIX)",
         "ker.CollisionLaw(ker.lambertian(), geo.Disk()).sample([[0.0, -1.0, 0.0]], MATRIX)",
-        "ker.CircularArcLaw(1.2).means(np.cos, MATRIX)",
+        "ker.CircularArcLaw(1.2).apply(np.cos, MATRIX)",
         "ker.CircularArcLaw(1.2).pieces(MATRIX)",
         "ker.RectangularTeethLaw(1.0).conditionals(MATRIX, degree=0, edges=[1.0])",
         "ker.WallLaw(geo.elliptical_arcs(1.0)).conditionals(MATRIX, degree=0, edges=[1.0])",

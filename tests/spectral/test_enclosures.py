@@ -92,11 +92,11 @@ def test_errors_of_means_of_a_density_with_a_kink_that_moves_are_counted():
     basis, angle = ker.Legendre(12), np.array([0.31, 0.9, 1.7, 2.6])
     found, error = image_rule(law, basis, np.eye(12))(angle, 1e-8)
     node, weight = np.polynomial.legendre.leggauss(20)
-    for u, image, doubt in zip(np.cos(angle), found, error, strict=True):
+    for u, image, uncertainty in zip(np.cos(angle), found, error, strict=True):
         # polynomials on either side of the kink
         halves = [(0.5 * (a + b) + 0.5 * (b - a) * node, 0.5 * (b - a) * weight) for a, b in ((-1.0, u), (u, 1.0))]
         exact = sum((0.5 * w * kernel(u, v)) @ basis.evaluate(np.arccos(v)) for v, w in halves)
-        assert 1e-12 < np.abs(image - exact).max() <= doubt < 1e-3
+        assert 1e-12 < np.abs(image - exact).max() <= uncertainty < 1e-3
 
 
 def test_the_next_value_of_slow_functions_is_held_against_fast_oscillations():

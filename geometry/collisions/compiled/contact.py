@@ -221,7 +221,7 @@ def graph_after(form, t, rotation, path):
 
 @inlined
 def graph_bounds(sign, graph, motion, xi1, ahead):
-    """-> (least, doubt, third): bounds on a graph's sign F up to a time ahead: F'' is in [least, least + doubt].
+    """-> (least, uncertainty, third): bounds on a graph's sign F ahead: its F'' is in [least, least + uncertainty].
 
     ``third`` bounds |F'''|.
     """
@@ -263,10 +263,10 @@ def next_root(sign, leaving, line, conic, graph, span, path, patience):
             # at the start, the satellite is behind the piece by a rounding error
             return t, rotation, CLEAR if number > 0 else CORNER
         ahead = min(end - t, patience)
-        doubt = (third + growth * ahead) * ahead
-        least = f2 - doubt
+        uncertainty = (third + growth * ahead) * ahead
+        least = f2 - uncertainty
         if graph is not None:
-            least, doubt, third = graph_bounds(sign, graph[0], motion, xi1, ahead)
+            least, uncertainty, third = graph_bounds(sign, graph[0], motion, xi1, ahead)
             if f1 < 0.0 < f2:
                 # near a tangency, where rounding decides between two roots and none
                 until = -f1 / f2
@@ -285,7 +285,7 @@ def next_root(sign, leaving, line, conic, graph, span, path, patience):
         t += step
         rotation = turning(motion.spin * t)
         # F at the new t is at most its distance from the parabola; far below the slack it counts as 0
-        if step < ahead and (doubt * step * step <= ROOT_FRACTION * slack or t == before):
+        if step < ahead and (uncertainty * step * step <= ROOT_FRACTION * slack or t == before):
             return t, rotation, CLEAR
     else:
         return t, rotation, BOUNCE_LIMIT
@@ -377,8 +377,8 @@ def stays_in_front(line, span, leaving, motion, slack):
     here, rate, bend = line_after(line, span.t, span.rotation, motion)
     ahead = span.end - span.t
     # F lies above a concave parabola, and so above the lower of its end values
-    doubt = motion.spin * motion.spin * abs(motion.omega) * ahead
-    lowest = here + (rate + 0.5 * min(bend - doubt, 0.0) * ahead) * ahead
+    uncertainty = motion.spin * motion.spin * abs(motion.omega) * ahead
+    lowest = here + (rate + 0.5 * min(bend - uncertainty, 0.0) * ahead) * ahead
     return lowest > slack and (here > slack or (leaving and rate > 0.0))
 
 

@@ -121,13 +121,13 @@ def approach(w, s, line, arc, slack, fraction, scale):
     behind = (state == SEARCHING) & (f <= 0.0) & (t > w[FROM + s])
     live = (state == SEARCHING) & (not behind)
     ahead = w[UNTIL + s] - t
-    doubt = (third + growth * ahead) * ahead
-    least = f2 - doubt
+    uncertainty = (third + growth * ahead) * ahead
+    least = f2 - uncertainty
     step = safe_step(f, f1, least)
     # near a tangency rounding decides between two roots and none
     unclear = live & (f1 < 0.0) & (least > 0.0) & (abs(f1 * f1 - 2.0 * least * f) <= least * slack * CLOSE)
     live = live & (step < ahead)
-    found = (state == FOUND) | behind | (live & (doubt * step * step <= slack * fraction))
+    found = (state == FOUND) | behind | (live & (uncertainty * step * step <= slack * fraction))
     w[UNCERTAIN + s] = 1.0 if unclear else w[UNCERTAIN + s]
     w[ROOT + s] = t + step if live else t
     w[SEARCH + s] = FOUND if found else (SEARCHING if live else ENDED)

@@ -256,12 +256,12 @@ def row_masses(ends, grid, values, cells, masses, room):
 
 
 @compiled
-def masses_of_rows(grid, ends, outs, owners, doubts, cells, masses, errors, room):
+def masses_of_rows(grid, ends, outs, owners, uncertainties, cells, masses, errors, room):
     """Add the masses of pieces, each at one angle, to those of the angles' numbers ``owners``, and their errors."""
     for i in range(owners.shape[0]):
         k = owners[i]
         change, gaps, _ = row_masses(ends_at(ends[i], ALONE), grid, outs[i, ALONE], cells, masses[k], room)
-        errors[k] += doubts[i] * change + gaps
+        errors[k] += uncertainties[i] * change + gaps
 
 
 @linked
@@ -394,19 +394,19 @@ def patch_masses(panel, row_grid, grid, ends, outs, cells, goal, masses, room):
 
 
 @compiled
-def masses_of_patches(panels, row_grid, grid, strips, doubts, limits, goals, cells, found, room):
+def masses_of_patches(panels, row_grid, grid, strips, uncertainties, limits, goals, cells, found, room):
     """Add the integrals over patches to those of their panels, and their errors.
 
     ``panels`` are the lower and upper ends, and the measures of the panels; ``strips`` the ends, the outgoing angles
-    and the panel of every patch; ``doubts`` the errors of the angles at single nodes, of the interpolated angles, and
-    of the interpolated ends. A patch whose error is above the limit of its panel is not integrated: the masses at its
-    nodes are added to ``rest``. ``found`` are ``rest``, the integrals and their squared errors, the errors of the means
-    due to gaps, and the squared ones due to the outgoing angles at the nodes.
+    and the panel of every patch; ``uncertainties`` the errors of the angles at single nodes, of the interpolated
+    angles, and of the interpolated ends. A patch whose error is above the limit of its panel is not integrated: the
+    masses at its nodes are added to ``rest``. ``found`` are ``rest``, the integrals and their squared errors, the
+    errors of the means due to gaps, and the squared ones due to the outgoing angles at the nodes.
     """
     lows, highs, measures = panels
     rest, integrals, squares, errors, node_squares = found
     all_ends, all_outs, owners = strips
-    at_nodes, between, of_ends = doubts
+    at_nodes, between, of_ends = uncertainties
     middle = row_grid.nodes.shape[0] // 2
     for i in range(owners.shape[0]):
         p = owners[i]

@@ -95,7 +95,7 @@ def new_desk(wide):
 def passed(course, desk, count, flux, hollow, most_steps):
     """-> (Course, fate, steps, rounding): move a beam to the triangle whose apex splits it.
 
-    Then ``desk.values`` are the apex's functionals. ``rounding`` bounds the flux that is doubtful by rounding. The fate
+    Then ``desk.values`` are the apex's functionals. ``rounding`` bounds the flux that rounding may misplace. The fate
     is SPLIT, LEFT, or STOPPED at the limit of steps.
     A beam that comes to an edge for the second time, with a translated unfolding, measures the next period, and skips
     as many as it can.
@@ -103,10 +103,10 @@ def passed(course, desk, count, flux, hollow, most_steps):
     polygon, frame, history = desk.polygon, desk.frame, desk.history
     mark, period, most, due, reflections = course, period_between(course, course), 0.0, 0, 0
     put_course(history, 0, course)
-    rounding, doubt = 0.0, set_frame(frame, polygon, count, course.unfolding)
+    rounding, uncertainty = 0.0, set_frame(frame, polygon, count, course.unfolding)
     for step in range(most_steps):
         edge = course.edge
-        side = side_of(frame, count, hollow.apex_x[edge], hollow.apex_y[edge], doubt)
+        side = side_of(frame, count, hollow.apex_x[edge], hollow.apex_y[edge], uncertainty)
         if side == 0:
             signs = signs_of(polygon, count, apex_of(course, hollow), desk.values)
             if signs.positive and signs.negative:
@@ -116,7 +116,7 @@ def passed(course, desk, count, flux, hollow, most_steps):
                 rounding += abs(flux)
             side = -1 if signs.negative else 1
         if most >= 1.0:
-            most = min(most, periods_without_split(frame, count, side, doubt, period))
+            most = min(most, periods_without_split(frame, count, side, uncertainty, period))
         way = 2 * edge + ((side < 0) != (course.unfolding.sign < 0.0))
         code = hollow.behind[way]
         if code >= 0:
@@ -138,7 +138,7 @@ def passed(course, desk, count, flux, hollow, most_steps):
                 mark, due, most = course, reflections + lag, period.most
                 set_drift(frame, polygon, count, period)
         put_course(history, reflections % MEMORY, course)
-        doubt = set_frame(frame, polygon, count, course.unfolding)
+        uncertainty = set_frame(frame, polygon, count, course.unfolding)
     return course, STOPPED, most_steps, rounding
 
 

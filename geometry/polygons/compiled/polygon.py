@@ -40,7 +40,7 @@ class Signs(NamedTuple):
 @inlined
 def signs_of(polygon, count, apex, values):
     """-> Signs: set ``values`` to an apex's functional at the vertices of a beam, 0 within rounding."""
-    doubtful, doubt = False, 0.0
+    uncertain, uncertainty = False, 0.0
     positive, negative = False, False
     low, high = 0, 0
     for i in range(count):
@@ -49,9 +49,9 @@ def signs_of(polygon, count, apex, values):
         slack = apex.error_x * s + apex.error_y * abs(c) + FUNCTIONAL_ULPS * EPS * p
         if abs(value) <= slack:
             if value != 0.0:
-                doubtful = True
+                uncertain = True
             value = 0.0
-        doubt = max(doubt, slack)
+        uncertainty = max(uncertainty, slack)
         values[i] = value
         positive = positive or value > 0.0
         negative = negative or value < 0.0
@@ -60,10 +60,10 @@ def signs_of(polygon, count, apex, values):
         if c * polygon[high, LINE_S] < s * polygon[high, LINE_C]:
             high = i
     rounding = 0.0
-    if doubtful and not (positive and negative):
-        # the part on the other side: at most `doubt` in p, over at most the beam's range of angles
+    if uncertain and not (positive and negative):
+        # the part on the other side: at most `uncertainty` in p, over at most the beam's range of angles
         spread = polygon[high, LINE_S] * polygon[low, LINE_C] - polygon[high, LINE_C] * polygon[low, LINE_S]
-        rounding = 0.5 * math.pi * doubt * abs(spread)
+        rounding = 0.5 * math.pi * uncertainty * abs(spread)
     return Signs(positive, negative, rounding)
 
 
@@ -119,7 +119,7 @@ def clip(polygon, count, values, wanted, apex, out):
 def cut_rounding(polygon, count, apex):
     """Return a bound on the flux on the wrong side of the line through an apex.
 
-    The error of the line is at most ``doubt`` in p over the cut's range of angles.
+    The error of the line is at most ``uncertainty`` in p over the cut's range of angles.
     """
     rounding = 0.0
     for i in range(count):
@@ -132,8 +132,8 @@ def cut_rounding(polygon, count, apex):
                 polygon[j, LINE_C],
             )
             p, s, c = max(polygon[i, LINE_P], polygon[j, LINE_P]), max(here_s, there_s), max(abs(here_c), abs(there_c))
-            doubt = apex.error_x * s + apex.error_y * c + FUNCTIONAL_ULPS * EPS * p
-            rounding += 0.5 * math.pi * doubt * abs(here_s * there_c - here_c * there_s)
+            uncertainty = apex.error_x * s + apex.error_y * c + FUNCTIONAL_ULPS * EPS * p
+            rounding += 0.5 * math.pi * uncertainty * abs(here_s * there_c - here_c * there_s)
     return rounding
 
 
@@ -178,15 +178,15 @@ def set_frame(frame, polygon, count, unfolding):
 
 
 @inlined
-def side_of(frame, count, x, y, doubt):
+def side_of(frame, count, x, y, uncertainty):
     """Return 1 if a vertex of the hollow lies right of all lines of a beam for certain, -1 if left, and 0 otherwise."""
     right, left, lines = 0, 0, padded(count)
     for group in range(0, lines, GROUP):
         for k in range(GROUP):
             value = frame.along[group + k] * x + frame.up[group + k] * y + frame.rest[group + k]
             frame.values[group + k] = value
-            right += value > doubt
-            left += value < -doubt
+            right += value > uncertainty
+            left += value < -uncertainty
     return 1 if right == lines else (-1 if left == lines else 0)
 
 

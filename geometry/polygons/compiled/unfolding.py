@@ -173,7 +173,7 @@ class Period(NamedTuple):
     x: float
     y: float
     turn: float
-    doubt: float
+    uncertainty: float
     error: float
     most: float
 
@@ -191,9 +191,9 @@ def period_between(mark, course):
     x, y = change_between(first.x, last.x), change_between(first.y, last.y)
     turn = change_between(first.turn, last.turn)
     angle, size = abs(turn) + EPS, abs(x) + abs(y)
-    doubt = 2.0 * (last.error_x - first.error_x + last.error_y - first.error_y) + (angle + STEP_ULPS * EPS) * size
+    uncertainty = 2.0 * (last.error_x - first.error_x + last.error_y - first.error_y) + (angle + STEP_ULPS * EPS) * size
     most = np.floor(MOST_TURN / angle)
-    return Period(x, y, turn, doubt, doubt + angle * FARTHEST + 0.5 * MOST_TURN * size, most)
+    return Period(x, y, turn, uncertainty, uncertainty + angle * FARTHEST + 0.5 * MOST_TURN * size, most)
 
 
 @inlined
@@ -217,11 +217,11 @@ def set_drift(frame, polygon, count, period):
 
 
 @inlined
-def periods_without_split(frame, count, side, doubt, period):
+def periods_without_split(frame, count, side, uncertainty, period):
     """Return for how many further periods a vertex stays on its side of a beam for certain, from `side_of`."""
     most = period.most
     for i in range(count):
-        value = side * frame.values[i] - 2.0 * doubt
+        value = side * frame.values[i] - 2.0 * uncertainty
         drift = side * frame.drift[i] - period.error
         if value + drift <= 0.0:
             return 0.0
@@ -237,8 +237,11 @@ def repeated(mark, course, expected, periods):
     Unchanged and False if this period is not ``expected``.
     """
     period, last = period_between(mark, course), course.unfolding
-    doubt = expected.doubt
-    if abs(period.x - expected.x) + abs(period.y - expected.y) > doubt or abs(period.turn) > abs(expected.turn) + EPS:
+    uncertainty = expected.uncertainty
+    if (
+        abs(period.x - expected.x) + abs(period.y - expected.y) > uncertainty
+        or abs(period.turn) > abs(expected.turn) + EPS
+    ):
         return course, False
     # the translation turns by period.turn in each period, on average by half the angle between the first and the last
     half = 0.5 * (periods + 1.0) * period.turn

@@ -74,7 +74,7 @@ def room_for(hollows: Floats, block: int) -> Room:
 
 @inner
 def cross_arc(form, entry, angle, hits, moment, incidence):
-    """Reflect rays by a circular hollow: entry and angle become those of the exit, hits their number (0 if in doubt).
+    """Reflect rays by a circular hollow: entry and angle become those of the exit, hits their number (0 if uncertain).
 
     With d the angle of incidence from the arc, X the fraction of the opening to the left of the ray,
 
@@ -83,7 +83,7 @@ def cross_arc(form, entry, angle, hits, moment, incidence):
     all terms positive, and the same with cosines. A chord advances by 2 d to the left if d is acute, else by
     2 (pi - d) to the right, which gives the number of hits. The angular momentum about the centre gives the exit.
     """
-    left, right, doubt = form[c.FORM_LEFT], form[c.FORM_RIGHT], form[c.DOUBT]
+    left, right, uncertainty = form[c.FORM_LEFT], form[c.FORM_RIGHT], form[c.UNCERTAINTY]
     middle, height, radius, half = form[c.CIRCLE_X], form[c.CIRCLE_Y], form[c.RADIUS], form[c.HALF_ANGLE]
     width = right - left
     for i in range(entry.shape[0]):
@@ -114,7 +114,7 @@ def cross_arc(form, entry, angle, hits, moment, incidence):
         # the first and last segments pass the joints at 2 r sin(a/2) sin((step - a)/2) with a = start and a = off
         passing = start * (step - start)
         passing = passing if passing < off * (step - off) else off * (step - off)
-        hits[i] = count if passing > doubt else 0.0
+        hits[i] = count if passing > uncertainty else 0.0
     for i in range(entry.shape[0]):
         sine, cosine = sine_cosine(angle[i])
         entry[i] = middle + (radius * moment[i] - height * cosine) / sine
@@ -127,10 +127,10 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
     The sign of ``turn``, the moment of the apex about the ray, selects the line that is met first. The number of hits
     is the number of consecutive unfolded ends of the opening on the side of the ray opposite to the apex.
     """
-    left, right, doubt, apex_x, apex_y = (
+    left, right, uncertainty, apex_x, apex_y = (
         form[c.FORM_LEFT],
         form[c.FORM_RIGHT],
-        form[c.DOUBT],
+        form[c.UNCERTAINTY],
         form[c.WEDGE_X],
         form[c.WEDGE_Y],
     )
@@ -168,7 +168,7 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
         # distances of the ray's line from the apex, from the ends of the opening, and from its ends at the exit
         west, east = (left - entry[i]) * vy[i], (entry[i] - right) * vy[i]
         closest = min(min(abs(turn[i]), min(west, east)), min(abs(inside), abs(outside)))
-        hits[i] = hits[i] if closest > doubt and fraction > 0.0 else 0.0
+        hits[i] = hits[i] if closest > uncertainty and fraction > 0.0 else 0.0
         entry[i] = exit
 
 

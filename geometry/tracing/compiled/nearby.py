@@ -24,8 +24,8 @@ from .pointers import call_late
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
 from .tree import first_boxes, next_leaf
 
-# A value of `Hit.doubt`: the side of the piece on which the ray starts is not resolved.
-DOUBTFUL = 2
+# A value of `Hit.uncertainty`: the side of the piece on which the ray starts is not resolved.
+UNCERTAIN = 2
 # Constants of these types, because numba compiles a function again for every literal argument.
 NOT_OWN, FORWARD, A_LINE = np.bool_(False), np.bool_(True), np.int64(LINE)
 
@@ -125,7 +125,7 @@ def nearer(scope, found, piece, own, px, py, vx, vy):
     if not t < found.time:
         return found
     from_piece = own.kind != OPENING and own.kind != SIDE
-    hit = Hit(max(t, 0.0), kind, number, s, tangent if is_clear or not from_piece else DOUBTFUL)
+    hit = Hit(max(t, 0.0), kind, number, s, tangent if is_clear or not from_piece else UNCERTAIN)
     # no piece lies above the opening or beyond a side, so a piece within rounding of them is hit there
     if is_clear or not from_piece:
         return hit
@@ -141,7 +141,7 @@ def nearer(scope, found, piece, own, px, py, vx, vy):
 def hit_nearby(scope, own, px, py, vx, vy):
     """-> Hit: the first hit on nearby pieces with the ray's start on their front side.
 
-    The hit is DOUBTFUL if the gap between start and piece is within the slack, as in the apex of a wedge: double
+    The hit is UNCERTAIN if the gap between start and piece is within the slack, as in the apex of a wedge: double
     precision does not determine how the ray continues.
     """
     found = Hit(np.inf, NO_PIECE, -1, 0.0, 0)

@@ -26,7 +26,7 @@ from ...scene.scene import NO_TABLES
 from ...scene.structs import Struct
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
 from ..double_double.formulas import arc_normal, mirror, with_length_one
-from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
+from .nearby import UNCERTAIN, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined, inner
 from .pieces import (
     LEAST_FRACTION,
@@ -345,11 +345,11 @@ def trace_ray(scope, entry, theta, limit, labelled, with_path, path):
     while True:
         hit, corner = nearest_piece(scope, own, px, py, vx, vy)
         bounces = own.bounces
-        if hit.doubt == DOUBTFUL:
+        if hit.uncertainty == UNCERTAIN:
             return shift + px, vx, vy, bounces, CORNER, label, steps
         time, kind = exit_time(scope, own, px, py, vx, vy, hit.time)
         if kind != NO_PIECE:
-            hit = Hit(time, kind, hit.number, hit.s, hit.doubt)
+            hit = Hit(time, kind, hit.number, hit.s, hit.uncertainty)
         steps += 1
         if hit.kind == NO_PIECE or meets_corner(scope, hit, corner, px, py, vx, vy):
             return shift + px, vx, vy, bounces, CORNER, label, steps
@@ -357,7 +357,7 @@ def trace_ray(scope, entry, theta, limit, labelled, with_path, path):
             if with_path:
                 path[bounces + 1, c.POINT_X], path[bounces + 1, c.POINT_Y] = shift + px + hit.time * vx, 0.0
             return shift + px + hit.time * vx, vx, vy, bounces, ESCAPED, label, steps
-        if hit.doubt != 0:
+        if hit.uncertainty != 0:
             return shift + px, vx, vy, bounces, GRAZING, label, steps
         if (bounces >= limit and hit.kind != SIDE) or steps > MOST_STEPS:
             return shift + px, vx, vy, bounces, BOUNCE_LIMIT, label, steps

@@ -75,17 +75,17 @@ class Own(NamedTuple):
 
 
 class Hit(NamedTuple):
-    """The end of a ray segment: time (inf for no hit), kind and row of the piece, position s on it, and doubt.
+    """The end of a ray segment: time (inf for no hit), kind and row of the piece, position s on it, and uncertainty.
 
     On a line, s is a fraction, negative if relative to the line's end; on a Bezier piece, s is the parameter. The
-    doubt is 0, 1 if hit and miss are not distinguished, or `DOUBTFUL`.
+    uncertainty is 0, 1 if hit and miss are not distinguished, or `UNCERTAIN`.
     """
 
     time: float
     kind: int
     number: int
     s: float
-    doubt: int
+    uncertainty: int
 
 
 class Rays(NamedTuple):

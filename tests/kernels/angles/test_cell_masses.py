@@ -58,7 +58,7 @@ def test_a_fold_is_crossed_twice_wherever_it_lies(level, shift):
     assert masses[0] == pytest.approx([1.0 - above, above], abs=1e-9)
 
 
-def test_gaps_at_the_ends_count_with_half_their_width_and_a_doubtful_angle_with_the_shift_of_its_crossing():
+def test_gaps_at_the_ends_count_with_half_their_width_and_a_uncertain_angle_with_the_shift_of_its_crossing():
     # theta' = 1 + s crosses the edge in the middle, where dx/ds = 3/2 of the width
     nodes, weights = positions(2)
     masses, errors = np.zeros((1, 2)), np.zeros(1)

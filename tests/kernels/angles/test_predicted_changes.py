@@ -35,7 +35,7 @@ def enclosures(angle, nearest, farther, least=1e-13):
 
 @pytest.mark.parametrize(("known", "order"), [(2, 1), (3, 2), (4, 3)])
 def test_samples_enclose_the_changes_ever_closer_as_the_angles_do(known, order):
-    """Two known angles give a line, three a parabola, four a cubic with a doubt of the parabola's order plus one."""
+    """Two known angles give a line, three a parabola, four a cubic that errs by the parabola's order plus one."""
     distances = []
     for h in (0.1, 0.05, 0.025):
         nearest = pieces(1.0 - h), pieces(1.0 + 1.2 * h)

@@ -125,6 +125,22 @@ def test_densities_that_jump_are_refused_with_the_defect() -> None:
     assert 1e-7 < info.value.defect < 1e-2
 
 
+@pytest.mark.parametrize("end", [0.9, 1.0, 1.3])
+def test_jumps_that_are_mirror_images_do_not_hide_each_other(end: float) -> None:
+    """The two errors of quadrature have opposite signs, so the density integrates to 1 by any symmetric rule."""
+
+    def odd(angle: np.ndarray) -> np.ndarray:
+        return np.where(angle < end, 1.0, 0.0) - np.where(angle > np.pi - end, 1.0, 0.0)
+
+    def density(theta: np.ndarray, out: np.ndarray) -> np.ndarray:
+        return ker.SINE.density(out) * (1.0 + 0.8 * odd(theta) * odd(out))
+
+    with pytest.raises(AccuracyError, match="breakpoints"):
+        ker.DensityLaw(density)
+    found = ker.DensityLaw(density, [end, np.pi - end]).conditionals([0.3])
+    assert abs(found.mean(np.cos)[0] - 0.4 * math.sin(end) ** 2) <= found.error[0] + 1e-15 < 1e-13
+
+
 def test_breakpoints_let_densities_jump() -> None:
     fraction = float(ker.SINE.mass(0.0, 1.0))
     law = ker.DensityLaw(stepped, breakpoints=[1.0])

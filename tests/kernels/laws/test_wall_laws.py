@@ -101,10 +101,10 @@ def test_means_over_walls_with_many_pieces_have_the_error_of_their_conditionals(
     assert law.exact_law is None and len(wall.pieces) > 64
     entry = (np.arange(2**16) + 0.5) / 2**16
     cosines = np.cos(law.reflect(entry[:, None], theta))
-    doubt = np.abs(cosines[::2].mean(axis=0) - cosines[1::2].mean(axis=0))
+    uncertainty = np.abs(cosines[::2].mean(axis=0) - cosines[1::2].mean(axis=0))
     error = law.conditionals(theta, 1e-4).error
-    assert np.all(np.abs(law.apply(np.cos, theta) - cosines.mean(axis=0)) <= error + doubt)
-    assert error.max() < reached and doubt.max() < 3e-3
+    assert np.all(np.abs(law.apply(np.cos, theta) - cosines.mean(axis=0)) <= error + uncertainty)
+    assert error.max() < reached and uncertainty.max() < 3e-3
 
 
 def test_means_over_resolved_polygons_with_many_pieces_are_exact():
