@@ -24,7 +24,6 @@ from ...core.checks import (
     instance,
     numbers,
     sequence,
-    shaped,
     shortened,
     whole_number,
 )
@@ -36,7 +35,6 @@ from ..bases.basis import AngleFunction, Frame
 from ..bases.given import Vectorised, seed_by_name
 from ..expectations.conditionals import Conditionals, degree_of
 from .branches import chained, chained_breakpoints, joined, merged
-from .distribution import Distribution
 from .isometry_table import IsometryTable
 
 # Half the spacing of rng.random(). It replaces draws of exactly 0, for which the ray would enter at a tip of the wall.
@@ -51,8 +49,6 @@ MOST_VALUES = 10**8
 ENTRY_POINTS = 4096
 # The tolerance of `apply`, the incoming angles with which it begins, and outgoing angles in memory at a time.
 TOLERANCE, FIRST_ANGLES, NODES_AT_ONCE = 1e-8, 16, 2**20
-# Cells of outgoing angles in memory at a time; each has some nodes.
-CELLS_AT_ONCE = 2**17
 # Degree of the functions that `conditionals` averages by default.
 DEGREE = 8
 # Breakpoints of laws at which the means under the law before them are cut.
@@ -60,8 +56,6 @@ CUTS = 64
 # Incoming angle, tolerance, and degrees with edges of the test whether conditional distributions depend on these.
 PROBE, PROBE_TOLERANCE = np.array([1.0]), 1e-2
 PROBE_FUNCTIONS = (0, np.empty(0)), (64, np.linspace(0.05, 3.09, 32))
-# Edges begin at 0 and end at pi within a few roundings.
-ENDS_TOLERANCE = 1e-14
 # Limit on nested calls of `apply`; more would exceed Python's recursion limit.
 DEEPEST_POWER = 100
 # Limits on the exponents of powers of which branches are listed, and of which rays are drawn, some seconds of work.
@@ -226,18 +220,6 @@ class Law(ABC):
         """The known outgoing angles at which densities jump or have a kink for every incoming angle."""
         return np.empty(0)
 
-    def density_cuts(self, theta: ArrayLike) -> Floats | None:
-        """Outgoing angles between which the density of P~(theta_k, .) is smooth, shape (angles, any), in any order.
-
-        The narrowest pieces may be left out. None if the law does not know them for every incoming angle; else
-        `distribution` takes other edges for each incoming angle, of shape (angles, edges).
-        """
-        return self._density_cuts(shaped("theta", angles("theta", theta), "n"))
-
-    def _density_cuts(self, theta: Floats) -> Floats | None:
-        """`density_cuts` for checked angles; the default knows none."""
-        return None
-
     def random_map(self) -> RandomMap | None:
         """The law as a map of a uniform number in (0, 1) and the incoming angle; None if it needs more randomness."""
         return None
@@ -245,28 +227,6 @@ class Law(ABC):
     def isometry_table(self) -> IsometryTable | None:
         """All isometries of the law with their probabilities; None if the law is no such mixture or cannot list it."""
         return None
-
-    def distribution(self, theta: ArrayLike, edges: ArrayLike) -> Distribution:
-        """P~(theta_k, .) for every theta_k, with its atoms if the law knows them; ``edges`` go from 0 to pi.
-
-        A law that knows its `density_cuts` also takes edges of shape (angles, edges).
-        """
-        angle, cells = shaped("theta", angles("theta", theta), "n"), finite_array("edges", edges)
-        own = cells.ndim == 2 and len(cells) == angle.size and self._density_cuts(angle) is not None
-        if not (cells.ndim == 1 or own) or cells.shape[-1] < 2 or np.any(np.diff(cells) < 0.0):
-            raise InputError(f"edges: expected increasing angles in a row, got {shortened(edges)}")
-        if np.any(np.abs(cells[..., [0, -1]] - [0.0, np.pi]) > ENDS_TOLERANCE):
-            raise InputError(f"edges: expected angles from 0 to pi, got {cells.min():g} to {cells.max():g}")
-        return self._distribution(angle, cells)
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """`distribution` for checked arguments, by default from conditional distributions."""
-        if is_atomic(self):
-            return Distribution.of_atoms(edges, *self._conditionals(theta, TOLERANCE, 0, np.empty(0)).atoms())
-        steps = range(0, theta.size, max(1, CELLS_AT_ONCE // edges.size))
-        some = (theta[start : start + steps.step] for start in steps)
-        masses = [self._conditionals(part, TOLERANCE, 0, edges[1:-1]).masses(edges) for part in some]
-        return Distribution.of_cells(np.concatenate([np.empty((0, edges.size - 1)), *masses]))
 
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
@@ -322,10 +282,6 @@ class BranchLaw(Law):
         """Increasing angles in (0, pi) where the branches change, at most about ``limit`` of them, and the measure
         under sin(theta)/2 d theta of the angles, mostly near grazing, whose breakpoints were left out."""
 
-    def _density_cuts(self, theta: Floats) -> Floats:
-        """None are needed, because there is no density."""
-        return np.empty((theta.size, 0))
-
     def random_map(self) -> RandomMap:
         """The map that takes the branch in whose part of (0, 1) the number lies."""
         return lambda x, theta: (self._branch_taken(x, theta), None)
@@ -362,11 +318,6 @@ class DrivenLaw(Law):
     def random_map(self) -> RandomMap:
         """The map `reflect_with_status`."""
         return self.reflect_with_status
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """One atom for each of 4096 equally spaced entry points."""
-        outgoing = self.reflect(_entry_points(), theta[:, None])
-        return Distribution.of_atoms(edges, outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.reflect(np.maximum(rng.random(theta.shape), SMALLEST_DRAW), theta)
@@ -511,23 +462,11 @@ class Combination(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return joined([law.breakpoints(limit) for weight, law in self.parts])
 
-    @property
-    def outgoing_breakpoints(self) -> Floats:
-        return np.unique(np.concatenate([law.outgoing_breakpoints for _, law in self.terms]))
-
-    def _density_cuts(self, theta: Floats) -> Floats | None:
-        cuts = [law.density_cuts(theta) for _, law in self.terms]
-        known = [found for found in cuts if found is not None]
-        return np.concatenate(known, axis=1) if len(known) == len(cuts) else None
-
     def isometry_table(self) -> IsometryTable | None:
         """The sum of the terms' tables; None if a term has none."""
         terms = [(weight, law.isometry_table()) for weight, law in self.parts]
         tables = [table.scaled(weight) for weight, table in terms if table is not None]
         return IsometryTable.joined(tables) if len(tables) == len(terms) else None
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        return Distribution.mixed([(weight, law.distribution(theta, edges)) for weight, law in self.parts])
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         terms = self.parts
@@ -771,8 +710,13 @@ def as_base(law: Law) -> str:
 
 def is_atomic(law: Law) -> bool:
     """Whether the conditional distributions of a law are finitely many atoms, which average any function exactly."""
+    return knows_errors(law) and has_fixed_nodes(law)
+
+
+def has_fixed_nodes(law: Law) -> bool:
+    """Whether conditional distributions have the same nodes for all functions: they are atoms, or those of samples."""
     whole, cut = (law._conditionals(PROBE, PROBE_TOLERANCE, degree, edges) for degree, edges in PROBE_FUNCTIONS)
-    return not np.isnan(whole.error).any() and np.array_equal(whole.nodes, cut.nodes)
+    return np.array_equal(whole.nodes, cut.nodes)
 
 
 def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
@@ -862,10 +806,6 @@ class SpecularFrame(Law):
     def outgoing_breakpoints(self) -> Floats:
         return np.asarray(np.pi - self.law.outgoing_breakpoints[::-1])
 
-    def _density_cuts(self, theta: Floats) -> Floats | None:
-        cuts = self.law.density_cuts(theta)
-        return None if cuts is None else np.asarray(np.pi - cuts)
-
     def random_map(self) -> RandomMap | None:
         inner = self.law.random_map()
         if inner is None:
@@ -880,9 +820,6 @@ class SpecularFrame(Law):
     def isometry_table(self) -> IsometryTable | None:
         table = self.law.isometry_table()
         return None if table is None else table.in_specular_frame()
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        return self.law.distribution(theta, (np.pi - edges)[..., ::-1]).mirrored()
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return mirrored_angle(self.law.sample(theta, rng))

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, instance
 from ...geometry import MushroomGenerations
 from ..expectations.conditionals import Conditionals
-from ..laws.distribution import Distribution
 from ..laws.law import LARGEST, DrivenLaw, entry_points
 from .traced_map import if_escaped, traced_reflection
 from .wall_law import WallLaw
@@ -67,14 +66,6 @@ class MushroomLaw(DrivenLaw):
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle for the entry point ``x`` in (0, 1), see `reflect_with_status`, and the angle ``theta``."""
         return if_escaped(self, *self.reflect_with_status(x, theta))
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The distributions of generation 1 by quadrature, its flat tops reduced to those of the last generation."""
-        left, right = self.wall.opening
-        found = WallLaw(self.wall.mushroom).distribution(theta, edges)
-        factor = self.wall.opened / (right - left)
-        flat = factor * (found.mass - (1.0 - (right - left))) + (1.0 - self.wall.opened)
-        return Distribution(factor * found.below, found.position, flat)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Those of generation 1, with its flat tops reduced to those of the last generation."""

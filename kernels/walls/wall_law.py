@@ -15,14 +15,12 @@ from ...core.rounding import EPS
 from ...geometry import Arc, Segment, Wall
 from ...geometry.cells.hollow import Hollow
 from ...geometry.cells.hollow_shape import HollowShape, side_by_side
-from ..bases.intervals import cell_among
 from ..expectations.conditionals import Conditionals
-from ..laws.distribution import Distribution
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, DrivenLaw, Law, specular, sum_of
 from ..laws.structure import holds_of_all
 from .circular_arc import CircularArcLaw
-from .conditionals import WallConditionals, is_few, traced_conditionals
+from .conditionals import is_few, traced_conditionals
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
 from .traced_map import UNRESOLVED_TOLERANCE, if_escaped, traced_reflection
@@ -43,8 +41,6 @@ FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
 MOST_CURVED = 4
 # The least tolerance for walls with many pieces, some ten milliseconds for an angle.
 MANY_TOLERANCE = 1e-4
-# Error of the distribution function at the edges of cells.
-CELL_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -143,32 +139,9 @@ class WallLaw(DrivenLaw):
         """Those of the isometries and closed forms; none are known of traced rays."""
         return super().breakpoints(limit) if self._known is None else self._known.breakpoints(limit)
 
-    def _density_cuts(self, theta: Floats) -> Floats | None:
-        return None if self._known is None else self._known.density_cuts(theta)
-
     def isometry_table(self) -> IsometryTable | None:
         """The isometries of a wall of straight pieces whose beams resolve; else None."""
         return None if self._known is None else self._known.isometry_table()
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The distributions of the parts or isometries, or else by quadrature in the entry point.
-
-        Flat tops are atoms. The quadrature is adaptive for walls with few pieces and equally spaced for others.
-        """
-        if self._known is not None:
-            return self._known.distribution(theta, edges)
-        if not is_few(self.wall):
-            return super()._distribution(theta, edges)
-        found, _ = WallConditionals(self.wall, 0, edges[1:-1])(theta, CELL_TOLERANCE)
-        owner = np.repeat(np.arange(theta.size), np.diff(found.starts))
-        level = found.nodes == (np.pi - theta)[owner]
-        cells = edges.size - 1
-        cell = owner * cells + cell_among(edges, found.nodes)
-        scattered = np.where(level, 0.0, found.weights)
-        masses = np.bincount(cell, weights=scattered, minlength=theta.size * cells).astype(np.float64)
-        flat = np.bincount(owner, weights=np.where(level, found.weights, 0.0), minlength=theta.size).astype(np.float64)
-        below = Distribution.of_cells(masses.reshape(-1, cells)).below
-        return Distribution(below, (np.pi - theta)[:, None], flat[:, None])
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return super()._sample(theta, rng) if self.has_traced_parts else sum_of(self.parts).sample(theta, rng)

@@ -198,13 +198,11 @@ METHODS = {
     "apply": lambda law: law.apply(np.cos, ANGLES),
     "branches": lambda law: law.branches(ANGLES),
     "breakpoints": lambda law: law.breakpoints(8),
-    "distribution": lambda law: law.distribution(ANGLES, EDGES),
     "isometry_table": lambda law: law.isometry_table(),
     "conditionals": lambda law: law.conditionals(ANGLES, 1e-3, 0, EDGES[1:-1]),
     "adjoint": lambda law: law.adjoint(),
     "in_specular_frame": lambda law: law.in_specular_frame(),
     "repr": repr,
-    "density_cuts": lambda law: law.density_cuts(ANGLES),
     "discretise": lambda law: ker.discretise(law, ker.Bins(4), tolerance=1e-2),
 }
 KINDS = [
