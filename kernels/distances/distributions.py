@@ -130,7 +130,10 @@ def cells_and_atoms(
         # one distribution for all angles
         incoming = theta[:1] if term.law.is_lambertian else theta
         given = term.law._conditionals(incoming, tolerance, 0, edges[1:-1])
-        wrong += weight * np.where(np.isnan(given.error), 0.0 if term.is_sampled else UNKNOWN, given.error)
+        error = np.where(np.isnan(given.error), 0.0 if term.is_sampled else UNKNOWN, given.error)
+        table = term.law.isometry_table() if term.has_atoms and not sup else None
+        # of a mean over theta, unresolved rays change no more than their fraction
+        wrong += weight * (error if table is None else 2.0 * table.unresolved)
         if term.has_atoms:
             position, mass = (part[:, entries] if term.is_sampled else part for part in given.atoms())
             atoms.append(np.stack((position, weight * mass / mass.sum(axis=1, keepdims=True))))
@@ -146,7 +149,7 @@ def cells_and_atoms(
 
 
 def _is_flat_top(law: Law, theta: Floats, given: Conditionals) -> NDArray[np.bool_]:
-    """Which nodes are those of flat tops, atoms of traced walls; to be deleted where `Law.parts` separates them."""
+    """Which nodes are those of flat tops, the only atoms of traced walls."""
     specular = np.pi - theta
     found = mirrored_angle(specular) if isinstance(law, SpecularFrame) else specular
     return np.asarray((given.nodes == found[given.owner]) & (not law.is_lambertian))
