@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +12,15 @@ from scipy.stats import binom, chi2, gamma, norm, t
 from asperity.errors import AccuracyError
 from asperity.kernels import Basis, Bins, Legendre, Panels
 from asperity.kernels.bases.directions import Directions
+from asperity.kernels.matrices.defects import SymmetryDefect
 from asperity.kernels.sampling import counts as counting
 from asperity.kernels.sampling.counts import (
+    SampledArray,
     array_from_counts,
     array_from_sums,
     count_pairs,
     half_width,
+    missed_fraction,
     sum_products,
     sums_of_rows,
 )
@@ -68,12 +72,11 @@ def test_parts_are_the_replicates_of_their_mean() -> None:
             assert not replicate.flags.writeable
         assert found.error == pytest.approx(half_width(found.symmetric, alone), rel=1e-12)
         assert found.counts is not None and np.array_equal(found.counts, sum(parts))
+        # sums of weights, also those below 1, give the same
+        weighted = array_from_counts([p / 7e3 for p in parts], UNEVEN, symmetrise=symmetrise, independent=False)
+        assert weighted.counts is None and np.allclose(weighted.symmetric, found.symmetric, rtol=1e-13)
+        assert weighted.error == pytest.approx(found.error, rel=1e-12)
     assert np.array_equal(parts[0], [[20, 20], [40, 80]])
-    weighted = array_from_counts([p / 7.0 for p in parts], UNEVEN, symmetrise=True, independent=False)
-    assert weighted.counts is None
-    whole = array_from_counts(parts, UNEVEN, symmetrise=True, independent=False)
-    assert np.allclose(weighted.symmetric, whole.symmetric, rtol=1e-13)
-    assert weighted.error == pytest.approx(whole.error, rel=1e-12)
 
 
 @pytest.mark.parametrize("symmetrise", [False, True])
@@ -363,8 +366,21 @@ def test_rows_of_pairs_have_the_sums_of_each_row(basis: Basis, rays: int) -> Non
     assert found.dtype == expected.dtype and np.allclose(found, expected, rtol=1e-12, atol=1e-11 * rays**0.5)
 
 
+@pytest.mark.parametrize("rays", [1, 40, 10**6])
+def test_missed_events_have_a_twentieth_of_a_chance_and_change_a_matrix_by_at_most_the_error(rays: int) -> None:
+    p = missed_fraction(rays)
+    assert (1.0 - p) ** rays == pytest.approx(0.05, rel=1e-9)
+    constant, identity = Bins(5).constant, np.eye(5)
+    means = np.outer(constant, constant)
+    # the most is reached: an event that sends all functions of mean 0 to their opposite, or keeps them
+    for before, given in ((identity, 2.0 * means - identity), (means * (1.0 - 1e-15), identity)):
+        found = SampledArray(before, 0.0, (), SymmetryDefect(0.0), None)
+        assert found.with_missed_events(rays).error == pytest.approx(p * np.linalg.norm(given - before), rel=1e-12)
+        assert replace(found, error=9.0).with_missed_events(rays).error == 9.0
+
+
 def test_short_rows_evaluate_the_basis_once(monkeypatch: pytest.MonkeyPatch) -> None:
     calls, evaluate = [], Legendre.evaluate
     monkeypatch.setattr(Legendre, "evaluate", lambda basis, angle: calls.append(angle) or evaluate(basis, angle))
     sums_of_rows(Legendre(3), *np.random.default_rng(2).uniform(0.0, np.pi, (2, 8, 10)))
-    assert len(calls) == 2
+    assert len(calls) == 2 and 2**16 <= counting.MOST_TOGETHER <= 2**20
