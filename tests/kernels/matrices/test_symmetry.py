@@ -7,14 +7,18 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, gamma, norm, t
 
+from asperity.kernels.matrices import defects
 from asperity.kernels.matrices.defects import (
     SYMMETRY_NORM,
     Defect,
     SymmetryDefect,
+    defect_of_pairs,
     invariance_z_score,
+    occupied_pairs,
     relative_asymmetry,
     replicate_z_score,
     reversibility_z_score,
+    row_blocks,
 )
 
 
@@ -152,6 +156,23 @@ def test_the_asymmetry_is_relative_to_the_whole() -> None:
     assert relative_asymmetry(np.array([[3.0, 6.0], [4.0, 0.0]])) == pytest.approx(np.sqrt(2.0 / 61.0), rel=1e-15)
     assert relative_asymmetry(np.zeros((2, 2))) == 0.0
     assert relative_asymmetry(np.array([[0.0, 0.5], [-0.5, 0.0]])) == pytest.approx(1.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(("large", "sizes"), [(1, [1] * 5), (10, [2, 2, 1]), (25, [5])])
+def test_blocks_of_rows_find_what_the_whole_array_holds(large: int, sizes: list[int], monkeypatch) -> None:
+    monkeypatch.setattr(defects, "LARGE", large)
+    assert [len(range(5)[rows]) for rows in row_blocks(5)] == sizes
+    counts, scale = np.random.default_rng(3).poisson(0.5, (5, 5)), np.arange(1.0, 6.0)
+    assert np.array_equal(occupied_pairs(counts), np.nonzero(np.triu(counts + counts.T, 1)))
+    scaled = counts * np.outer(scale, scale)
+    assert relative_asymmetry(counts, scale) == pytest.approx(relative_asymmetry(scaled), rel=1e-14)
+
+
+def test_pairs_of_numbers_are_counted_in_cells_with_the_end_in_the_last() -> None:
+    counts = np.array([[2, 0, 9], [1, 0, 1], [4, 1, 0]])
+    first, second = np.repeat([[0, 0, 1, 1, 2, 2], [0, 2, 0, 2, 0, 1]], [2, 9, 1, 1, 4, 1], axis=1) * 1.5
+    found = defect_of_pairs(first, second, 3)
+    assert (found, found.z_score) == (relative_asymmetry(counts), reversibility_z_score(counts))
 
 
 def test_defects_are_immutable_numbers_with_a_norm() -> None:
