@@ -46,7 +46,7 @@ RETURNED = {
     "geometry.collide_modified": "ModifiedCollision",
     "geometry.collide_pair": "PairCollision",
     "geometry.shadow": "Shadow CollisionConstants",
-    "kernels.Law": "BranchLaw DrivenLaw Combination Composition Power SpecularFrame",
+    "kernels.Law": "BranchLaw DrivenLaw Combination Composition Power SpecularFrame kernels.laws.tables.Table",
     "kernels.KernelMatrix": "Defect SymmetryDefect",
     "kernels.SINE": "AngularMeasure",
     "kernels.CollisionLaw": "VelocityLaw CollisionCombination",

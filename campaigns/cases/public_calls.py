@@ -335,7 +335,7 @@ ARGUMENTS: dict[str, Any] = {
     "wall_normal": [0.0, 1.0], "w": [0.0, 1.0, 0.0], "w2": [0.0, 1.0, 0.0], "theta_basis": BINS,
     "psi_basis": MOMENTUM_BINS, "samples": 64, "neck": 0.1, "unfollowed": 0.0, "distance": 0.1, "scale": 1.0,
     "largest": 4, "speed": [1.0, 2.0], "gas_temperature": 1.0, "temperature": 1.0, "left": 0.0, "right": 1.0,
-    "intervals": 2, "family": lambda x: LAW, "walls": [TEETH], "repeats": 1, "container": STRIP,
+    "intervals": 2, "family": lambda x: LAW, "walls": [TEETH], "repeats": 1, "container": STRIP, "n_in": 3, "n_out": 3,
     "centre": [0.0, 0.0], "cost": None, "directions": None, "normal": [0.0, 1.0], "scales": [0.1],
     "first_velocity": [0.0, -1.0, 0.0], "second_velocity": [0.0, 0.0, 0.0], "near": np.array([True] * 9),
     "coordinates": "velocity", "frames": 3, "duration": 1.0, "ConfigurationSpace.height": -0.5,
