@@ -1,4 +1,4 @@
-"""Kernel matrices as files: an .npz archive with every field, exact to the last bit."""
+"""Kernel matrices as files: an .npz archive with every field, exact to the last bit, or a .csv for others."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.lib import format as npy
 
-from ...core.checks import check_memory, whole_number
+from ...core.checks import Floats, check_memory, whole_number
 from ...core.errors import InputError
 from ...core.files import ending_in, regular_file, write_whole
+from ...core.tables import numbers_as_csv
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
@@ -26,6 +27,9 @@ from ..bases.tensor import TensorBasis
 FORMAT, VERSION = "asperity kernel matrix", 1
 # Of a record, in characters; and of a byte of a deflated member, in bytes that it inflates to.
 LONGEST_RECORD, DEFLATION = 2**24, 1032
+
+# The reflection that keeps the angle, by convention.
+SAME_ANGLE = {"paper": "retroreflection", "specular": "specular reflection"}
 
 Record = dict[str, Any]
 Arrays = dict[str, np.ndarray[Any, Any]]
@@ -53,6 +57,21 @@ def write(path: str | Path, record: Record, arrays: Arrays, basis: Basis, *, ove
     arrays["record"] = np.array(text)
     write_whole(target, lambda stream: np.savez_compressed(stream, **arrays), overwrite=overwrite)  # type: ignore[arg-type]
     return target
+
+
+def write_csv(path: str | Path, array: Floats, edges: Floats, facts: Record, *, overwrite: bool) -> Path:
+    """Write probabilities between bins, with ``facts`` in comments and both edges of each bin in the first rows."""
+    comments = [
+        "asperity kernel matrix: probabilities of outgoing bins (columns) given the incoming bin (rows)",
+        *(f"{name}: {value}" for name, value in facts.items()),
+        f"convention of {facts['convention']!r}: theta_out = theta_in is {SAME_ANGLE[facts['convention']]}",
+        "radians; rows: 0,0,lower edges; 0,0,upper edges; then both edges and the probabilities of each incoming bin",
+    ]
+    low, high = edges[:-1], edges[1:]
+    heads = np.pad([low, high], ((0, 0), (2, 0)))
+    rows = np.vstack([heads, np.column_stack([low, high, array])])
+    write_whole(Path(path), numbers_as_csv(comments, rows.tolist()), overwrite=overwrite)
+    return Path(path)
 
 
 def read(path: str | Path, restored: Callable[[Record, Stored, Basis], T]) -> T:
