@@ -1,5 +1,8 @@
 """Tables of inverse distribution functions: exact cases, their errors, files, and what is drawn from them."""
 
+import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -161,3 +164,62 @@ def test_the_error_of_a_law_that_does_not_know_it_is_nan():
 def test_sums_that_are_no_laws_are_refused():
     with pytest.raises(InputError, match="weights"):
         (0.5 * ker.specular() + 0.4 * ker.lambertian()).table(4, 4)
+
+
+PAGE = (Path(__file__).parents[3] / "docs" / "tables.md").read_text(encoding="utf-8")
+
+
+def block_of(language, number=0):
+    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)[number]
+
+
+def assert_angles_of(law, table, theta, drawn):
+    """Mean, second moment and distribution of angles from a sampler, against the law and exact draws from the table."""
+    assert drawn.min() > 0.0 and drawn.max() < np.pi
+    for function in (np.cos, np.sin, lambda angle: np.cos(2.0 * angle)):
+        deviation = abs(function(drawn).mean() - float(law.apply(function, theta)))
+        assert deviation < table.largest_error + table.distribution_error + 5.0 / np.sqrt(drawn.size)
+    # Kolmogorov and Smirnov's distance to quantiles of the table; 2.0 / sqrt(n) is exceeded with probability 0.0007
+    p = (np.arange(4000) + 0.5) / 4000
+    quantile = np.sort(table._at(np.full(p.shape, theta), p))
+    distribution = np.searchsorted(np.sort(drawn), quantile) / drawn.size
+    assert np.abs(distribution - p).max() < 2.0 / np.sqrt(drawn.size) + 1.0 / p.size
+
+
+def test_the_sampler_in_numpy_on_the_page_draws_from_the_law(tmp_path, monkeypatch):
+    law, theta = ker.CircularArcLaw(1.2), 1.3
+    table = law.table(24, 25)
+    table.save(tmp_path / "law.csv")
+    monkeypatch.chdir(tmp_path)
+    names = {"law": law}
+    exec(compile(block_of("python", 1), "tables.md", "exec"), names)
+    drawn = names["sample"](names["read_table"]("law.csv"), np.full(50_000, theta), np.random.default_rng(4))
+    assert_angles_of(law, table, theta, drawn)
+    # at grazing angles too it does as the table does
+    grazing = np.array([1e-9, 0.01, 3.1, np.pi - 1e-9])
+    own = names["sample"](table.quantile, grazing, np.random.default_rng(7))
+    assert np.array_equal(own, table.sample(grazing, np.random.default_rng(7)))
+
+
+@pytest.mark.parametrize(
+    ("compiler", "language", "suffix", "flags", "sizes"),
+    [
+        ("cc", "c", ".c", ["-std=c99", "-Wall", "-Werror"], []),
+        ("gfortran", "fortran", ".f90", ["-std=f2008", "-Wall"], ["24", "25"]),
+    ],
+)
+def test_the_compiled_samplers_on_the_page_draw_from_the_law(compiler, language, suffix, flags, sizes, tmp_path):
+    if shutil.which(compiler) is None:
+        pytest.skip(f"{compiler} is not installed")
+    source, program, rows = tmp_path / f"sample{suffix}", tmp_path / "sample", 20_000
+    source.write_text(block_of(language))
+    subprocess.run([compiler, "-O2", *flags, str(source), "-o", str(program), "-lm"], check=True, cwd=tmp_path)
+    law = ker.CircularArcLaw(1.2)
+    table = law.table(24, 25)
+    table.save(tmp_path / "law.csv")
+    for theta in (0.05, 1.3, 3.1):
+        command = [str(program), str(tmp_path / "law.csv"), *sizes, str(theta), str(rows)]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        drawn = np.array(text.split(), dtype=np.float64)
+        assert drawn.size == rows
+        assert_angles_of(law, table, theta, drawn)
