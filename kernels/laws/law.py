@@ -402,6 +402,32 @@ def as_weight(weight: object) -> float | None:
     return float(numbers("weight", weight)) if is_number else None  # type: ignore[arg-type]
 
 
+def total_weight(terms: Sequence[tuple[float, object]]) -> float:
+    """The sum of the weights of terms."""
+    return math.fsum(weight for weight, _ in terms)
+
+
+def check_weights(terms: Sequence[tuple[float, object]], whole: object) -> None:
+    """Raise an InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
+    for index, (weight, law) in enumerate(terms):
+        if weight < 0.0:
+            raise InputError(f"weights: expected non-negative ones, got {weight!r} for term {index}, {law!r}")
+    total = total_weight(terms)
+    if abs(total - 1.0) > WEIGHT_TOLERANCE:
+        raise InputError(
+            f"weights: expected a sum of 1, got {total!r} for {whole!r}; scale the weights or add the missing law"
+        )
+
+
+def drawn_terms(
+    terms: Sequence[tuple[float, object]], shape: tuple[int, ...], rng: np.random.Generator
+) -> NDArray[np.intp]:
+    """Indices of terms, each drawn with the probability that is its weight."""
+    cumulative = np.cumsum([weight for weight, _ in terms])
+    choice = np.searchsorted(cumulative, rng.random(shape) * cumulative[-1], side="right")
+    return np.asarray(np.minimum(choice, len(terms) - 1))
+
+
 def entry_inside(x: Floats) -> Floats:
     """Clip uniform numbers to the open interval (0, 1)."""
     return np.asarray(np.clip(x, SMALLEST, LARGEST))
@@ -486,18 +512,11 @@ class Combination(Law):
     @property
     def sums_to_one(self) -> bool:
         """Whether the weights sum to 1 within 1e-12."""
-        return abs(math.fsum(weight for weight, _ in self.terms) - 1.0) <= WEIGHT_TOLERANCE
+        return abs(total_weight(self.terms) - 1.0) <= WEIGHT_TOLERANCE
 
     def terms_checked(self) -> tuple[tuple[float, Law], ...]:
         """The terms; raises InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
-        for index, (weight, law) in enumerate(self.terms):
-            if weight < 0.0:
-                raise InputError(f"weights: expected non-negative ones, got {weight!r} for term {index}, {law!r}")
-        if not self.sums_to_one:
-            total = math.fsum(weight for weight, _ in self.terms)
-            raise InputError(
-                f"weights: expected a sum of 1, got {total!r} for {self!r}; scale the weights or add the missing law"
-            )
+        check_weights(self.terms, self)
         return self.terms
 
     def __add__(self, other: Law) -> Combination:
@@ -547,9 +566,7 @@ class Combination(Law):
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         terms = self.terms_checked()
-        cumulative = np.cumsum([weight for weight, _ in terms])
-        choice = np.searchsorted(cumulative, rng.random(theta.shape) * cumulative[-1], side="right")
-        choice = np.minimum(choice, len(terms) - 1)
+        choice = drawn_terms(terms, theta.shape, rng)
         outgoing = np.empty(theta.shape)
         for index, (_, law) in enumerate(terms):
             chosen = choice == index
