@@ -122,11 +122,11 @@ def zernike_functions(points: Floats, degrees: NDArray[np.int64], orders: NDArra
     """
     from scipy.special import eval_jacobi
 
-    power = np.abs(orders)
+    order = np.abs(orders)
     z = (points[..., 0] + 1j * points[..., 1])[..., None]
-    factors = np.broadcast_to(z, (*z.shape[:-1], int(power.max(initial=0)) + 1)).copy()
+    factors = np.broadcast_to(z, (*z.shape[:-1], int(order.max(initial=0)) + 1)).copy()
     factors[..., 0] = 1.0
-    turned = np.cumprod(factors, axis=-1)
-    angular = np.where(orders < 0, turned.imag[..., power], turned.real[..., power])
-    radial = eval_jacobi((degrees - power) // 2, 0.0, power, 2.0 * np.abs(z) ** 2 - 1.0)
+    powers = np.cumprod(factors, axis=-1)
+    angular = np.where(orders < 0, powers.imag[..., order], powers.real[..., order])
+    radial = eval_jacobi((degrees - order) // 2, 0.0, order, 2.0 * np.abs(z) ** 2 - 1.0)
     return np.asarray(np.sqrt((degrees + 1.0) * np.where(orders, 2.0, 1.0)) * radial * angular)

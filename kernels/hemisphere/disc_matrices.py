@@ -38,12 +38,12 @@ def matrix_of_grooves(planar: Floats, degrees: Indices, orders: Indices, angle: 
     chebyshev = np.cos(node), 2.0 / (count + 1) * np.sin(node) ** 2
     legendre = x, 2.0 / np.pi * np.sqrt(1.0 - x * x) * weight
     total = np.zeros((degrees.size, degrees.size))
-    for part, (b, share) in ((np.where(odd, 0.0, planar), chebyshev), (np.where(odd, planar, 0.0), legendre)):
+    for part, (b, mass) in ((np.where(odd, 0.0, planar), chebyshev), (np.where(odd, planar, 0.0), legendre)):
         if part.any():
             across, along = -np.sqrt(1.0 - b * b)[:, None] * x, np.broadcast_to(b[:, None], (count, count))
             values = zernike_functions(in_the_plane(across, along, angle), degrees, orders)
             found = np.einsum("bxk,xl->bkl", values, moments, optimize=True)
-            total += np.tensordot(share[:, None, None] * found, found @ part.T, axes=([0, 2], [0, 2]))
+            total += np.tensordot(mass[:, None, None] * found, found @ part.T, axes=([0, 2], [0, 2]))
     return total
 
 

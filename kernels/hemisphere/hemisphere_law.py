@@ -139,8 +139,8 @@ class DirectionLaw(SpatialLaw):
             mine = np.flatnonzero(chosen == index)
             for number, law in enumerate(laws):
                 # a wall on the other side of the channel
-                turned = outgoing[mine] * [1.0, 1.0, -1.0 if number else 1.0]
-                outgoing[mine] = law.reflected(turned, source)
+                arriving = outgoing[mine] * [1.0, 1.0, -1.0 if number else 1.0]
+                outgoing[mine] = law.reflected(arriving, source)
         return outgoing.reshape(incoming.shape)
 
     def matrix(self, degree: int, m: int, **discretisation: Any) -> AzimuthalBlock:

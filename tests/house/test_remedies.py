@@ -84,6 +84,18 @@ REMEDIES = {
         lambda: ker.PolygonLaw(geo.focusing_arcs()),
         lambda: ker.WallLaw(geo.focusing_arcs()),
     ),
+    "use it with ker.HemisphereLaw(law)": (
+        lambda: ker.discretise(LAW, ker.Zernike(2)),
+        lambda: ker.discretise(ker.HemisphereLaw(LAW), ker.Zernike(2)),
+    ),
+    "use ker.discretise(H, ker.Zernike(": (
+        lambda: ker.HemisphereLaw(LAW, 0.5).matrix(2, 1),
+        lambda: ker.discretise(ker.HemisphereLaw(LAW, 0.5), ker.Zernike(2)),
+    ),
+    "Take a palindrome such as H1 @ H2 @ H1": (
+        lambda: spec.spectral_gap(ker.HemisphereLaw(LAW) @ ker.HemisphereLaw(ker.specular())),
+        lambda: spec.spectral_gap(ker.HemisphereLaw(LAW) @ ker.HemisphereLaw(ker.specular()) @ ker.HemisphereLaw(LAW)),
+    ),
     "expected a name that ends in": (None, None),
     "pass overwrite=True to replace": (None, None),
 }  # fmt: skip
