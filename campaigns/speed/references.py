@@ -27,6 +27,7 @@ from asperity.bench.references import FILE
 from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import traced_matrix
+from asperity.kernels.laws.law import sum_of
 
 from .exact_rows import ArcRow, Atoms, crevice_row, mean_over_angles, tooth_row
 from .reference_eigenvalues import reference_eigenvalue
@@ -129,7 +130,7 @@ def plane_of_rows(row: Row, tolerance: float) -> dict[str, Found]:
 
 def teeth_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] | None:
     """The library's closed forms for triangular and rectangular teeth, confirmed by independent conditionals."""
-    law = ker.WallLaw(wall).closed_form
+    law = sum_of(ker.WallLaw(wall).parts)
     if isinstance(law, ker.TriangularTeethLaw):
         row, tolerance = partial(tooth_row, psi=law.angle), TRIANGULAR_TOLERANCE
     elif isinstance(law, ker.RectangularTeethLaw):

@@ -38,7 +38,10 @@ MOST_CUTS, CUT_FRACTION = 6, 0.1
 
 
 class Conditional(NamedTuple):
-    """Outgoing angles, the widths of the opening that lead to them, the error of integrals, the unresolved width."""
+    """Outgoing angles, the widths of the opening that lead to them, the error of integrals, the unresolved width.
+
+    Rays that do not escape count as retroreflected, and in the error.
+    """
 
     nodes: Floats
     widths: Floats

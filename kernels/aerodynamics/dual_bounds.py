@@ -6,14 +6,13 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ..bases.bins import Bins
 from ..bases.measure import SINE, gauss_on_intervals
 from .drag import CostFunction
 
 # Gauss nodes per cell for means of an angle; on the narrow cells of a grid the error is rounding.
 NODES = 8
-# Entries of a table in memory at a time.
-CHUNK = 2**22
 MOST_PIVOTS = 10**9
 
 
@@ -28,7 +27,7 @@ def dual_bound(potential: Floats, cost: CostFunction, curvature: float) -> float
     count = potential.size
     nodes = np.linspace(0.0, np.pi, count)
     transform = np.full(count, np.inf)
-    step = max(1, CHUNK // count)
+    step = max(1, NUMBERS_AT_ONCE // count)
     for start in range(0, count, step):
         part = slice(start, start + step)
         table = cost(nodes[part, None], nodes) - potential[part, None]

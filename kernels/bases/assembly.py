@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from .basis import Basis
 from .panels import Panels
 
-# Limit on the values of basis functions in memory at a time.
-CHUNK = 2**21
 # OpenBLAS uses one thread for products of at most this many multiplications, and to limit it takes 30 us.
 SMALL_PRODUCT = 2**18
 # Matrices with more entries are copied as seldom as possible.
@@ -49,7 +48,7 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
         (source, values), (target, images) = basis.local(incoming), basis.local(outgoing)
         add_blocks(total, basis, source, target, values, weight[:, None] * images)
         return
-    step = max(1, CHUNK // basis.size)
+    step = max(1, NUMBERS_AT_ONCE // basis.size)
     for start in range(0, incoming.size, step):
         part = slice(start, start + step)
         values, images = basis.evaluate(incoming[part]), weight[part, None] * basis.evaluate(outgoing[part])

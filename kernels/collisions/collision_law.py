@@ -381,8 +381,7 @@ class CollisionLaw(VelocityLaw):
 
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.WallLaw(wall.foreshorten(disk))")
-        if isinstance(self.law, Combination):
-            self.law.terms_checked()
+        _ = self.law.parts  # raises InputError unless the weights of a combination make it a law
         instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
         if self.law.frame != "paper":
             raise InputError("law: expected a law in the paper's convention, got one in the specular frame")

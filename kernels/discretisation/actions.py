@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ..bases.assembly import largest_square_sum
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
@@ -13,13 +14,11 @@ from ..expectations.angle_panels import NODES, AnglePanels
 from ..laws.law import DrivenLaw, Law, knows_errors
 from ..laws.structure import is_compound, lists_branches
 from ..matrices.matrix import KernelMatrix
-from ..walls.wall_law import WallLaw
+from ..walls.wall_law import traced_wall
 from .method import Budget, MethodName, computed, rounding
 
 # Limit on the values of basis functions: one or two seconds of work.
 MOST_VALUES = 2**26
-# Limit on the numbers in memory at a time.
-CHUNK = 2**21
 # Number of breakpoints among the first panel edges; the fraction of the tolerance that the error of one panel may have;
 # and the error that rounding leaves.
 FIRST_BREAKPOINTS, PANEL_FRACTION, CONVERGED = 32, 0.02, 1e-15
@@ -37,9 +36,8 @@ class Actions:
     def accepts(self, law: Law, basis: Basis) -> bool:
         if is_compound(law) or _has_too_many_breakpoints(law):
             return False
-        if isinstance(law, DrivenLaw) and not isinstance(basis, Legendre):
-            return False
-        return not isinstance(law, WallLaw) and knows_errors(law)
+        driven = isinstance(law, DrivenLaw) and law.isometry_table() is None
+        return traced_wall(law) is None and (isinstance(basis, Legendre) or not driven) and knows_errors(law)
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error = action_matrix(law, basis, budget.tolerance)
@@ -81,7 +79,7 @@ def action_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
         # The next round is at most twice as large.
         last = spent + 2 * values * low.size > MOST_VALUES
         converged = np.zeros(low.size, dtype=np.bool_)
-        step = max(1, CHUNK // max(values, basis.size**2))
+        step = max(1, NUMBERS_AT_ONCE // max(values, basis.size**2))
         for start in range(0, low.size, step):
             panels = AnglePanels.between(low[start : start + step], high[start : start + step], basis.size)
             found = law.conditionals(panels.angle, max(MEAN_FRACTION * tolerance, CONVERGED), degree, inside)

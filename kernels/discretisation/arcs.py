@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.assembly import add_blocks, add_masses
@@ -30,8 +31,6 @@ FEWEST_HITS, MOST_HITS, REST_FRACTION = 32, 8192, 1e-5
 # partitions.
 NODES_SHORT, NODES_CELL = 5, 14
 SHORT = 0.1
-# Limit on nodes times basis functions, or nodes times cells, in memory at a time.
-CHUNK = 2**21
 NOISE_PROBES = 5
 # Entries are integrals over delta in an interval of length 2 sin(xi) at most, whose ends are known to about pi eps.
 ROUNDING = 4.0 * np.pi * EPS
@@ -170,7 +169,7 @@ def _add_strips(
     mass = 0.0
     for chosen, order in ((short, NODES_SHORT), (~short, long_nodes)):
         selected = np.flatnonzero(chosen)
-        step = max(1, CHUNK // (order * cut))
+        step = max(1, NUMBERS_AT_ONCE // (order * cut))
         for start in range(0, selected.size, step):
             part = strips.part(selected[start : start + step])
             theta, weight = gauss_on_intervals(part.low, part.high, order)
@@ -219,7 +218,7 @@ def _add_cut_strips(
     short = 2.0 * strips.hits[strip] * (high - low) * basis.nodes_per_interval < width
     for chosen, order in ((short, NODES_SHORT), (~short, basis.nodes_per_interval)):
         selected = np.flatnonzero(chosen)
-        step = max(1, CHUNK // (order * (basis.degree + 1 if isinstance(basis, Panels) else basis.size)))
+        step = max(1, NUMBERS_AT_ONCE // (order * (basis.degree + 1 if isinstance(basis, Panels) else basis.size)))
         for start in range(0, selected.size, step):
             part = selected[start : start + step]
             chord, fraction = gauss_on_intervals(low[part], high[part], order)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.assembly import add_products
 from ..bases.basis import Basis
@@ -37,8 +38,6 @@ CONDITIONAL_NODES = (6, 4, 2)
 MOST_CONDITIONAL_VALUES = 2**27
 # Edges x and pi - y closer than this count as equal.
 MIRROR_TOLERANCE = 4.0 * EPS * np.pi
-# Limit on the numbers in memory at a time.
-CHUNK = 2**21
 # Evaluations of the density at a time for conditional distributions: the arrays then stay in cache.
 CONDITIONAL_CHUNK = 2**17
 # Grading of intervals at the jumps of a map, where it may have square-root singularities if it maps from or to grazing.
@@ -201,7 +200,7 @@ def _density_rule(law: HasDensity, basis: Basis, edges: Floats, order: int) -> F
     angle, weight = gauss_rule(edges, order)
     mass = weight * SINE.density(angle)
     total = np.zeros((basis.size, basis.size))
-    step = max(CHUNK // angle.size // order, 1) * order
+    step = max(NUMBERS_AT_ONCE // angle.size // order, 1) * order
     owner = basis.index(0.5 * (edges[1:] + edges[:-1])) if basis.is_partition else None
     values = basis.evaluate(angle) if owner is None else None
     for start in range(0, angle.size, step):

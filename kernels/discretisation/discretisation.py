@@ -100,10 +100,10 @@ def discretise(
     -----
     ``"auto"`` tries the methods in this order; every other value of ``method`` tries the methods of its kind.
 
-    1. ``RaysOrConditionals`` (auto): a wall without closed form, by the first of these that meets the tolerance, or by
-       the most exact: isometries, if the beams of a polygonal wall resolve; 2^17 rays; conditional distributions, of
-       walls that close and have at most 16 pieces; all rays. The error does not grow if the tolerance falls. The same
-       for a wall in the other frame.
+    1. ``RaysOrConditionals`` (auto): a wall without further parts, by the first of these that meets the tolerance, or
+       by the most exact: isometries, if the beams of a polygonal wall resolve; 2^17 rays; conditional distributions,
+       of walls that close and have at most 16 pieces; all rays. The error does not grow if the tolerance falls. The
+       same for a wall in the other frame.
     2. ``IsometryTables`` (exact): isometries on intervals of angles, with probabilities, such as polygonal walls.
     3. ``Isometries`` (exact): any other law that lists its isometries and is not a composition.
     4. ``Diagonal`` (exact): Henyey-Greenstein scattering, in `Legendre`.
@@ -114,12 +114,12 @@ def discretise(
     9. ``Actions`` (quadrature): any other law whose conditional distributions have errors; laws that average over
        entry points only in `Legendre`.
     10. ``Sobol`` (qmc): laws driven by one uniform number.
-    11. ``Traced`` (quadrature): any wall.
+    11. ``Traced`` (quadrature): any wall without further parts or isometries.
     12. ``MonteCarlo`` (monte-carlo): any law.
 
     Methods 1 to 9 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the other
     frame from its inner law, a composition from its factors if none of them needs rays. Methods 10 to 12 come last. A
-    wall with different hollows is a sum.
+    wall is the sum of its `parts`.
 
     A law of matrices, with Lambertian reflection and isometries, in `Bins` that refine the matrices' is exact (auto).
 

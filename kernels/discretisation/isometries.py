@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.displacement import Displacement
@@ -25,8 +26,8 @@ NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
 # Breakpoints that accumulate at grazing are listed until the omitted fraction is negligible or their use would take
 # more than about a second.
 FEWEST_BREAKPOINTS, BREAKPOINT_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
-# Limit on nodes times branches in memory at a time, and angles at which branches are counted.
-CHUNK, PROBES = 2**22, np.linspace(0.1, 3.0, 30)
+# Angles at which branches are counted.
+PROBES = np.linspace(0.1, 3.0, 30)
 # Number of branches that are computed before those of a chain merge.
 BRANCHES_COMPUTED = Rules(
     lambda law: law.branches(PROBES)[0].shape[-1], lambda terms: sum(n for _, n in terms), math.prod, lambda n: n
@@ -86,8 +87,9 @@ def branch_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
         tame = width * basis.nodes_per_interval < np.diff(basis.edges).min()
         narrow, order_narrow = narrow & tame, NODES_NARROW + 2
     for chosen, nodes in ((narrow, order_narrow), (~narrow, order)):
-        _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], nodes, total, CHUNK // (nodes * branches))
-    for middle in np.array_split(0.5 * (edges[1:] + edges[:-1]), 1 + edges.size * branches // CHUNK):
+        step = NUMBERS_AT_ONCE // (nodes * branches)
+        _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], nodes, total, step)
+    for middle in np.array_split(0.5 * (edges[1:] + edges[:-1]), 1 + edges.size * branches // NUMBERS_AT_ONCE):
         _add_cuts(law, basis, middle, displacement)
     return total, omitted * worst + rounding(basis) + displacement.bound()
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ..bases.angles import clipped_inside
 from ..bases.assembly import add_masses, add_products, largest_square_sum
 from ..bases.basis import Basis
@@ -30,8 +31,6 @@ SHORT = ((1e-3, 2), (0.02, 3), (0.2, 5), (1.0, 8), (4.0, 14))
 MORE_NODES = 18
 # Shorter pieces get the number of nodes that a sinusoid needs on this width.
 FEW = 0.1
-# Limit on the pieces, or nodes, in memory at a time.
-CHUNK = 2**20
 
 
 class IsometryTables:
@@ -97,7 +96,7 @@ def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
 
 def _add_table(table: IsometryTable, basis: Basis, total: Floats, displacement: Displacement) -> None:
     # Pieces of a table are cut into about as many parts as the basis has cells on them.
-    step = max(CHUNK // (2 * basis.edges.size), 1)
+    step = max(NUMBERS_AT_ONCE // (2 * basis.edges.size), 1)
     for begin in range(0, table.low.size, step):
         piece, low, high = _cut(table, basis, np.arange(begin, min(begin + step, table.low.size)))
         middle = 0.5 * (low + high)
@@ -148,7 +147,7 @@ def _add_nodes(
     number = _nodes(basis, high - low)
     for nodes in np.unique(number):
         chosen = np.nonzero(number == nodes)[0]
-        step = max(CHUNK // int(nodes), 1)
+        step = max(NUMBERS_AT_ONCE // int(nodes), 1)
         for begin in range(0, chosen.size, step):
             part = chosen[begin : begin + step]
             angle, weight = gauss_on_intervals(low[part], high[part], int(nodes))

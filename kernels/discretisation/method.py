@@ -65,7 +65,7 @@ class Budget:
 class Method(Protocol):
     """A method that computes the matrices of some laws; each is listed in `methods.METHODS` or `methods.SAMPLED`.
 
-    Walls with a closed form are replaced by it beforehand. The law may be a sum, a chain, or in the specular frame.
+    Walls are replaced by their `parts` beforehand. The law may be a sum, a chain, or in the specular frame.
     """
 
     name: MethodName

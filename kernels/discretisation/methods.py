@@ -85,12 +85,12 @@ class _Law:
     def without_rays(self, basis: Basis) -> bool:
         if self.parts is not None:
             return self.parts.without_rays(basis)
-        return any(method.accepts(_resolved(self.law), basis) for method in METHODS if method.name != "auto")
+        return any(method.accepts(self.law, basis) for method in METHODS if method.name != "auto")
 
     def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
         method = self._method(wanted, basis)
         if method is not None:
-            return method.matrix(self._law(wanted), basis, budget)
+            return method.matrix(self.law, basis, budget)
         assert self.parts is not None  # `has` was True, and any other law can be sampled
         return self.parts.matrix(wanted, basis, budget)
 
@@ -102,11 +102,7 @@ class _Law:
 
     def _first(self, methods: Sequence[Method], wanted: MethodName, basis: Basis) -> Method | None:
         named = (method for method in methods if wanted in ("auto", method.name))
-        return next((method for method in named if method.accepts(self._law(wanted), basis)), None)
-
-    def _law(self, wanted: MethodName) -> Law:
-        """The law; for exact methods and quadrature, a polygonal wall becomes its table of isometries."""
-        return _resolved(self.law) if wanted in ("exact", "quadrature") else self.law
+        return next((method for method in named if method.accepts(self.law, basis)), None)
 
 
 class _Sum:
@@ -224,15 +220,9 @@ RULES: Rules[Any] = Rules(_Law, _Sum, _chain, _Mirrored, _Law)
 def _names(found: _Law | _Sum, basis: Basis) -> tuple[MethodName, ...]:
     """The kinds of methods of a law, the best first."""
     if isinstance(found, _Law) and found.parts is None:
-        law = _resolved(found.law)
-        accepted = [method.name for method in METHODS + SAMPLED if method.accepts(law, basis)]
+        accepted = [method.name for method in METHODS + SAMPLED if method.accepts(found.law, basis)]
         return tuple(dict.fromkeys(name for name in accepted if name != "auto"))
     return tuple(name for name in NAMES if name == "monte-carlo" or found.has(name, basis))
-
-
-def _resolved(law: Law) -> Law:
-    """The law, or its table of isometries if it is a resolved polygonal wall."""
-    return law.exact_law or law
 
 
 def _scaled_defect(weight: float, matrix: KernelMatrix, total: KernelMatrix) -> SymmetryDefect:

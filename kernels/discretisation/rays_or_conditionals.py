@@ -1,4 +1,4 @@
-"""The method choice of `auto` for the law of a wall without closed form: isometries, rays or conditionals."""
+"""The method choice of `auto` for the law of a wall without further parts: isometries, rays or conditionals."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import cast
 
 from ...core.errors import AccuracyError
 from ..bases.basis import Basis
-from ..laws.law import Law
+from ..bases.panels import Panels
+from ..laws.law import Law, sum_of
 from ..matrices.matrix import KernelMatrix
 from ..sampling.sobol import SobolSampler
 from ..walls.wall_law import FEW_PIECES, WallLaw
@@ -27,9 +28,9 @@ RAYS_GAIN = 1.0 / 16.0
 
 
 class RaysOrConditionals:
-    """Walls without closed form: the first of these matrices that meets the tolerance, or else the most exact one.
+    """Walls without further parts: the first of these matrices that meets the tolerance, or else the most exact one.
 
-    1. Isometries of a polygonal wall, if its beams resolve; if it has many pieces, after the first rays.
+    1. Isometries of a polygonal wall, if its beams resolve; if it has many pieces, after the first rays, but on panels.
     2. The first rays.
     3. Conditional distributions, of walls that close and have few pieces.
     4. All rays.
@@ -40,18 +41,20 @@ class RaysOrConditionals:
     name: MethodName = "auto"
 
     def accepts(self, law: Law, basis: Basis) -> bool:
-        return isinstance(law, WallLaw) and law.closed_form is None
+        return isinstance(law, WallLaw) and sum_of(law.parts) is law
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         law = cast(WallLaw, law)
-        if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
-            return IsometryTables().matrix(law.exact_law, basis, budget)
+        isometries = IsometryTables()
+        # on panels, mostly between the factors of a chain, rays would have to resolve hundreds of functions
+        if (len(law.wall.pieces) <= FEW_PIECES or isinstance(basis, Panels)) and isometries.accepts(law, basis):
+            return isometries.matrix(law, basis, budget)
         sampler = SobolSampler(law, basis, budget.rng)
         first = _by_rays(sampler, basis, replace(budget, rays=min(FIRST_RAYS, budget.rays)))
         if first is not None and float(first.error) <= budget.tolerance:
             return first
-        if law.exact_law is not None:
-            return IsometryTables().matrix(law.exact_law, basis, budget)
+        if isometries.accepts(law, basis):
+            return isometries.matrix(law, basis, budget)
         if not _has_conditionals(law, basis, budget):
             return sobol_matrix(sampler, basis, budget)
         found = Traced().matrix(law, basis, budget)

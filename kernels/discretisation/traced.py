@@ -15,12 +15,11 @@ from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..expectations.angle_panels import NODES, NORMAL, NULL_RULES, AnglePanels
-from ..expectations.basis_means import means_of_basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.cell_masses import CellMasses
 from ..walls.conditionals import WallConditionals
-from ..walls.wall_law import WallLaw
+from ..walls.wall_law import WallLaw, traced_wall
 from .method import Budget, MethodName, computed, rounding
 
 if TYPE_CHECKING:
@@ -82,7 +81,7 @@ class Traced:
     name: MethodName = "quadrature"
 
     def accepts(self, law: Law, basis: Basis) -> bool:
-        return isinstance(law, WallLaw)
+        return traced_wall(law) is not None
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error, rays = traced_matrix(cast(WallLaw, law).wall, basis, budget)
@@ -129,7 +128,7 @@ class _Integrator:
     def __init__(self, wall: Wall, basis: Basis, budget: Budget) -> None:
         self.basis, self.budget = basis, budget
         self.tolerance = max(budget.tolerance, 8.0 * EPS * basis.size)
-        self.rays, self.segments, self.angle_count = 0, 0, 0
+        self.angle_count = 0
         self.best: tuple[Floats, float] = np.zeros((basis.size, basis.size)), float("inf")
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
@@ -167,15 +166,20 @@ class _Integrator:
             self._begin(stage)
             self._meet(stage)
             if self._is_done() or stage <= self.tolerance:
-                return *self.best, self.rays
+                return *self.best, self.conditionals.spent()[0]
             stage *= STAGE_RATIO
 
     def first_segments(self) -> float:
         """The predicted ray segments of the first panels, from some angles."""
         of_means = min(self.mean_tolerance / math.sqrt(FAIR_FRACTION), self._coarsest_mean)
-        segments = self.conditionals(SAMPLED_ANGLES, of_means).segments
+        self.conditionals(SAMPLED_ANGLES, of_means)
         patches = PATCH_COST if self.cells is not None else 1.0
-        return patches * len(NODES) * (len(self.edges) - 1) * segments / len(SAMPLED_ANGLES)
+        return patches * len(NODES) * (len(self.edges) - 1) * self.segments / len(SAMPLED_ANGLES)
+
+    @property
+    def segments(self) -> int:
+        """The ray segments so far."""
+        return self.conditionals.spent()[1]
 
     def _is_done(self) -> bool:
         """Whether the error is small enough or no segments are left."""
@@ -343,12 +347,9 @@ class _Integrator:
         panel, node = np.nonzero(mask)
         for first in range(0, len(panel), ANGLES_AT_ONCE):
             few = slice(first, first + ANGLES_AT_ONCE)
-            conditionals = self.conditionals(panels.angle[panel[few], node[few]], tolerance[panel[few]])
-            self.rays, self.segments = self.rays + conditionals.rays, self.segments + conditionals.segments
-            self.angle_count += len(conditionals.theta)
-            panels.image[panel[few], node[few]] = means_of_basis(
-                self.basis, conditionals.nodes, conditionals.weights, conditionals.starts
-            )
+            conditionals, _ = self.conditionals(panels.angle[panel[few], node[few]], tolerance[panel[few]])
+            self.angle_count += conditionals.error.size
+            panels.image[panel[few], node[few]] = conditionals.in_basis(self.basis)
             panels.mean_error[panel[few], node[few]] = conditionals.error
         self._estimate(panels, np.unique(panel))
 
@@ -357,10 +358,7 @@ class _Integrator:
         step = max(1, ANGLES_AT_ONCE // len(NODES))
         for first in range(0, len(chosen), step):
             few = chosen[first : first + step]
-            before = self.conditionals.spent()
             found = cells(panels.low[few], panels.high[few], panels.angle[few], tolerance[few])
-            rays, segments = (now - then for now, then in zip(self.conditionals.spent(), before, strict=True))
-            self.rays, self.segments = self.rays + rays, self.segments + segments
             self.angle_count += len(few) * len(NODES)
             panels.image[few], panels.integral[few] = found.rest, found.integrals
             panels.mean_error[few] = found.mean_error

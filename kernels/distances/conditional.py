@@ -2,57 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.long_runs import progress_bar
 from ..bases.intervals import cell_among
-from ..laws.distribution import Distribution
 from ..laws.law import Law
-from .transport import Distributions, absolute_area, power_mean, wasserstein
+from .distributions import CellsAndAtoms, Terms, cells_and_atoms, terms_of
+from .transport import absolute_area, power_mean, wasserstein
 
-# Incoming angle at which laws are tested for densities; the result does not depend on it.
-PROBE = 1.0
-# Fewest cells of the outgoing angle if the cuts of the densities are known, and if not.
-CELLS_BETWEEN_CUTS, CELLS = 8, 64
-# Numbers in memory at a time. Walls with many pieces have an atom for each entry point.
-NUMBERS_AT_ONCE = 2**21
-# Numbers in memory at a time between cuts, of which each angle has another number.
-NUMBERS_BETWEEN_CUTS = 2**18
-# The cells contribute at most this fraction of the tolerance.
+# Incoming angle at which atoms are counted.
+PROBE = np.array([1.0])
+# Fewest cells of the outgoing angle.
+CELLS = 32
+# Edges and atoms in memory at a time; on each cell a conditional distribution has some nodes.
+NUMBERS_AT_ONCE = 2**16
+# The cells, and the laws by their tolerance, contribute at most this fraction of the tolerance.
 CELLS_PART = 0.1
-# Levels of polygons are extrapolated if their p-th powers differ by at most this fraction.
-CLOSE = 0.1
+# Where a distribution is narrower than a cell, its error halves when cells are halved. The largest change is then as
+# large as the error that remains.
+SUPREMUM_FACTOR = 2.0
+# Tolerances in total variation of conditional distributions: tighter ones cost more than they gain, and W_p for large p
+# is not known better by them.
+LAW_TOLERANCES = 1e-9, 1e-2
 
 
 @dataclass(frozen=True)
 class ConditionalDistance:
     """W_p(P(theta, .), Q(theta, .)) for two laws P and Q, as a function of the incoming angles.
 
-    Atoms are exact. If both laws know the cuts of their densities, distribution functions are computed at the atoms,
-    the cuts, the edges of cells and the middles between all these; they are smooth in between. Else they count as
-    linear between the edges of cells.
+    Atoms are exact. The distribution functions of the atomless parts are computed at the edges and in the middles of
+    cells of the outgoing angle. Between these they count as quadratic for p = 1, else as linear.
     """
 
     first: Law
     second: Law
     order: float
+    sup: bool
+    tolerance: float
+
+    @cached_property
+    def terms(self) -> tuple[Terms, Terms]:
+        """Both laws as sums."""
+        return terms_of(self.first), terms_of(self.second)
 
     @cached_property
     def is_atomic(self) -> bool:
         """Whether all conditional distributions consist of atoms, so that no cells are needed."""
-        theta, edges = np.array([PROBE]), np.array([0.0, np.pi])
-        return not any(np.any(law.distribution(theta, edges).below) for law in (self.first, self.second))
-
-    @cached_property
-    def knows_cuts(self) -> bool:
-        """Whether distribution functions are computed between the cuts of both densities."""
-        return all(law.density_cuts(np.array([PROBE])) is not None for law in (self.first, self.second))
+        return all(term.has_atoms for terms in self.terms for _, term in terms)
 
     @property
     def halves(self) -> int:
@@ -62,121 +62,80 @@ class ConditionalDistance:
     @cached_property
     def atoms(self) -> int:
         """The number of atoms of both laws at an incoming angle."""
-        theta, edges = np.array([PROBE]), np.array([0.0, np.pi])
-        return sum(law.distribution(theta, edges).mass.shape[1] for law in (self.first, self.second))
+        return sum(part.mass.shape[1] for part in self._parts(PROBE, np.linspace(0.0, np.pi, 3)))
 
-    def cells(self, theta: Floats, sup: bool, tolerance: float, most: int) -> tuple[int, float]:
-        """The number of cells that the tolerance needs, and the error that remains, from the difference of two numbers.
+    @property
+    def law_tolerance(self) -> float:
+        """The error in total variation that contributes `CELLS_PART` of the tolerance to the distance."""
+        return float(np.clip(2.0 * (CELLS_PART * self.tolerance / np.pi) ** self.order, *LAW_TOLERANCES))
 
-        The error is the p-mean, or the largest, of the differences at incoming angles, which stand for equal parts of
-        the measure. The number is at most ``most``.
+    def cells(self, theta: Floats, wanted: float, most: int) -> tuple[int, float, float]:
+        """The number of cells that a wanted error needs, the error that remains from cells, and that from both laws.
+
+        The first error is the p-mean, or the largest, of the differences from half the number at incoming angles, which
+        stand for equal parts of the measure. The number is at most ``most``.
         """
-        least = CELLS_BETWEEN_CUTS if self.knows_cuts else CELLS
-        if self.is_atomic:
-            return least, 0.0
-        number, found, error = least, self(theta, least), np.inf
-        while number < most and error > CELLS_PART * tolerance:
+        (found, wrong), number, error = self(theta, CELLS), CELLS, np.inf
+        from_laws = self._norm(wrong)
+        while number < most and error > CELLS_PART * max(wanted, from_laws) and not self.is_atomic:
             number *= 2
-            before, found = found, self(theta, number)
-            step = np.abs(found - before)
-            error = float(step.max() if sup else power_mean(step, np.full(theta.size, 1.0 / theta.size), self.order))
-        return number, error
+            before, found = found, self(theta, number)[0]
+            error = (SUPREMUM_FACTOR if self.sup else 1.0) * self._norm(np.abs(found - before))
+        return number, 0.0 if self.is_atomic else error, from_laws
 
-    def __call__(self, theta: Floats, cells: int) -> Floats:
-        """The distances at incoming angles, with this number of cells of the outgoing angle."""
-        # neighbouring angles have about the same number of cuts
-        sequence = np.argsort(theta, kind="stable")
-        found = np.empty(theta.size)
-        points = [law.outgoing_breakpoints for law in (self.first, self.second)]
-        edges = np.linspace(0.0, np.pi, (1 if self.is_atomic else cells) + 1)
-        edges = np.unique(np.concatenate((edges, *points)))
-        numbers = NUMBERS_BETWEEN_CUTS if self.knows_cuts else NUMBERS_AT_ONCE
-        step = max(1, numbers // max(edges.size, self.atoms))
-        rows = self._between_cuts if self.knows_cuts else self._on_cells
+    def __call__(self, theta: Floats, cells: int) -> tuple[Floats, Floats]:
+        """The distances at incoming angles with this number of cells, and their errors from those of both laws."""
+        outgoing = [term.law.outgoing_breakpoints for terms in self.terms for _, term in terms]
+        edges = np.unique(np.concatenate((np.linspace(0.0, np.pi, (1 if self.is_atomic else cells) + 1), *outgoing)))
+        points = _with_middles(edges)
+        found, error = np.empty(theta.size), np.empty(theta.size)
+        step = max(1, NUMBERS_AT_ONCE // max(points.size, self.atoms))
         with progress_bar(theta.size, "angle", "distance") as bar:
             for start in range(0, theta.size, step):
-                part = sequence[start : start + step]
-                found[part] = rows(theta[part], edges)
-                bar.update(part.size)
-        return found
+                part = slice(start, start + step)
+                one, other = self._parts(theta[part], points)
+                if self.order == 1.0:
+                    found[part] = _area_between(points, one, other)
+                else:
+                    found[part] = wasserstein(one.on(points), other.on(points), self.order)
+                # an error E in total variation moves the mass E/2 by pi at most
+                wrong = np.minimum(0.5 * np.stack((one.error, other.error)), 1.0)
+                error[part] = np.pi * (wrong ** (1.0 / self.order)).sum(axis=0)
+                bar.update(wrong.shape[1])
+        return found, error
 
-    def _on_cells(self, theta: Floats, edges: Floats) -> Floats:
-        """W_p between distributions that are linear between edges, apart from atoms."""
-        parts = [law.distribution(theta, edges) for law in (self.first, self.second)]
-        if self.order != 1.0:
-            pair = [Distributions.of_parts(edges, *part) for part in parts]
-            return wasserstein(pair[0], pair[1], self.order)
-        gap, position, jump = _difference(parts, [part.below for part in parts])
-        corner = np.broadcast_to(edges, gap.shape)
-        if position.shape[1]:
-            cell = cell_among(edges, position)
-            low, high = (np.take_along_axis(gap, cell + side, axis=1) for side in (0, 1))
-            inside = low + (position - edges[cell]) / (edges[cell + 1] - edges[cell]) * (high - low)
-            corner, order, jumps = _sorted(corner, position, jump)
-            gap = np.take_along_axis(np.concatenate((gap, inside), axis=1), order, axis=1)
-            above = gap + np.cumsum(jumps, axis=1)
-            start, end = above[:, :-1], (above - jumps)[:, 1:]
-        else:
-            start, end = gap[:, :-1], gap[:, 1:]
-        return absolute_area(np.diff(corner, axis=1), start, 0.5 * (start + end), end)
+    def _parts(self, theta: Floats, edges: Floats) -> list[CellsAndAtoms]:
+        return [cells_and_atoms(terms, theta, edges, self.law_tolerance, self.sup) for terms in self.terms]
 
-    def _between_cuts(self, theta: Floats, edges: Floats) -> Floats:
-        """W_p from distribution functions at the atoms, the cuts, the edges and the middles between all these."""
-        laws = (self.first, self.second)
-        parts = [law.distribution(theta, np.array([0.0, np.pi])) for law in laws]
-        cuts = [law.density_cuts(theta) for law in laws]
-        listed = [found for found in cuts if found is not None]
-        grid = np.concatenate((np.broadcast_to(edges, (theta.size, edges.size)), *listed), axis=1)
-        position = np.concatenate([part.position for part in parts], axis=1)
-        corner = _sorted(grid, position, position)[0]
-        points = np.empty((theta.size, 2 * corner.shape[1] - 1))
-        points[:, ::2], points[:, 1::2] = corner, 0.5 * (corner[:, 1:] + corner[:, :-1])
-        below = [
-            law.distribution(theta, points).below if np.any(part.below) else np.zeros(points.shape)
-            for law, part in zip(laws, parts, strict=True)
-        ]
-        if self.order == 1.0:
-            gap, _, jump = _difference(parts, below)
-            step = np.cumsum(_sorted(grid, position, jump)[2], axis=1)[:, :-1]
-            ends = (gap[:, :-1:2] + step, gap[:, 1::2] + step, gap[:, 2::2] + step)
-            return absolute_area(np.diff(corner, axis=1), *ends)
-        masses = (parts[0].mass, np.zeros(parts[1].mass.shape)), (np.zeros(parts[0].mass.shape), parts[1].mass)
-        jumps = [_sorted(grid, position, np.concatenate(pair, axis=1))[2] for pair in masses]
-        levels = []
-        for every in (1, 2):
-            pair = [_with_jumps(points[:, ::every], below[k][:, ::every], jumps[k]) for k in (0, 1)]
-            levels.append(wasserstein(pair[0], pair[1], self.order))
-        return self._extrapolated(levels[0], levels[1])
-
-    def _extrapolated(self, fine: Floats, coarse: Floats) -> Floats:
-        """From distances between polygons with two numbers of corners: the error of the p-th power is of order 2."""
-        if self.is_atomic:
-            return fine
-        ratio = np.divide(coarse, fine, out=np.ones_like(fine), where=fine > 0.0)
-        change = np.where(np.abs(ratio - 1.0) * self.order <= CLOSE, 1.0 - ratio**self.order, 0.0)
-        return np.asarray(fine * (1.0 + change / 3.0) ** (1.0 / self.order))
+    def _norm(self, values: Floats) -> float:
+        same = np.full(values.size, 1.0 / values.size)
+        return float(values.max() if self.sup else power_mean(values, same, self.order))
 
 
-def _difference(parts: Sequence[Distribution], below: Sequence[Floats]) -> tuple[Floats, Floats, Floats]:
-    """The difference of atomless parts, and the positions and signed masses of all atoms, of measures of total 1."""
-    totals = [(part.below[:, -1] + part.mass.sum(axis=1))[:, None] for part in parts]
-    mass = np.concatenate((parts[0].mass / totals[0], -parts[1].mass / totals[1]), axis=1)
-    return below[0] / totals[0] - below[1] / totals[1], np.concatenate([part.position for part in parts], axis=1), mass
-
-
-def _sorted(grid: Floats, position: Floats, jump: Floats) -> tuple[Floats, NDArray[np.intp], Floats]:
-    """Grid points and positions of atoms in increasing order, their order, and the jumps at each."""
-    corner = np.concatenate((grid, position), axis=1)
+def _area_between(points: Floats, one: CellsAndAtoms, other: CellsAndAtoms) -> Floats:
+    """The area between distribution functions, without their jumps quadratic on cells; edges and middles are given."""
+    cells = one.cells - other.cells
+    gap = np.concatenate((np.zeros((len(cells), 1)), np.cumsum(cells, axis=1)), axis=1)
+    edges = np.broadcast_to(points[::2], (len(gap), points[::2].size))
+    corner = np.concatenate((edges, one.position, other.position), axis=1)
+    jumps = np.concatenate((np.zeros(edges.shape), one.mass, -other.mass), axis=1)
     order = np.argsort(corner, axis=1, kind="stable")
-    jumps = np.concatenate((np.zeros(grid.shape), jump), axis=1)
-    return np.take_along_axis(corner, order, axis=1), order, np.take_along_axis(jumps, order, axis=1)
+    corner, jumps = (np.take_along_axis(given, order, axis=1) for given in (corner, jumps))
+    above = np.cumsum(jumps, axis=1)[:, :-1]
+    values = _quadratic(points, gap, _with_middles(corner)) if corner.shape[1] > edges.shape[1] else gap
+    return absolute_area(np.diff(corner), values[:, :-1:2] + above, values[:, 1::2] + above, values[:, 2::2] + above)
 
 
-def _with_jumps(points: Floats, below: Floats, jump: Floats) -> Distributions:
-    """Distribution functions that are linear between points, with jumps at equally many points."""
-    jumps = np.zeros(points.shape)
-    jumps[:, :: (points.shape[1] - 1) // (jump.shape[1] - 1)] = jump
-    above = below + np.cumsum(jumps, axis=1)
-    level = np.stack((above - jumps, above), axis=-1).reshape(len(points), -1)
-    level = np.maximum.accumulate(level, axis=1)
-    return Distributions(np.repeat(points, 2, axis=1), level / level[:, -1:])
+def _with_middles(edges: Floats) -> Floats:
+    """Edges in the last axis and the middles between them."""
+    found = np.empty((*edges.shape[:-1], 2 * edges.shape[-1] - 1))
+    found[..., ::2], found[..., 1::2] = edges, 0.5 * (edges[..., 1:] + edges[..., :-1])
+    return found
+
+
+def _quadratic(points: Floats, values: Floats, position: Floats) -> Floats:
+    """Functions that are quadratic on the cells whose edges and middles are the points, from their values there."""
+    cell = cell_among(points[::2], position)
+    start, middle, end = (np.take_along_axis(values, 2 * cell + k, axis=1) for k in range(3))
+    t = (position - points[2 * cell]) / (points[2 * cell + 2] - points[2 * cell])
+    return np.asarray(start + t * (4.0 * middle - 3.0 * start - end + 2.0 * t * (start + end - 2.0 * middle)))

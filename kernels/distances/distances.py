@@ -87,10 +87,12 @@ def distance(
 
     Notes
     -----
-    *Laws.* Conditional distributions that consist of atoms are exact. Densities are integrated between the outgoing
-    angles at which they jump, if both laws know them, else resolved on cells; the error is estimated from two numbers
-    of cells. Panels in the incoming angle are halved where the rules of Gauss and Kronrod disagree, and the sum of
-    their differences is part of the error. A supremum is that over nodes, refined until two levels agree.
+    *Laws.* Conditional distributions that consist of atoms are exact. Densities are resolved on cells of the outgoing
+    angle, on which their distribution functions count as quadratic for p = 1, else as linear; the error is estimated
+    from two numbers of cells. Errors E of the conditional distributions themselves, in total variation, count as
+    pi (E/2)^(1/p): for p > 1 they can be most of the error. Panels in the incoming angle are halved where the rules of
+    Gauss and Kronrod disagree, and the sum of their differences is part of the error. A supremum is that over nodes,
+    refined until two levels agree.
 
     *Matrices* are treated as kernels between the middle angles of their cells. By the triangle inequality the error is
     at most the sum of the errors of both matrices; for empirical matrices these are found by resampling. The interval

@@ -1,132 +1,184 @@
-"""The distribution of the outgoing angle at each incoming angle, for every kind of law."""
+"""Conditional distributions of the outgoing angle as atoms and masses of cells, for every kind of law."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ..bases.angles import mirrored_angle
 from ..bases.bins import Bins
+from ..bases.intervals import cell_among
 from ..bases.measure import SINE
 from ..discretisation.discretisation import discretise
 from ..expectations.conditionals import Conditionals
-from ..laws.distribution import Distribution
-from ..laws.law import ENTRY_POINTS, Combination, Composition, Law, Power, SpecularFrame, is_atomic
+from ..laws.law import Combination, Composition, Law, Power, SpecularFrame, has_fixed_nodes, is_atomic, knows_errors
+from ..laws.structure import law_of, words_of
 from ..matrices.matrix import KernelMatrix
 from .transport import Distributions, power_mean, wasserstein
 
 # Incoming angles at which the error from entry points is estimated, and the number of cells for products.
 ANGLES = 64
-# Incoming angle at which laws are tested for entry points; the result does not depend on it.
-PROBE = 1.0
+# Limit on the atoms of the first factors of a product from which the last factor is followed without a matrix.
+MOST_FOLLOWED = 32
+# Incoming angle at which these are counted.
+PROBE = np.array([1.0])
+# Error in total variation of conditional distributions of which no error is known.
+UNKNOWN = 2.0
+# Matrices of later factors in memory.
+MATRICES = 4
 
 
-def outgoing_distributions(law: Law, theta: Floats, edges: Floats) -> Distributions:
-    """P(theta_k, .) for every theta_k: exact for atoms, else linear between ``edges``, which go from 0 to pi."""
-    return Distributions.of_parts(edges, *law.distribution(theta, edges))
+class Term(NamedTuple):
+    """A law without sums, and of a product on cells its first factor, as terms, and the law of the others.
 
-
-def on_cells(law: Law) -> Law:
-    """The same law, with products that take the distribution of their later factors from a matrix on the cells.
-
-    The default, `apply`, would nest one integral in another.
+    ``has_atoms``: the conditional distributions are finitely many atoms, those of entry points if ``is_sampled``.
     """
-    if isinstance(law, Combination):
-        return Combination(tuple((weight, on_cells(term)) for weight, term in law.terms))
-    if isinstance(law, SpecularFrame):
-        return SpecularFrame(on_cells(law.law))
-    if isinstance(law, Power) and law.exponent:
-        law = Composition((law.law,) * law.exponent)
-    return _OnCells((on_cells(law.laws[0]), *law.laws[1:])) if isinstance(law, Composition) else law
+
+    law: Law
+    factors: tuple[Terms, Law] | None
+    has_atoms: bool
+    is_sampled: bool
 
 
-def cells_error(law: Law, order: float, sup: bool) -> float:
-    """Error of a distance from the matrices that replace the later factors of products.
+Terms: TypeAlias = "list[tuple[float, Term]]"
 
-    The Frobenius errors of the last matrices used enter as in `resampling.matrices_error`; they bound total variations,
-    which further factors do not increase. W_p^p is convex in both measures, so the p-th powers of the errors of the
-    terms of a sum are averaged.
+
+class CellsAndAtoms(NamedTuple):
+    """P(theta_k, .) for some theta_k: masses of cells without the atoms, atoms, and errors in total variation.
+
+    The shapes are (angles, cells), twice (angles, atoms), and (angles,). The error of a matrix is its mean over theta,
+    or the largest.
     """
+
+    cells: Floats
+    position: Floats
+    mass: Floats
+    error: Floats
+
+    def on(self, edges: Floats) -> Distributions:
+        """The distribution functions, linear between the edges but for the atoms."""
+        below = np.concatenate((np.zeros((len(self.cells), 1)), np.cumsum(self.cells, axis=1)), axis=1)
+        return Distributions.of_parts(edges, below, self.position, self.mass)
+
+    def masses(self, edges: Floats) -> Floats:
+        """The masses of cells, with those of the atoms."""
+        found = self.cells.copy()
+        np.add.at(found, (np.arange(len(found))[:, None], cell_among(edges, self.position)), self.mass)
+        return found
+
+
+def terms_of(law: Law) -> Terms:
+    """The law as a weighted sum of laws of atoms, laws without atoms but flat tops, and products of these."""
+    words = words_of(law)
+    if words is not None:
+        return [(weight, _term(law_of(word))) for word, weight in words.items()]
     if isinstance(law, Combination):
-        errors = np.array([cells_error(term, order, sup) for _, term in law.terms])
-        return float(power_mean(errors, np.array([weight for weight, _ in law.terms]), order))
+        return [(weight * part, term) for weight, one in law.parts for part, term in terms_of(one)]
+    return [(1.0, _term(law))]
+
+
+def _term(law: Law) -> Term:
+    factors = None if _is_followed(law) else _first_and_others(law)
+    if factors is not None:
+        return Term(law, (terms_of(factors[0]), factors[1]), False, False)
+    has_atoms = has_fixed_nodes(law)
+    return Term(law, None, has_atoms, has_atoms and not knows_errors(law))
+
+
+def _is_followed(law: Law) -> bool:
+    """Whether the conditional distributions of a product are known with their errors, and are not too long."""
+    if not isinstance(law, Composition):
+        return False
+    *first, last = law.laws
+    if not all(is_atomic(part) for part in first) or not knows_errors(last):
+        return False
+    return is_atomic(last) or Composition(tuple(first)).conditionals(PROBE).nodes.size <= MOST_FOLLOWED
+
+
+def _first_and_others(law: Law) -> tuple[Law, Law] | None:
+    """The first factor of a product and the law of the others; None for other laws."""
     if isinstance(law, SpecularFrame):
-        return cells_error(law.law, order, sup)
-    if not isinstance(law, _OnCells) or law.last is None:
-        return 0.0
-    error = float(law.last.error) / (float(np.sqrt(law.last.weights.min())) if sup else 1.0)
-    return float(np.pi * min(0.5 * error, 1.0) ** (1.0 / order)) + cells_error(law.laws[0], order, sup)
+        factors = _first_and_others(law.law)
+        return None if factors is None else (factors[0], SpecularFrame.of(factors[1]))
+    if isinstance(law, Power):
+        return law.law, Power(law.law, law.exponent - 1)
+    if isinstance(law, Composition):
+        return law.laws[0], law.laws[1] if len(law.laws) == 2 else Composition(law.laws[1:])
+    return None
 
 
-def entry_error(law: Law, order: float, sup: bool) -> float:
-    """Error of a distance from laws whose distributions are those of equally spaced entry points.
+def cells_and_atoms(
+    terms: Terms, theta: Floats, edges: Floats, tolerance: float, sup: bool, entries: slice = slice(None)
+) -> CellsAndAtoms:
+    """The conditional distributions of a sum at incoming angles, with its masses between edges from 0 to pi.
+
+    The first factor of a product is multiplied by the matrix of the others. Of entry points only ``entries`` count.
+    """
+    total, wrong = np.zeros((theta.size, edges.size - 1)), np.zeros(theta.size)
+    atoms = [np.empty((2, theta.size, 0))]
+    for weight, term in terms:
+        if term.factors is not None:
+            first = cells_and_atoms(term.factors[0], theta, edges, tolerance, sup, entries)
+            matrix = _matrix(term.factors[1], edges.tobytes())
+            total += weight * first.masses(edges) @ matrix.array
+            wrong += weight * (first.error + float(matrix.error) / (np.sqrt(matrix.weights.min()) if sup else 1.0))
+            continue
+        # one distribution for all angles
+        incoming = theta[:1] if term.law.is_lambertian else theta
+        given = term.law._conditionals(incoming, tolerance, 0, edges[1:-1])
+        error = np.where(np.isnan(given.error), 0.0 if term.is_sampled else UNKNOWN, given.error)
+        table = term.law.isometry_table() if term.has_atoms and not sup else None
+        # of a mean over theta, unresolved rays change no more than their fraction
+        wrong += weight * (error if table is None else 2.0 * table.unresolved)
+        if term.has_atoms:
+            position, mass = (part[:, entries] if term.is_sampled else part for part in given.atoms())
+            atoms.append(np.stack((position, weight * mass / mass.sum(axis=1, keepdims=True))))
+            continue
+        level = _is_flat_top(term.law, incoming, given)
+        total += weight * given._replace(weights=np.where(level, 0.0, given.weights)).masses(edges)
+        if level.any():
+            flat = np.bincount(given.owner, weights=np.where(level, given.weights, 0.0), minlength=theta.size)
+            position = np.pi - theta if not isinstance(term.law, SpecularFrame) else theta
+            atoms.append(np.stack((position, weight * flat))[..., None])
+    position, mass = np.concatenate(atoms, axis=2)
+    return CellsAndAtoms(total, position, mass, wrong)
+
+
+def _is_flat_top(law: Law, theta: Floats, given: Conditionals) -> NDArray[np.bool_]:
+    """Which nodes are those of flat tops, the only atoms of traced walls."""
+    specular = np.pi - theta
+    found = mirrored_angle(specular) if isinstance(law, SpecularFrame) else specular
+    return np.asarray((given.nodes == found[given.owner]) & (not law.is_lambertian))
+
+
+@lru_cache(maxsize=MATRICES)
+def _matrix(law: Law, edges: bytes) -> KernelMatrix:
+    return discretise(law, Bins(np.frombuffer(edges)))
+
+
+def entry_error(terms: Terms, order: float, sup: bool, tolerance: float) -> float:
+    """Error of a distance from terms whose atoms are those of equally spaced entry points.
 
     It is the distance between the laws with every other entry point: each half has twice the spacing of all points, or
-    half of the sample where the angles are chaotic. The law is one that `on_cells` returned.
+    half of the sample where the angles are chaotic.
     """
-    if not _has_entry_points(law):
+    if not _has_entry_points(terms):
         return 0.0
     angle, edges = SINE.quantile((np.arange(ANGLES) + 0.5) / ANGLES), np.linspace(0.0, np.pi, ANGLES + 1)
-    one, other = (outgoing_distributions(_with_half(law, first), angle, edges) for first in (0, 1))
+    one, other = (
+        cells_and_atoms(terms, angle, edges, tolerance, sup, slice(start, None, 2)).on(edges) for start in (0, 1)
+    )
     rows = wasserstein(one, other, order)
     return float(rows.max() if sup else power_mean(rows, np.full(ANGLES, 1.0 / ANGLES), order))
 
 
-def _has_entry_points(law: Law) -> bool:
-    """Whether a distribution of the law, or of the first factor of a product, is that of entry points."""
-    if isinstance(law, Combination):
-        return any(_has_entry_points(term) for weight, term in law.terms if weight > 0.0)
-    if isinstance(law, (SpecularFrame, Composition)):
-        return _has_entry_points(law.law if isinstance(law, SpecularFrame) else law.laws[0])
-    return bool(law.distribution(np.array([PROBE]), np.array([0.0, np.pi])).mass.shape[1] == ENTRY_POINTS)
-
-
-def _with_half(law: Law, first: int) -> Law:
-    """The law with every other entry point."""
-    if isinstance(law, Combination):
-        return Combination(tuple((weight, _with_half(term, first)) for weight, term in law.terms))
-    if isinstance(law, SpecularFrame):
-        return SpecularFrame(_with_half(law.law, first))
-    if isinstance(law, Composition):
-        return _OnCells((_with_half(law.laws[0], first), *law.laws[1:]))
-    return _HalfOfEntries(law, first) if _has_entry_points(law) else law
-
-
-@dataclass(frozen=True, repr=False)
-class _HalfOfEntries(Law):
-    """The distributions of a law from every other one of its entry points; nothing else is asked of it."""
-
-    law: Law
-    first: int
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        found = self.law.distribution(theta, edges)
-        return Distribution(found.below, found.position[:, self.first :: 2], 2.0 * found.mass[:, self.first :: 2])
-
-    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        return self.law.sample(theta, rng)
-
-    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        return self.law._conditionals(theta, tolerance, degree, edges)
-
-
-@dataclass(frozen=True, repr=False)
-class _OnCells(Composition):
-    """A product whose later factors are replaced by the matrix of their product on the cells between the edges."""
-
-    # the last matrix used, for its error
-    last: KernelMatrix | None = field(default=None, compare=False, repr=False)
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        if is_atomic(self):
-            return super()._distribution(theta, edges)
-        first, *rest = self.laws
-        found = first.distribution(theta, edges)
-        if not rest:
-            return found
-        matrix = self.last
-        if matrix is None or not np.array_equal(matrix.basis.edges, edges):
-            matrix = discretise(rest[0] if len(rest) == 1 else Composition(tuple(rest)), Bins(edges))
-            object.__setattr__(self, "last", matrix)
-        return Distribution.of_cells(np.diff(found.cumulative(edges), axis=1) @ matrix.array)
+def _has_entry_points(terms: Terms) -> bool:
+    return any(
+        term.is_sampled if term.factors is None else _has_entry_points(term.factors[0])
+        for weight, term in terms
+        if weight > 0.0
+    )

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import InputError
-from ...core.long_runs import progress_bar
+from ...core.long_runs import NUMBERS_AT_ONCE, progress_bar
 from ..matrices.matrix import KernelMatrix, check_same_basis
 from ..sampling.counts import Counts, missed_fraction
 from .transport import grid_wasserstein, power_mean
@@ -21,8 +21,6 @@ RESAMPLES = 32
 # estimated from 32 resamples. The maximum over many incoming angles has a longer tail.
 DEVIATIONS, DEVIATIONS_OF_SUPREMUM = 1.96, 2.5
 SEED = 0
-# Counts in memory at a time.
-CHUNK = 2**22
 
 
 def stochastic_rows(matrix: KernelMatrix) -> Floats:
@@ -121,7 +119,7 @@ def _draws(matrix: KernelMatrix, common: Floats, number: int, rng: np.random.Gen
 
 def chunks(number: int, size: int) -> list[int]:
     """How many tables of a size are computed at a time, of ``number`` in total."""
-    most = max(1, CHUNK // size)
+    most = max(1, NUMBERS_AT_ONCE // size)
     return [min(most, number - start) for start in range(0, number, most)]
 
 

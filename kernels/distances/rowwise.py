@@ -15,8 +15,9 @@ from ..expectations.angle_panels import GAUSS, KRONROD, SLOPES, STRETCHED
 from ..laws.law import ENTRY_POINTS, Law
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .conditional import ConditionalDistance
-from .distributions import cells_error, entry_error, on_cells
+from .distributions import entry_error
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
+from .transport import power_mean
 
 # Panels of the incoming angle from 0 to pi on the coarsest level, breakpoints not counted, and breakpoints.
 PANELS, BREAKPOINTS = 32, 24
@@ -61,22 +62,20 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
     The supremum is that over the nodes of panels that are refined until two levels agree. Two numbers of cells of the
     outgoing angle are compared.
     """
-    between = ConditionalDistance(on_cells(first), on_cells(second), order)
-    laws = (between.first, between.second)
-    from_entries = sum(entry_error(law, order, sup) for law in laws)
+    between = ConditionalDistance(first, second, order, sup, tolerance)
+    from_entries = sum(entry_error(terms, order, sup, between.law_tolerance) for terms in between.terms)
     wanted = max(tolerance - from_entries, from_entries)
     probes = SINE.quantile((np.arange(PROBES) + 0.5) / PROBES)
     probes = np.concatenate((probes, _nodes_and_ends(_panel_edges(between, 0)))) if sup else probes
     for most in MOST_CELLS[: 1 if sup else 2]:
-        cells, from_cells = between.cells(probes, sup, wanted, most)
-        left = max(wanted - from_cells, SMALL_PART * from_cells)
-        value, error, panels = (_supremum if sup else _mean)(between, cells, left)
-        if error > left or from_cells <= wanted:
+        cells, from_cells, from_laws = between.cells(probes, wanted, most)
+        left = max(wanted - from_cells - from_laws, SMALL_PART * (from_cells + from_laws))
+        value, error, from_laws, panels = (_supremum if sup else _mean)(between, cells, left)
+        if error > left or from_cells <= max(wanted, from_laws):
             break
-    error += from_cells + ROUNDING + sum(cells_error(law, order, sup) for law in laws)
     how = f"levels with up to {panels} panels" if sup else f"rules of Gauss and Kronrod on {panels} panels"
     how += f", and {from_entries:.2g} from {ENTRY_POINTS} entry points" if from_entries else ""
-    return Estimate(value, error + from_entries, "estimate", how)
+    return Estimate(value, error + from_cells + from_laws + from_entries + ROUNDING, "estimate", how)
 
 
 def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> Estimate:
@@ -90,15 +89,16 @@ def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup
 
 @dataclass(frozen=True)
 class _Panels:
-    """Panels of the incoming angle, the distances at their nodes, shape (panels, 15), and errors from halving.
+    """Panels of the incoming angle, the distances at their nodes and errors from the laws, and errors from halving.
 
-    ``change`` is the error of the integral of the p-th power over the panel that was halved, for each half, divided by
-    the p-th power of ``unit``.
+    ``rows`` and ``wrong`` have the shape (panels, 15). ``change`` is the error of the integral of the p-th power over
+    the panel that was halved, for each half, divided by the p-th power of ``unit``.
     """
 
     low: Floats
     high: Floats
     rows: Floats
+    wrong: Floats
     change: Floats
     unit: Floats
 
@@ -106,13 +106,17 @@ class _Panels:
     def at(between: ConditionalDistance, cells: int, low: Floats, high: Floats) -> _Panels:
         """The panels with these ends, which no one was halved for."""
         angle = _nodes(low, high)
-        zero = np.zeros(low.size)
-        return _Panels(low, high, between(angle.ravel(), cells).reshape(angle.shape), zero, zero + 1.0)
+        rows, wrong = (found.reshape(angle.shape) for found in between(angle.ravel(), cells))
+        return _Panels(low, high, rows, wrong, np.zeros(low.size), np.ones(low.size))
 
     def parts(self, order: float, rule: Floats, unit: float) -> Floats:
         """The integrals of (distance / unit)^p over the panels."""
-        weight = (self.high - self.low)[:, None] * SLOPES * SINE.density(_nodes(self.low, self.high)) * rule
-        return np.asarray(np.sum((self.rows / unit) ** order * weight, axis=1))
+        return np.asarray(np.sum((self.rows / unit) ** order * self.weights(rule), axis=1))
+
+    def weights(self, rule: Floats) -> Floats:
+        """The weights of the nodes under sin(theta)/2 d theta."""
+        nodes = _nodes(self.low, self.high)
+        return np.asarray((self.high - self.low)[:, None] * SLOPES * SINE.density(nodes) * rule)
 
     def errors(self, order: float, unit: float, cuts: Floats) -> Floats:
         """The errors of the integrals of (distance / unit)^p over the panels.
@@ -142,8 +146,8 @@ class _Panels:
         return replace(halves, change=np.tile(change, 2), unit=np.full(halves.low.size, unit))
 
 
-def _mean(between: ConditionalDistance, cells: int, wanted: float) -> tuple[float, float, int]:
-    """The p-mean over the incoming angle, its error, and the number of panels."""
+def _mean(between: ConditionalDistance, cells: int, wanted: float) -> tuple[float, float, float, int]:
+    """The p-mean over the incoming angle, its error, the part of the laws, and the number of panels."""
     order, halves = between.order, between.halves
     edges, cuts = _panel_edges(between, 0), _breakpoints(between, MOST_BREAKPOINTS)
     panels = _Panels.at(between, cells, edges[:-1], edges[1:])
@@ -155,7 +159,8 @@ def _mean(between: ConditionalDistance, cells: int, wanted: float) -> tuple[floa
         value, high, low = (unit * max(power, 0.0) ** (1.0 / order) for power in (total, total + doubt, total - doubt))
         error = max(high - value, value - low)
         if error <= wanted or panels.rows.size * (cells + between.atoms + FEW_ATOMS) > MOST_CORNERS:
-            return value, error, halves * panels.low.size
+            from_laws = power_mean(panels.wrong.ravel(), halves * panels.weights(KRONROD).ravel(), order)
+            return value, error, float(from_laws), halves * panels.low.size
         ranked = np.argsort(errors)
         many = np.cumsum(errors[ranked]) > REMAINING * doubt * wanted / error
         new = panels.selected(ranked[many]).halved(between, cells, cuts, unit)
@@ -165,8 +170,8 @@ def _mean(between: ConditionalDistance, cells: int, wanted: float) -> tuple[floa
         )
 
 
-def _supremum(between: ConditionalDistance, cells: int, wanted: float) -> tuple[float, float, int]:
-    """The supremum over the incoming angle, its error, and the number of panels of the last level."""
+def _supremum(between: ConditionalDistance, cells: int, wanted: float) -> tuple[float, float, float, int]:
+    """The supremum over the incoming angle, its error, the part of the laws, and the number of panels."""
     found: list[float] = []
     error, number = np.inf, 0
     for level in count():
@@ -176,7 +181,7 @@ def _supremum(between: ConditionalDistance, cells: int, wanted: float) -> tuple[
             break
         number = between.halves * (edges.size - 1)
         angle = _nodes_and_ends(edges)
-        values = between(angle, cells)
+        values, wrong = between(angle, cells)
         found.append(float(values.max()))
         steps = np.abs(np.diff(found))
         if level == 0:
@@ -187,8 +192,8 @@ def _supremum(between: ConditionalDistance, cells: int, wanted: float) -> tuple[
     panel = np.clip(np.searchsorted(edges, angle) - 1, 0, edges.size - 2)
     largest = np.unique(panel[np.argsort(values)[-LARGEST_PANELS * NODES :]])[:, None]
     inside = edges[largest] + np.diff(edges)[largest] * (np.arange(FINE_NODES) + 0.5) / FINE_NODES
-    value = max(found[-1], float(between(inside.ravel(), cells).max()))
-    return value, max(error, value - found[-1]), number
+    value = max(found[-1], float(between(inside.ravel(), cells)[0].max()))
+    return value, max(error, value - found[-1]), float(wrong.max()), number
 
 
 def _nodes_and_ends(edges: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ..bases.basis import Basis
 from ..bases.legendre import legendre_moments
 from ..bases.measure import gauss_rule
@@ -18,8 +19,6 @@ from ..bases.panels import Panels
 PROBE, PROBE_TOLERANCE = np.array([1.0]), 1e-2
 # Incoming angles at a time.
 ANGLES_AT_ONCE = 512
-# Limit on the values of functions in memory at a time.
-VALUES_AT_ONCE = 2_000_000
 # Angles on an interval at which the largest absolute value of functions is sought.
 HEIGHT_PROBES = 5
 
@@ -67,7 +66,7 @@ def means_of_basis(basis: Basis, nodes: Floats, weights: Floats, starts: NDArray
         moments = legendre_moments(local, weights, basis.degree, cell, rows * panels)
         return basis.of_legendre(moments.T.reshape(rows, panels, -1))
     found = np.empty((rows, size))
-    most = max(1, VALUES_AT_ONCE // size)
+    most = max(1, NUMBERS_AT_ONCE // size)
     first = 0
     while first < rows:
         last = max(first + 1, int(np.searchsorted(starts, starts[first] + most, side="right")) - 1)

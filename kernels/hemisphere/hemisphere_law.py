@@ -22,7 +22,7 @@ from ..bases.given import seed_by_name
 from ..bases.legendre import Legendre
 from ..bases.zernike import Zernike
 from ..discretisation.discretisation import discretise
-from ..laws.law import Combination, Law, as_weight, check_weights, drawn_terms
+from ..laws.law import Combination, Law, as_weight, drawn_terms, used_terms
 from ..laws.tensor_law import Discretiser, SpatialLaw
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from .disc_matrices import in_the_plane, matrix_of_average, matrix_of_grooves
@@ -69,18 +69,18 @@ class DirectionLaw(SpatialLaw):
     __array_ufunc__ = None
 
     @abstractmethod
-    def parts(self) -> tuple[Term, ...]:
+    def products(self) -> tuple[Term, ...]:
         """(weight, laws applied one after the other), of which the law is the sum."""
 
-    def parts_checked(self) -> tuple[Term, ...]:
-        """`parts`; raises InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
-        check_weights(self.parts(), self)
-        return self.parts()
+    @property
+    def parts(self) -> tuple[Term, ...]:
+        """The products; raises InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
+        return used_terms(self.products(), self)
 
     @property
     def rotation_invariant(self) -> bool:
         """Whether every groove has a random direction."""
-        return all(law.orientation == "random" for _, laws in self.parts() for law in laws)
+        return all(law.orientation == "random" for _, laws in self.products() for law in laws)
 
     @property
     def reversible(self) -> bool | None:
@@ -89,10 +89,10 @@ class DirectionLaw(SpatialLaw):
         Grooves of random direction are reversible with every reversible planar law P~: the mean of P~ J and of its
         mirror image J P~ is symmetric.
         """
-        palindromes = all(laws == laws[::-1] for _, laws in self.parts())
+        palindromes = all(laws == laws[::-1] for _, laws in self.products())
         known = all(
             law.law.reversible if law.orientation == "random" else law.specular.reversible
-            for _, laws in self.parts()
+            for _, laws in self.products()
             for law in laws
         )
         return True if palindromes and known else None
@@ -132,7 +132,7 @@ class DirectionLaw(SpatialLaw):
                 "velocity: expected incoming ones, with a negative component along the outward normal, the third, got "
                 f"{incoming[tuple(bad[0])].tolist()} at row {bad[0].tolist()} ({len(bad)} such)"
             )
-        source, terms = generator(rng), self.parts_checked()
+        source, terms = generator(rng), self.parts
         outgoing = incoming.reshape(-1, 3).copy()
         chosen = drawn_terms(terms, outgoing.shape[:1], source)
         for index, (_, laws) in enumerate(terms):
@@ -197,7 +197,7 @@ class DirectionLaw(SpatialLaw):
         instance("basis", basis, Zernike, "ker.Zernike(8) for a law of directions")
         assert isinstance(basis, Zernike)
         symmetric, error, kind = self.entries(basis.degree, None, discretise)
-        most = max(_between(basis.degree, laws) for _, laws in self.parts())
+        most = max(_between(basis.degree, laws) for _, laws in self.products())
         total = frobenius_error(math.sqrt(most + 1.0) * error, kind, "error of the planar matrix on the disc")
         return KernelMatrix(
             symmetric, basis, total, method="quadrature", law=repr(self), reversible=self.reversible, frame="specular"
@@ -209,7 +209,7 @@ class DirectionLaw(SpatialLaw):
         Those of one order are sines, then cosines, by degree.
         """
         total, error, kinds = np.zeros(()), 0.0, set()
-        for weight, laws in self.parts_checked():
+        for weight, laws in self.parts:
             most = _between(degree, laws)
             degrees, orders = _functions(most, order)
             planar = [discretise(law.specular, Legendre(most + 1)) for law in laws]
@@ -229,21 +229,21 @@ class DirectionLaw(SpatialLaw):
         """This law, then the other."""
         if not isinstance(other, DirectionLaw):
             return foreign(other)
-        pairs = [(w * v, (*first, *second)) for w, first in self.parts() for v, second in other.parts()]
+        pairs = [(w * v, (*first, *second)) for w, first in self.products() for v, second in other.products()]
         return HemisphereCombination(tuple(pairs))
 
     def __rmul__(self, weight: float) -> DirectionLaw:
         factor = as_weight(weight)
         if factor is None:
             return foreign(weight)  # type: ignore[no-any-return]
-        return HemisphereCombination(tuple((factor * own, laws) for own, laws in self.parts()))
+        return HemisphereCombination(tuple((factor * own, laws) for own, laws in self.products()))
 
     __mul__ = __rmul__
 
     def __add__(self, other: DirectionLaw) -> DirectionLaw:
         if not isinstance(other, DirectionLaw):
             return foreign(other)
-        return HemisphereCombination(self.parts() + other.parts())
+        return HemisphereCombination(self.products() + other.products())
 
 
 @dataclass(frozen=True, repr=False)
@@ -292,14 +292,14 @@ class HemisphereLaw(DirectionLaw):
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.WallLaw(wall)")
         if isinstance(self.law, Combination):
-            self.law.terms_checked()
+            used_terms(self.law.terms, self.law)
         if isinstance(self.orientation, str):
             if self.orientation != "random":
                 raise InputError(f"orientation: expected an angle in radians or 'random', got {self.orientation!r}")
         else:
             object.__setattr__(self, "orientation", finite_number("orientation", self.orientation))
 
-    def parts(self) -> tuple[Term, ...]:
+    def products(self) -> tuple[Term, ...]:
         """The only term, the law itself."""
         return ((1.0, (self,)),)
 
@@ -363,7 +363,7 @@ class HemisphereCombination(DirectionLaw):
         for weight, _ in self.terms:
             finite_number("weight", weight)
 
-    def parts(self) -> tuple[Term, ...]:
+    def products(self) -> tuple[Term, ...]:
         """The terms."""
         return self.terms
 

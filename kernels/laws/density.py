@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, common_shape, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.given import Vectorised
@@ -36,8 +37,6 @@ PANEL_STIFFNESS = 12.0
 # Cells on each panel in the table of the cdf that is sampled.
 CELLS_PER_PANEL = 16
 PROBES = 24
-# Limit on the values of the density in memory at a time.
-CHUNK = 2**20
 
 
 class DensityLaw(Law):
@@ -167,7 +166,7 @@ class DensityLaw(Law):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         flat, draw = theta.reshape(-1), rng.random(theta.size)
         edges = self._cells()
-        step = max(1, CHUNK // edges.size)
+        step = max(1, NUMBERS_AT_ONCE // edges.size)
         outgoing = np.empty(flat.size)
         for start in range(0, flat.size, step):
             part = slice(start, start + step)

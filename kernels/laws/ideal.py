@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, common_shape, finite_array, number_between
 from ..bases.measure import SINE
 from .density import DensityLaw
-from .distribution import Distribution
 from .law import Combination, specular
 
 
@@ -37,14 +36,6 @@ class LambertianLaw(DensityLaw):
     def panels(self, theta: Floats) -> Floats:
         """One panel."""
         return np.broadcast_to([0.0, np.pi], (*finite_array("theta", theta).shape, 2))
-
-    def _density_cuts(self, theta: Floats) -> Floats:
-        """None are needed, because the density is smooth."""
-        return np.empty((theta.size, 0))
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The same distribution function at every incoming angle."""
-        return Distribution.without_atoms(np.broadcast_to(SINE.cdf(edges), (theta.size, edges.shape[-1])))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return SINE.sample(theta.shape, rng)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles
 from ...core.errors import InputError
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.intervals import joined_lists, without_extremal
@@ -22,8 +23,6 @@ Whole = NDArray[np.int64]
 SAME_OFFSET = 64.0 * np.pi * EPS
 # Sums of probabilities that differ from 1 by less than this differ by rounding; they are normalised.
 ROUNDED_SUM = 1e-9
-# Limit on the candidate pieces of a query in memory at a time.
-CHUNK = 2**21
 # Number of angles up to which all pieces are compared with the angles, before there is an index.
 FEW_ANGLES = 4
 # Approximate number of entries in the index for each piece.
@@ -270,7 +269,7 @@ class IsometryTable:
         found: list[tuple[Whole, Whole, Floats]] = []
         bucket = np.clip((theta * (buckets / np.pi)).astype(np.int64), 0, buckets - 1)
         size = first[bucket + 1] - first[bucket]
-        step = max(CHUNK // max(int(size.max(initial=1)), 1), 1)
+        step = max(NUMBERS_AT_ONCE // max(int(size.max(initial=1)), 1), 1)
         for begin in range(0, max(theta.size, 1), step):
             part = slice(begin, begin + step)
             owner, group = joined_lists(size[part])

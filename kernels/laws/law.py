@@ -6,7 +6,8 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from functools import cached_property
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +24,6 @@ from ...core.checks import (
     instance,
     numbers,
     sequence,
-    shaped,
     shortened,
     whole_number,
 )
@@ -35,7 +35,6 @@ from ..bases.basis import AngleFunction, Frame
 from ..bases.given import Vectorised, seed_by_name
 from ..expectations.conditionals import Conditionals, degree_of
 from .branches import chained, chained_breakpoints, joined, merged
-from .distribution import Distribution
 from .isometry_table import IsometryTable
 
 # Half the spacing of rng.random(). It replaces draws of exactly 0, for which the ray would enter at a tip of the wall.
@@ -50,8 +49,6 @@ MOST_VALUES = 10**8
 ENTRY_POINTS = 4096
 # The tolerance of `apply`, the incoming angles with which it begins, and outgoing angles in memory at a time.
 TOLERANCE, FIRST_ANGLES, NODES_AT_ONCE = 1e-8, 16, 2**20
-# Cells of outgoing angles in memory at a time; each has some nodes.
-CELLS_AT_ONCE = 2**17
 # Degree of the functions that `conditionals` averages by default.
 DEGREE = 8
 # Breakpoints of laws at which the means under the law before them are cut.
@@ -59,13 +56,12 @@ CUTS = 64
 # Incoming angle, tolerance, and degrees with edges of the test whether conditional distributions depend on these.
 PROBE, PROBE_TOLERANCE = np.array([1.0]), 1e-2
 PROBE_FUNCTIONS = (0, np.empty(0)), (64, np.linspace(0.05, 3.09, 32))
-# Edges begin at 0 and end at pi within a few roundings.
-ENDS_TOLERANCE = 1e-14
 # Limit on nested calls of `apply`; more would exceed Python's recursion limit.
 DEEPEST_POWER = 100
 # Limits on the exponents of powers of which branches are listed, and of which rays are drawn, some seconds of work.
 LONGEST_CHAIN, LONGEST_SAMPLE = 10**4, 10**5
 
+T = TypeVar("T")
 # A map from uniform numbers and incoming angles to the outgoing angles and, for traced rays, whether each ray escaped.
 RandomMap: TypeAlias = Callable[[Floats, Floats], tuple[Floats, "NDArray[np.bool_] | None"]]
 
@@ -190,38 +186,22 @@ class Law(ABC):
 
     def _repr_html_(self) -> str:
         known = {True: "yes", False: "no", None: "not known"}
+        whole = self if isinstance(self, Combination) else sum_of(self.parts)
         lines = {
             "convention": self.frame, "reversible": known[self.reversible],
-            "mirror-symmetric": known[self.mirror_symmetric], "closed form": self.closed_form,
+            "mirror-symmetric": known[self.mirror_symmetric], "parts": None if whole is self else whole,
         }  # fmt: skip
         return html_table(f"Law {self!r}", lines)
 
     # ---- optional properties, each with a default -------------------------------------------------------------
     @property
-    def closed_form(self) -> Law | None:
-        """The same law as an object with closed formulas; None if there is none or if this object is it.
+    def parts(self) -> tuple[tuple[float, Law], ...]:
+        """The law as a sum of simpler laws with positive weights; by default this law itself with weight 1.
 
-        It is None for compound laws; `asperity.kernels.laws.structure.fold` replaces their parts by closed forms.
+        `sum_of` makes one law of them. Compositions, powers and laws in the other frame are no sums;
+        `asperity.kernels.laws.structure.fold` divides the laws in them.
         """
-        return None
-
-    @property
-    def replacement(self) -> Law | None:
-        """The same law as a simpler one by which `fold` replaces it: the closed form, or a sum of simpler laws."""
-        return self.closed_form
-
-    @property
-    def exact_law(self) -> Law | None:
-        """The closed form, or else the same law as a table of isometries, whose computation may take a second."""
-        return self.closed_form
-
-    @property
-    def is_isometric(self) -> bool:
-        """Whether the law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
-
-        False for compound laws; `asperity.kernels.laws.structure.made_of_isometries` examines their parts.
-        """
-        return False
+        return ((1.0, self),)
 
     @property
     def is_lambertian(self) -> bool:
@@ -241,18 +221,6 @@ class Law(ABC):
         """The known outgoing angles at which densities jump or have a kink for every incoming angle."""
         return np.empty(0)
 
-    def density_cuts(self, theta: ArrayLike) -> Floats | None:
-        """Outgoing angles between which the density of P~(theta_k, .) is smooth, shape (angles, any), in any order.
-
-        The narrowest pieces may be left out. None if the law does not know them for every incoming angle; else
-        `distribution` takes other edges for each incoming angle, of shape (angles, edges).
-        """
-        return self._density_cuts(shaped("theta", angles("theta", theta), "n"))
-
-    def _density_cuts(self, theta: Floats) -> Floats | None:
-        """`density_cuts` for checked angles; the default knows none."""
-        return None
-
     def random_map(self) -> RandomMap | None:
         """The law as a map of a uniform number in (0, 1) and the incoming angle; None if it needs more randomness."""
         return None
@@ -260,28 +228,6 @@ class Law(ABC):
     def isometry_table(self) -> IsometryTable | None:
         """All isometries of the law with their probabilities; None if the law is no such mixture or cannot list it."""
         return None
-
-    def distribution(self, theta: ArrayLike, edges: ArrayLike) -> Distribution:
-        """P~(theta_k, .) for every theta_k, with its atoms if the law knows them; ``edges`` go from 0 to pi.
-
-        A law that knows its `density_cuts` also takes edges of shape (angles, edges).
-        """
-        angle, cells = shaped("theta", angles("theta", theta), "n"), finite_array("edges", edges)
-        own = cells.ndim == 2 and len(cells) == angle.size and self._density_cuts(angle) is not None
-        if not (cells.ndim == 1 or own) or cells.shape[-1] < 2 or np.any(np.diff(cells) < 0.0):
-            raise InputError(f"edges: expected increasing angles in a row, got {shortened(edges)}")
-        if np.any(np.abs(cells[..., [0, -1]] - [0.0, np.pi]) > ENDS_TOLERANCE):
-            raise InputError(f"edges: expected angles from 0 to pi, got {cells.min():g} to {cells.max():g}")
-        return self._distribution(angle, cells)
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """`distribution` for checked arguments, by default from conditional distributions."""
-        if is_atomic(self):
-            return Distribution.of_atoms(edges, *self._conditionals(theta, TOLERANCE, 0, np.empty(0)).atoms())
-        steps = range(0, theta.size, max(1, CELLS_AT_ONCE // edges.size))
-        some = (theta[start : start + steps.step] for start in steps)
-        masses = [self._conditionals(part, TOLERANCE, 0, edges[1:-1]).masses(edges) for part in some]
-        return Distribution.of_cells(np.concatenate([np.empty((0, edges.size - 1)), *masses]))
 
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
@@ -329,11 +275,6 @@ class BranchLaw(Law):
 
     reversible = True
 
-    @property
-    def is_isometric(self) -> bool:
-        """Always True."""
-        return True
-
     @abstractmethod
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
 
@@ -341,10 +282,6 @@ class BranchLaw(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Increasing angles in (0, pi) where the branches change, at most about ``limit`` of them, and the measure
         under sin(theta)/2 d theta of the angles, mostly near grazing, whose breakpoints were left out."""
-
-    def _density_cuts(self, theta: Floats) -> Floats:
-        """None are needed, because there is no density."""
-        return np.empty((theta.size, 0))
 
     def random_map(self) -> RandomMap:
         """The map that takes the branch in whose part of (0, 1) the number lies."""
@@ -375,14 +312,13 @@ class DrivenLaw(Law):
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle for the entry point ``x``, a fraction of the period in (0, 1), and the angle ``theta``."""
 
-    def random_map(self) -> RandomMap:
-        """The map `reflect`."""
-        return lambda x, theta: (self.reflect(x, theta), None)
+    def reflect_with_status(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_] | None]:
+        """Outgoing angles, and which rays escaped if rays are traced."""
+        return self.reflect(x, theta), None
 
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """One atom for each of 4096 equally spaced entry points."""
-        outgoing = self.reflect(_entry_points(), theta[:, None])
-        return Distribution.of_atoms(edges, outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS))
+    def random_map(self) -> RandomMap:
+        """The map `reflect_with_status`."""
+        return self.reflect_with_status
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.reflect(np.maximum(rng.random(theta.shape), SMALLEST_DRAW), theta)
@@ -407,8 +343,8 @@ def total_weight(terms: Sequence[tuple[float, object]]) -> float:
     return math.fsum(weight for weight, _ in terms)
 
 
-def check_weights(terms: Sequence[tuple[float, object]], whole: object) -> None:
-    """Raise an InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
+def used_terms(terms: Sequence[tuple[float, T]], whole: object) -> tuple[tuple[float, T], ...]:
+    """The terms with a positive weight; raises InputError if one is negative or the sum is not 1 within 1e-12."""
     for index, (weight, law) in enumerate(terms):
         if weight < 0.0:
             raise InputError(f"weights: expected non-negative ones, got {weight!r} for term {index}, {law!r}")
@@ -417,6 +353,7 @@ def check_weights(terms: Sequence[tuple[float, object]], whole: object) -> None:
         raise InputError(
             f"weights: expected a sum of 1, got {total!r} for {whole!r}; scale the weights or add the missing law"
         )
+    return tuple(term for term in terms if term[0])
 
 
 def drawn_terms(
@@ -514,10 +451,10 @@ class Combination(Law):
         """Whether the weights sum to 1 within 1e-12."""
         return abs(total_weight(self.terms) - 1.0) <= WEIGHT_TOLERANCE
 
-    def terms_checked(self) -> tuple[tuple[float, Law], ...]:
+    @property
+    def parts(self) -> tuple[tuple[float, Law], ...]:
         """The terms; raises InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
-        check_weights(self.terms, self)
-        return self.terms
+        return used_terms(self.terms, self)
 
     def __add__(self, other: Law) -> Combination:
         if not isinstance(other, Law):
@@ -534,38 +471,25 @@ class Combination(Law):
 
     def adjoint(self) -> Law:
         """The combination of the adjoints, with the same weights."""
-        terms = self.terms_checked()
-        return self if self.reversible else Combination(tuple((weight, law.adjoint()) for weight, law in terms))
+        parts = self.parts
+        return self if self.reversible else Combination(tuple((weight, law.adjoint()) for weight, law in parts))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        parts = [(weight, *law.branches(theta)) for weight, law in self.terms_checked() if weight > 0.0]
+        parts = [(weight, *law.branches(theta)) for weight, law in self.parts]
         probability = np.concatenate([weight * fraction for weight, fraction, _ in parts], axis=-1)
         return merged(probability, np.concatenate([angle for _, _, angle in parts], axis=-1))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        return joined([law.breakpoints(limit) for weight, law in self.terms_checked() if weight > 0.0])
-
-    @property
-    def outgoing_breakpoints(self) -> Floats:
-        return np.unique(np.concatenate([law.outgoing_breakpoints for _, law in self.terms]))
-
-    def _density_cuts(self, theta: Floats) -> Floats | None:
-        cuts = [law.density_cuts(theta) for _, law in self.terms]
-        known = [found for found in cuts if found is not None]
-        return np.concatenate(known, axis=1) if len(known) == len(cuts) else None
+        return joined([law.breakpoints(limit) for weight, law in self.parts])
 
     def isometry_table(self) -> IsometryTable | None:
         """The sum of the terms' tables; None if a term has none."""
-        terms = [(weight, law.isometry_table()) for weight, law in self.terms_checked() if weight > 0.0]
+        terms = [(weight, law.isometry_table()) for weight, law in self.parts]
         tables = [table.scaled(weight) for weight, table in terms if table is not None]
         return IsometryTable.joined(tables) if len(tables) == len(terms) else None
 
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        terms = self.terms_checked()
-        return Distribution.mixed([(weight, law.distribution(theta, edges)) for weight, law in terms])
-
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        terms = self.terms_checked()
+        terms = self.parts
         choice = drawn_terms(terms, theta.shape, rng)
         outgoing = np.empty(theta.shape)
         for index, (_, law) in enumerate(terms):
@@ -575,12 +499,16 @@ class Combination(Law):
         return outgoing
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        terms = [(weight, law) for weight, law in self.terms_checked() if weight > 0.0]
         wanted = theta, tolerance, degree, edges
-        return Conditionals.mixed([(weight, law._conditionals(*wanted)) for weight, law in terms])
+        return Conditionals.mixed([(weight, law._conditionals(*wanted)) for weight, law in self.parts])
 
     def __repr__(self) -> str:
         return " + ".join(f"{weight:.12g}*{as_factor(law)}" for weight, law in self.terms)
+
+
+def sum_of(parts: tuple[tuple[float, Law], ...]) -> Law:
+    """The weighted sum of the parts of a law, or the only part."""
+    return parts[0][1] if len(parts) == 1 else Combination(parts)
 
 
 def common_frame(laws: Sequence[Law], verb: str) -> Frame:
@@ -608,8 +536,53 @@ def as_factor(law: Law) -> str:
     return f"({law!r})" if isinstance(law, (Combination, Composition)) else repr(law)
 
 
+class _Chain(Law):
+    """Laws applied one after the other."""
+
+    @abstractmethod
+    def _factors(self) -> tuple[Law, ...]:
+        """The laws in their order of application."""
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        return chained(self._factors(), angles("theta", theta))
+
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        return chained_breakpoints(self._factors(), limit)
+
+    @cached_property
+    def _error_of_atoms(self) -> float:
+        """The sum of the errors of the laws, if all are made of isometries."""
+        return sum(float(_probe(law).error[0]) for law in self._factors())
+
+    @cached_property
+    def _atomic_factors(self) -> int:
+        """The number of laws with finitely many atoms before the first other one."""
+        laws = self._factors()
+        return next((k for k, law in enumerate(laws) if not is_atomic(law)), len(laws))
+
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """The conditional distributions; means under a law are cut at the next law's breakpoints."""
+        laws = self._factors()
+        try:
+            probability, outgoing = chained(laws, theta)
+            return Conditionals.of_atoms(outgoing, probability, self._error_of_atoms)
+        except InputError:
+            # not isometries, or too many of them
+            found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)))
+        for index, law in enumerate(laws):
+            cuts = edges if index + 1 == len(laws) else _breakpoints_of_start(laws[index + 1 :])
+            each = law._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
+            if each * found.nodes.size > MOST_VALUES:
+                raise InputError(
+                    f"apply: {self!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
+                    "discretise() and compose the matrices, or fewer angles at a time"
+                )
+            found = found.followed_by(_conditionals_of(law, tolerance, degree, cuts), index <= self._atomic_factors)
+        return found
+
+
 @dataclass(frozen=True, repr=False)
-class Composition(Law):
+class Composition(_Chain):
     """Laws applied one after the other, ``first @ second``; as an operator, f -> P_first P_second f.
 
     Parameters
@@ -663,19 +636,13 @@ class Composition(Law):
         """(P Q)* = Q* P*."""
         return self if self.reversible else Composition(tuple(law.adjoint() for law in reversed(self.laws)))
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        return chained(self.laws, angles("theta", theta))
-
-    def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        return chained_breakpoints(self.laws, limit)
+    def _factors(self) -> tuple[Law, ...]:
+        return self.laws
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         for law in self.laws:
             theta = law.sample(theta, rng)
         return theta
-
-    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        return _conditionals_of_chain(self, self.laws, theta, tolerance, degree, edges)
 
     def __repr__(self) -> str:
         return " @ ".join(as_factor(law) for law in self.laws)
@@ -701,7 +668,7 @@ def _is_identity(law: Law) -> bool:
 
 
 @dataclass(frozen=True, repr=False)
-class Power(Law):
+class Power(_Chain):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
     The number of outgoing angles of its conditional distributions grows like a power with exponent n, unless isometries
@@ -730,14 +697,15 @@ class Power(Law):
         """(P^n)* = (P*)^n."""
         return self if self.reversible else Power(self.law.adjoint(), self.exponent)
 
+    def _factors(self) -> tuple[Law, ...]:
+        return (self.law,) * self.exponent
+
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         _check_length("branches", self.exponent, LONGEST_CHAIN)
-        return chained((self.law,) * self.exponent, angles("theta", theta))
+        return super().branches(theta)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        if self.exponent > DEEPEST_POWER:
-            return np.empty(0), math.inf
-        return chained_breakpoints((self.law,) * self.exponent, limit)
+        return (np.empty(0), math.inf) if self.exponent > DEEPEST_POWER else super().breakpoints(limit)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         _check_length("sample", self.exponent, LONGEST_SAMPLE)
@@ -747,7 +715,7 @@ class Power(Law):
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         _check_length("apply", self.exponent, DEEPEST_POWER)
-        return _conditionals_of_chain(self, (self.law,) * self.exponent, theta, tolerance, degree, edges)
+        return super()._conditionals(theta, tolerance, degree, edges)
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)} ** {self.exponent}"
@@ -760,8 +728,13 @@ def as_base(law: Law) -> str:
 
 def is_atomic(law: Law) -> bool:
     """Whether the conditional distributions of a law are finitely many atoms, which average any function exactly."""
+    return knows_errors(law) and has_fixed_nodes(law)
+
+
+def has_fixed_nodes(law: Law) -> bool:
+    """Whether conditional distributions have the same nodes for all functions: they are atoms, or those of samples."""
     whole, cut = (law._conditionals(PROBE, PROBE_TOLERANCE, degree, edges) for degree, edges in PROBE_FUNCTIONS)
-    return not np.isnan(whole.error).any() and np.array_equal(whole.nodes, cut.nodes)
+    return np.array_equal(whole.nodes, cut.nodes)
 
 
 def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
@@ -780,30 +753,6 @@ def knows_errors(law: Law) -> bool:
 
 def _probe(law: Law) -> Conditionals:
     return law._conditionals(PROBE, PROBE_TOLERANCE, 0, np.empty(0))
-
-
-def _conditionals_of_chain(
-    law: Law, laws: Sequence[Law], theta: Floats, tolerance: float, degree: int, edges: Floats
-) -> Conditionals:
-    """The conditional distributions of composed laws; means under a law are cut at the next law's breakpoints."""
-    try:
-        probability, outgoing = chained(laws, theta)
-        error = {part: float(_probe(part).error[0]) for part in set(laws)}
-        return Conditionals.of_atoms(outgoing, probability, sum(error[part] for part in laws))
-    except InputError:
-        # not isometries, or too many of them
-        found, exact = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1))), True
-    for index, part in enumerate(laws):
-        cuts = edges if index + 1 == len(laws) else _breakpoints_of_start(laws[index + 1 :])
-        each = part._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
-        if each * found.nodes.size > MOST_VALUES:
-            raise InputError(
-                f"apply: {law!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
-                "discretise() and compose the matrices, or fewer angles at a time"
-            )
-        found = found.followed_by(_conditionals_of(part, tolerance, degree, cuts), exact)
-        exact = exact and is_atomic(part)
-    return found
 
 
 def _conditionals_of(law: Law, tolerance: float, degree: int, edges: Floats) -> Callable[[Floats], Conditionals]:
@@ -875,10 +824,6 @@ class SpecularFrame(Law):
     def outgoing_breakpoints(self) -> Floats:
         return np.asarray(np.pi - self.law.outgoing_breakpoints[::-1])
 
-    def _density_cuts(self, theta: Floats) -> Floats | None:
-        cuts = self.law.density_cuts(theta)
-        return None if cuts is None else np.asarray(np.pi - cuts)
-
     def random_map(self) -> RandomMap | None:
         inner = self.law.random_map()
         if inner is None:
@@ -893,9 +838,6 @@ class SpecularFrame(Law):
     def isometry_table(self) -> IsometryTable | None:
         table = self.law.isometry_table()
         return None if table is None else table.in_specular_frame()
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        return self.law.distribution(theta, (np.pi - edges)[..., ::-1]).mirrored()
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return mirrored_angle(self.law.sample(theta, rng))

@@ -18,7 +18,6 @@ from ..bases.intervals import cell_among
 from ..bases.measure import SINE
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from .density import NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw, split_panels
-from .distribution import Distribution
 from .ideal import LambertianLaw
 from .law import IsometryLaw, Law, set_properties
 from .phase_function import HenyeyGreensteinLaw
@@ -121,17 +120,6 @@ class MatrixLaw(DensityLaw):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The inner edges of the bins; none are left out."""
         return self.edges[1:-1], 0.0
-
-    def _density_cuts(self, theta: Floats) -> Floats:
-        """The edges of the bins."""
-        return np.broadcast_to(self.edges, (theta.size, self.edges.size))
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The masses of whole bins below an edge, and of its bin the fraction below it."""
-        source, target = cell_among(self.edges, theta)[:, None], cell_among(self.edges, edges)
-        whole = np.cumsum(self.array, axis=1) - self.array
-        fraction = SINE.mass(self.edges[target], edges) / self._masses[target]
-        return Distribution.without_atoms(whole[source, target] + self.array[source, target] * fraction)
 
     def adjoint(self) -> MatrixLaw:
         """The law of W^-1 P^T W with bin masses W; raises InputError if P does not preserve sin(theta) d theta."""

@@ -6,12 +6,13 @@ A word is a chain of laws in the order of application; the empty word is the ide
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Generic, TypeVar
 
 from ...core.errors import InputError
-from .law import Combination, Composition, Law, Power, SpecularFrame, retroreflection, simplified, specular
+from .law import Combination, Composition, Law, Power, SpecularFrame, retroreflection, simplified, specular, sum_of
 
 Fact = TypeVar("Fact")
 Word = tuple[Law, ...]
@@ -52,7 +53,7 @@ class Rules(Generic[Fact]):
 
 
 def fold(law: Law, rules: Rules[Fact]) -> Fact:
-    """The fact of a law computed from the facts of its parts; a law with a ``replacement`` is replaced by it.
+    """The fact of a law computed from the facts of its `parts`, and of their parts.
 
     Examples
     --------
@@ -63,9 +64,6 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     >>> fold(0.5 * specular() + 0.5 * (specular() @ TriangularTeethLaw(1.0)) ** 2, count)
     2.5
     """
-    if isinstance(law, Combination):
-        terms = [(weight, fold(term, rules)) for weight, term in law.terms_checked() if weight > 0.0]
-        return rules.whole(law, rules.mixture(terms))
     if isinstance(law, Composition):
         return rules.whole(law, rules.chain([fold(part, rules) for part in law.laws]))
     if isinstance(law, Power):
@@ -76,7 +74,10 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
         return rules.whole(law, rules.chain([fold(law.law, rules)] * law.exponent))
     if isinstance(law, SpecularFrame):
         return rules.whole(law, rules.mirrored(fold(law.law, rules)))
-    return rules.leaf(law) if law.replacement is None else fold(law.replacement, rules)
+    whole = sum_of(law.parts)
+    if isinstance(whole, Combination):
+        return rules.whole(whole, rules.mixture([(weight, fold(term, rules)) for weight, term in whole.terms]))
+    return rules.leaf(law) if whole is law else fold(whole, rules)
 
 
 def is_compound(law: Law) -> bool:
@@ -94,16 +95,8 @@ def holds_of_all(law: Law, test: Callable[[Law], bool]) -> bool:
     return fold(law, Rules(test, lambda terms: all(fact for _, fact in terms), all, lambda fact: fact))
 
 
-def made_of_isometries(law: Law) -> bool:
-    """Whether a law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
-
-    Such laws are the laws of walls of straight pieces, specular reflection, retroreflection, and compounds of these.
-    """
-    return holds_of_all(law, lambda part: part.is_isometric)
-
-
 def lists_branches(law: Law) -> bool:
-    """Whether every part of a law lists its isometries and breakpoints; stronger than `made_of_isometries`."""
+    """Whether every part of a law lists its isometries and breakpoints; walls of straight pieces may not."""
     return holds_of_all(law, _answers)
 
 
@@ -143,18 +136,21 @@ def law_of(word: Word) -> Law:
 
 
 def _word(law: Law) -> Sum | None:
-    # a wall's law in closed form, or as a table of isometries
-    return {simplified((law.exact_law or law,)): 1.0}
+    return {simplified((law,)): 1.0}
+
+
+def _added(words: Iterable[tuple[Word, float]]) -> Sum:
+    """The sum of weighted words."""
+    total: Sum = {}
+    for word, weight in words:
+        total[word] = total.get(word, 0.0) + weight
+    return total
 
 
 def _mixed(terms: Sequence[tuple[float, Sum | None]]) -> Sum | None:
-    total: Sum = {}
-    for weight, words in terms:
-        if words is None:
-            return None
-        for word, fraction in words.items():
-            total[word] = total.get(word, 0.0) + weight * fraction
-    return total
+    if any(words is None for _, words in terms):
+        return None
+    return _added((word, weight * fraction) for weight, words in terms for word, fraction in (words or {}).items())
 
 
 def _multiplied(parts: Sequence[Sum | None]) -> Sum | None:
@@ -162,12 +158,8 @@ def _multiplied(parts: Sequence[Sum | None]) -> Sum | None:
     for words in parts:
         if words is None:
             return None
-        product: Sum = {}
-        for word, weight in total.items():
-            for other, fraction in words.items():
-                longer = simplified(word + other)
-                product[longer] = product.get(longer, 0.0) + weight * fraction
-        if len(product) > MOST_WORDS or max(map(len, product)) > LONGEST_WORD:
+        pairs = product(total.items(), words.items())
+        total = _added((simplified(word + other), weight * fraction) for (word, weight), (other, fraction) in pairs)
+        if len(total) > MOST_WORDS or max(map(len, total)) > LONGEST_WORD:
             return None
-        total = product
     return total

@@ -22,6 +22,7 @@ from ...core.workers import BACKLOG, connected, in_order, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import DrivenLaw, Law, entry_inside
+from ..walls.wall_law import WallLaw
 from .rays import RaySums
 
 # Rays of a task for a worker, a second of work or a few. Counts in cells do not depend on it; sums of real numbers are
@@ -141,8 +142,8 @@ class IndependentRays:
         own = np.random.default_rng([*self.root, part, index])
         theta = SINE.sample(number, own)
         # the map of a driven law tells besides which rays escaped
-        driven = isinstance(self.law, DrivenLaw) and self.law.closed_form is None
-        reflect = self.law.random_map() if driven else None
+        closed = isinstance(self.law, WallLaw) and not self.law.has_traced_parts
+        reflect = self.law.random_map() if isinstance(self.law, DrivenLaw) and not closed else None
         if reflect is None:
             return theta, self.law.sample(theta, own), None
         outgoing, escaped = reflect(entry_inside(own.random(theta.shape)), theta)

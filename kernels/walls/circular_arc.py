@@ -13,18 +13,13 @@ from ..bases.intervals import between_cuts, edges_inside, joined_lists
 from ..bases.measure import SINE
 from ..expectations.arcs import ArcPieces, outgoing_lines
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
-from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entries
 
 # Each interval with a constant number of hits N <= MOST_HITS has its own Gauss rule. Rays with more hits are a fraction
 # of about 1/(4 N^2), for theta within xi/N of xi. Their outgoing angle lies within xi/N of pi - xi (or xi), and its
 # mean within xi/N^2. For a smooth function the error is below 1/(4 N^4) = 4e-12.
 MOST_HITS = 500
-# Hits of the pieces whose ends are listed; the others lie within xi/24 of pi - xi (or xi).
-HITS_IN_CUTS = 24
 FEWEST_HITS = 8
-# Incoming angles at once; each has up to 2 MOST_HITS pieces of NODES outgoing angles.
-CHUNK = 2**11
 
 
 @dataclass(frozen=True)
@@ -99,25 +94,6 @@ class CircularArcLaw(DrivenLaw):
             float(2.0 * SINE.mass(low, min(high, np.pi))), 1.0
         )
 
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The masses between the edges, by integrals of a sine."""
-        step = max(1, CHUNK // edges.shape[-1])
-        parts = [np.empty((0, edges.shape[-1]))]
-        for start in range(0, theta.size, step):
-            part = slice(start, start + step)
-            parts.append(self._below(theta[part], edges if edges.ndim == 1 else edges[part]))
-        return Distribution.without_atoms(np.concatenate(parts))
-
-    def _density_cuts(self, theta: Floats) -> Floats:
-        """The ends of the pieces with a constant number of hits, up to 24 of them."""
-        ray, mirrored, lower, upper, hits, rest, _ = self.pieces(theta, HITS_IN_CUTS)
-        base = np.where(mirrored, np.pi - theta[ray], theta[ray])
-        ends = np.pi + base - 2.0 * hits * np.where(rest, upper, [lower, upper])
-        number = np.bincount(ray, minlength=theta.size)
-        cuts = np.zeros((theta.size, 2, number.max(initial=0)))
-        cuts[ray, :, joined_lists(number)[1]] = np.clip(np.where(mirrored, np.pi - ends, ends), 0.0, np.pi).T
-        return cuts.reshape(theta.size, -1)
-
     def _rotation(self, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], Floats, Floats, Floats]:
         """Whether the ray is mirrored, its (mirrored) angle, the chord's angle delta <= pi/2, and N."""
         angle, complement = mixed_arccos(x, theta, self.half_angle)
@@ -148,25 +124,6 @@ class CircularArcLaw(DrivenLaw):
             np.concatenate((weight * SINE.density(chord), lines.mass[single])),
             2.0 * left / lines.of_angles(lines.mass, theta.size),
         )
-
-    def _below(self, theta: Floats, edges: Floats) -> Floats:
-        """P(theta_k, (edges[0], edges[j])) for increasing edges, common ones or those of each angle."""
-        ray, mirror, lower, upper, hits, rest, alone = self.pieces(theta)
-        lower = np.where(rest, lower, np.minimum(lower, upper))
-        own = edges if edges.ndim == 1 else edges[ray]
-        base = np.where(mirror, np.pi - theta[ray], theta[ray])
-        mirrored = np.where(mirror[:, None], np.pi - own, own)
-        # theta' decreases in delta: outgoing angles below an edge have delta above this value
-        chord = (np.pi + base[:, None] - mirrored) / (2.0 * hits[:, None])
-        chord = np.where(rest[:, None], np.where(mirrored > np.pi - self.half_angle, -1.0, 4.0), chord)
-        high = np.maximum(upper, lower)[:, None]
-        beyond = SINE.mass(np.clip(chord, lower[:, None], high), high)
-        single = alone & ~rest
-        beyond[single] = chord[single] <= upper[single][:, None]
-        # a mirrored ray has the mass above the edge
-        piece = np.abs(beyond - beyond[:, :1])
-        found = np.add.reduceat(piece, np.searchsorted(ray, np.arange(theta.size)), axis=0)
-        return np.asarray(found / found[:, -1:])
 
     def pieces(self, theta: Floats, most_hits: int = MOST_HITS) -> ArcPieces:
         """The intervals of delta on which N is constant, for every theta and both sides, sorted by incoming angle."""

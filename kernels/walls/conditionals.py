@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles, finite_array, finite_number, instance, whole_number
 from ...core.errors import InputError
 from ...core.rounding import EPS
 from ...geometry import Wall
 from ...geometry.itineraries.hollow import NO_LIMIT, HollowConditionals
-from ..bases.basis import AngleFunction
 from ..expectations.conditionals import Conditionals
 
 # Up to this number of pieces of a wall one conditional distribution takes a few milliseconds.
@@ -27,45 +25,6 @@ PILOT_TOLERANCE = 1e-3
 MANY_SEGMENTS, MOST_PILOT_SEGMENTS = 15_000, 400_000
 
 
-@dataclass(frozen=True)
-class AdaptiveConditionals:
-    """Conditional distributions P(theta, d theta') of a wall as weighted outgoing angles.
-
-    Attributes
-    ----------
-    theta : array, shape (angles,)
-        Incoming angles, radians.
-    nodes, weights : arrays
-        Outgoing angles and their probabilities, one distribution after the other; the weights of each sum to 1.
-    starts : array of int, shape (angles + 1,)
-        The k-th conditional distribution has the nodes ``nodes[starts[k]:starts[k + 1]]``.
-    error : array, shape (angles,)
-        Estimated error of the mean of a function of sup norm 1 and the degree asked for.
-    unresolved : array, shape (angles,)
-        Probability of rays that did not escape; they count as retroreflected.
-    rays, segments : int
-        Number of rays traced and of their ray segments.
-    """
-
-    theta: Floats
-    nodes: Floats
-    weights: Floats
-    starts: NDArray[np.int64]
-    error: Floats
-    unresolved: Floats
-    rays: int
-    segments: int
-
-    @property
-    def conditionals(self) -> Conditionals:
-        """The distributions, whose errors include those of rays that did not escape."""
-        return Conditionals(self.nodes, self.weights, self.starts, self.error + 2.0 * self.unresolved)
-
-    def mean(self, function: AngleFunction) -> Floats:
-        """E[f(Theta') | theta] for every angle, shape ``(angles,) + extra`` if f has values ``theta.shape + extra``."""
-        return self.conditionals.mean(function)
-
-
 def is_few(wall: Wall) -> bool:
     """Whether the wall has at most `MOST_PIECES` pieces; the cost per angle is about their number squared."""
     return len(wall.pieces) + sum(map(len, wall.islands)) <= MOST_PIECES
@@ -73,7 +32,7 @@ def is_few(wall: Wall) -> bool:
 
 def adaptive_conditionals(
     wall: Wall, theta: ArrayLike, tolerance: float = 1e-10, degree: int = 1, edges: ArrayLike = ()
-) -> AdaptiveConditionals:
+) -> Conditionals:
     r"""Conditional distributions of a wall's law to a given tolerance.
 
     Parameters
@@ -90,7 +49,8 @@ def adaptive_conditionals(
 
     Returns
     -------
-    AdaptiveConditionals
+    Conditionals
+        The errors include twice the probability of rays that did not escape, which count as retroreflected.
 
     Raises
     ------
@@ -117,7 +77,8 @@ def adaptive_conditionals(
     if finite_number("tolerance", tolerance) < EPS:
         raise InputError(f"tolerance: expected a number of at least {EPS:.2g}, the rounding, got {tolerance!r}")
     incoming = np.atleast_1d(angles("theta", theta)).ravel()
-    return WallConditionals(wall, whole_number("degree", degree, 0), finite_array("edges", edges))(incoming, tolerance)
+    conditionals = WallConditionals(wall, whole_number("degree", degree, 0), finite_array("edges", edges))
+    return conditionals(incoming, tolerance)[0]
 
 
 class WallConditionals:
@@ -181,22 +142,24 @@ class WallConditionals:
             for hollows in shapes
         ]
 
-    def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveConditionals:
-        """The conditional distributions at checked angles."""
+    def __call__(self, theta: Floats, tolerance: float | Floats) -> tuple[Conditionals, Floats]:
+        """The conditional distributions at checked angles, and the probabilities of rays that did not escape.
+
+        These rays count as retroreflected, and in the errors.
+        """
         # the compiled march takes doubles by their address
         incoming, group = np.unique(np.asarray(theta, dtype=np.float64), return_inverse=True)
         tolerances = np.full(len(incoming), np.inf)
         np.minimum.at(tolerances, group, np.broadcast_to(tolerance, theta.shape))
-        before = self.spent()
         flat = self.flat_fraction
         nodes: list[list[Floats]] = [[] for _ in incoming]
         weights: list[list[Floats]] = [[] for _ in incoming]
         error, unresolved = np.zeros(len(incoming)), np.zeros(len(incoming))
         for conditionals, fraction in self.hollows:
-            found, outdated = conditionals.march(incoming, tolerances)
+            marched, outdated = conditionals.march(incoming, tolerances)
             self.outdated |= outdated
             scale = fraction / conditionals.width
-            for k, conditional in enumerate(found[angle] for angle in incoming.tolist()):
+            for k, conditional in enumerate(marched[angle] for angle in incoming.tolist()):
                 nodes[k].append(conditional.nodes)
                 weights[k].append(scale * conditional.widths)
                 error[k] += scale * conditional.error
@@ -205,15 +168,13 @@ class WallConditionals:
             for k, angle in enumerate(incoming.tolist()):
                 nodes[k].append(np.array([np.pi - angle]))
                 weights[k].append(np.array([flat]))
-        return AdaptiveConditionals(
-            theta,
+        found = Conditionals(
             np.concatenate([np.empty(0), *(part for k in group.tolist() for part in nodes[k])]),
             np.concatenate([np.empty(0), *(part for k in group.tolist() for part in weights[k])]),
             np.cumsum([0, *(sum(map(len, nodes[k])) for k in group.tolist())]),
             error[group],
-            unresolved[group],
-            *(now - then for now, then in zip(self.spent(), before, strict=True)),
         )
+        return found, unresolved[group]
 
     def spent(self) -> tuple[int, int]:
         """Rays and ray segments so far."""
@@ -244,4 +205,5 @@ def traced_conditionals(wall: Wall, degree: int, edges: Floats) -> WallCondition
 def is_chaotic(wall: Wall) -> bool:
     """Whether a pilot run takes more than `MANY_SEGMENTS` ray segments per angle."""
     conditionals = WallConditionals(wall, 1, np.empty(0), most_segments=MOST_PILOT_SEGMENTS)
-    return conditionals(PILOT_ANGLES, PILOT_TOLERANCE).segments > MANY_SEGMENTS * PILOT_ANGLES.size
+    conditionals(PILOT_ANGLES, PILOT_TOLERANCE)
+    return conditionals.spent()[1] > MANY_SEGMENTS * PILOT_ANGLES.size

@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, instance
-from ...core.errors import AccuracyError
 from ...geometry import MushroomGenerations
 from ..expectations.conditionals import Conditionals
-from ..laws.distribution import Distribution
-from ..laws.law import DrivenLaw, RandomMap, entries
-from .traced_map import UNRESOLVED_TOLERANCE, traced_reflection
+from ..laws.law import LARGEST, DrivenLaw, entry_points
+from .traced_map import if_escaped, traced_reflection
 from .wall_law import WallLaw
 
 
@@ -61,37 +59,13 @@ class MushroomLaw(DrivenLaw):
 
         The openings are moved to the left: ``x`` below ``wall.opened`` enters a mushroom.
         """
-        x, theta = np.broadcast_arrays(*entries(x, theta))
-        left, right = self.wall.opening
-        inside = x < self.wall.opened
-        outgoing, escaped = np.array(np.pi - theta), np.ones(theta.shape, dtype=np.bool_)
-        entry = left + (right - left) * (x[inside] / self.wall.opened)
-        outgoing[inside], escaped[inside] = traced_reflection(self.wall.mushroom, entry, theta[inside])
-        return outgoing, escaped
-
-    def random_map(self) -> RandomMap:
-        """The map `reflect_with_status`."""
-        return self.reflect_with_status
+        # above, the ray enters on the flat top to the right of the mushroom of generation 1
+        entry = np.interp(entry_points(x), [0.0, self.wall.opened, 1.0], [*self.wall.opening, LARGEST])
+        return traced_reflection(self.wall.mushroom, entry, theta)
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle for the entry point ``x`` in (0, 1), see `reflect_with_status`, and the angle ``theta``."""
-        outgoing, escaped = self.reflect_with_status(x, theta)
-        unresolved = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
-        if unresolved > UNRESOLVED_TOLERANCE:
-            raise AccuracyError(
-                f"MushroomLaw: {unresolved:.2g} of {escaped.size} rays did not escape, more than "
-                f"{UNRESOLVED_TOLERANCE:g}; MushroomLaw.reflect_with_status() says which they were",
-                unresolved,
-            )
-        return outgoing
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The distributions of generation 1 by quadrature, its flat tops reduced to those of the last generation."""
-        left, right = self.wall.opening
-        found = WallLaw(self.wall.mushroom).distribution(theta, edges)
-        factor = self.wall.opened / (right - left)
-        flat = factor * (found.mass - (1.0 - (right - left))) + (1.0 - self.wall.opened)
-        return Distribution(factor * found.below, found.position, flat)
+        return if_escaped(self, *self.reflect_with_status(x, theta))
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Those of generation 1, with its flat tops reduced to those of the last generation."""

@@ -17,7 +17,7 @@ from ...geometry import Wall
 from ..expectations.conditionals import Conditionals
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw
-from .traced_map import traced_angles
+from .traced_map import if_escaped, traced_reflection
 from .triangular import TriangularTeethLaw
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ class PolygonLaw(BranchLaw):
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
-        return traced_angles(self.wall, x, theta)
+        return if_escaped(self, *traced_reflection(self.wall, x, theta))
 
 
 def table_of_beams(beams: Beams) -> IsometryTable:

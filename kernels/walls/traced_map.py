@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
-from ..laws.law import entries
+from ..laws.law import Law, entries
 
 if TYPE_CHECKING:
     from ...geometry import Wall
@@ -32,15 +32,13 @@ def traced_reflection(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Float
     return np.where(escaped, traced.theta, theta), escaped
 
 
-def traced_angles(wall: Wall, x: ArrayLike, theta: ArrayLike) -> Floats:
-    """Outgoing angles; raises an AccuracyError if more than a fraction of 1e-4 of the rays did not escape."""
-    outgoing, escaped = traced_reflection(wall, x, theta)
+def if_escaped(law: Law, outgoing: Floats, escaped: NDArray[np.bool_]) -> Floats:
+    """The outgoing angles; raises an AccuracyError if more than a fraction of 1e-4 of the rays did not escape."""
     unresolved = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
     if unresolved > UNRESOLVED_TOLERANCE:
         raise AccuracyError(
-            f"WallLaw(wall={wall!r}): {unresolved:.2g} of {escaped.size} rays did not escape, more than "
-            f"{UNRESOLVED_TOLERANCE:g}; geometry.trace(wall, x, theta).counts() says how they ended, "
-            "WallLaw.reflect_with_status() which they were",
+            f"{law!r}: {unresolved:.2g} of {escaped.size} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}; "
+            "geometry.trace(wall, x, theta).counts() says how they ended, reflect_with_status() which they were",
             unresolved,
         )
     return outgoing

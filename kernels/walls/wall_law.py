@@ -1,11 +1,10 @@
-"""The law of a wall, in closed form if the hollows allow it, else by traced rays."""
+"""The law of a wall as the sum of the laws of its flat tops and hollows: closed forms, beams or traced rays."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,22 +12,19 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, instance
 from ...core.errors import AccuracyError
 from ...core.rounding import EPS
-from ...geometry import Wall
-from ..bases.intervals import cell_among
+from ...geometry import Arc, Segment, Wall
+from ...geometry.cells.hollow import Hollow
+from ...geometry.cells.hollow_shape import HollowShape, side_by_side
 from ..expectations.conditionals import Conditionals
-from ..laws.distribution import Distribution
 from ..laws.isometry_table import IsometryTable
-from ..laws.law import Combination, DrivenLaw, Law, RandomMap, specular
+from ..laws.law import BranchLaw, DrivenLaw, Law, specular, sum_of
+from ..laws.structure import holds_of_all
 from .circular_arc import CircularArcLaw
-from .conditionals import WallConditionals, is_few, traced_conditionals
+from .conditionals import is_few, traced_conditionals
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
-from .traced_map import UNRESOLVED_TOLERANCE, traced_angles, traced_reflection
+from .traced_map import UNRESOLVED_TOLERANCE, if_escaped, traced_reflection
 from .triangular import TriangularTeethLaw
-
-if TYPE_CHECKING:
-    from ...geometry.cells.hollow import Hollow
-    from ...geometry.curves.curve import Curve
 
 # Relative tolerance, a few roundings, for the sum of widths against the period and for an arc against a semicircle.
 ROUNDED = 64.0 * EPS
@@ -40,21 +36,20 @@ MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
 # Walls with more than FEW_PIECES pieces are tried with fewer beams first. These suffice if they leave at most RESOLVED,
 # as most rough profiles of 40 to 800 pieces do with 50 beams per piece.
 FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
-# A wall whose hollows include more different curved ones without closed form is not taken apart: sampling each of them
+# A wall whose hollows include more different curved ones without closed form is not divided: sampling each of them
 # would take longer than sampling the wall.
 MOST_CURVED = 4
 # The least tolerance for walls with many pieces, some ten milliseconds for an angle.
 MANY_TOLERANCE = 1e-4
-# Error of the distribution function at the edges of cells.
-CELL_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class WallLaw(DrivenLaw):
     """The law P~ of a wall, for rays that enter at a uniform point of the period.
 
-    `reflect` and `reflect_with_status` trace rays. `sample` uses the closed form if there is one and traces rays
-    otherwise. `apply`, `conditionals`, `branches`, `breakpoints` and `discretise` use the exact law if there is one.
+    `reflect` and `reflect_with_status` trace rays, and `sample` does so unless every part has a closed form. `apply`,
+    `conditionals`, `branches`, `breakpoints` and `discretise` use the parts, and of polygonal ones the isometries, if
+    the beams of the wall resolve within about a second.
 
     The wanted error of a traced `apply` is 1e-8 times the sup norm of the function, and 1e-4 with more than 64 pieces.
     Rough walls may not reach it; the error reached is that of `conditionals`.
@@ -65,19 +60,16 @@ class WallLaw(DrivenLaw):
 
     Attributes
     ----------
-    closed_form : Law or None
-        A law in closed form, if the wall consists of flat tops and hollows that are isosceles triangles, rectangles
-        (in total not wider than the flat tops), or circular arcs up to a semicircle. A Combination if the hollows
-        differ. Hollows are recognised by their shape, not by the wall's constructor.
-    exact_law : Law or None
-        The closed form, or else the `PolygonLaw` of a polygonal wall that closes and is resolved within about a
-        second, or else the sum of the exact laws of the hollows, if each has one. Computed on first use.
-    replacement : Law or None
-        The closed form; or, of a wall that closes with curved and several different hollows, the sum of the laws of its
-        hollows and flat tops, weighted by their fractions of the period. `discretise` and other functions use it, so
-        each hollow is computed by its own best method: polygonal hollows exactly.
+    parts : tuple of (float, Law)
+        The laws of flat tops and hollows, with their fractions of the period. Isosceles triangles, rectangles (in total
+        not wider than the flat tops; the law of each includes a flat top of its width) and circular arcs up to a
+        semicircle have closed forms. Hollows are recognised by their shape, not by the wall's constructor. Beside
+        curved hollows, the other straight hollows have one law together, and the other curved ones one for each shape.
+        The only part is this law itself, without closed form, if the wall does not close; if all pieces are straight or
+        all hollows alike; if more than four shapes of curved hollows have no closed form; or if hollows wider than
+        their openings have no room side by side.
     mirror_symmetric : bool or None
-        True if the wall's cell or its closed form is mirror-symmetric, otherwise None (not known).
+        True if the wall's cell or every part is mirror-symmetric, otherwise None (not known).
 
     Raises
     ------
@@ -94,10 +86,10 @@ class WallLaw(DrivenLaw):
     Examples
     --------
     >>> from asperity import geometry as geo
-    >>> WallLaw(geo.rectangular_teeth(0.75)).closed_form
-    RectangularTeethLaw(height_to_width=0.75)
-    >>> WallLaw(geo.flat()).closed_form
-    specular()
+    >>> WallLaw(geo.rectangular_teeth(0.75)).parts
+    ((1.0, RectangularTeethLaw(height_to_width=0.75)),)
+    >>> WallLaw(geo.Wall.from_vertices([(0, 0), (1, -1), (2, 0), (4, 0)])).parts
+    ((0.5, TriangularTeethLaw(angle=1.5707963267948966)), (0.5, specular()))
     """
 
     wall: Wall
@@ -107,52 +99,27 @@ class WallLaw(DrivenLaw):
 
     def __post_init__(self) -> None:
         instance("wall", self.wall, Wall, "geo.triangular_teeth(0.7)")
-        # An asymmetric cell may still have a symmetric law, hence None.
-        object.__setattr__(self, "mirror_symmetric", True if self.wall.is_mirror_symmetric else None)
-        if self.closed_form is not None:
-            object.__setattr__(self, "mirror_symmetric", self.closed_form.mirror_symmetric)
+        # an asymmetric cell may still have a symmetric law, hence None
+        symmetric = self.wall.is_mirror_symmetric or (self._divided and sum_of(self._divided).mirror_symmetric)
+        object.__setattr__(self, "mirror_symmetric", True if symmetric else None)
 
     @property
-    def is_isometric(self) -> bool:
-        """Whether the law is made of isometries: `is_polygonal`."""
-        return self.is_polygonal
+    def parts(self) -> tuple[tuple[float, Law], ...]:
+        return self._divided or ((1.0, self),)
 
     @property
-    def is_polygonal(self) -> bool:
-        """Whether every piece of the wall is straight."""
-        return self.wall.is_polygonal
+    def has_traced_parts(self) -> bool:
+        """Whether a part has no closed form."""
+        return any(isinstance(part, WallLaw) for _, part in self.parts)
 
     @cached_property
-    def closed_form(self) -> Law | None:
-        return _closed_form(self.wall)
+    def _divided(self) -> tuple[tuple[float, Law], ...] | None:
+        return parts_of_wall(self.wall)
 
     @cached_property
-    def replacement(self) -> Law | None:
-        return self.closed_form or _taken_apart(self.wall)
-
-    @cached_property
-    def exact_law(self) -> Law | None:
-        if self.closed_form is not None:
-            return self.closed_form
-        if isinstance(self.replacement, Combination):
-            laws = [
-                (weight, law.exact_law if isinstance(law, WallLaw) else law) for weight, law in self.replacement.terms
-            ]
-            exact = tuple((weight, law) for weight, law in laws if law is not None)
-            return Combination(exact) if len(exact) == len(laws) else None
-        wall = self.wall
-        if not (wall.is_polygonal and wall.closes and len(wall.pieces) <= MOST_PIECES):
-            return None
-        if len(wall.pieces) > FEW_PIECES:
-            # the other beams reduce the unresolved fraction at most by a factor of a hundred
-            few = max(FEW_BEAMS, BEAMS_A_PIECE * len(wall.pieces))
-            probe = PolygonLaw(wall, max_beams=min(few, MOST_BEAMS))
-            if not probe.resolves(100.0 * EXACT_ENOUGH):
-                return None
-            if probe.resolves(RESOLVED):
-                return probe
-        law = PolygonLaw(wall, max_beams=MOST_BEAMS)
-        return law if law.resolves(EXACT_ENOUGH) else None
+    def _known(self) -> Law | None:
+        """The sum of the parts, or the law of the beams of an undivided wall; None if its rays are traced."""
+        return beams_law(self.wall) if self._divided is None else sum_of(self._divided)
 
     def reflect_with_status(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
         """Outgoing angles by tracing, and the mask of the rays that escaped; the other rays count as retroreflected.
@@ -161,149 +128,131 @@ class WallLaw(DrivenLaw):
         """
         return traced_reflection(self.wall, x, theta)
 
-    def random_map(self) -> RandomMap:
-        """The map `reflect_with_status`."""
-        return self.reflect_with_status
-
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
-        return traced_angles(self.wall, x, theta)
+        return if_escaped(self, *self.reflect_with_status(x, theta))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        return super().branches(theta) if self.exact_law is None else self.exact_law.branches(theta)
+        return super().branches(theta) if self._known is None else self._known.branches(theta)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """Breakpoints of the exact law; none are known without one."""
-        return super().breakpoints(limit) if self.exact_law is None else self.exact_law.breakpoints(limit)
-
-    def _density_cuts(self, theta: Floats) -> Floats | None:
-        known = self.exact_law or self.replacement
-        return None if known is None else known.density_cuts(theta)
+        """Those of the isometries and closed forms; none are known of traced rays."""
+        return super().breakpoints(limit) if self._known is None else self._known.breakpoints(limit)
 
     def isometry_table(self) -> IsometryTable | None:
-        """The table of the exact law, or None."""
-        return None if self.exact_law is None else self.exact_law.isometry_table()
-
-    def _distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The distributions of the exact law or of the hollows, or else by quadrature in the entry point.
-
-        Flat tops are atoms. The quadrature is adaptive for walls with few pieces and equally spaced for others.
-        """
-        known = self.exact_law or self.replacement
-        if known is not None:
-            return known.distribution(theta, edges)
-        if not is_few(self.wall):
-            return super()._distribution(theta, edges)
-        found = WallConditionals(self.wall, 0, edges[1:-1])(theta, CELL_TOLERANCE)
-        owner = np.repeat(np.arange(theta.size), np.diff(found.starts))
-        level = found.nodes == (np.pi - theta)[owner]
-        cells = edges.size - 1
-        cell = owner * cells + cell_among(edges, found.nodes)
-        scattered = np.where(level, 0.0, found.weights)
-        masses = np.bincount(cell, weights=scattered, minlength=theta.size * cells).astype(np.float64)
-        flat = np.bincount(owner, weights=np.where(level, found.weights, 0.0), minlength=theta.size).astype(np.float64)
-        below = Distribution.of_cells(masses.reshape(-1, cells)).below
-        return Distribution(below, (np.pi - theta)[:, None], flat[:, None])
+        """The isometries of a wall of straight pieces whose beams resolve; else None."""
+        return None if self._known is None else self._known.isometry_table()
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        return super()._sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
+        return super()._sample(theta, rng) if self.has_traced_parts else sum_of(self.parts).sample(theta, rng)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        """Those of the exact law or of the hollows, or else by tracing; rays that do not escape count in the error."""
-        known = self.exact_law or self.replacement
-        if known is not None:
-            return known._conditionals(theta, tolerance, degree, edges)
-        found = traced_conditionals(self.wall, degree, edges)(
+        """Those of the parts or isometries, or else by tracing; rays that do not escape count in the error."""
+        if self._known is not None:
+            return self._known._conditionals(theta, tolerance, degree, edges)
+        found, unresolved = traced_conditionals(self.wall, degree, edges)(
             theta, tolerance if is_few(self.wall) else max(tolerance, MANY_TOLERANCE)
         )
-        unresolved = float(np.mean(found.unresolved))
-        if unresolved > UNRESOLVED_TOLERANCE:
+        most = float(np.mean(unresolved))
+        if most > UNRESOLVED_TOLERANCE:
             raise AccuracyError(
-                f"{self!r}: {unresolved:.2g} of the rays did not escape, more than {UNRESOLVED_TOLERANCE:g}", unresolved
+                f"{self!r}: {most:.2g} of the rays did not escape, more than {UNRESOLVED_TOLERANCE:g}", most
             )
-        return found.conditionals
+        return found
 
 
-def _closed_form(wall: Wall) -> Law | None:
-    """The laws of flat tops and hollows, weighted by their fractions of the period; None if a hollow has none."""
+def made_of_isometries(law: Law) -> bool:
+    """Whether a law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
+
+    Such laws are the laws of walls of straight pieces, whether their beams resolve or not, specular reflection,
+    retroreflection, and compounds of these.
+    """
+    return holds_of_all(law, _is_isometric)
+
+
+def _is_isometric(law: Law) -> bool:
+    return law.wall.is_polygonal if isinstance(law, WallLaw) else isinstance(law, BranchLaw)
+
+
+def traced_wall(law: Law) -> Wall | None:
+    """The wall of a law that is known by its rays only; None for walls with parts or isometries and for other laws."""
+    return law.wall if isinstance(law, WallLaw) and law._known is None else None
+
+
+def parts_of_wall(wall: Wall) -> tuple[tuple[float, Law], ...] | None:
+    """The laws of flat tops and hollows with their fractions of the period; None if the wall is not divided."""
     if not wall.closes:
         return None
-    wall = wall.cell
-    terms: dict[Law, float] = {}
-    level = wall.flat_top
-    for hollow in wall.hollows:
-        law = _of_hollow(wall, hollow)
-        if law is None:
-            return None
-        width = hollow.width
+    cell = wall.cell
+    widths: dict[Law, float] = {}
+    straight: list[Hollow] = []
+    curved: list[tuple[HollowShape, list[Hollow]]] = []
+    level = cell.flat_top
+    for hollow in cell.hollows:
+        law, width = hollow_law(cell, hollow), hollow.width
         if isinstance(law, RectangularTeethLaw):
-            level, width = level - width, 2.0 * width
-        terms[law] = terms.get(law, 0.0) + width
-    return _joined(terms, level, wall.period)
-
-
-def _joined(terms: dict[Law, float], level: float, period: float) -> Law | None:
-    """The mixture of laws by their widths and of specular reflection by the width ``level``; None if it is negative."""
-    if level < -ROUNDED * period:
+            # with a flat top of its width, if one is left
+            law = law if level - width >= -ROUNDED * cell.period else None
+            level, width = (level, width) if law is None else (level - width, 2.0 * width)
+        if law is not None:
+            widths[law] = widths.get(law, 0.0) + width
+        elif cell.is_polygonal:
+            return None
+        elif all(isinstance(piece, Segment) for piece in cell.pieces[hollow.first : hollow.last]):
+            straight.append(hollow)
+        else:
+            shape = HollowShape.of(cell, hollow)
+            alike = next((hollows for known, hollows in curved if shape.same_as(known)), None)
+            if alike is not None:
+                alike.append(hollow)
+            elif len(curved) < MOST_CURVED:
+                curved.append((shape, [hollow]))
+            else:
+                return None
+    groups = [(straight, straight)] if straight else []
+    groups += [(hollows, hollows[:1]) for _, hollows in curved]
+    if groups and len(groups) + len(widths) < 2:
         return None
-    if level > ROUNDED * period:
-        terms[specular()] = level
-    if len(terms) == 1:
-        return next(iter(terms))
-    total = math.fsum(terms.values())
-    return Combination(tuple((width / total, law) for law, width in terms.items()))
-
-
-def _taken_apart(wall: Wall) -> Law | None:
-    """The mixture of the laws of a wall's hollows, of straight ones in one law; None for walls of one kind of hollow.
-
-    Also None if hollows that are wider than their openings do not have room side by side.
-    """
-    if not wall.closes or wall.is_polygonal or len(wall.hollows) < 2:
+    for hollows, shown in groups:
+        alone, width = side_by_side(cell, shown), math.fsum(hollow.width for hollow in hollows)
+        whole = width * (alone.period / math.fsum(hollow.width for hollow in shown))
+        widths[WallLaw(alone)] = whole
+        level -= whole - width
+    if level < -ROUNDED * cell.period:
+        # hollows wider than their openings have no room side by side
         return None
-    from ...geometry.cells.hollow_shape import distinct_hollows, side_by_side
-
-    wall = wall.cell
-    kinds = [(set(shape.kinds) == {"Segment"}, hollows) for shape, hollows in distinct_hollows(wall)]
-    if len(kinds) < 2:
-        return None
-    terms: dict[Law, float] = {}
-    level, curved = wall.period, 0
-    groups = [[hollow for straight, hollows in kinds if straight for hollow in hollows]]
-    for hollows in filter(None, groups + [hollows for straight, hollows in kinds if not straight]):
-        straight = hollows is groups[0]
-        law = None if straight else _of_hollow(wall, hollows[0])
-        width = math.fsum(hollow.width for hollow in hollows)
-        if law is None:
-            alone = side_by_side(wall, hollows if straight else hollows[:1])
-            width *= alone.period / math.fsum(hollow.width for hollow in (hollows if straight else hollows[:1]))
-            law, curved = WallLaw(alone), curved + (not straight)
-        terms[law] = terms.get(law, 0.0) + width
-        level -= width
-    return _joined(terms, level, wall.period) if curved <= MOST_CURVED else None
+    if level > ROUNDED * cell.period:
+        widths[specular()] = level
+    total = math.fsum(widths.values())
+    return tuple((width / total, law) for law, width in widths.items())
 
 
-def _of_hollow(wall: Wall, hollow: Hollow) -> Law | None:
+def hollow_law(cell: Wall, hollow: Hollow) -> Law | None:
     """The closed form of one hollow, or None; for a rectangle, the law includes a flat top of the same width."""
-    from ...geometry.cells.hollow_shape import HollowShape
-
-    pieces = wall.pieces[hollow.first : hollow.last]
+    pieces = cell.pieces[hollow.first : hollow.last]
     if len(pieces) > MOST_PIECES_KNOWN:
         return None
-    shape = HollowShape.of(wall, hollow)
+    shape, arc = HollowShape.of(cell, hollow), pieces[0]
     if shape.apex_angle is not None:
         return TriangularTeethLaw(shape.apex_angle)
     if shape.height_to_width is not None:
         return RectangularTeethLaw(shape.height_to_width)
-    return _arc(pieces)
-
-
-def _arc(pieces: tuple[Curve, ...]) -> Law | None:
-    from ...geometry import Arc
-
-    arc = pieces[0]
-    if len(pieces) != 1 or not isinstance(arc, Arc) or not arc.is_circular or arc.direction < 0:
+    if shape.kinds != ("Arc",) or not isinstance(arc, Arc) or not arc.is_circular or arc.direction < 0:
         return None
-    if arc.half_span > 0.5 * np.pi * (1.0 + ROUNDED):
+    return CircularArcLaw(min(arc.half_span, 0.5 * np.pi)) if arc.half_span <= 0.5 * np.pi * (1.0 + ROUNDED) else None
+
+
+def beams_law(wall: Wall) -> Law | None:
+    """The law of a polygonal wall from beams; None if these do not resolve within about a second."""
+    if not (wall.is_polygonal and wall.closes and len(wall.pieces) <= MOST_PIECES):
         return None
-    return CircularArcLaw(min(arc.half_span, 0.5 * np.pi))
+    if len(wall.pieces) > FEW_PIECES:
+        # the other beams reduce the unresolved fraction at most by a factor of a hundred
+        few = max(FEW_BEAMS, BEAMS_A_PIECE * len(wall.pieces))
+        probe = PolygonLaw(wall, max_beams=min(few, MOST_BEAMS))
+        if not probe.resolves(100.0 * EXACT_ENOUGH):
+            return None
+        if probe.resolves(RESOLVED):
+            return probe
+    law = PolygonLaw(wall, max_beams=MOST_BEAMS)
+    return law if law.resolves(EXACT_ENOUGH) else None

@@ -20,7 +20,7 @@ from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, Power
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
-from ...kernels.laws.structure import made_of_isometries
+from ...kernels.walls.wall_law import made_of_isometries
 from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
 from ..eigenvalues.spectra import Spectrum, check_reversible, matrix_spectrum
 from .contraction import refuse_unless_self_adjoint

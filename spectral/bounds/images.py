@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.checks import Floats
-from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels, WallLaw
+from ...core.long_runs import NUMBERS_AT_ONCE
+from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
 from ...kernels.expectations.arcs import ArcMeans
-from ...kernels.expectations.basis_means import VALUES_AT_ONCE, Means, height_of, means_of_basis, weighted_means
+from ...kernels.expectations.basis_means import Means, height_of, weighted_means
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.law import Combination, Composition, Power, SpecularFrame, knows_errors
+from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.structure import holds_of_all
 from ...kernels.walls.circular_arc import followed_hits
 from ...kernels.walls.conditionals import is_chaotic, is_few, traced_conditionals
+from ...kernels.walls.wall_law import traced_wall
 
 # Incoming angles at a time.
 ANGLES_AT_ONCE = 512
@@ -24,8 +26,9 @@ def suits_panels(law: Law) -> bool:
 
     Products have none, walls of many pieces take too long, and polynomials suffice for densities.
     """
-    if isinstance(law, Combination):
-        return all(suits_panels(term) for weight, term in law.terms_checked() if weight > 0.0)
+    whole = sum_of(law.parts)
+    if whole is not law:
+        return all(suits_panels(term) for _, term in law.parts)
     if isinstance(law, SpecularFrame):
         # panels adapted to the law are mirror-symmetric then
         return law.mirror_symmetric is True and suits_panels(law.law)
@@ -33,27 +36,24 @@ def suits_panels(law: Law) -> bool:
         return False
     if isinstance(law, DensityLaw):
         return isinstance(law, LambertianLaw)
-    if isinstance(law, WallLaw):
-        known = _known(law)
-        return is_few(law.wall) if known is None else suits_panels(known)
-    return knows_errors(law)
+    wall = traced_wall(law)
+    return knows_errors(law) if wall is None else is_few(wall)
 
 
 def is_traced(law: Law) -> bool:
     """Whether rays are traced. This takes about a millisecond per angle, fifty times as long as closed forms."""
-    return not holds_of_all(law, lambda part: not isinstance(part, WallLaw) or part.exact_law is not None)
+    return not holds_of_all(law, lambda part: traced_wall(part) is None)
 
 
 def is_costly(law: Law) -> bool:
     """Whether a thousand angles take minutes, because a hollow is chaotic."""
-    return not holds_of_all(law, lambda part: not is_traced(part) or not is_chaotic(part.wall))  # type: ignore[attr-defined]
+    return not holds_of_all(law, lambda part: (wall := traced_wall(part)) is None or not is_chaotic(wall))
 
 
 def expectations(law: Law, basis: Basis) -> Means:
     """E[e_j(Theta') | theta] for all functions of a basis and the errors for functions of sup norm 1."""
-    if isinstance(law, Combination):
-        terms = [(weight, term) for weight, term in law.terms_checked() if weight > 0.0]
-        return weighted_means([(weight, expectations(term, basis)) for weight, term in terms])
+    if sum_of(law.parts) is not law:
+        return weighted_means([(weight, expectations(term, basis)) for weight, term in law.parts])
     if isinstance(law, SpecularFrame) and is_mirror_symmetric(basis):
         inner, flip = expectations(law.law, basis), reflection_matrix(basis)
 
@@ -64,9 +64,6 @@ def expectations(law: Law, basis: Basis) -> Means:
         return mirrored
     if isinstance(law, LambertianLaw):
         return lambda theta, tolerance: (np.tile(basis.constant, (theta.size, 1)), np.zeros(theta.size))
-    if isinstance(law, WallLaw):
-        known = _known(law)
-        return _of_nodes(law, basis) if known is None else expectations(known, basis)
     return _of_nodes(law, basis)
 
 
@@ -78,7 +75,7 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
     height, each = height_of(basis, vectors), expectations(law, basis)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        step = max(1, VALUES_AT_ONCE // basis.size)
+        step = max(1, NUMBERS_AT_ONCE // basis.size)
         finer = tolerance / max(height, 1.0)
         parts = [each(theta[start : start + step], finer) for start in range(0, theta.size, step)]
         images = np.concatenate([image @ vectors for image, _ in parts])
@@ -87,18 +84,14 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
     return means
 
 
-def _known(law: WallLaw) -> Law | None:
-    """The exact law of a wall, or else the sum of its hollows if they have few pieces."""
-    return law.exact_law or law.replacement
-
-
 def _of_nodes(law: Law, basis: Basis) -> Means:
     """Expectations from conditional distributions. Those of a traced wall share what they find at other angles."""
     edges, degree = np.empty(0), max(1, basis.size - 1)
     if not basis.is_polynomial:
         edges = basis.edges[1:-1]
         degree = basis.degree if isinstance(basis, Panels) else 0 if basis.is_partition else basis.nodes_per_interval
-    shared = traced_conditionals(law.wall, degree, edges) if isinstance(law, WallLaw) and is_few(law.wall) else None
+    wall = traced_wall(law)
+    shared = None if wall is None or not is_few(wall) else traced_conditionals(wall, degree, edges)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         images, errors = [np.empty((0, basis.size))], [np.empty(0)]
@@ -107,8 +100,8 @@ def _of_nodes(law: Law, basis: Basis) -> Means:
             if shared is None:
                 found = law.conditionals(some, tolerance, degree, edges)
             else:
-                found = shared(some, tolerance).conditionals
-            images.append(means_of_basis(basis, found.nodes, found.weights, found.starts))
+                found, _ = shared(some, tolerance)
+            images.append(found.in_basis(basis))
             errors.append(found.error)
         return np.concatenate(images), np.concatenate(errors)
 

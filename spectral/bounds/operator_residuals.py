@@ -9,7 +9,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
-from ...kernels import Basis, Bins, DensityLaw, Law, Panels, WallLaw
+from ...kernels import Basis, Bins, DensityLaw, Law, Panels
 from ...kernels.bases.measure import SINE
 from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
 from ...kernels.discretisation.actions import GRAZING_EDGES
@@ -19,6 +19,7 @@ from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
 from ...kernels.walls.conditionals import is_few
+from ...kernels.walls.wall_law import traced_wall
 from .images import expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
@@ -206,9 +207,7 @@ def _rule(law: Law, basis: Basis, vectors: Floats) -> Means:
     if isinstance(law, LambertianLaw):
         mean = basis.constant @ vectors
         return lambda theta, tolerance: (np.tile(mean, (theta.size, 1)), np.zeros(theta.size))
-    if isinstance(law, WallLaw) and law.exact_law is not None:
-        return _rule(law.exact_law, basis, vectors)
-    if isinstance(law, WallLaw) and not is_few(law.wall):
+    if (wall := traced_wall(law)) is not None and not is_few(wall):
         raise _refusal(law, "its conditional distributions take too long")
     if knows_errors(law):
         return expectations_of(law, Panels(basis.edges, 0) if isinstance(basis, Bins) else basis, vectors)

@@ -43,13 +43,12 @@ class SpaceAccommodation:
 
 def in_space(law: DirectionLaw, planar: Callable[[Law], tuple[Estimate, ...]]) -> SpaceAccommodation:
     """The coefficients of a mixture of laws of grooves, from the planar tangential and normal ones of each."""
-    parts = law.parts_checked()
-    if any(len(laws) > 1 for _, laws in parts):
+    if any(len(laws) > 1 for _, laws in law.parts):
         raise InputError(
             f"{law!r}: expected a law of one collision, a law of grooves or a mixture of such; of a product of random "
             "grooves 1 - H.matrix(1, 1).symmetric[0, 0] is the tangential coefficient"
         )
-    each = [(weight, planar(laws[0].law)) for weight, laws in parts if weight > 0.0]
+    each = [(weight, planar(laws[0].law)) for weight, laws in law.parts]
     tangential, normal = (
         _combined([(ratio * weight, found[index]) for weight, found in each])
         for index, ratio in enumerate((TANGENTIAL, NORMAL))

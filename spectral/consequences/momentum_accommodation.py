@@ -206,7 +206,7 @@ def _checked(theta: ArrayLike) -> Floats:
 def _parts(law: Law, tolerance: float, rng: np.random.Generator) -> list[tuple[float, _Changes]]:
     """The law as a weighted sum of laws; sums of coefficients then have the relative accuracy of their parts."""
     if isinstance(law, Combination):
-        terms = [(weight, _parts(term, tolerance, rng)) for weight, term in law.terms_checked() if weight > 0.0]
+        terms = [(weight, _parts(term, tolerance, rng)) for weight, term in law.parts]
         return [(outer * weight, part) for outer, parts in terms for weight, part in parts]
     slopes = slopes_of(law)
     slopes = slopes if slopes is not None and slopes.steepest > 0.0 else None

@@ -14,7 +14,8 @@ from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
-from ...kernels.laws.structure import Rules, fold, made_of_isometries
+from ...kernels.laws.structure import Rules, fold
+from ...kernels.walls.wall_law import made_of_isometries
 from .grazing import SWAP, GrazingLimit, grazing_limit
 from .straight_pieces import straight_part
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...kernels import Law
-from ...kernels.laws.law import Combination, IsometryLaw, SpecularFrame
+from ...kernels.laws.law import IsometryLaw, SpecularFrame, sum_of
 
 
 def without_identity(law: Law) -> tuple[float, Law]:
@@ -21,17 +21,12 @@ def without_identity(law: Law) -> tuple[float, Law]:
     """
     in_frame = isinstance(law, SpecularFrame)
     inner = law.law if isinstance(law, SpecularFrame) else law
-    inner = inner.closed_form or inner
-    if not isinstance(inner, Combination):
-        return 1.0, law
-    terms = [(weight, SpecularFrame.of(term) if in_frame else term) for weight, term in inner.terms_checked()]
-    rest = [(weight, term) for weight, term in terms if weight > 0.0 and not _keeps_angles(term)]
-    if not rest or len(rest) == sum(weight > 0.0 for weight, _ in terms):
+    terms = [(weight, SpecularFrame.of(term) if in_frame else term) for weight, term in inner.parts]
+    rest = [(weight, term) for weight, term in terms if not _keeps_angles(term)]
+    if len(rest) in (0, len(terms)):
         return 1.0, law
     fraction = math.fsum(weight for weight, _ in rest)
-    return fraction, rest[0][1] if len(rest) == 1 else Combination(
-        tuple((weight / fraction, term) for weight, term in rest)
-    )
+    return fraction, sum_of(tuple((weight / fraction, term) for weight, term in rest))
 
 
 def _keeps_angles(law: Law) -> bool:

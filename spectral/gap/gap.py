@@ -14,7 +14,7 @@ from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
-from ...kernels.laws.structure import made_of_isometries
+from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
 from ..bounds.images import is_costly, suits_panels

@@ -37,7 +37,7 @@ def gap_of_grooves(
             "grooves of a fixed direction, or ker.discretise(H, ker.Zernike(8))",
             np.inf,
         )
-    used = [laws for weight, laws in law.parts_checked() if weight > 0.0]
+    used = [laws for _, laws in law.parts]
     angles = [one.orientation for laws in used for one in laws]
     fixed = [float(angle) for angle in angles if not isinstance(angle, str)]
     if len(fixed) == len(angles) and np.ptp(np.mod(fixed, np.pi)) == 0.0:
@@ -58,7 +58,7 @@ def gap_of_grooves(
     reasons = [f"the Rayleigh quotient of functions of degree {degree} bounds the gap from above"]
     together = 0.0
     if all(len(laws) == 1 for laws in used):
-        together = sum(weight * _at_least(laws[0], planar_gap) for weight, laws in law.parts_checked() if weight > 0.0)
+        together = sum(weight * _at_least(laws[0], planar_gap) for weight, laws in law.parts)
         reasons.append(
             f"the mean of the planar gaps is at least G = {together:.6g}: the gap is at least G/2, and the essential "
             "spectrum at most 1 - G"

@@ -12,7 +12,7 @@ from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import finite_matrix
-from ...kernels.laws.structure import made_of_isometries
+from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
 from ..bounds.images import is_costly, suits_panels
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum

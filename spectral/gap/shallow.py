@@ -240,7 +240,7 @@ def slopes_of(law: Law) -> Slopes | None:
     if isinstance(law, SpecularFrame):
         return slopes_of(law.law)
     if isinstance(law, Combination):
-        parts = [(weight, slopes_of(term)) for weight, term in law.terms_checked()]
+        parts = [(weight, slopes_of(term)) for weight, term in law.parts]
         known = [(weight, part) for weight, part in parts if part is not None]
         if len(known) < len(parts):
             return None

@@ -11,7 +11,7 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ...kernels import InvolutionLaw, KernelMatrix, Law
 from ...kernels.laws.matrix_law import finite_matrix
-from ...kernels.laws.structure import made_of_isometries
+from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.separation import lambertian_fraction
 from ..eigenvalues.spectra import Verdict, matrix_spectrum
 from ..essential.edge import essential_edge

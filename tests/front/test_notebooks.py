@@ -55,7 +55,7 @@ def text_of(value) -> str:
     ("make", "words"),
     [
         (lambda: LAW, ["henyey_greenstein(0.5)", "reversible"]),
-        (lambda: ker.WallLaw(geo.flat()), ["WallLaw", "closed form"]),
+        (lambda: ker.WallLaw(geo.flat()), ["WallLaw", "parts", "specular()"]),
         (lambda: ker.discretise(LAW, ker.Bins(4)), ["Bins(4)", "Frobenius error"]),
         (lambda: spec.spectrum(LAW, k=3), ["Eigenvalues", "0 even", "1 odd", "2 even", "isolated"]),
         (lambda: spec.spectral_gap(LAW), ["Spectral gap 0.5", "isolated"]),

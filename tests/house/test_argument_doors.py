@@ -45,8 +45,8 @@ def in_a_child(code: str) -> str:
         "ker.CollisionLaw(ker.lambertian(), geo.Disk()).sample([[0.0, -1.0, 0.0]], MATRIX)",
         "ker.CircularArcLaw(1.2).apply(np.cos, MATRIX)",
         "ker.CircularArcLaw(1.2).pieces(MATRIX)",
-        "ker.RectangularTeethLaw(1.0).distribution(MATRIX, [0.0, 1.0, np.pi])",
-        "ker.WallLaw(geo.elliptical_arcs(1.0)).distribution(MATRIX, [0.0, 1.0, np.pi])",
+        "ker.RectangularTeethLaw(1.0).conditionals(MATRIX, degree=0, edges=[1.0])",
+        "ker.WallLaw(geo.elliptical_arcs(1.0)).conditionals(MATRIX, degree=0, edges=[1.0])",
     ],
 )
 def test_a_matrix_does_not_end_the_process(call):

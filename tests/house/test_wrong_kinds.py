@@ -68,13 +68,13 @@ def test_the_functions_of_the_first_pages_are_called():
 def test_whole_angles_reach_the_compiled_march_as_doubles(theta):
     # the march takes doubles by their address: other numbers were read beyond their end
     law = ker.WallLaw(geo.elliptical_arcs(1.0))
-    whole, doubles = (law.distribution(given, EDGES) for given in (theta, theta.astype(np.float64)))
-    np.testing.assert_array_equal(whole.below, doubles.below)
+    whole, doubles = (law.conditionals(given, degree=0, edges=EDGES) for given in (theta, theta.astype(np.float64)))
+    np.testing.assert_array_equal(whole.nodes, doubles.nodes)
 
 
 def test_edges_of_a_wrong_shape_do_not_reach_the_compiled_march():
     with pytest.raises(InputError, match="edges"):
-        ker.WallLaw(geo.elliptical_arcs(1.0)).distribution(np.array([1.0]), np.ones((4, 3, 2)))
+        ker.WallLaw(geo.elliptical_arcs(1.0)).conditionals(np.array([1.0]), edges=np.ones((4, 3, 2)))
 
 
 @pytest.mark.slow

@@ -53,11 +53,9 @@ def test_rows_integrated_over_theta_give_the_matrix_of_polygons(panels):
 
 def test_rows_of_traced_walls_are_those_of_the_closed_form(panels):
     wall = geo.focusing_arcs(0.9)
-    from asperity.kernels.expectations.basis_means import means_of_basis
     from asperity.kernels.walls.conditionals import WallConditionals
 
-    rows = WallConditionals(wall, 1, panels.edges[1:-1], 2)(ANGLES[:5], 1e-8)
-    traced = means_of_basis(panels, rows.nodes, rows.weights, rows.starts)
+    traced = WallConditionals(wall, 1, panels.edges[1:-1], 2)(ANGLES[:5], 1e-8)[0].in_basis(panels)
     exact, _ = expectations(ker.CircularArcLaw(0.9), panels)(ANGLES[:5], 1e-12)
     assert np.abs(traced - exact).max() < 1e-6 * np.abs(panels.evaluate(ANGLES)).max()
 

@@ -6,7 +6,8 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.kernels.laws.structure import lists_branches, made_of_isometries
+from asperity.kernels.laws.structure import lists_branches
+from asperity.kernels.walls.wall_law import made_of_isometries
 from asperity.spectral.essential.edge import essential_edge, grazing_symbol
 
 SEMICIRCLE = ker.CircularArcLaw(np.pi / 2)

@@ -15,6 +15,7 @@ from ..core.child import ChildCrashed, ChildProcess, OutOfTime
 from ..kernels import WallLaw
 from ..kernels.walls.wall_law import FEW_PIECES
 from ..spectral import ReferenceValue
+from ..spectral.bounds.images import is_traced
 from ..spectral.work_diagrams.runs import FAILURES
 from .problems import methods_of, value_of
 from .quantities.methods import AUTO, BEAMS, CLOSED_FORM, QMC, ROWS
@@ -88,7 +89,7 @@ def _chooses(scene: str, method: str) -> tuple[str, ...]:
     wall = wall_of(scene)
     law = WallLaw(wall)
     # of these walls it takes the closed form or beams, whatever the tolerance
-    exact = law.closed_form is not None or (len(wall.pieces) <= FEW_PIECES and law.exact_law is not None)
+    exact = not law.has_traced_parts or (len(wall.pieces) <= FEW_PIECES and not is_traced(law))
     return () if method == ROWS and exact else (AUTO,)
 
 

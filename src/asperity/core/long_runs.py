@@ -24,6 +24,8 @@ T = TypeVar("T")
 # Seconds after which a faster method with a larger error takes over. They are counted from the work, at nominal speeds,
 # so that results depend neither on the machine nor on its load.
 TIME_LIMIT = 10.0
+# Numbers in memory at a time, 16 MB, where an array would have a number for every pair of two long lists.
+NUMBERS_AT_ONCE = 2**21
 # Before that no progress bar appears.
 SLOW_SECONDS = 2.0
 # Least seconds between two pictures of a bar.

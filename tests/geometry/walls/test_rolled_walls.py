@@ -23,10 +23,11 @@ def test_half_a_period_of_shift_keeps_the_closed_form():
     wall = geo.Wall([rises.moved(-0.5, -0.7), falls.moved(0.5, -0.7)])
     assert wall.closes and wall.origin == pytest.approx((0.5, -0.7), abs=1e-15)
     assert wall.hollows[0].left == pytest.approx(0.5) and wall.hollows[0].right == pytest.approx(1.5)
-    assert isinstance(ker.WallLaw(wall).closed_form, ker.CircularArcLaw)
-    assert ker.WallLaw(wall).closed_form.half_angle == pytest.approx(1.2, rel=1e-15)
+    ((weight, law),) = ker.WallLaw(wall).parts
+    assert weight == 1.0 and isinstance(law, ker.CircularArcLaw)
+    assert law.half_angle == pytest.approx(1.2, rel=1e-15)
     teeth = geo.Wall.from_vertices([(0, -0.5), (0.5, 0), (1, -0.5)])
-    assert ker.WallLaw(teeth).closed_form == ker.TriangularTeethLaw(math.pi / 2)
+    assert ker.WallLaw(teeth).parts == ((1.0, ker.TriangularTeethLaw(math.pi / 2)),)
     assert teeth.is_mirror_symmetric and teeth.depth == 0.5
 
 

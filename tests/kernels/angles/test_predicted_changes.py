@@ -97,7 +97,7 @@ def test_errors_of_vectors_count_each_gap_by_the_functions_in_its_cells():
     """Functions eight times as large give eight times the error at the same samples; the masses stay the same."""
     edges, angles = np.linspace(0.0, np.pi, 9)[1:-1], np.array([0.4, 1.3])
     one, eight = (
-        WallConditionals(geo.focusing_arcs(1.2), 0, edges, sizes=np.full(8, size))(angles, 1e-4 * size)
+        WallConditionals(geo.focusing_arcs(1.2), 0, edges, sizes=np.full(8, size))(angles, 1e-4 * size)[0]
         for size in (1.0, 8.0)
     )
     assert np.array_equal(one.weights, eight.weights) and np.array_equal(8.0 * one.error, eight.error)

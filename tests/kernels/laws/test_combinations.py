@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from asperity import InputError
 from asperity import kernels as ker
 from asperity.kernels.laws.law import Combination
-from asperity.kernels.laws.structure import made_of_isometries
+from asperity.kernels.walls.wall_law import made_of_isometries
 
 THETA = np.linspace(0.07, 3.05, 23)
 # A law that preserves the measure and is neither reversible nor mirror symmetric: a cycle of three equal bins.
@@ -198,13 +198,11 @@ METHODS = {
     "apply": lambda law: law.apply(np.cos, ANGLES),
     "branches": lambda law: law.branches(ANGLES),
     "breakpoints": lambda law: law.breakpoints(8),
-    "distribution": lambda law: law.distribution(ANGLES, EDGES),
     "isometry_table": lambda law: law.isometry_table(),
     "conditionals": lambda law: law.conditionals(ANGLES, 1e-3, 0, EDGES[1:-1]),
     "adjoint": lambda law: law.adjoint(),
     "in_specular_frame": lambda law: law.in_specular_frame(),
     "repr": repr,
-    "density_cuts": lambda law: law.density_cuts(ANGLES),
     "discretise": lambda law: ker.discretise(law, ker.Bins(4), tolerance=1e-2),
 }
 KINDS = [

@@ -9,19 +9,27 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import AccuracyError
 from asperity.geometry.cells.hollow_shape import side_by_side
-from asperity.kernels.laws.law import Combination
+from asperity.kernels.laws.law import Combination, sum_of
 from asperity.kernels.walls.conditionals import adaptive_conditionals
+from asperity.kernels.walls.wall_law import made_of_isometries
+from asperity.spectral.bounds.images import is_traced
 from wall_shapes import polygon
 
 
-def same(law: ker.Law | None, expected: ker.Law) -> bool:
+def same(law: ker.Law, expected: ker.Law) -> bool:
     theta = np.linspace(0.1, 3.0, 20)
-    return law is not None and bool(np.allclose(law.apply(np.cos, theta), expected.apply(np.cos, theta), atol=1e-12))
+    return bool(np.allclose(law.apply(np.cos, theta), expected.apply(np.cos, theta), atol=1e-12))
+
+
+def only_part(wall: geo.Wall) -> ker.Law:
+    ((weight, law),) = ker.WallLaw(wall).parts
+    assert weight == 1.0
+    return law
 
 
 def test_walls_with_a_closed_form_are_recognised_by_their_shape() -> None:
-    assert ker.WallLaw(geo.flat()).closed_form == ker.specular()
-    assert ker.WallLaw(geo.rectangular_teeth(1.5)).closed_form == ker.RectangularTeethLaw(1.5)
+    assert only_part(geo.flat()) == ker.specular()
+    assert only_part(geo.rectangular_teeth(1.5)) == ker.RectangularTeethLaw(1.5)
     for wall, expected in (
         (geo.triangular_teeth(0.7), ker.TriangularTeethLaw(0.7)),
         (geo.Wall.from_vertices([(0, 0), (3, -4), (6, 0)]), ker.TriangularTeethLaw(2.0 * math.atan(0.75))),
@@ -31,23 +39,24 @@ def test_walls_with_a_closed_form_are_recognised_by_their_shape() -> None:
         (geo.elliptical_arcs(0.9, geo.Disk()).foreshorten(geo.Disk()), ker.CircularArcLaw(0.9)),
         (geo.rectangular_teeth(0.8).mirrored(), ker.RectangularTeethLaw(0.8)),
     ):
-        assert same(ker.WallLaw(wall).closed_form, expected), wall
+        found = only_part(wall)
+        assert type(found) is type(expected) and same(found, expected), wall
 
 
 def test_foreshortened_teeth_have_the_corrected_parameters() -> None:
     disk = geo.Disk(mass=1.3, inertia=0.5)
     stretch = math.sqrt(1.0 + 1.3 / 0.5)
-    rectangles = ker.WallLaw(geo.rectangular_teeth(0.8).foreshorten(disk)).closed_form
+    rectangles = only_part(geo.rectangular_teeth(0.8).foreshorten(disk))
     assert isinstance(rectangles, ker.RectangularTeethLaw)
     assert rectangles.height_to_width == pytest.approx(stretch * 0.8, rel=1e-14)
-    triangles = ker.WallLaw(geo.triangular_teeth(0.8).foreshorten(disk)).closed_form
+    triangles = only_part(geo.triangular_teeth(0.8).foreshorten(disk))
     assert isinstance(triangles, ker.TriangularTeethLaw)
     assert triangles.angle == pytest.approx(2.0 * math.atan(math.tan(0.4) / stretch), rel=1e-14)
 
 
 def test_several_hollows_make_a_combination_by_their_widths() -> None:
     wall = geo.Wall.from_vertices([(0, 0), (1, -1), (2, 0), (3, 0), (3, -2), (3.5, -2), (3.5, 0), (4, 0)])
-    law = ker.WallLaw(wall).closed_form
+    law = sum_of(ker.WallLaw(wall).parts)
     assert isinstance(law, Combination)
     expected = 0.5 * ker.TriangularTeethLaw(math.pi / 2) + 0.25 * ker.RectangularTeethLaw(4.0) + 0.25 * ker.specular()
     assert same(law, expected)
@@ -67,8 +76,8 @@ def test_several_hollows_make_a_combination_by_their_widths() -> None:
 )
 def test_other_walls_have_no_closed_form(wall: geo.Wall) -> None:
     law = ker.WallLaw(wall)
-    assert law.closed_form is None
-    assert law.is_polygonal is wall.is_polygonal
+    assert law.parts == ((1.0, law),) and law.has_traced_parts
+    assert made_of_isometries(law) is wall.is_polygonal
     if wall.is_polygonal:
         assert law.branches(1.0)[0].sum() == pytest.approx(1.0, abs=1e-14)
 
@@ -98,7 +107,7 @@ def _rough(points: int) -> geo.Wall:
 def test_means_over_walls_with_many_pieces_have_the_error_of_their_conditionals(wall, reached):
     # the midpoint sums over 256 entry points were wrong by .03
     law, theta = ker.WallLaw(wall), np.array([0.3, 1.6, 2.5])
-    assert law.exact_law is None and len(wall.pieces) > 64
+    assert law.isometry_table() is None and len(wall.pieces) > 64
     entry = (np.arange(2**16) + 0.5) / 2**16
     cosines = np.cos(law.reflect(entry[:, None], theta))
     uncertainty = np.abs(cosines[::2].mean(axis=0) - cosines[1::2].mean(axis=0))
@@ -109,8 +118,8 @@ def test_means_over_walls_with_many_pieces_have_the_error_of_their_conditionals(
 
 def test_means_over_resolved_polygons_with_many_pieces_are_exact():
     law, theta = ker.WallLaw(_rough(75)), np.array([0.3, 1.6, 2.5])
-    assert len(law.wall.pieces) == 150 and law.exact_law is not None and law.closed_form is None
-    probability, outgoing = law.exact_law.branches(theta)
+    assert len(law.wall.pieces) == 150 and law.isometry_table() is not None and law.has_traced_parts
+    probability, outgoing = law.branches(theta)
     expected = np.sum(probability * np.cos(outgoing), axis=-1)
     np.testing.assert_allclose(law.apply(np.cos, theta), expected, rtol=0, atol=1e-13)
     assert np.all(np.abs(law.conditionals(theta).mean(np.cos) - expected) <= law.conditionals(theta).error)
@@ -155,7 +164,7 @@ def wall(request):
 
 def test_the_mixture_of_the_hollows_agrees_with_rays_of_the_whole_wall(wall):
     law, basis = ker.WallLaw(wall), ker.Bins(6)
-    assert isinstance(law.replacement, Combination)
+    assert len(law.parts) > 1
     found = ker.discretise(law, basis, tolerance=1e-2, samples=2**17)
     rng = np.random.default_rng(5)
     x, theta = rng.random(2**18), np.arccos(1.0 - 2.0 * rng.random(2**18))
@@ -180,18 +189,18 @@ def test_each_hollow_alone_is_a_valid_wall_with_the_same_opening(wall):
 def test_the_hollows_together_have_the_cell_masses_of_quadrature_over_the_whole_wall(wall):
     law, theta, edges = ker.WallLaw(wall), np.array([0.2, 0.9, 1.7, 2.9]), np.linspace(0.0, np.pi, 8)
     whole = adaptive_conditionals(wall, theta, 1e-9, 0, edges[1:-1])
-    below = whole.mean(lambda angle: (angle[:, None] < edges).astype(float))
-    found = law.replacement.distribution(theta, edges).cumulative(edges)
-    assert np.all(np.abs(found - below) <= 1e-9 + whole.error[:, None] + 2.0 * whole.unresolved[:, None])
+    found = law.conditionals(theta, 1e-9, 0, edges[1:-1])
+    wrong = np.abs(found.masses(edges) - whole.masses(edges)).sum(axis=1)
+    assert np.all(wrong <= 1e-12 + found.error + whole.error)
 
 
-def test_a_wall_of_straight_hollows_and_arcs_has_an_exact_law():
+def test_the_parts_of_a_wall_have_the_best_method_of_each():
     law = ker.WallLaw(geo.Wall(WALLS["straight and arcs"]))
-    exact = law.exact_law
-    assert law.closed_form is None and isinstance(exact, Combination)
-    assert math.fsum(weight for weight, _ in exact.terms) == pytest.approx(1.0, abs=1e-14)
-    assert {type(part) for _, part in exact.terms} == {ker.PolygonLaw, ker.CircularArcLaw}
-    assert ker.WallLaw(geo.Wall(WALLS["overhanging"])).exact_law is None
+    assert math.fsum(weight for weight, _ in law.parts) == pytest.approx(1.0, abs=1e-14)
+    kinds = {type(part): part for _, part in law.parts}
+    assert set(kinds) == {ker.WallLaw, ker.CircularArcLaw, ker.TriangularTeethLaw}
+    assert kinds[ker.WallLaw].isometry_table() is not None and law.isometry_table() is None
+    assert not is_traced(law) and is_traced(ker.WallLaw(geo.Wall(WALLS["overhanging"])))
     assert float(ker.discretise(law, ker.Bins(16), tolerance=1e-6).error) < 1e-6
 
 
@@ -205,7 +214,7 @@ def test_walls_of_one_kind_of_hollow_or_without_room_for_their_hollows_stay_whol
         *polygon((0.95, -0.1), (0.85, -0.1), (0.85, 0), (1, 0)),
     ]
     for whole in (geo.Wall(caps), geo.mushrooms(0.3, 0.5), geo.koch(2), geo.dispersing_arcs(1.0)):
-        assert ker.WallLaw(whole).replacement is None or ker.WallLaw(whole).closed_form is not None
+        assert len(ker.WallLaw(whole).parts) == 1
 
 
 def test_the_essential_edge_of_a_mixture_is_at_least_its_straight_fraction():

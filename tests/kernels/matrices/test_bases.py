@@ -309,7 +309,7 @@ def test_angles_that_nearly_coincide_are_one_edge() -> None:
 )
 @pytest.mark.parametrize("chunk", [1, 50, 2**21])
 def test_sums_of_products_are_those_of_single_pairs(basis, chunk: int, monkeypatch) -> None:
-    monkeypatch.setattr(products_module, "CHUNK", chunk)
+    monkeypatch.setattr(products_module, "NUMBERS_AT_ONCE", chunk)
     rng = np.random.default_rng(1)
     incoming, outgoing, weight = np.pi * rng.random(40), np.pi * rng.random(40), rng.normal(size=40)
     total = np.full((basis.size, basis.size), 0.5)
@@ -321,9 +321,9 @@ def test_sums_of_products_are_those_of_single_pairs(basis, chunk: int, monkeypat
 
 
 def test_long_sums_are_cut_into_pieces_of_bounded_size(monkeypatch) -> None:
-    assert 2**22 <= 8 * products_module.CHUNK <= 2**26  # bytes
+    assert 2**22 <= 8 * products_module.NUMBERS_AT_ONCE <= 2**26  # bytes
     sizes = []
-    monkeypatch.setattr(products_module, "CHUNK", 30)
+    monkeypatch.setattr(products_module, "NUMBERS_AT_ONCE", 30)
     monkeypatch.setattr(Legendre, "evaluate", lambda basis, angle: sizes.append(angle.size) or np.ones((angle.size, 6)))
     total = np.zeros((6, 6))
     add_products(total, Legendre(6), np.ones(12), np.ones(12), np.full(12, 0.5))

@@ -70,12 +70,10 @@ def matrix_methods(wall: Wall, basis: Basis) -> Methods:
         return discretise(PolygonLaw(wall, max_beams=int(number)), basis, "exact")
 
     def by_formula(_: float) -> KernelMatrix:
-        law = WallLaw(wall).closed_form
-        assert law is not None
-        return discretise(law, basis)
+        return discretise(WallLaw(wall), basis)
 
     found: Methods = [(WorkMethod(AUTO, chosen, True), (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8))]
-    if WallLaw(wall).closed_form is not None:
+    if not WallLaw(wall).has_traced_parts:
         found.append((WorkMethod(CLOSED_FORM, by_formula), (1.0,), (1.0,)))
     if wall.is_polygonal and wall.closes:
         found.append((WorkMethod(BEAMS, beams), (1e3, 1e4), (1e2, 1e3, 1e4, 1e5)))
