@@ -218,7 +218,7 @@ class DirectionLaw(SpatialLaw):
             wrong = math.prod(1.0 + float(one.error) for one in planar) - 1.0 + degrees.size * EPS
             if len(laws) > 1:
                 coarser = _product(found, degrees <= degree, degrees <= max(degree, most // 2))
-                wrong += CHANGE * float(np.linalg.norm(product - coarser, 2))
+                wrong += CHANGE * float(np.linalg.norm(product - coarser))
             kinds |= {one.error.kind for one in planar} | ({"estimate"} if len(laws) > 1 else set())
             total, error = total + weight * product, error + weight * wrong
         if self.reversible:
