@@ -74,9 +74,9 @@ def branch_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
         limit *= 2
         breakpoints, omitted = law.breakpoints(limit)
     edges = np.unique(np.concatenate((basis.edges, breakpoints)))
-    edges = np.unique(
-        np.concatenate((edges, preimages(law.branches, np.concatenate(([0.0], breakpoints, [np.pi])), basis.edges)))
-    )
+    sources = preimages(law.branches, np.concatenate(([0.0], breakpoints, [np.pi])), basis.edges)
+    assert sources is not None  # `branches` raises an InputError instead
+    edges = np.unique(np.concatenate((edges, sources)))
     total, displacement = np.zeros((basis.size, basis.size)), Displacement(basis)
     width, near = np.diff(edges), np.minimum(edges[1:], np.pi - edges[:-1])
     narrow = (width < NARROW) & (width < NARROW * near)

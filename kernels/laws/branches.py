@@ -10,7 +10,6 @@ from typing import Protocol
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.intervals import edges_inside
@@ -21,7 +20,7 @@ SAME_ANGLE = 16.0 * EPS
 MOST_BRANCHES = 64
 
 # Probabilities and outgoing angles, shape theta.shape + (branches,).
-Branches = Callable[[Floats], tuple[Floats, Floats]]
+Branches = Callable[[Floats], "tuple[Floats, Floats] | None"]
 
 
 def joined(parts: Sequence[tuple[Floats, float]]) -> tuple[Floats, float]:
@@ -34,8 +33,8 @@ def joined(parts: Sequence[tuple[Floats, float]]) -> tuple[Floats, float]:
 class Branching(Protocol):
     """The methods of a law that `chained` and `chained_breakpoints` use."""
 
-    def branches(self, theta: Floats, /) -> tuple[Floats, Floats]:
-        """Probabilities and outgoing angles at incoming angles."""
+    def _branches(self, theta: Floats, /) -> tuple[Floats, Floats] | None:
+        """Probabilities and outgoing angles at incoming angles; None if there are no branches, or too many."""
 
     def breakpoints(self, limit: int, /) -> tuple[Floats, float]:
         """Angles where the branches change, about ``limit`` at most, and the measure with breakpoints left out."""
@@ -58,20 +57,20 @@ def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
     return probability, np.where(probability > 0.0, outgoing, first)
 
 
-def chained(laws: Sequence[Branching], theta: Floats) -> tuple[Floats, Floats]:
-    """The branches of a composition of laws, merged after each law."""
+def chained(laws: Sequence[Branching], theta: Floats) -> tuple[Floats, Floats] | None:
+    """The branches of a composition of laws, merged after each law; None if a law has none, or if they are too many."""
     probability, outgoing = np.ones((*theta.shape, 1)), theta[..., None]
     for law in laws:
-        step, angle = law.branches(outgoing)
+        found = law._branches(outgoing)
+        if found is None:
+            return None
+        step, angle = found
         shape = (*theta.shape, step.shape[-2] * step.shape[-1])
         probability = (probability[..., None] * step).reshape(shape)
         outgoing = angle.reshape(shape)
         probability, outgoing = _compressed(*merged(*_compressed(probability, outgoing)))
         if probability.shape[-1] > MOST_BRANCHES:
-            raise InputError(
-                f"branches: expected at most {MOST_BRANCHES} of a composition, got {probability.shape[-1]} after "
-                f"{law!r}; use sample() or discretise()"
-            )
+            return None
     return probability, outgoing
 
 
@@ -87,25 +86,29 @@ def chained_breakpoints(laws: Sequence[Branching], limit: int) -> tuple[Floats, 
     if math.isinf(left_out):
         return np.empty(0), math.inf
     found = each[0][0]
-    try:
-        for index in range(1, len(laws)):
-            between = np.concatenate([[0.0], found, [np.pi]])
-            sources = preimages(partial(chained, laws[:index]), between, each[index][0])
-            found = np.unique(np.concatenate([found, sources]))
-    except InputError:
-        # The laws before the last do not list branches, or have too many.
-        return np.empty(0), math.inf
+    for index in range(1, len(laws)):
+        between = np.concatenate([[0.0], found, [np.pi]])
+        sources = preimages(partial(chained, laws[:index]), between, each[index][0])
+        if sources is None:
+            return np.empty(0), math.inf
+        found = np.unique(np.concatenate([found, sources]))
     return found, min(left_out, 1.0)
 
 
-def preimages(branches: Branches, breakpoints: Floats, targets: Floats) -> Floats:
-    """Angles that a branch maps to a target, found for every interval between breakpoints; both inputs are sorted."""
+def preimages(branches: Branches, breakpoints: Floats, targets: Floats) -> Floats | None:
+    """Angles that a branch maps to a target, found for every interval between breakpoints; both inputs are sorted.
+
+    None if there are no branches.
+    """
     low, high = breakpoints[:-1], breakpoints[1:]
     proper = high > low
     low, high = low[proper], high[proper]
-    probe = low + np.array([[0.25], [0.75]]) * (high - low)
+    probe = clipped_inside(low + np.array([[0.25], [0.75]]) * (high - low))
     # Both probes in one call, so that a slot is the same isometry in both.
-    probability, angle = branches(probe)
+    found = branches(probe)
+    if found is None:
+        return None
+    probability, angle = found
     sign = np.sign(angle[1] - angle[0])
     offset = angle[0] - sign * probe[0][:, None]
     used = (probability.sum(axis=0) > 0.0) & (sign != 0.0)

@@ -34,7 +34,7 @@ from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Frame
 from ..bases.given import Vectorised, seed_by_name
 from ..expectations.conditionals import Conditionals, degree_of
-from .branches import chained, chained_breakpoints, joined, merged
+from .branches import MOST_BRANCHES, chained, chained_breakpoints, joined, merged
 from .isometry_table import IsometryTable
 
 # Half the spacing of rng.random(). It replaces draws of exactly 0, for which the ray would enter at a tip of the wall.
@@ -170,15 +170,24 @@ class Law(ABC):
         """Probabilities and outgoing angles of a law made of isometries theta' = +-theta + const.
 
         Returns two arrays of shape ``theta.shape + (branches,)``. Branches with equal isometry are merged; unused
-        slots have probability 0 and the angle of another branch. Raises InputError for other laws.
+        slots have probability 0 and the angle of another branch. Raises InputError for other laws, and for compositions
+        with more than 64 branches.
         """
-        raise InputError(
-            f"{self!r} is not a finite mixture of isometries, so it has no branches; use sample() or apply()"
-        )
+        found = self._branches(angles("theta", theta))
+        if found is None:
+            raise InputError(
+                f"{self!r} is not known to be a mixture of at most {MOST_BRANCHES} isometries, so it has no branches; "
+                "use sample(), apply() or discretise()"
+            )
+        return found
 
     @abstractmethod
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         """`sample` for checked arguments."""
+
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
+        """`branches` for checked angles; None if there are none, or too many."""
+        return None
 
     @abstractmethod
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
@@ -269,14 +278,14 @@ class Law(ABC):
 class BranchLaw(Law):
     """A law made of isometries theta' = sign theta + offset, whose probabilities are smooth between breakpoints.
 
-    Subclasses define `branches` and `breakpoints`. Between two neighbouring breakpoints every slot of `branches` is
+    Subclasses define `_branches` and `breakpoints`. Between two neighbouring breakpoints every slot of `branches` is
     one fixed isometry with a smooth probability, so that quadrature between breakpoints is exact to rounding.
     """
 
     reversible = True
 
     @abstractmethod
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats]: ...
 
     @abstractmethod
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
@@ -291,13 +300,13 @@ class BranchLaw(Law):
         return self._branch_taken(rng.random(theta.shape), theta)
 
     def _branch_taken(self, x: Floats, theta: Floats) -> Floats:
-        probability, outgoing = self.branches(theta)
+        probability, outgoing = self._branches(theta)
         cumulative = np.cumsum(probability, axis=-1)
         choice = np.argmax(x[..., None] * cumulative[..., -1:] < cumulative, axis=-1)
         return np.asarray(np.take_along_axis(outgoing, choice[..., None], axis=-1)[..., 0])
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        probability, outgoing = self.branches(theta)
+        probability, outgoing = self._branches(theta)
         return Conditionals.of_atoms(outgoing, probability)
 
 
@@ -474,10 +483,13 @@ class Combination(Law):
         parts = self.parts
         return self if self.reversible else Combination(tuple((weight, law.adjoint()) for weight, law in parts))
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        parts = [(weight, *law.branches(theta)) for weight, law in self.parts]
-        probability = np.concatenate([weight * fraction for weight, fraction, _ in parts], axis=-1)
-        return merged(probability, np.concatenate([angle for _, _, angle in parts], axis=-1))
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
+        found = [(weight, law._branches(theta)) for weight, law in self.parts]
+        parts = [(weight * each[0], each[1]) for weight, each in found if each is not None]
+        if len(parts) < len(found):
+            return None
+        probability, outgoing = (np.concatenate(both, axis=-1) for both in zip(*parts, strict=True))
+        return merged(probability, outgoing)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return joined([law.breakpoints(limit) for weight, law in self.parts])
@@ -543,8 +555,8 @@ class _Chain(Law):
     def _factors(self) -> tuple[Law, ...]:
         """The laws in their order of application."""
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        return chained(self._factors(), angles("theta", theta))
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
+        return chained(self._factors(), theta)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return chained_breakpoints(self._factors(), limit)
@@ -563,12 +575,10 @@ class _Chain(Law):
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """The conditional distributions; means under a law are cut at the next law's breakpoints."""
         laws = self._factors()
-        try:
-            probability, outgoing = chained(laws, theta)
-            return Conditionals.of_atoms(outgoing, probability, self._error_of_atoms)
-        except InputError:
-            # not isometries, or too many of them
-            found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)))
+        branches = self._branches(theta)
+        if branches is not None:
+            return Conditionals.of_atoms(branches[1], branches[0], self._error_of_atoms)
+        found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)))
         for index, law in enumerate(laws):
             cuts = edges if index + 1 == len(laws) else _breakpoints_of_start(laws[index + 1 :])
             each = law._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
@@ -700,9 +710,9 @@ class Power(_Chain):
     def _factors(self) -> tuple[Law, ...]:
         return (self.law,) * self.exponent
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
         _check_length("branches", self.exponent, LONGEST_CHAIN)
-        return super().branches(theta)
+        return super()._branches(theta)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return (np.empty(0), math.inf) if self.exponent > DEEPEST_POWER else super().breakpoints(limit)
@@ -809,9 +819,9 @@ class SpecularFrame(Law):
             transformed if self.mirror_symmetric else Composition((_flip(self.frame), transformed, _flip(self.frame)))
         )
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        probability, outgoing = self.law.branches(theta)
-        return probability, mirrored_angle(outgoing)
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
+        found = self.law._branches(theta)
+        return None if found is None else (found[0], mirrored_angle(found[1]))
 
     @property
     def is_lambertian(self) -> bool:
@@ -866,9 +876,8 @@ class IsometryLaw(BranchLaw):
 
     mirror_symmetric = True
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats]:
         """One branch, of probability 1."""
-        theta = angles("theta", theta)
         outgoing = theta.copy() if self.retro else mirrored_angle(theta)
         return np.ones((*theta.shape, 1)), outgoing[..., None]
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Generic, TypeVar
 
+import numpy as np
+
 from ...core.errors import InputError
 from .law import Combination, Composition, Law, Power, SpecularFrame, retroreflection, simplified, specular, sum_of
 
@@ -22,7 +24,7 @@ MOST_WORDS = 24
 # Limit on the laws of a word.
 LONGEST_WORD = 100
 # Breakpoint limit and incoming angle (in radians) of the test whether a law lists isometries.
-FEW_BREAKPOINTS, PROBE = 8, 1.0
+FEW_BREAKPOINTS, PROBE = 8, np.array([1.0])
 # Limit on the factors of a power whose facts are combined.
 MOST_FACTORS = 10**6
 
@@ -101,11 +103,7 @@ def lists_branches(law: Law) -> bool:
 
 
 def _answers(law: Law) -> bool:
-    try:
-        law.branches(PROBE)
-    except InputError:
-        return False
-    return math.isfinite(law.breakpoints(FEW_BREAKPOINTS)[1])
+    return law._branches(PROBE) is not None and math.isfinite(law.breakpoints(FEW_BREAKPOINTS)[1])
 
 
 def words_of(law: Law) -> Sum | None:

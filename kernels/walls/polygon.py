@@ -171,8 +171,7 @@ class PolygonLaw(BranchLaw):
         fraction = self._table.unresolved
         return Estimate(fraction, fraction, "bound", f"beams of at most {self.max_beams} a hollow")
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        """Probabilities and outgoing angles, merged by isometry, shape ``theta.shape + (branches,)``."""
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats]:
         return self._table.branches(theta)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:

@@ -64,9 +64,8 @@ class RectangularTeethLaw(BranchLaw):
         with np.errstate(over="ignore"):
             return np.asarray(2.0 * self.height_to_width / np.abs(np.tan(angles("theta", theta))))
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats]:
         """Probabilities and angles, shape ``theta.shape + (2,)``: specular first, then retroreflection."""
-        theta = angles("theta", theta)
         retro = 0.5 * crevice_retro(self.height_to_width, theta)
         return np.stack([1.0 - retro, retro], axis=-1), np.stack([mirrored_angle(theta), theta], axis=-1)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, number_between, whole_number
+from ...core.checks import Floats, number_between, whole_number
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
 from ..bases.intervals import without_extremal
@@ -66,13 +66,12 @@ class TriangularTeethLaw(BranchLaw):
     def __post_init__(self) -> None:
         object.__setattr__(self, "angle", number_between("angle", self.angle, 0.0, np.pi))
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats]:
         """Probabilities and angles, shape ``theta.shape + (4,)``.
 
         The order is: left of the bottom with N - 1 hits and with N hits, right of the bottom with N hits and with
         N - 1 hits. N belongs to theta on the left and to pi - theta on the right.
         """
-        theta = angles("theta", theta)
         mirror = np.pi - theta
         # cos(theta - psi/2) written as a sine is accurate for psi close to pi
         left = np.sin(theta + 0.5 * (np.pi - self.angle)) / (2.0 * np.sin(theta) * np.sin(0.5 * self.angle))

@@ -132,8 +132,8 @@ class WallLaw(DrivenLaw):
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
         return if_escaped(self, *self.reflect_with_status(x, theta))
 
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        return super().branches(theta) if self._known is None else self._known.branches(theta)
+    def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
+        return None if self._known is None else self._known._branches(theta)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Those of the isometries and closed forms; none are known of traced rays."""

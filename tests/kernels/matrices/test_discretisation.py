@@ -57,8 +57,7 @@ class Swap(BranchLaw):
 
     steep: float
 
-    def branches(self, theta: object) -> tuple[np.ndarray, np.ndarray]:
-        theta = np.asarray(theta, dtype=np.float64)
+    def _branches(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         specular = (np.abs(theta - np.pi / 2) < self.steep).astype(np.float64)
         return np.stack([specular, 1.0 - specular], -1), np.stack([np.pi - theta, theta], -1)
 
