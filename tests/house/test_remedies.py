@@ -67,9 +67,9 @@ REMEDIES = {
         lambda: ker.distance(*2 * (ker.discretise(LAW, ker.Legendre(4)),)),
         lambda: ker.distance(*2 * (ker.discretise(LAW, ker.Legendre(4)),), kind="pseudometric"),
     ),
-    "use sample() or apply()": (
+    "use sample(), apply() or discretise()": (
         lambda: LAW.branches(1.0),
-        lambda: (LAW.sample([1.0]), LAW.apply(np.cos, [1.0])),
+        lambda: (LAW.sample([1.0]), LAW.apply(np.cos, [1.0]), ker.discretise(LAW, ker.Bins(2))),
     ),
     "use in_specular_frame() on one": (
         lambda: ker.distance(LAW, SPECULAR),
