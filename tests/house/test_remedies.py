@@ -107,7 +107,6 @@ EXPLAINED = {
     "the next generation needs room": "in the list above",
     "mushrooms in each flat top": "the limits depend on the machine's memory",
     "take fewer cells, or method='monte-carlo'": "the size depends on the machine's memory",
-    "use sample() or discretise()": "takes thousands of branches",
     "use KernelMatrix.adjoint()": "test_composed_laws.py runs it",
     "use discretise() and compose the matrices": "takes a million evaluations",
     "use discretise(law, basis) ** n": "takes a deep power",
