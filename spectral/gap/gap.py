@@ -204,7 +204,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     if upper.verdict == "no gap" or lambertian_fraction(law) == upper.value:
         # the slem is 1, or is the norm 1 - a of the rest of a law with a Lambertian fraction a
         return upper
-    listed = law_eigenvalues(law, MODULI, tolerance, rng, time_limit)
+    listed = upper.spectrum or law_eigenvalues(law, MODULI, tolerance, rng, time_limit)
     lowest = int(np.argmin(listed.values))
     least, error = -float(listed.values[lowest]), float(listed.errors.total()[lowest])
     top = 1.0 - upper.value
