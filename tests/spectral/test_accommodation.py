@@ -169,6 +169,8 @@ def test_degrees_that_are_no_incidence_are_refused(degrees, words):
 def test_angles_are_given_in_one_way():
     with pytest.raises(InputError, match="either this or theta"):
         spec.accommodation(ker.lambertian(), theta=1.0, incidence_deg=30.0)
+    with pytest.raises(InputError, match=r"^incidence_deg: expected none"):
+        spec.accommodation(ker.HemisphereLaw(ker.lambertian()), incidence_deg=30.0)
 
 
 def test_the_default_angles_are_far_from_the_poles():
