@@ -193,7 +193,7 @@ def test_every_message_that_advises_a_call_is_run_or_explained():
 
 
 def test_the_names_that_are_advised_for_files_are_written(tmp_path):
-    for save, name in ((P.save, "kern.csv"), (WALL.save, "wall.txt")):
+    for save, name in ((P.save, "kern.mat"), (WALL.save, "wall.txt")):
         with pytest.raises(AsperityError, match="expected a name that ends in") as refused:
             save(tmp_path / name)
         advised = re.search(r"pass '(.*)'", str(refused.value))[1]
