@@ -215,6 +215,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
                                        "density": None, "start": None, "initial": 1.0}),
     "accommodation": (spec.accommodation, {"law": LAW, "theta": [1.0], "tolerance": 0.1, "rng": 0}),
     "Between": (spec.Between, {"low": 0.2, "high": 0.4, "points": 4, "resolution": 0.1}),
+    "transmission": (spec.transmission, {"law": LAW, "length": 1.0, "section": "channel", "tolerance": 0.1, "rng": 0}),
     "sweep": (spec.sweep, {"family": ker.maxwell, "grid": {"diffuse_fraction": [0.5]}, "quantities": "gap",
         "tolerance": 0.1, "progress": False, "zipped": False}),
     "ensemble": (spec.ensemble, {"family": seeded, "realisations": 4, "quantities": "gap", "tolerance": 0.1, "rng": 0,

@@ -167,6 +167,11 @@ def checked(law: Law, name: str, levels: ArrayLike, arrangement: str, particles:
     return paper, found
 
 
+def reflected(law: Law, incoming: Floats, rng: np.random.Generator) -> Floats:
+    """Outgoing angles; incoming ones that rounding took to 0 or pi are moved inside."""
+    return law.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
+
+
 def passed(levels: Floats, reached: NDArray[np.int64], ends: Floats) -> tuple[NDArray[np.int64], ...]:
     """Particles and the levels that their flights to these ends pass, as index pairs; then all numbers of levels."""
     after = np.maximum(reached, np.searchsorted(levels, ends, side="right"))
@@ -221,7 +226,7 @@ class _Particles:
                 return {"times": times}
             inside, reached, x, clock = inside[stays], reached[stays], target[stays], (clock + duration)[stays]
             incoming = theta[stays] if half_turn else np.pi - theta[stays]
-            theta = self.law.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
+            theta = reflected(self.law, incoming, rng)
             sign = -sign if half_turn else sign
         raise InputError(
             f"law: {self.law!r} keeps {x.size} particles within L = {levels[-1]:g} after {MOST_FLIGHTS} flights"
