@@ -3,6 +3,7 @@ from .bounds.enclosure import enclosures as enclosures
 from .consequences.channel import exit_times as exit_times
 from .consequences.cheeger import conductance as conductance
 from .consequences.clausing import transmission as transmission
+from .consequences.diffusion import channel_diffusivity as channel_diffusivity
 from .consequences.diffusion import diffusivity as diffusivity
 from .consequences.laplacian import laplacian_comparison as laplacian_comparison
 from .consequences.laplacian import mean_squared_slope as mean_squared_slope

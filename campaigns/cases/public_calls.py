@@ -206,6 +206,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "radius": 1.0, "speed": 1.0, "bend": 3.0, "arrangement": "mirror"}),
     "curvature_gap_bounds": (spec.curvature_gap_bounds, {"curvature": 1.0, "bins": 50}),
     "essential_edge": (spec.essential_edge, {"law": LAW}),
+    "channel_diffusivity": (spec.channel_diffusivity, {"law": LAW, "lengths": [1.0, 2.0], "particles": 4, "rng": 0,
+        "radius": 1.0, "speed": 1.0, "arrangement": "mirror"}),
     "exit_times": (spec.exit_times, {"law": LAW, "lengths": [1.0, 2.0, 4.0], "particles": 4, "rng": 0, "radius": 1.0,
                                      "speed": 1.0, "arrangement": "mirror"}),
     "fit_order": (spec.fit_order, {"size": [1, 2, 4], "error": [1.0, 0.5, 0.25], "repeats": None}),
