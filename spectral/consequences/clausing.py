@@ -117,8 +117,8 @@ def transmission(
     At walls that reflect diffusely with probability a, else specularly, the places x of diffuse reflections form a
     Markov chain. With the fraction S of particles that go from a place of the wall beyond a distance, S_a(z) = a sum_k
     (1 - a)^(k-1) S(z/k) is the fraction without a diffuse reflection before. The probability u of leaving at the far
-    end solves u(x) = S_a(L - x) - int S_a'(|x - y|) u(y) dy, by Gauss quadrature on panels. For other laws particles
-    are simulated from their first collision on; the fraction that has none is exact.
+    end solves u(x) = S_a(L - x) - int S_a'(d) u(y) dy with the distance d of x and y, by Gauss quadrature on panels.
+    For other laws particles are simulated from their first collision on; the fraction that has none is exact.
 
     Source: P. Clausing, Ann. Phys. 404 (1932) 961.
 
