@@ -22,7 +22,7 @@ COLLISION, SPACE = ker.CollisionLaw(LAW, DISK), geo.ConfigurationSpace(TEETH, DI
 PROFILE, STRIP = geo.Profile([0.0, 1.0, 2.0], [0.0, -1.0, 0.5]), geo.Container.strip()
 CIRCLE = geo.Container.circle()
 BUMPS = geo.SatelliteDisk(DISK, 9, 0.1)
-PAIR = ker.PairLaw(LAW, DISK)
+PAIR, GROOVES = ker.PairLaw(LAW, DISK), ker.HemisphereLaw(LAW)
 RECORD = ker.play(CIRCLE, ker.smooth(DISK), [0.5, 0.0], [0.0, 1.0, 0.0], 3)
 VELOCITY, POSITION = [[0.2, -1.0, 0.1]], [[0.3, 0.1]]
 PROBLEM = spec.WorkProblem("a", (spec.ReferenceValue(0.0, 0.0, "by hand"),))
@@ -100,6 +100,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Legendre": (ker.Legendre, {"n": 4, "weight": "sin"}),
     "Panels": (ker.Panels, {"edges": [0.0, 1.0, np.pi], "degree": 2, "weight": "sin"}),
     "Panels.for_wall": (ker.Panels.for_wall, {"wall": TEETH, "degree": 2, "smallest": 0.01}),
+    "Zernike": (ker.Zernike, {"degree": 2}),
     "TensorBasis": (ker.TensorBasis, {"factors": (BINS, BINS)}),
     "CircularArcLaw": (ker.CircularArcLaw, {"half_angle": 1.0}),
     "RectangularTeethLaw": (ker.RectangularTeethLaw, {"height_to_width": 1.0}),
@@ -110,6 +111,9 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "CollisionLaw.from_wall": (ker.CollisionLaw.from_wall, {"wall": TEETH, "disk": DISK}),
     "CollisionLaw.sample": (COLLISION.sample, {"velocity": VELOCITY, "rng": 0}),
     "CollisionLaw.operator": (COLLISION.operator, {"theta_basis": BINS, "psi_basis": ker.Bins(4, "sin2")}),
+    "HemisphereLaw": (ker.HemisphereLaw, {"law": LAW, "orientation": 0.5}),
+    "HemisphereLaw.sample": (GROOVES.sample, {"velocity": [[0.2, 0.1, -1.0]], "rng": 0}),
+    "HemisphereLaw.matrix": (GROOVES.matrix, {"degree": 3, "m": 1}),
     "SatelliteLaw": (ker.SatelliteLaw, {"wall": TEETH, "disk": DISK, "scale": 0.01, "spacing": None}),
     "DensityLaw": (ker.DensityLaw, {"density": lambda a, b: 0.5 * np.sin(b) + 0.0 * a, "breakpoints": ()}),
     "InvolutionLaw": (ker.InvolutionLaw, {"map": lambda theta: np.pi - theta}),
@@ -316,6 +320,7 @@ OBJECTS: tuple[Any, ...] = (
     ker.InvolutionLaw(lambda theta: np.pi - theta), ker.DensityLaw(lambda a, b: 0.5 * np.sin(b) + 0.0 * a),
     ker.LeastResistanceLaw(), 0.5 * LAW + 0.5 * ker.specular(), TRIANGLES @ ker.specular(), TRIANGLES**2,
     LAW.in_specular_frame(), COLLISION, 0.5 * COLLISION + 0.5 * ker.smooth(DISK), ker.no_slip(DISK),
+    GROOVES, 0.5 * GROOVES + 0.5 * GROOVES @ GROOVES, ker.Zernike(2),
     ker.SatelliteLaw(TEETH, DISK, 0.01), PAIR, ROUGH, ker.PolygonalBody([[(0, 0), (1, 0), (0, 1)]]),
     ker.PositionLaw([0.0, 1.0], [LAW]), ker.SpringWall(0.5, 1.0),
     ker.CollisionAlongWall(ker.PositionLaw([0.0, 1.0], [LAW]), DISK), RECORD, ker.displacements(TEETH, 200, rng=0),
@@ -351,7 +356,9 @@ ARGUMENTS: dict[str, Any] = {
     "SpringWall.n": 4096, "CollisionLaw.other": COLLISION, "CollisionCombination.other": COLLISION,
     "PositionLaw.function": lambda x, theta: np.cos(theta), "CollisionLaw.function": lambda t, p: t * p,
     "CollisionCombination.function": lambda t, p: t * p, "ExchangeHollow.function": lambda a, b: a * b,
-    "TensorBasis.function": lambda angle: angle[..., 0], "ExchangeHollow.number": 2, "PairLaw.wall": TEETH,
+    "TensorBasis.function": lambda angle: angle[..., 0], "Zernike.function": lambda at: at[..., 0],
+    "Zernike.angle": [0.5, 0.1], "HemisphereLaw.velocity": [[0.2, 0.1, -1.0]],
+    "HemisphereCombination.velocity": [[0.2, 0.1, -1.0]], "m": 1, "ExchangeHollow.number": 2, "PairLaw.wall": TEETH,
     "CollisionLaw.wall": TEETH, "Container.length": [0.1], "PolygonalBody.rays": 128, "Container.angle": 1.0,
     "Wall.vertices": [(0.0, 0.0), (0.5, -1.0), (1.0, 0.0)], "Wall.height": [0.0, 0.1], "Wall.seam": "mirror",
     "Profile.unit": "", "ConfigurationSpace.length": 1.0, "SatelliteDisk.alpha": 0.1, "Container.last": [-1],
@@ -364,6 +371,9 @@ ARGUMENTS: dict[str, Any] = {
 # They take other functions of the library, an array into which they write, or what other functions have checked.
 UNCALLED = {
     "matrix_on",
+    "entries",
+    "on_disc",
+    "reflected",
     "add_products",
     "attempt",
     "apply_to_states",

@@ -22,6 +22,7 @@ from ..bases.bins import Bins
 from ..bases.legendre import Legendre
 from ..bases.panels import Panels
 from ..bases.tensor import TensorBasis
+from ..bases.zernike import Zernike
 
 FORMAT, VERSION = "asperity kernel matrix", 1
 # Of a record, in characters; and of a byte of a deflated member, in bytes that it inflates to.
@@ -129,6 +130,8 @@ def _described(basis: Basis, arrays: Arrays, name: str) -> dict[str, Any]:
     if isinstance(basis, TensorBasis):
         factors = [_described(factor, arrays, f"{name}.{k}") for k, factor in enumerate(basis.factors)]
         return {"kind": "TensorBasis", "factors": factors}
+    if isinstance(basis, Zernike):
+        return {"kind": "Zernike", "degree": basis.degree}
     weight = basis.measure.name
     if isinstance(basis, Legendre):
         return {"kind": "Legendre", "n": basis.n, "weight": weight}
@@ -137,7 +140,7 @@ def _described(basis: Basis, arrays: Arrays, name: str) -> dict[str, Any]:
         if isinstance(basis, Bins):
             return {"kind": "Bins", "edges": name, "weight": weight}
         return {"kind": "Panels", "edges": name, "degree": basis.degree, "weight": weight}
-    raise InputError(f"basis: expected Bins, Legendre, Panels or a TensorBasis of these, got {basis!r}")
+    raise InputError(f"basis: expected Bins, Legendre, Panels, a TensorBasis of these or Zernike, got {basis!r}")
 
 
 def _basis_from(described: dict[str, Any], arrays: Stored, most: int) -> Basis:
@@ -147,11 +150,13 @@ def _basis_from(described: dict[str, Any], arrays: Stored, most: int) -> Basis:
         return TensorBasis(tuple(_basis_from(factor, arrays, most) for factor in described["factors"]))
     if kind == "Legendre":
         return Legendre(described["n"], described["weight"])
+    if kind == "Zernike":
+        return Zernike(whole_number("degree", described["degree"], 0, most=most))
     edges = arrays.read(described["edges"], "f8", (range(most + 2),))
     if kind == "Panels":
         return Panels(edges, whole_number("degree", described["degree"], 0, most=most), described["weight"])
     if kind != "Bins":
-        raise ValueError(f"basis: expected Bins, Legendre, Panels or TensorBasis, got {kind!r}")
+        raise ValueError(f"basis: expected Bins, Legendre, Panels, TensorBasis or Zernike, got {kind!r}")
     equal = Bins(edges.size - 1, described["weight"])
     # equal bins are known by their number, which also makes finding a bin faster
     return equal if np.array_equal(equal.edges, edges) else Bins(edges, described["weight"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +18,7 @@ from ...kernels.bases.basis import Basis
 from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
 from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
 from ...kernels.expectations.basis_means import Means
+from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Combination, IsometryLaw, is_atomic
 from ...kernels.laws.structure import has_chain, law_of, words_of
@@ -24,6 +26,7 @@ from ..bounds.images import is_costly
 from ..bounds.operator_residuals import image_rule
 from ..gap.shallow import ROUNDING, Slopes, slopes_of
 from .channel import in_paper_frame
+from .grooves_accommodation import SpaceAccommodation, in_space
 
 # cos(theta) and sin(theta) are polynomials of this degree on so many panels, to 1e-14.
 PANELS, DEGREE = 4, 10
@@ -82,13 +85,24 @@ class Accommodation:
     kind_at: ErrorKind
 
 
-def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = None, rng: Rng = None) -> Accommodation:
+@overload
+def accommodation(
+    law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = None, rng: Rng = None
+) -> Accommodation: ...
+@overload
+def accommodation(
+    law: DirectionLaw, tolerance: float = 1e-8, theta: None = None, rng: Rng = None
+) -> SpaceAccommodation: ...
+def accommodation(
+    law: Law | DirectionLaw, tolerance: float = 1e-8, theta: ArrayLike | None = None, rng: Rng = None
+) -> Accommodation | SpaceAccommodation:
     r"""Tangential and normal momentum accommodation coefficients, and the Maxwell fraction that fits a law best.
 
     Parameters
     ----------
-    law : Law
-        In either convention; it is converted to the paper's.
+    law : Law or HemisphereLaw
+        In either convention; it is converted to the paper's. Of a law on the half sphere of velocities, or a mixture of
+        such, the averages in space are given.
     tolerance : float
         Wanted error of the law's matrix, and of each coefficient at an angle as a fraction of it; where the latter is
         missed, the result says so.
@@ -99,13 +113,14 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
 
     Returns
     -------
-    Accommodation
+    Accommodation or SpaceAccommodation
 
     Raises
     ------
     InputError
-        If an angle is pi/2, where the tangential momentum is 0, or one with sin(theta) = pi/4, where the normal
-        momentum is the accommodated one: a coefficient is a quotient of differences, and both are 0 there.
+        If angles are given for a law on the half sphere, or such a law is a product. If an angle is pi/2, where the
+        tangential momentum is 0, or one with sin(theta) = pi/4, where the normal momentum is the accommodated one: a
+        coefficient is a quotient of differences, and both are 0 there.
 
     Notes
     -----
@@ -146,8 +161,18 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
     1.0 1.0 1.0 1.0
     0.0 0.0 0.0 0.0
     2.0 2.0 0.0 0.0
+
+    Grooves keep one of the two tangential components:
+
+    >>> float(spec.accommodation(ker.HemisphereLaw(ker.lambertian())).tangential)
+    0.5
     """
     wanted = positive_number("tolerance", tolerance)
+    if isinstance(law, DirectionLaw):
+        if theta is not None:
+            raise InputError(f"theta: expected none for {law!r}, of which the averages are given, got {theta!r}")
+        source = generator(rng, 0)
+        return in_space(law, lambda one: _averaged(_parts(in_paper_frame(one), wanted, source)))
     midpoints = SINE.quantile((np.arange(DEFAULT_ANGLES) + 0.5) / DEFAULT_ANGLES)
     incoming = midpoints if theta is None else _checked(theta)
     paper = in_paper_frame(law)
