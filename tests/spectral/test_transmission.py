@@ -37,8 +37,23 @@ def test_diffuse_tubes_have_the_known_transmission(length):
     assert abs(float(found) - TUBES[length]) < 1e-7 and found.error < 1e-9
 
 
-def in_space(section, length, diffuse, particles, rng):
-    """How many of these particles leave at the far end of a channel |y| < 1/2 or a tube of radius 1, in space."""
+def grooved(velocity, along, angle, rng):
+    """Velocities after diffuse reflection in the cross section of grooves at this angle to the axis, in space.
+
+    The component along the grooves is kept; ``along`` holds the axis, the direction across it and the normal.
+    """
+    groove = np.cos(angle)[:, None] * along[0] + np.sin(angle)[:, None] * along[1]
+    kept = (velocity * groove).sum(1)
+    rest, cosine = np.sqrt(1.0 - kept**2), 2.0 * rng.random(len(kept)) - 1.0
+    normal = (rest * np.sqrt(1.0 - cosine**2))[:, None] * along[2]
+    return kept[:, None] * groove + (rest * cosine)[:, None] * np.cross(along[2], groove) + normal
+
+
+def in_space(section, length, diffuse, particles, rng, orientation=None):
+    """How many of these particles leave at the far end of a channel |y| < 1/2 or a tube of radius 1, in space.
+
+    With an orientation the diffuse reflections are those of grooves.
+    """
     sine, turn = np.sqrt(rng.random(particles)), 2.0 * np.pi * rng.random(particles)
     velocity = np.stack((np.sqrt(1.0 - sine**2), sine * np.cos(turn), sine * np.sin(turn)), axis=1)
     place = np.zeros((particles, 3))
@@ -68,6 +83,11 @@ def in_space(section, length, diffuse, particles, rng):
         sine, turn = np.sqrt(rng.random(len(place))), 2.0 * np.pi * rng.random(len(place))
         scattered = np.sqrt(1.0 - sine**2)[:, None] * normal + (sine * np.sin(turn))[:, None] * side
         scattered[:, 0] += sine * np.cos(turn)
+        if orientation is not None:
+            angle = turn if orientation == "random" else np.full(len(place), orientation)
+            # walls of a channel are mirror images, so their grooves have one direction
+            beside = np.array([0.0, 0.0, 1.0]) if section == "channel" else side
+            scattered = grooved(velocity, (np.array([1.0, 0.0, 0.0]), beside, normal), angle, rng)
         mirrored = velocity - 2.0 * (velocity * normal).sum(1)[:, None] * normal
         velocity = np.where((rng.random(len(place)) < diffuse)[:, None], scattered, mirrored)
     return through
@@ -112,13 +132,52 @@ def test_long_diffuse_channels_and_tubes_pass_as_diffusion_says():
     assert float(spec.transmission(ker.lambertian(), 300.0)) == pytest.approx((math.log(600) - 0.5) / 300, rel=0.02)
 
 
+def by_flights(length, rng):
+    def reflect(angle):
+        return clausing._turn(ker.lambertian(), angle, rng)
+
+    return clausing._by_flights("channel", length, 0.01, rng, clausing._entered_in_plane, reflect)
+
+
 @pytest.mark.parametrize("length", [0.5, 3.0])
 def test_flights_agree_with_the_integral_equation_in_95_percent(monkeypatch, length):
     monkeypatch.setattr(clausing, "TOGETHER", 2**12)
     exact = float(spec.transmission(ker.lambertian(), length))
-    found = [clausing._by_flights(ker.lambertian(), length, 0.01, np.random.default_rng(seed)) for seed in range(20)]
+    found = [by_flights(length, np.random.default_rng(seed)) for seed in range(20)]
     assert all(one.error <= 0.01 for one in found)
     assert sum(abs(float(one) - exact) > one.error for one in found) <= 3
+
+
+@pytest.mark.parametrize("section", ["channel", "tube"])
+@pytest.mark.parametrize("orientation", ["random", 0.7])
+def test_grooved_walls_pass_as_many_particles_in_space_as_a_plain_simulation(section, orientation):
+    particles = 60_000
+    law = 0.8 * ker.HemisphereLaw(ker.lambertian(), orientation) + 0.2 * ker.HemisphereLaw(ker.specular())
+    found = spec.transmission(law, 2.0, section, tolerance=2e-3, rng=1)
+    seen = in_space(section, 2.0, 0.8, particles, np.random.default_rng(3), orientation) / particles
+    assert abs(seen - float(found)) < 1.5 * (found.error + 1.96 * math.sqrt(seen * (1.0 - seen) / particles))
+    assert abs(seen - float(spec.transmission(ker.maxwell(0.8), 2.0, section))) > 10.0 * found.error
+
+
+@pytest.mark.parametrize("section", ["channel", "tube"])
+def test_grooves_along_the_axis_pass_all_particles_and_retroreflecting_ones_across_it_none(section):
+    passing = {"channel": direct(2.0), "tube": direct(1.0) ** 2}[section]
+    along, across = (ker.HemisphereLaw(ker.retroreflection(), angle) for angle in (0.0, np.pi / 2.0))
+    for law, expected in ((along, 1.0), (ker.HemisphereLaw(ker.specular()), 1.0), (across, passing)):
+        found = spec.transmission(law, 2.0, section, rng=4)
+        assert float(found) == pytest.approx(expected, abs=1e-12) and 0.0 < found.error <= 1e-4
+
+
+@pytest.mark.parametrize("law", [ARCS, SAW], ids=["arcs", "saw"])
+def test_grooves_across_a_channel_in_space_pass_as_many_particles_as_the_planar_law(law):
+    planar = spec.transmission(law, 2.0, tolerance=2e-3, rng=5)
+    spatial = spec.transmission(ker.HemisphereLaw(law, np.pi / 2.0), 2.0, tolerance=2e-3, rng=6)
+    assert abs(float(planar) - float(spatial)) < planar.error + spatial.error
+
+
+def test_a_channel_too_short_for_collisions_has_an_error_all_the_same():
+    found = spec.transmission(ker.HemisphereLaw(ker.lambertian()), 1e-9, tolerance=1e-12, rng=0)
+    assert abs(float(found) - (1.0 - 0.5e-9)) <= found.error < 1e-8
 
 
 def in_plane(law, length, particles, rng):
@@ -190,6 +249,8 @@ def test_a_seed_gives_the_same_number_again():
         ({"section": "tube", "length": 601.0}, "length: in a tube expected at most 600 radii"),
         ({"section": "tube", "law": ker.maxwell(0.001)}, "diffuse fraction of at least 0.01"),
         ({"law": 2.0 * ker.lambertian()}, "weights"),
+        ({"law": 0.5 * ker.HemisphereLaw(ARCS), "section": "tube"}, "weights"),
+        ({"law": ker.CollisionLaw(ARCS, geo.Disk())}, "law: expected a law"),
         ({"rng": -1}, "rng: expected"),
     ],
     ids=str,
