@@ -70,6 +70,7 @@ RETURNED = {
     "spectral.exit_times": "ExitTimes",
     "spectral.conductance": "Conductance",
     "spectral.diffusivity": "Diffusivity",
+    "spectral.channel_diffusivity": "ChannelDiffusivity",
     "spectral.laplacian_comparison": "LaplacianComparison",
     "spectral.mixing_time": "MixingTime",
     "spectral.accommodation": "Accommodation spectral.consequences.grooves_accommodation.SpaceAccommodation",
