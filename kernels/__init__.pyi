@@ -12,6 +12,7 @@ from .bases.measure import SINE as SINE
 from .bases.measure import SINE_SQUARED as SINE_SQUARED
 from .bases.panels import Panels as Panels
 from .bases.tensor import TensorBasis as TensorBasis
+from .bases.zernike import Zernike as Zernike
 from .billiards.along_walls import CollisionAlongWall as CollisionAlongWall
 from .billiards.billiard import play as play
 from .billiards.gas import play_gas as play_gas
@@ -29,6 +30,7 @@ from .discretisation.discretisation import discretise as discretise
 from .distances.distances import distance as distance
 from .distances.retroreflectors import retroreflection_distance as retroreflection_distance
 from .distances.two_sample import difference_test as difference_test
+from .hemisphere.hemisphere_law import HemisphereLaw as HemisphereLaw
 from .inverse.cell_sequences import dichotomy as dichotomy
 from .inverse.design import design_wall as design_wall
 from .inverse.exchange_wall import exchange_hollow as exchange_hollow

@@ -2,6 +2,8 @@ from .bounds.curvature import curvature_gap_bounds as curvature_gap_bounds
 from .bounds.enclosure import enclosures as enclosures
 from .consequences.channel import exit_times as exit_times
 from .consequences.cheeger import conductance as conductance
+from .consequences.clausing import transmission as transmission
+from .consequences.diffusion import channel_diffusivity as channel_diffusivity
 from .consequences.diffusion import diffusivity as diffusivity
 from .consequences.laplacian import laplacian_comparison as laplacian_comparison
 from .consequences.laplacian import mean_squared_slope as mean_squared_slope

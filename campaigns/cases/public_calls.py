@@ -22,7 +22,7 @@ COLLISION, SPACE = ker.CollisionLaw(LAW, DISK), geo.ConfigurationSpace(TEETH, DI
 PROFILE, STRIP = geo.Profile([0.0, 1.0, 2.0], [0.0, -1.0, 0.5]), geo.Container.strip()
 CIRCLE = geo.Container.circle()
 BUMPS = geo.SatelliteDisk(DISK, 9, 0.1)
-PAIR = ker.PairLaw(LAW, DISK)
+PAIR, GROOVES = ker.PairLaw(LAW, DISK), ker.HemisphereLaw(LAW)
 RECORD = ker.play(CIRCLE, ker.smooth(DISK), [0.5, 0.0], [0.0, 1.0, 0.0], 3)
 VELOCITY, POSITION = [[0.2, -1.0, 0.1]], [[0.3, 0.1]]
 PROBLEM = spec.WorkProblem("a", (spec.ReferenceValue(0.0, 0.0, "by hand"),))
@@ -100,6 +100,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Legendre": (ker.Legendre, {"n": 4, "weight": "sin"}),
     "Panels": (ker.Panels, {"edges": [0.0, 1.0, np.pi], "degree": 2, "weight": "sin"}),
     "Panels.for_wall": (ker.Panels.for_wall, {"wall": TEETH, "degree": 2, "smallest": 0.01}),
+    "Zernike": (ker.Zernike, {"degree": 2}),
     "TensorBasis": (ker.TensorBasis, {"factors": (BINS, BINS)}),
     "CircularArcLaw": (ker.CircularArcLaw, {"half_angle": 1.0}),
     "RectangularTeethLaw": (ker.RectangularTeethLaw, {"height_to_width": 1.0}),
@@ -110,6 +111,9 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "CollisionLaw.from_wall": (ker.CollisionLaw.from_wall, {"wall": TEETH, "disk": DISK}),
     "CollisionLaw.sample": (COLLISION.sample, {"velocity": VELOCITY, "rng": 0}),
     "CollisionLaw.operator": (COLLISION.operator, {"theta_basis": BINS, "psi_basis": ker.Bins(4, "sin2")}),
+    "HemisphereLaw": (ker.HemisphereLaw, {"law": LAW, "orientation": 0.5}),
+    "HemisphereLaw.sample": (GROOVES.sample, {"velocity": [[0.2, 0.1, -1.0]], "rng": 0}),
+    "HemisphereLaw.matrix": (GROOVES.matrix, {"degree": 3, "m": 1}),
     "SatelliteLaw": (ker.SatelliteLaw, {"wall": TEETH, "disk": DISK, "scale": 0.01, "spacing": None}),
     "DensityLaw": (ker.DensityLaw, {"density": lambda a, b: 0.5 * np.sin(b) + 0.0 * a, "breakpoints": ()}),
     "InvolutionLaw": (ker.InvolutionLaw, {"map": lambda theta: np.pi - theta}),
@@ -206,6 +210,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "radius": 1.0, "speed": 1.0, "bend": 3.0, "arrangement": "mirror"}),
     "curvature_gap_bounds": (spec.curvature_gap_bounds, {"curvature": 1.0, "bins": 50}),
     "essential_edge": (spec.essential_edge, {"law": LAW}),
+    "channel_diffusivity": (spec.channel_diffusivity, {"law": LAW, "lengths": [1.0, 2.0], "particles": 4, "rng": 0,
+        "radius": 1.0, "speed": 1.0, "arrangement": "mirror"}),
     "exit_times": (spec.exit_times, {"law": LAW, "lengths": [1.0, 2.0, 4.0], "particles": 4, "rng": 0, "radius": 1.0,
                                      "speed": 1.0, "arrangement": "mirror"}),
     "fit_order": (spec.fit_order, {"size": [1, 2, 4], "error": [1.0, 0.5, 0.25], "repeats": None}),
@@ -215,6 +221,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
                                        "density": None, "start": None, "initial": 1.0}),
     "accommodation": (spec.accommodation, {"law": LAW, "theta": [1.0], "tolerance": 0.1, "rng": 0}),
     "Between": (spec.Between, {"low": 0.2, "high": 0.4, "points": 4, "resolution": 0.1}),
+    "transmission": (spec.transmission, {"law": LAW, "length": 1.0, "section": "channel", "tolerance": 0.1, "rng": 0}),
     "sweep": (spec.sweep, {"family": ker.maxwell, "grid": {"diffuse_fraction": [0.5]}, "quantities": "gap",
         "tolerance": 0.1, "progress": False, "zipped": False}),
     "ensemble": (spec.ensemble, {"family": seeded, "realisations": 4, "quantities": "gap", "tolerance": 0.1, "rng": 0,
@@ -313,6 +320,7 @@ OBJECTS: tuple[Any, ...] = (
     ker.InvolutionLaw(lambda theta: np.pi - theta), ker.DensityLaw(lambda a, b: 0.5 * np.sin(b) + 0.0 * a),
     ker.LeastResistanceLaw(), 0.5 * LAW + 0.5 * ker.specular(), TRIANGLES @ ker.specular(), TRIANGLES**2,
     LAW.in_specular_frame(), COLLISION, 0.5 * COLLISION + 0.5 * ker.smooth(DISK), ker.no_slip(DISK),
+    GROOVES, 0.5 * GROOVES + 0.5 * GROOVES @ GROOVES, ker.Zernike(2),
     ker.SatelliteLaw(TEETH, DISK, 0.01), PAIR, ROUGH, ker.PolygonalBody([[(0, 0), (1, 0), (0, 1)]]),
     ker.PositionLaw([0.0, 1.0], [LAW]), ker.SpringWall(0.5, 1.0),
     ker.CollisionAlongWall(ker.PositionLaw([0.0, 1.0], [LAW]), DISK), RECORD, ker.displacements(TEETH, 200, rng=0),
@@ -335,7 +343,7 @@ ARGUMENTS: dict[str, Any] = {
     "wall_normal": [0.0, 1.0], "w": [0.0, 1.0, 0.0], "w2": [0.0, 1.0, 0.0], "theta_basis": BINS,
     "psi_basis": MOMENTUM_BINS, "samples": 64, "neck": 0.1, "unfollowed": 0.0, "distance": 0.1, "scale": 1.0,
     "largest": 4, "speed": [1.0, 2.0], "gas_temperature": 1.0, "temperature": 1.0, "left": 0.0, "right": 1.0,
-    "intervals": 2, "family": lambda x: LAW, "walls": [TEETH], "repeats": 1, "container": STRIP,
+    "intervals": 2, "family": lambda x: LAW, "walls": [TEETH], "repeats": 1, "container": STRIP, "n_in": 3, "n_out": 3,
     "centre": [0.0, 0.0], "cost": None, "directions": None, "normal": [0.0, 1.0], "scales": [0.1],
     "first_velocity": [0.0, -1.0, 0.0], "second_velocity": [0.0, 0.0, 0.0], "near": np.array([True] * 9),
     "coordinates": "velocity", "frames": 3, "duration": 1.0, "ConfigurationSpace.height": -0.5,
@@ -348,7 +356,9 @@ ARGUMENTS: dict[str, Any] = {
     "SpringWall.n": 4096, "CollisionLaw.other": COLLISION, "CollisionCombination.other": COLLISION,
     "PositionLaw.function": lambda x, theta: np.cos(theta), "CollisionLaw.function": lambda t, p: t * p,
     "CollisionCombination.function": lambda t, p: t * p, "ExchangeHollow.function": lambda a, b: a * b,
-    "TensorBasis.function": lambda angle: angle[..., 0], "ExchangeHollow.number": 2, "PairLaw.wall": TEETH,
+    "TensorBasis.function": lambda angle: angle[..., 0], "Zernike.function": lambda at: at[..., 0],
+    "Zernike.angle": [0.5, 0.1], "HemisphereLaw.velocity": [[0.2, 0.1, -1.0]],
+    "HemisphereCombination.velocity": [[0.2, 0.1, -1.0]], "m": 1, "ExchangeHollow.number": 2, "PairLaw.wall": TEETH,
     "CollisionLaw.wall": TEETH, "Container.length": [0.1], "PolygonalBody.rays": 128, "Container.angle": 1.0,
     "Wall.vertices": [(0.0, 0.0), (0.5, -1.0), (1.0, 0.0)], "Wall.height": [0.0, 0.1], "Wall.seam": "mirror",
     "Profile.unit": "", "ConfigurationSpace.length": 1.0, "SatelliteDisk.alpha": 0.1, "Container.last": [-1],
@@ -361,6 +371,9 @@ ARGUMENTS: dict[str, Any] = {
 # They take other functions of the library, an array into which they write, or what other functions have checked.
 UNCALLED = {
     "matrix_on",
+    "entries",
+    "on_disc",
+    "reflected",
     "add_products",
     "attempt",
     "apply_to_states",

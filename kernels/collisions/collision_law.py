@@ -32,9 +32,8 @@ from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.given import Vectorised, seed_by_name
 from ..bases.legendre import Legendre
-from ..bases.tensor import TensorBasis
 from ..laws.law import Combination, Law, as_weight, retroreflection, specular
-from ..laws.tensor_law import Discretiser, TensorLaw, Term
+from ..laws.tensor_law import Discretiser, TensorLaw, Term, checked_pair
 from ..walls.isometry_branches import isometries
 from .velocity_matrices import isometry_matrix
 
@@ -260,13 +259,13 @@ class VelocityLaw(TensorLaw):
             parts[flip] = matrix if weight == 1.0 else weight * matrix
         return CollisionOperator(parts.get(True), psi_basis, parts.get(False))
 
-    def matrix_on(self, basis: TensorBasis, discretise: Discretiser) -> KernelMatrix:
+    def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
         """The matrix on a basis of products e_i(theta) f_j(psi): the sum of the tensor products of its terms."""
         from ...core.estimates import Estimate
         from ..bases.mirror import reflection_matrix
         from ..matrices.matrix import KernelMatrix
 
-        theta_basis, psi_basis = basis.factors
+        theta_basis, psi_basis = checked_pair(basis).factors
         exact = Estimate(0.0, 0.0, "bound", "the flip of psi")
         total: KernelMatrix | None = None
         for weight, law, flip in self.parts_checked():

@@ -22,7 +22,7 @@ from ..bases.tensor import TensorBasis
 from ..laws.law import IsometryLaw, Law
 from ..laws.matrix_law import MatrixLaw, finite_matrix, not_a_law
 from ..laws.structure import Rules, fold, holds_of_all
-from ..laws.tensor_law import TensorLaw
+from ..laws.tensor_law import SpatialLaw
 from ..matrices.matrix import KernelMatrix
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
@@ -31,7 +31,7 @@ from .methods import recipe
 
 
 def discretise(
-    law: Law | TensorLaw,
+    law: Law | SpatialLaw,
     basis: Basis,
     method: MethodName = "auto",
     tolerance: float = 1e-8,
@@ -44,15 +44,15 @@ def discretise(
     r"""The Galerkin matrix <e_i, P e_j> of a law P in a basis of L^2(sin theta d theta).
 
     A law of angles (theta, psi), such as a `CollisionLaw`, takes a `TensorBasis` of a basis in theta and one in psi
-    with ``weight="sin2"``. A law made of specular reflection and retroreflection also takes a basis in psi alone,
-    because both preserve sin(psi)^2 d psi as well.
+    with ``weight="sin2"``, and a `HemisphereLaw` takes `Zernike`. A law made of specular reflection and retroreflection
+    also takes a basis in psi alone, because both preserve sin(psi)^2 d psi as well.
 
     Parameters
     ----------
-    law : Law or CollisionLaw
+    law : Law, CollisionLaw or HemisphereLaw
         Any law; for a combination each term is computed by its best method.
     basis : Basis
-        Bins, Legendre or Panels for theta.
+        Bins, Legendre or Panels for theta; Zernike for tangential velocities.
     method : {"auto", "exact", "quadrature", "qmc", "monte-carlo"}
         ``"exact"``: laws of isometries, to rounding; the error includes a bound for unresolved beams of a polygonal
         wall, or for breakpoints of a composition left out near grazing. ``"quadrature"``: Gauss rules, refined until
@@ -146,9 +146,9 @@ def discretise(
     >>> bool((discretise(ker.specular(), angles[0]).tensor(flip).array == K.array).all())
     True
     """
-    if isinstance(law, TensorLaw):
+    if isinstance(law, SpatialLaw):
         return law.matrix_on(
-            _checked_pair(basis),
+            basis,
             partial(
                 discretise,
                 method=method,
@@ -192,16 +192,6 @@ def discretise(
         frame=law.frame,
         requested_tolerance=float(tolerance),
         metadata={"numpy": np.__version__},
-    )
-
-
-def _checked_pair(basis: Basis) -> TensorBasis:
-    """The basis, if it is a product of one for theta and one for psi; else raises InputError."""
-    if isinstance(basis, TensorBasis) and [factor.measure.name for factor in basis.factors] == ["sin", "sin2"]:
-        return basis
-    raise InputError(
-        "basis: expected a product of one basis in theta and one in psi, such as "
-        f"TensorBasis((Bins(16), Bins(8, weight='sin2'))), got {basis!r}"
     )
 
 

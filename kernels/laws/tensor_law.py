@@ -1,4 +1,4 @@
-"""The protocol of laws of several angles, which `discretise` takes with a tensor basis."""
+"""The protocols of laws of several angles, made of laws of one angle, which `discretise` takes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TypeAlias
 
+from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.tensor import TensorBasis
 from ..matrices.matrix import KernelMatrix
@@ -17,13 +18,27 @@ Term: TypeAlias = tuple[float, Law, bool]
 Discretiser: TypeAlias = Callable[[Law, Basis], KernelMatrix]
 
 
-class TensorLaw(ABC):
+class SpatialLaw(ABC):
+    """A law of several angles or of velocities in space, whose matrix is computed from those of laws of one angle."""
+
+    @abstractmethod
+    def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
+        """The matrix in a basis; raises InputError for a basis of other functions."""
+
+
+class TensorLaw(SpatialLaw):
     """A law of the angles (theta, psi), computed from laws of the single angles."""
 
     @abstractmethod
     def parts_checked(self) -> tuple[Term, ...]:
         """The terms, of which the law is the sum; raises InputError if their weights do not sum to 1 within 1e-12."""
 
-    @abstractmethod
-    def matrix_on(self, basis: TensorBasis, discretise: Discretiser) -> KernelMatrix:
-        """The matrix on products e_i(theta) f_j(psi), with theta for sin(theta) and psi for sin(psi)^2."""
+
+def checked_pair(basis: Basis) -> TensorBasis:
+    """The basis, if it is a product of one for theta and one for psi; else raises InputError."""
+    if isinstance(basis, TensorBasis) and [factor.measure.name for factor in basis.factors] == ["sin", "sin2"]:
+        return basis
+    raise InputError(
+        "basis: expected a product of one basis in theta and one in psi, such as "
+        f"TensorBasis((Bins(16), Bins(8, weight='sin2'))), got {basis!r}"
+    )

@@ -1,4 +1,4 @@
-"""Kernel matrices as files: an .npz archive with every field, exact to the last bit."""
+"""Kernel matrices as files: an .npz archive with every field, exact to the last bit, or a .csv for others."""
 
 from __future__ import annotations
 
@@ -14,18 +14,23 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.lib import format as npy
 
-from ...core.checks import check_memory, whole_number
+from ...core.checks import Floats, check_memory, whole_number
 from ...core.errors import InputError
 from ...core.files import ending_in, regular_file, write_whole
+from ...core.tables import numbers_as_csv
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
 from ..bases.panels import Panels
 from ..bases.tensor import TensorBasis
+from ..bases.zernike import Zernike
 
 FORMAT, VERSION = "asperity kernel matrix", 1
 # Of a record, in characters; and of a byte of a deflated member, in bytes that it inflates to.
 LONGEST_RECORD, DEFLATION = 2**24, 1032
+
+# The reflection that keeps the angle, by convention.
+SAME_ANGLE = {"paper": "retroreflection", "specular": "specular reflection"}
 
 Record = dict[str, Any]
 Arrays = dict[str, np.ndarray[Any, Any]]
@@ -53,6 +58,21 @@ def write(path: str | Path, record: Record, arrays: Arrays, basis: Basis, *, ove
     arrays["record"] = np.array(text)
     write_whole(target, lambda stream: np.savez_compressed(stream, **arrays), overwrite=overwrite)  # type: ignore[arg-type]
     return target
+
+
+def write_csv(path: str | Path, array: Floats, edges: Floats, facts: Record, *, overwrite: bool) -> Path:
+    """Write probabilities between bins, with ``facts`` in comments and both edges of each bin in the first rows."""
+    comments = [
+        "asperity kernel matrix: probabilities of outgoing bins (columns) given the incoming bin (rows)",
+        *(f"{name}: {value}" for name, value in facts.items()),
+        f"convention of {facts['convention']!r}: theta_out = theta_in is {SAME_ANGLE[facts['convention']]}",
+        "radians; rows: 0,0,lower edges; 0,0,upper edges; then both edges and the probabilities of each incoming bin",
+    ]
+    low, high = edges[:-1], edges[1:]
+    heads = np.pad([low, high], ((0, 0), (2, 0)))
+    rows = np.vstack([heads, np.column_stack([low, high, array])])
+    write_whole(Path(path), numbers_as_csv(comments, rows.tolist()), overwrite=overwrite)
+    return Path(path)
 
 
 def read(path: str | Path, restored: Callable[[Record, Stored, Basis], T]) -> T:
@@ -129,6 +149,8 @@ def _described(basis: Basis, arrays: Arrays, name: str) -> dict[str, Any]:
     if isinstance(basis, TensorBasis):
         factors = [_described(factor, arrays, f"{name}.{k}") for k, factor in enumerate(basis.factors)]
         return {"kind": "TensorBasis", "factors": factors}
+    if isinstance(basis, Zernike):
+        return {"kind": "Zernike", "degree": basis.degree}
     weight = basis.measure.name
     if isinstance(basis, Legendre):
         return {"kind": "Legendre", "n": basis.n, "weight": weight}
@@ -137,7 +159,7 @@ def _described(basis: Basis, arrays: Arrays, name: str) -> dict[str, Any]:
         if isinstance(basis, Bins):
             return {"kind": "Bins", "edges": name, "weight": weight}
         return {"kind": "Panels", "edges": name, "degree": basis.degree, "weight": weight}
-    raise InputError(f"basis: expected Bins, Legendre, Panels or a TensorBasis of these, got {basis!r}")
+    raise InputError(f"basis: expected Bins, Legendre, Panels, a TensorBasis of these or Zernike, got {basis!r}")
 
 
 def _basis_from(described: dict[str, Any], arrays: Stored, most: int) -> Basis:
@@ -147,11 +169,13 @@ def _basis_from(described: dict[str, Any], arrays: Stored, most: int) -> Basis:
         return TensorBasis(tuple(_basis_from(factor, arrays, most) for factor in described["factors"]))
     if kind == "Legendre":
         return Legendre(described["n"], described["weight"])
+    if kind == "Zernike":
+        return Zernike(whole_number("degree", described["degree"], 0, most=most))
     edges = arrays.read(described["edges"], "f8", (range(most + 2),))
     if kind == "Panels":
         return Panels(edges, whole_number("degree", described["degree"], 0, most=most), described["weight"])
     if kind != "Bins":
-        raise ValueError(f"basis: expected Bins, Legendre, Panels or TensorBasis, got {kind!r}")
+        raise ValueError(f"basis: expected Bins, Legendre, Panels, TensorBasis or Zernike, got {kind!r}")
     equal = Bins(edges.size - 1, described["weight"])
     # equal bins are known by their number, which also makes finding a bin faster
     return equal if np.array_equal(equal.edges, edges) else Bins(edges, described["weight"])

@@ -479,7 +479,14 @@ class KernelMatrix:
 
     # ---- files and pictures ----------------------------------------------------------------------------------
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """Write everything to an .npz file that `load_matrix` reads; an existing file only with ``overwrite``."""
+        """Write everything to an .npz file that `load_matrix` reads; an existing file only with ``overwrite``.
+
+        A name that ends in .csv gets P[i, j] with the edges of its bins, for other programs: comments begin with #, two
+        rows have the lower and the upper edges of the outgoing bins in radians, below two zeros, and each other row has
+        both edges of an incoming bin and its probabilities. An InputError for .csv unless the basis is `Bins`.
+        """
+        if Path(path).suffix.lower() == ".csv":
+            return archive.write_csv(path, self.array, self._bin_edges("save"), self._described(), overwrite=overwrite)
         return archive.write(path, *self._packed(), self.basis, overwrite=overwrite)
 
     def to_frame(self) -> Any:

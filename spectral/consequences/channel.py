@@ -18,6 +18,7 @@ from ...core.checks import (
     frozen,
     generator,
     number_between,
+    shortened,
     whole_number,
 )
 from ...core.errors import InputError
@@ -142,7 +143,22 @@ def exit_times(
     >>> bool(found.means[0] < found.means[1])
     True
     """
-    paper, levels = checked(law, "lengths", lengths, arrangement, particles)
+    return simulated_times(law, lengths, particles, rng, radius, speed, arrangement, engine)
+
+
+def simulated_times(
+    law: Law,
+    lengths: ArrayLike,
+    particles: int,
+    rng: Rng,
+    radius: float,
+    speed: float,
+    arrangement: Arrangement,
+    engine: Engine,
+    least: int = 3,
+) -> ExitTimes:
+    """`exit_times` at ``least`` lengths or more."""
+    paper, levels = checked(law, "lengths", lengths, arrangement, particles, least)
     width, pace = 2.0 * number_between("radius", radius, 0.0, LARGEST), number_between("speed", speed, 0.0, LARGEST)
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     job = _Particles(paper, levels, particles, root, width, pace, arrangement)
@@ -157,14 +173,22 @@ def in_paper_frame(law: Law) -> Law:
     return law.in_specular_frame() if law.frame == "specular" else law
 
 
-def checked(law: Law, name: str, levels: ArrayLike, arrangement: str, particles: int) -> tuple[Law, Floats]:
+def checked(
+    law: Law, name: str, levels: ArrayLike, arrangement: str, particles: int, least: int = 3
+) -> tuple[Law, Floats]:
     """The law in the paper's convention and increasing levels, at which each particle gives a number."""
     paper, found = in_paper_frame(law), finite_array(name, levels).ravel()
-    if found.size < 3 or found[0] <= 0.0 or np.any(np.diff(found) <= 0.0):
-        raise InputError(f"{name}: expected at least three increasing positive {name}, got {levels!r}")
+    if found.size < least or found[0] <= 0.0 or np.any(np.diff(found) <= 0.0):
+        count = {1: "one or more", 3: "at least three"}[least]
+        raise InputError(f"{name}: expected {count} increasing positive {name}, got {shortened(levels)}")
     choice("arrangement", arrangement, get_args(Arrangement))
     check_memory("particles", f"the table of {name}", 2 * found.size * whole_number("particles", particles, 2))
     return paper, found
+
+
+def reflected(law: Law, incoming: Floats, rng: np.random.Generator) -> Floats:
+    """Outgoing angles; incoming ones that rounding took to 0 or pi are moved inside."""
+    return law.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
 
 
 def passed(levels: Floats, reached: NDArray[np.int64], ends: Floats) -> tuple[NDArray[np.int64], ...]:
@@ -221,7 +245,7 @@ class _Particles:
                 return {"times": times}
             inside, reached, x, clock = inside[stays], reached[stays], target[stays], (clock + duration)[stays]
             incoming = theta[stays] if half_turn else np.pi - theta[stays]
-            theta = self.law.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
+            theta = reflected(self.law, incoming, rng)
             sign = -sign if half_turn else sign
         raise InputError(
             f"law: {self.law!r} keeps {x.size} particles within L = {levels[-1]:g} after {MOST_FLIGHTS} flights"

@@ -1,21 +1,23 @@
-"""The slope by which diffusion in a channel with rough walls grows with its length (Knudsen diffusion)."""
+"""Diffusion in a channel with rough walls: its slope in the logarithm of the length, and its value at a length."""
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...core.checks import choice, positive_number
-from ...core.errors import AccuracyError, InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.checks import Floats, Rng, choice, frozen, positive_number
+from ...core.errors import AccuracyError, AsperityError, InputError
+from ...core.estimates import NORMAL_95, ErrorKind, Estimate
 from ...core.rounding import EPS
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.structure import holds_of_all
 from ..essential.edge import grazing_symbol
-from .channel import Arrangement, in_paper_frame
+from .channel import Arrangement, in_paper_frame, simulated_times
 
 # Sign of the displacement of rays that leave near theta = 0 and near theta = pi.
 DIRECTION = np.array([1.0, -1.0])
@@ -26,6 +28,8 @@ LARGEST_UNCERTAINTY = 1e-3
 
 # Incoming angles, and rays at each, for the length from which on the limit holds within this distance of zeta.
 ONSET_ANGLES, ONSET_RAYS, NEAR_LIMIT = 10.0 ** -np.arange(0.25, 3.1, 0.25), 2000, 0.1
+# Onsets beyond this multiple of the radius are warned of.
+FAR_ONSET = 1000.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,9 +37,10 @@ class Diffusivity(Estimate):
     r"""The slope D of L^2/tau(L) against ln(L/r) in a channel with two parallel rough walls, for long channels.
 
     tau(L) is the mean time to leave -L < x < L. The displacements between collisions have infinite variance, and the
-    tails of their distribution determine D, the limit of the slope. D is not L^2/tau of a channel: to D ln(L/r) this
-    adds a constant, which for shallow or nearly smooth walls is many times larger at any length of use. `exit_times`
-    gives L^2/tau at a length. The unit is that of radius x speed.
+    tails of their distribution determine D, the limit of the slope. It is the same, 4 r s / pi, for all walls that turn
+    grazing flights, whatever their shape. D is not L^2/tau of a channel: to D ln(L/r) this adds a constant, which for
+    shallow or nearly smooth walls is many times larger at any length of use. `channel_diffusivity` gives the
+    diffusivity at a length. The unit is that of radius x speed.
 
     Attributes
     ----------
@@ -62,7 +67,9 @@ class Diffusivity(Estimate):
 
     def __str__(self) -> str:
         digits = f"{self.value:.4g}" if self.error <= 1e-4 * abs(self.value) else super().__str__()
-        return f"{digits}, the slope of L^2/tau against ln(L/r) for L well above {self.onset:.2g}"
+        same = ", the same for all walls that turn grazing flights" if abs(self.eta - 1.0) <= self.eta_error else ""
+        far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "beyond 2000 r at least"
+        return f"{digits}, the slope of L^2/tau against ln(L/r) for L {far}{same}"
 
     def __repr__(self) -> str:
         return f"Diffusivity({self}; eta={self.eta:.6g}, zeta={self.zeta:.6g}, kind={self.kind!r})"
@@ -70,6 +77,9 @@ class Diffusivity(Estimate):
 
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
     r"""The slope D of L^2/tau(L) against ln(L/r) for the mean exit time tau of a long channel: see `Diffusivity`.
+
+    It is the same number for all walls that turn grazing flights. For the diffusivity of a channel of given length use
+    `channel_diffusivity`. A `UserWarning` says so where D is the slope beyond a length of 1000 r only.
 
     Parameters
     ----------
@@ -115,6 +125,123 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     >>> round(found.eta, 12), round(found.value * np.pi, 12)
     (3.0, 12.0)
     """
+    found = logarithmic_slope(law, radius, speed, arrangement)
+    if found.onset > FAR_ONSET * radius:
+        warnings.warn(
+            f"diffusivity: D = {found.value:.4g} is the slope of L^2/tau against ln(L/r) for lengths L beyond "
+            f"{FAR_ONSET:g} r only, and says nothing about shorter channels; channel_diffusivity(law, lengths) gives "
+            "the diffusivity at their lengths",
+            stacklevel=2,
+        )
+    return found
+
+
+@dataclass(frozen=True, repr=False)
+class ChannelDiffusivity:
+    r"""Mean exit times tau(L) from channels -L < x < L, and the diffusivity L^2/(2 tau) at each length.
+
+    Particles that diffuse by Fick's law, with the variance 2 D_F t, leave in the mean time L^2/(2 D_F). So L^2/(2 tau)
+    is the coefficient D_F of the channel of this length. Far beyond ``onset``, twice this coefficient grows like
+    D ln(L/r) with the D of `diffusivity`.
+
+    Attributes
+    ----------
+    lengths : array, shape (n,)
+        Increasing values of L, half of the distance between the ends.
+    times, time_errors : array, shape (n,)
+        Mean exit times tau(L) of particles that start at x = 0 on a wall with the invariant distribution of angles,
+        and half widths of their 95 % intervals.
+    onset : float
+        As of `Diffusivity`: the logarithmic law holds for L well above it. ``inf`` also where `diffusivity` refuses the
+        law.
+    particles : int
+    radius, speed : float
+        Half the width of the channel, and the speed of the particles.
+    """
+
+    lengths: Floats
+    times: Floats
+    time_errors: Floats
+    onset: float
+    particles: int
+    radius: float
+    speed: float
+
+    @property
+    def values(self) -> Floats:
+        """The diffusivities L^2/(2 tau), shape (n,), in the unit of radius x speed."""
+        return np.asarray(0.5 * self.lengths**2 / self.times)
+
+    @property
+    def errors(self) -> Floats:
+        """Half widths of the 95 % intervals of ``values``, to first order."""
+        return np.asarray(self.values * self.time_errors / self.times)
+
+    def __repr__(self) -> str:
+        numbers = (Estimate(*pair, "estimate", "") for pair in zip(self.values, self.errors, strict=True))
+        text = ", ".join(f"{number} at L = {length:g}" for length, number in zip(self.lengths, numbers, strict=True))
+        far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "from an unknown length on"
+        return f"ChannelDiffusivity(L^2/(2 tau): {text}; logarithmic in L {far})"
+
+
+def channel_diffusivity(
+    law: Law,
+    lengths: ArrayLike,
+    particles: int = 4096,
+    rng: Rng = None,
+    *,
+    radius: float = 1.0,
+    speed: float = 1.0,
+    arrangement: Arrangement = "mirror",
+) -> ChannelDiffusivity:
+    """The diffusivity of channels of given lengths between two rough walls, from simulated mean exit times.
+
+    Parameters
+    ----------
+    law : Law
+        The law of the walls, in either convention.
+    lengths : array_like
+        Increasing values of L, half of the distance between the ends, in the unit of ``radius``.
+    particles : int
+        Number of particles, at least 2. The relative error is about 1.6 divided by the square root of it.
+    rng : None, int or numpy.random.Generator
+    radius, speed : float
+        Half the width of the channel, and the speed of the particles.
+    arrangement : {"mirror", "half-turn"}
+        The upper wall is the mirror image of the lower one, or is rotated by pi.
+
+    Returns
+    -------
+    ChannelDiffusivity
+
+    Raises
+    ------
+    InputError
+        If an argument is not as described, or a particle has not left after 10^6 flights.
+
+    Examples
+    --------
+    `diffusivity` is the same for diffuse walls and for shallow arcs; at a length of 20 r their diffusivities differ:
+
+    >>> from asperity import kernels as ker, spectral as spec
+    >>> spec.channel_diffusivity(ker.lambertian(), [20.0], rng=1)
+    ChannelDiffusivity(L^2/(2 tau): 1.26(4) at L = 20; logarithmic in L well above 3.2)
+    >>> spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
+    ChannelDiffusivity(L^2/(2 tau): 3.63(9) at L = 20; logarithmic in L well above 36)
+    """
+    found = simulated_times(law, lengths, particles, rng, radius, speed, arrangement, {}, least=1)
+    errors = NORMAL_95 * found.times.std(axis=0, ddof=1) / np.sqrt(len(found.times))
+    try:
+        onset = logarithmic_slope(law, found.radius, found.speed, arrangement).onset
+    except AsperityError:
+        onset = np.inf
+    return ChannelDiffusivity(
+        found.lengths, frozen(found.means), frozen(errors), onset, len(found.times), found.radius, found.speed
+    )
+
+
+def logarithmic_slope(law: Law, radius: float, speed: float, arrangement: Arrangement) -> Diffusivity:
+    """`diffusivity` without a warning."""
     paper = in_paper_frame(law)
     scale = 4.0 * positive_number("radius", radius) * positive_number("speed", speed) / np.pi
     choice("arrangement", arrangement, get_args(Arrangement))
@@ -141,7 +268,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
         raise AccuracyError(
             f"law: the limit of grazing rays under {law!r} is known to {uncertainty:.2g} only (zeta = {zeta:.3g}), "
             "which does not bound the diffusivity; deep hollows with vertical sides turn these rays round or not with "
-            "every change of the angle. exit_times(law, ...) simulates the times to leave a channel",
+            "every change of the angle. channel_diffusivity(law, lengths) simulates channels of given lengths",
             uncertainty,
         )
     eta = float(0.5 * DIRECTION @ (2.0 * np.linalg.inv(np.eye(2) - step) - np.eye(2)) @ DIRECTION)

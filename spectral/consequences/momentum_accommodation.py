@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, angles, frozen, generator, positive_number
+from ...core.checks import Floats, Rng, angles, finite_array, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, ErrorKind, Estimate
 from ...core.rounding import EPS
@@ -17,6 +18,7 @@ from ...kernels.bases.basis import Basis
 from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
 from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
 from ...kernels.expectations.basis_means import Means
+from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Combination, IsometryLaw, is_atomic
 from ...kernels.laws.structure import has_chain, law_of, words_of
@@ -24,6 +26,7 @@ from ..bounds.images import is_costly
 from ..bounds.operator_residuals import image_rule
 from ..gap.shallow import ROUNDING, Slopes, slopes_of
 from .channel import in_paper_frame
+from .grooves_accommodation import SpaceAccommodation, in_space
 
 # cos(theta) and sin(theta) are polynomials of this degree on so many panels, to 1e-14.
 PANELS, DEGREE = 4, 10
@@ -58,13 +61,14 @@ class Accommodation:
         Root mean square, over angles, of the distance between the mean reflected velocities of the law and of that
         Maxwell law, in units of the speed. 0 of Maxwell's laws.
     theta : array of shape (n,)
-        Angles of incidence, radians.
+        Incoming angles, radians.
     tangential_at, normal_at : array of shape (n,)
         The coefficients at these angles.
     tangential_errors, normal_errors : array of shape (n,)
         Their errors, of the kind ``kind_at``.
     tangential_missed, normal_missed : array of bool, shape (n,)
-        Where such an error is larger than the tolerance times the coefficient.
+        Where such an error is larger than the tolerance times the coefficient, or the coefficient is not defined: at
+        normal incidence the tangential one is nan, with an infinite error.
     kind_at : {"bound", "estimate"}
     """
 
@@ -81,14 +85,38 @@ class Accommodation:
     normal_missed: NDArray[np.bool_]
     kind_at: ErrorKind
 
+    @property
+    def incidence_deg(self) -> Floats:
+        """The incoming angles as degrees from the normal, 90 - theta."""
+        return np.asarray(np.degrees(0.5 * np.pi - self.theta))
 
-def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = None, rng: Rng = None) -> Accommodation:
+
+@overload
+def accommodation(
+    law: Law,
+    tolerance: float = 1e-8,
+    theta: ArrayLike | None = None,
+    rng: Rng = None,
+    incidence_deg: ArrayLike | None = None,
+) -> Accommodation: ...
+@overload
+def accommodation(
+    law: DirectionLaw, tolerance: float = 1e-8, theta: None = None, rng: Rng = None, incidence_deg: None = None
+) -> SpaceAccommodation: ...
+def accommodation(
+    law: Law | DirectionLaw,
+    tolerance: float = 1e-8,
+    theta: ArrayLike | None = None,
+    rng: Rng = None,
+    incidence_deg: ArrayLike | None = None,
+) -> Accommodation | SpaceAccommodation:
     r"""Tangential and normal momentum accommodation coefficients, and the Maxwell fraction that fits a law best.
 
     Parameters
     ----------
-    law : Law
-        In either convention; it is converted to the paper's.
+    law : Law or HemisphereLaw
+        In either convention; it is converted to the paper's. Of a law on the half sphere of velocities, or a mixture of
+        such, the averages in space are given.
     tolerance : float
         Wanted error of the law's matrix, and of each coefficient at an angle as a fraction of it; where the latter is
         missed, the result says so.
@@ -96,16 +124,20 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
         Angles at which the coefficients are given; by default the midpoints of 32 cells of equal measure.
     rng : None, int or numpy.random.Generator
         For laws that are traced or sampled; ``np.random.default_rng(0)`` by default, so that results repeat.
+    incidence_deg : array_like, optional
+        The angles in place of ``theta``, in degrees from the normal, in (-90, 90): theta is 90 degrees less this
+        angle. At 0 only the normal coefficient is defined.
 
     Returns
     -------
-    Accommodation
+    Accommodation or SpaceAccommodation
 
     Raises
     ------
     InputError
-        If an angle is pi/2, where the tangential momentum is 0, or one with sin(theta) = pi/4, where the normal
-        momentum is the accommodated one: a coefficient is a quotient of differences, and both are 0 there.
+        If angles are given for a law on the half sphere, or such a law is a product. If an angle is pi/2, where the
+        tangential momentum is 0, or one with sin(theta) = pi/4, where the normal momentum is the accommodated one: a
+        coefficient is a quotient of differences, and both are 0 there. Of angles in degrees, 0 is allowed.
 
     Notes
     -----
@@ -146,10 +178,32 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
     1.0 1.0 1.0 1.0
     0.0 0.0 0.0 0.0
     2.0 2.0 0.0 0.0
+
+    By degrees from the normal:
+
+    >>> found = spec.accommodation(ker.maxwell(0.25), incidence_deg=[0, 30, 60])
+    >>> found.tangential_at.round(12).tolist(), found.normal_at.round(12).tolist()
+    ([nan, 0.25, 0.25], [0.25, 0.25, 0.25])
+
+    Grooves keep one of the two tangential components:
+
+    >>> float(spec.accommodation(ker.HemisphereLaw(ker.lambertian())).tangential)
+    0.5
     """
     wanted = positive_number("tolerance", tolerance)
+    if isinstance(law, DirectionLaw):
+        for name, given in (("theta", theta), ("incidence_deg", incidence_deg)):
+            if given is not None:
+                raise InputError(f"{name}: expected none for {law!r}, of which the averages are given, got {given!r}")
+        source = generator(rng, 0)
+        return in_space(law, lambda one: _averaged(_parts(in_paper_frame(one), wanted, source)))
     midpoints = SINE.quantile((np.arange(DEFAULT_ANGLES) + 0.5) / DEFAULT_ANGLES)
-    incoming = midpoints if theta is None else _checked(theta)
+    if incidence_deg is not None:
+        if theta is not None:
+            raise InputError("incidence_deg: expected either this or theta, got both")
+        incoming = _from_degrees(incidence_deg)
+    else:
+        incoming = midpoints if theta is None else _checked("theta", theta)
     paper = in_paper_frame(law)
     parts = _parts(paper, wanted, generator(rng, 0))
     tangential, normal, fraction = _averaged(parts)
@@ -164,16 +218,29 @@ def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = N
     )  # fmt: skip
 
 
-def _checked(theta: ArrayLike) -> Floats:
-    incoming = np.atleast_1d(angles("theta", theta)).ravel()
+def _from_degrees(incidence: ArrayLike) -> Floats:
+    """Incoming angles in radians from degrees from the normal, normal incidence among them."""
+    given = np.atleast_1d(finite_array("incidence_deg", incidence)).ravel()
+    incoming = np.asarray(np.radians(90.0 - given))
+    bad = (np.abs(given) >= 90.0) | (incoming <= 0.0) | (incoming >= np.pi)
+    if bad.any():
+        raise InputError(f"incidence_deg: expected degrees from the normal, in (-90, 90), got {float(given[bad][0])!r}")
+    oblique = np.abs(np.cos(incoming)) >= POLE
+    if oblique.any() or not given.size:
+        _checked("incidence_deg", incoming[oblique])
+    return np.where(oblique, incoming, 0.5 * np.pi)
+
+
+def _checked(name: str, theta: ArrayLike) -> Floats:
+    incoming = np.atleast_1d(angles(name, theta)).ravel()
     if not incoming.size:
-        raise InputError("theta: expected at least one angle, got none")
-    for name, rest in (("pi/2", np.cos(incoming)), ("arcsin(pi/4)", np.sin(incoming) - MEAN_SINE)):
+        raise InputError(f"{name}: expected at least one angle, got none")
+    for pole, rest in (("pi/2", np.cos(incoming)), ("arcsin(pi/4)", np.sin(incoming) - MEAN_SINE)):
         bad = np.abs(rest) < POLE
         if bad.any():
             raise InputError(
-                f"theta: expected angles other than {name} (or pi minus it), where the change of momentum is 0 by any "
-                f"law, got {incoming[bad][0]!r}; take one beside it"
+                f"{name}: expected angles other than theta = {pole} (or pi minus it), where the change of momentum is "
+                f"0 by any law, got {incoming[bad][0]!r}; take one beside it"
             )
     return incoming
 
@@ -311,21 +378,27 @@ def _summed(parts: list[tuple[float, _Changes]], theta: Floats, tolerance: float
 def _coefficients(
     parts: list[tuple[float, _Changes]], theta: Floats, wanted: float
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """The coefficients, their errors, and where an error exceeds the wanted one, relative to the coefficient."""
+    """The coefficients, their errors, and where an error exceeds the wanted one, relative to the coefficient.
+
+    A coefficient is nan where complete accommodation changes nothing.
+    """
     complete = _complete(theta)
+    pole = np.abs(complete) < POLE
     changes, errors = _summed(parts, theta, RULE_SHARE * wanted)
-    missed = errors > wanted * np.abs(changes)
+    missed = (errors > wanted * np.abs(changes)) & ~pole
     again = missed.any(axis=1)
     if again.any():
         # the rule's tolerance is absolute: the least change tells which one is needed
-        least = max(RULE_SHARE * wanted * float(np.abs(changes[again]).min()), LEAST_TOLERANCE)
+        least = float(np.where(pole, np.inf, np.abs(changes))[again].min())
+        least = max(RULE_SHARE * wanted * least, LEAST_TOLERANCE)
         finer = _summed(parts, theta[again], least)
         better = finer[1] < errors[again]
         changes[again], errors[again] = (
             np.where(better, new, old[again]) for new, old in zip(finer, (changes, errors), strict=True)
         )
         missed = errors > wanted * np.abs(changes)
-    return changes / complete, errors / np.abs(complete), missed
+    divisor = np.where(pole, np.nan, complete)
+    return changes / divisor, np.where(pole, np.inf, errors / np.abs(divisor)), missed | pole
 
 
 def _misfit(law: Law, parts: list[tuple[float, _Changes]], fraction: Estimate, wanted: float) -> Estimate:

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
-from .channel import MOST_FLIGHTS, SMALLEST, Arrangement, checked, passed
+from .channel import MOST_FLIGHTS, SMALLEST, Arrangement, checked, passed, reflected
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -288,6 +288,5 @@ def _simulated(law: Law, channel: _Channel, paths: Floats, particles: int, rng: 
         x = (x + channel.advance(direction, wall, length))[stays]
         run, going, reached, wall = (run + length)[stays], going[stays], reached[stays], after[stays]
         incoming = math.pi - channel.framed(arriving[stays], wall)
-        outgoing = law.sample(np.clip(incoming, SMALLEST, math.pi - SMALLEST), rng)
-        direction = channel.framed(outgoing, wall)
+        direction = channel.framed(reflected(law, incoming, rng), wall)
     raise InputError(f"law: {law!r} keeps {len(x)} particles in flight after {MOST_FLIGHTS} collisions")

@@ -12,6 +12,7 @@ from ...core.errors import AccuracyError
 from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
+from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
@@ -23,6 +24,7 @@ from ..bounds.trial_space import adapted_trial_space
 from ..eigenvalues.spectra import ONE_MATRIX, UNREFINED, Spectrum, matrix_spectrum
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
+from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
 from .refinement import EIGENVALUES, RAYS_FRACTION, Refinement, refined
 from .shallow import shallow_gap
@@ -35,6 +37,8 @@ ENCLOSED, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS = 3, 8, 1e-2, 2
 # Enclosures slightly wider than the tolerance are computed again with CLOSER times the tolerance. A gap whose error
 # exceeds the tolerance is accepted if its relative error is at most LARGEST_MISS.
 CLOSER, LARGEST_MISS = 0.25, 1e-3
+# Tolerance of the planar gaps that bound the gap of a law on the half sphere.
+PLANAR = 1e-2
 # Number of eigenvalues computed to find the least one.
 MODULI = 3
 
@@ -77,16 +81,21 @@ def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
 
 
 def spectral_gap(
-    law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6, rng: Rng = None, *, time_limit: float = TIME_LIMIT
+    law: Law | KernelMatrix | CollisionLaw | DirectionLaw,
+    tolerance: float = 1e-6,
+    rng: Rng = None,
+    *,
+    time_limit: float = TIME_LIMIT,
 ) -> SpectralGap:
     """The gap 1 - sup(spectrum off the constants) of a reversible law.
 
     Parameters
     ----------
-    law : Law, CollisionLaw or KernelMatrix
-        A law in its own convention; for a collision law its P~. A matrix is not refined: the error is then an estimate
-        of the distance from the gap of its law, and ``evidence`` has the gap of the matrix itself with its error. They
-        are the same for a law of finitely many states in bins that refine its own. An array of transition
+    law : Law, CollisionLaw, HemisphereLaw or KernelMatrix
+        A law in its own convention; for a collision law its P~. The gap of a law on the half sphere of velocities is
+        computed in Zernike functions, and planar gaps bound it from below. A matrix is not refined: the error is then
+        an estimate of the distance from the gap of its law, and ``evidence`` has the gap of the matrix itself with its
+        error. They are the same for a law of finitely many states in bins that refine its own. An array of transition
         probabilities is a law: ``MatrixLaw(array)``.
     tolerance : float
         Wanted error. If it is not reached with the largest basis and number of rays, ``error`` is larger.
@@ -134,10 +143,12 @@ def spectral_gap(
     seconds, rng = positive_number("time_limit", time_limit), generator(rng, 0)
     if isinstance(law, CollisionLaw):
         law = law.law
+    if isinstance(law, DirectionLaw):
+        return gap_of_grooves(law, tolerance, rng, lambda one: spectral_gap(one, PLANAR, rng, time_limit=seconds))
     if isinstance(law, KernelMatrix):
         return _of_matrix(law)
     if not isinstance(law, Law):
-        raise not_a_law("law", "a Law, a CollisionLaw or a KernelMatrix", law)
+        raise not_a_law("law", "a Law, a CollisionLaw, a HemisphereLaw or a KernelMatrix", law)
     other = self_adjoint_elsewhere(law)
     if other is not None:
         return _contraction(law, other, tolerance, rng, seconds)
@@ -193,7 +204,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     if upper.verdict == "no gap" or lambertian_fraction(law) == upper.value:
         # the slem is 1, or is the norm 1 - a of the rest of a law with a Lambertian fraction a
         return upper
-    listed = law_eigenvalues(law, MODULI, tolerance, rng, time_limit)
+    listed = upper.spectrum or law_eigenvalues(law, MODULI, tolerance, rng, time_limit)
     lowest = int(np.argmin(listed.values))
     least, error = -float(listed.values[lowest]), float(listed.errors.total()[lowest])
     top = 1.0 - upper.value

@@ -11,7 +11,7 @@ from ...core.checks import instance, shortened
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...kernels import Law, resistance
-from ..consequences.diffusion import diffusivity
+from ..consequences.diffusion import logarithmic_slope
 from ..consequences.mixing import relaxation_time, slem_from_gap
 from ..consequences.momentum_accommodation import accommodation
 from ..gap.gap import modulus_gap, spectral_gap
@@ -61,7 +61,7 @@ def _resistance(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
 
 
 def _eta(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
-    found = diffusivity(law)
+    found = logarithmic_slope(law, 1.0, 1.0, "mirror")
     return [Estimate(found.eta, found.eta_error, found.kind, found.method)], ""
 
 

@@ -52,6 +52,18 @@ JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of the random generator.")
 
 
+# Incoming angles and probabilities of a table of a law.
+TABLE_SIZE = 64, 65
+
+
+def numbers_of(text: str) -> list[float]:
+    """The numbers of a text such as 0,30,60."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as reason:
+        raise InputError(f"--incidence: expected degrees joined by commas, such as 0,30,60, got {text!r}") from reason
+
+
 @click.group(cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
 @click.version_option(__version__, prog_name="asperity")
 def main() -> None:
@@ -89,9 +101,13 @@ def main() -> None:
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option("--format", "picture_format", type=FORMAT, default="png", help="Format of the pictures.")
 @click.option("--dpi", type=click.FloatRange(10, 2400), default=100, help="Dots per inch of the pictures.")
+@click.option(
+    "--incidence", help="Also print the accommodation of momentum: degrees from the normal, joined by commas."
+)
+@click.option("--table", type=NEW_FILE, help="Also write a table of the law for other codes, .csv or .npz.")
 def study(
     wall: str, mass: float, inertia: float, seed: int, out: Path | None, force: bool, picture_format: str, dpi: float,
-    as_json: bool, verbose: bool, quiet: bool, **asked: Any,
+    as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, **asked: Any,
 ) -> None:  # fmt: skip
     """Study WALL: law, symmetry, spectrum, gap, and the collision law of a disk.
 
@@ -99,22 +115,41 @@ def study(
     Examples:
       asperity study focusing-arcs:half_angle=0.9 --out study
       asperity study profile.txt --mass 1 --inertia 0.5 --json
+      asperity study triangular-teeth --incidence 0,30,60 --table law.csv
     """
+    import json
+
     from .core.files import removed_on_failure
     from .geometry import Disk, wall_from_text
+    from .kernels import WallLaw
+    from .spectral import accommodation
     from .study import prepare_folder, study_wall
+    from .study.report import accommodation_as_dict, accommodation_as_text
 
     if quiet and (as_json or verbose):
         raise click.UsageError("--quiet prints nothing; leave --json and --verbose out")
     disk = Disk(mass, inertia)
     found_wall = wall_from_text(wall)
+    # what may be refused comes before the work
+    momentum = None
+    if incidence is not None:
+        momentum = accommodation(WallLaw(found_wall), asked["tolerance"], rng=seed, incidence_deg=numbers_of(incidence))
+    if table is not None:
+        WallLaw(found_wall).table(*TABLE_SIZE).save(table, overwrite=force)
     with removed_on_failure(out):
         if out is not None:
             # refuse before the work, not after it
             prepare_folder(out, overwrite=force, picture_format=picture_format)
         report = study_wall(found_wall, Path(wall).name, disk, rng=seed, progress=not quiet, **asked)
-        if not quiet:
+        if as_json and momentum is not None:
+            plain = {**report.as_dict(), "accommodation": accommodation_as_dict(momentum)}
+            click.echo(json.dumps(plain, indent=2, allow_nan=False))
+        elif not quiet:
             click.echo(report.to_json() if as_json else report.summary(verbose=verbose))
+            if momentum is not None:
+                click.echo(accommodation_as_text(momentum))
+        if table is not None and not quiet:
+            click.echo(f"wrote      {table}", err=as_json)
         if out is not None:
             for path in report.save(out, overwrite=force, picture_format=picture_format, dpi=dpi):
                 if not quiet:

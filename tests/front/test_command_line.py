@@ -2,12 +2,15 @@
 
 import json
 import os
+import re
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
 from asperity.study import DATA, PICTURES
 from commands import ended, run
 
@@ -47,6 +50,35 @@ def test_one_existing_file_is_enough_to_refuse_before_the_work_and_nothing_else_
     assert "--force" in message and "study.json" in message
     assert [path.name for path in tmp_path.iterdir()] == ["study.json"]
     assert (tmp_path / "study.json").read_text() == "mine"
+
+
+def test_a_study_prints_accommodation_by_degrees_and_writes_a_table(tmp_path):
+    options = ("--bins", 8, "--incidence", "0,30", "--table", tmp_path / "law.csv")
+    lines = run("study", "triangular-teeth:angle=0.7", *options).stdout.splitlines()
+    law = ker.WallLaw(geo.triangular_teeth(0.7))
+    found = spec.accommodation(law, 1e-3, incidence_deg=[0, 30])
+    at = next(line for line in lines if "at 30 degrees" in line)
+    printed = [float(number) for number in re.findall(r" (\d\.\d+)\(", at)]
+    assert printed == pytest.approx([found.tangential_at[1], found.normal_at[1]], rel=1e-9)
+    assert any("at 0 degrees: tangential not defined, normal" in line for line in lines)
+    table = np.loadtxt(tmp_path / "law.csv", delimiter=",")
+    assert np.array_equal(table[1:, 1:], law.table(64, 65).quantile)
+    assert f"wrote      {tmp_path / 'law.csv'}" in lines
+    again = run("study", "triangular-teeth:angle=0.7", *options, "--force", "--json")
+    plain = json.loads(again.stdout)["accommodation"]
+    assert plain["tangential"]["value"] == found.tangential.value
+    assert [row["incidence_deg"] for row in plain["at"]] == pytest.approx([0.0, 30.0])
+    assert plain["at"][0]["tangential"] is None and plain["at"][1]["tangential"] == found.tangential_at[1]
+
+
+def test_incidence_and_table_are_refused_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.setattr("asperity.study.study_wall", lambda *_, **__: pytest.fail("the work began"))
+    (tmp_path / "law.csv").write_text("mine")
+    assert "joined by commas" in refused("study", "flat", "--incidence", "30 60")
+    assert "(-90, 90)" in refused("study", "flat", "--incidence", "0,95")
+    assert "exists" in refused("study", "flat", "--table", tmp_path / "law.csv")
+    assert ".csv or .npz" in refused("study", "flat", "--table", tmp_path / "law.h5")
+    assert (tmp_path / "law.csv").read_text() == "mine"
 
 
 def test_force_replaces_an_earlier_study(tmp_path):

@@ -33,7 +33,7 @@ FLOORS = [
         "kernels.sampling",
     ),
     *("kernels.discretisation", "kernels.distances", "kernels.positions", "kernels.thermal", "kernels.collisions"),
-    *("kernels.billiards", "kernels.inverse", "kernels.aerodynamics", "kernels"),
+    *("kernels.hemisphere", "kernels.billiards", "kernels.inverse", "kernels.aerodynamics", "kernels"),
     *("spectral.eigenvalues", "spectral.essential", "spectral.bounds", "spectral.gap", "spectral.consequences"),
     *("spectral.sweeps", "spectral.work_diagrams", "spectral"),
     # the ledger's index finds the files of its folders without naming them

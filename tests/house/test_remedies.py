@@ -67,9 +67,9 @@ REMEDIES = {
         lambda: ker.distance(*2 * (ker.discretise(LAW, ker.Legendre(4)),)),
         lambda: ker.distance(*2 * (ker.discretise(LAW, ker.Legendre(4)),), kind="pseudometric"),
     ),
-    "use sample() or apply()": (
+    "use sample(), apply() or discretise()": (
         lambda: LAW.branches(1.0),
-        lambda: (LAW.sample([1.0]), LAW.apply(np.cos, [1.0])),
+        lambda: (LAW.sample([1.0]), LAW.apply(np.cos, [1.0]), ker.discretise(LAW, ker.Bins(2))),
     ),
     "use in_specular_frame() on one": (
         lambda: ker.distance(LAW, SPECULAR),
@@ -84,6 +84,18 @@ REMEDIES = {
         lambda: ker.PolygonLaw(geo.focusing_arcs()),
         lambda: ker.WallLaw(geo.focusing_arcs()),
     ),
+    "use it with ker.HemisphereLaw(law)": (
+        lambda: ker.discretise(LAW, ker.Zernike(2)),
+        lambda: ker.discretise(ker.HemisphereLaw(LAW), ker.Zernike(2)),
+    ),
+    "use ker.discretise(H, ker.Zernike(": (
+        lambda: ker.HemisphereLaw(LAW, 0.5).matrix(2, 1),
+        lambda: ker.discretise(ker.HemisphereLaw(LAW, 0.5), ker.Zernike(2)),
+    ),
+    "Take a palindrome such as H1 @ H2 @ H1": (
+        lambda: spec.spectral_gap(ker.HemisphereLaw(LAW) @ ker.HemisphereLaw(ker.specular())),
+        lambda: spec.spectral_gap(ker.HemisphereLaw(LAW) @ ker.HemisphereLaw(ker.specular()) @ ker.HemisphereLaw(LAW)),
+    ),
     "expected a name that ends in": (None, None),
     "pass overwrite=True to replace": (None, None),
 }  # fmt: skip
@@ -95,7 +107,6 @@ EXPLAINED = {
     "the next generation needs room": "in the list above",
     "mushrooms in each flat top": "the limits depend on the machine's memory",
     "take fewer cells, or method='monte-carlo'": "the size depends on the machine's memory",
-    "use sample() or discretise()": "takes thousands of branches",
     "use KernelMatrix.adjoint()": "test_composed_laws.py runs it",
     "use discretise() and compose the matrices": "takes a million evaluations",
     "use discretise(law, basis) ** n": "takes a deep power",
@@ -182,7 +193,7 @@ def test_every_message_that_advises_a_call_is_run_or_explained():
 
 
 def test_the_names_that_are_advised_for_files_are_written(tmp_path):
-    for save, name in ((P.save, "kern.csv"), (WALL.save, "wall.txt")):
+    for save, name in ((P.save, "kern.mat"), (WALL.save, "wall.txt")):
         with pytest.raises(AsperityError, match="expected a name that ends in") as refused:
             save(tmp_path / name)
         advised = re.search(r"pass '(.*)'", str(refused.value))[1]

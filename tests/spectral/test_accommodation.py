@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.errors import InputError
 
 AVERAGES = ("tangential", "normal", "maxwell_fraction", "misfit")
 
@@ -110,6 +111,66 @@ def test_laws_without_known_means_are_sampled_with_honest_errors():
     exact = 1.0 + known.apply(lambda t: known.apply(np.cos, t), [0.4, 1.2]) / np.cos([0.4, 1.2])
     assert np.all(found.tangential_errors > 0.0)
     assert np.all(np.abs(found.tangential_at - exact) < 2.3 * found.tangential_errors)
+
+
+@pytest.mark.parametrize("law", [ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.4), (1, 0)])),
+                                 ker.WallLaw(geo.dispersing_arcs(0.01))], ids=["sawtooth", "shallow arcs"])  # fmt: skip
+def test_degrees_from_the_normal_are_angles_that_begin_at_the_other_end(law):
+    theta = np.array([np.pi / 3, 2 * np.pi / 3, np.pi / 12])
+    by_degrees = spec.accommodation(law, 1e-4, incidence_deg=[30, -30, 75])
+    by_angles = spec.accommodation(law, 1e-4, theta)
+    assert np.allclose(by_degrees.theta, theta, rtol=1e-15)
+    assert by_angles.incidence_deg == pytest.approx([30.0, -30.0, 75.0])
+    for name in ("tangential_at", "normal_at"):
+        assert np.allclose(getattr(by_degrees, name), getattr(by_angles, name), rtol=1e-6)
+    if isinstance(law, ker.PolygonLaw):
+        # a ray with theta < pi/2 moves to the left
+        assert abs(by_degrees.tangential_at[0] - by_degrees.tangential_at[1]) > 0.1
+
+
+@pytest.mark.parametrize("law", [ker.maxwell(0.25), ker.CircularArcLaw(1.2), ker.WallLaw(geo.dispersing_arcs(0.01)),
+                                 ker.TriangularTeethLaw(0.7)], ids=repr)  # fmt: skip
+def test_at_normal_incidence_only_the_normal_coefficient_is_defined(law):
+    found = spec.accommodation(law, 1e-4, incidence_deg=[0.0, 45.0])
+    assert np.isnan(found.tangential_at[0]) and np.isinf(found.tangential_errors[0]) and found.tangential_missed[0]
+    expected = (1.0 - float(law.apply(np.sin, np.pi / 2))) / (1.0 - np.pi / 4)
+    assert abs(found.normal_at[0] - expected) <= found.normal_errors[0] + 1e-7
+    # the other angle does not suffer
+    alone = spec.accommodation(law, 1e-4, incidence_deg=45.0)
+    assert found.tangential_at[1] == pytest.approx(alone.tangential_at[0], rel=1e-4)
+    assert found.tangential_missed[1] == alone.tangential_missed[0] and not found.normal_missed[0]
+
+
+def test_incidence_from_thirty_degrees_on_keeps_relative_accuracy_for_shallow_walls():
+    wall = geo.dispersing_arcs(1e-4)
+    found = spec.accommodation(ker.WallLaw(wall), 1e-6, incidence_deg=[0, 30, 60])
+    assert np.all(found.tangential_errors[1:] < 1e-6 * found.tangential_at[1:])
+    assert np.all(found.normal_errors < 1e-6 * np.abs(found.normal_at))
+    # sigma_t is 4 E sin(slope)^2 for the leading order
+    assert found.tangential_at[1:] == pytest.approx(4 * float(spec.mean_squared_slope(wall)), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "words"),
+    [
+        ([0, 90], "-90, 90"),
+        ([-120.0], "-90, 90"),
+        ([], "at least one angle"),
+        ([np.nan], "incidence_deg"),
+        (np.degrees(np.arccos(np.pi / 4)), "take one beside it"),
+    ],
+)
+def test_degrees_that_are_no_incidence_are_refused(degrees, words):
+    with pytest.raises(InputError, match=words) as reason:
+        spec.accommodation(ker.lambertian(), incidence_deg=degrees)
+    assert str(reason.value).startswith("incidence_deg: ")
+
+
+def test_angles_are_given_in_one_way():
+    with pytest.raises(InputError, match="either this or theta"):
+        spec.accommodation(ker.lambertian(), theta=1.0, incidence_deg=30.0)
+    with pytest.raises(InputError, match=r"^incidence_deg: expected none"):
+        spec.accommodation(ker.HemisphereLaw(ker.lambertian()), incidence_deg=30.0)
 
 
 def test_the_default_angles_are_far_from_the_poles():

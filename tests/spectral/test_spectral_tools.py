@@ -181,6 +181,68 @@ def test_the_text_of_a_diffusivity_says_that_it_is_a_slope_and_from_where_on():
     assert abs(np.mean(np.tan(angle) / np.tan(outgoing))) < 0.1
 
 
+def test_a_diffusivity_whose_logarithm_begins_far_out_warns_and_one_at_hand_does_not():
+    for radius in (1.0, 1e-6):
+        with pytest.warns(UserWarning, match=r"beyond 1000 r only.*channel_diffusivity\(law, lengths\)"):
+            found = spec.diffusivity(ker.CircularArcLaw(0.001), radius=radius)
+        assert "L beyond 2000 r at least, the same for all walls that turn grazing flights" in repr(found)
+        assert np.isfinite(spec.diffusivity(ker.CircularArcLaw(0.05), radius=radius).onset)
+    assert "the same for all walls" not in str(spec.diffusivity(ker.maxwell(0.5)))
+    assert spec.sweep(ker.CircularArcLaw, {"half_angle": [0.001]}, "eta", progress=False).rows[0].value == 1.0
+
+
+def mean_exit_time(length):
+    """Of particles from a diffuse wall at 0 until they leave (-length, length) in a channel of width 1, at speed 1.
+
+    T(x) = the mean time to the next wall or end + the integral of T(y)/2 (1 + (x - y)^2)^(-3/2).
+    """
+    unit, weight = np.polynomial.legendre.leggauss(801)
+    x, weight = length * unit, length * weight
+    to_next = np.full(x.size, 0.5 * np.pi)
+    for distance in (length - x, length + x):
+        to_next += 0.25 * distance * np.log1p(distance**-2.0) - 0.5 * np.arctan(1.0 / distance)
+    kernel = 0.5 * (1.0 + (x - x[:, None]) ** 2) ** -1.5 * weight
+    return np.linalg.solve(np.eye(x.size) - kernel, to_next)[400]
+
+
+def test_diffuse_channels_have_the_mean_exit_times_of_an_integral_equation_in_95_percent():
+    lengths = [0.25, 2.0, 10.0]
+    exact = np.array([mean_exit_time(length) for length in lengths])
+    inside = []
+    for seed in range(20):
+        found = spec.channel_diffusivity(ker.lambertian(), lengths, 1000, seed, radius=0.5)
+        inside.append(np.abs(found.times - exact) <= found.time_errors)
+        assert np.allclose(found.values, 0.5 * found.lengths**2 / found.times)
+        assert np.all(np.abs(found.errors / found.values - found.time_errors / found.times) < 1e-14)
+    assert np.all(np.sum(inside, axis=0) >= 17)
+
+
+def test_the_diffusivity_of_channels_grows_by_half_of_the_slope():
+    found = spec.channel_diffusivity(ker.lambertian(), [20.0, 200.0], rng=2)
+    slope = 2.0 * (found.values[1] - found.values[0]) / np.log(10.0)
+    assert abs(slope - float(spec.diffusivity(ker.lambertian()))) < 2.0 * found.errors.sum() / np.log(10.0) + 0.05
+    assert found.onset < 20.0 and "at L = 200; logarithmic in L well above 3.2" in repr(found)
+
+
+def test_the_diffusivity_of_one_length_scales_with_radius_and_speed():
+    first = spec.channel_diffusivity(ker.CircularArcLaw(0.3), 5.0, 50, 1)
+    second = spec.channel_diffusivity(ker.CircularArcLaw(0.3), [10.0], 50, 1, radius=2.0, speed=4.0)
+    assert second.values == pytest.approx(8.0 * first.values) and second.onset == pytest.approx(2.0 * first.onset)
+
+
+def test_a_channel_whose_slope_is_refused_has_times_all_the_same():
+    """Every particle keeps its angle to the wall until it leaves."""
+    law = 0.5 * ker.specular() + 0.5 * ker.retroreflection()
+    found = spec.channel_diffusivity(law, [1.0, 2.0], 200, 3)
+    assert found.onset == np.inf and np.all(found.times > 0.0) and "well above inf" not in repr(found)
+
+
+@pytest.mark.parametrize("lengths", [[], [0.0], [-1.0], [2.0, 1.0], [1.0, np.inf], [np.nan]])
+def test_lengths_of_channels_that_do_not_increase_from_above_zero_are_refused(lengths):
+    with pytest.raises(InputError, match=r"^lengths: expected "):
+        spec.channel_diffusivity(ker.lambertian(), lengths)
+
+
 # without a closed form
 TWO_DEPTHS = geo.Wall.from_vertices([(0, 0), (0, -0.3), (0.4, -0.3), (0.4, -0.7), (0.9, -0.7), (0.9, 0), (1, 0)])
 
@@ -203,6 +265,7 @@ def test_walls_that_keep_the_sine_of_every_angle_have_no_diffusivity(law):
         spec.diffusivity(law)
 
 
+@pytest.mark.filterwarnings("ignore:diffusivity:UserWarning")
 def test_half_rectangular_teeth_in_a_diffuse_wall_have_the_mean_of_their_diffusivities():
     """Between two diffuse reflections d is kept, so eta is the mean of (2 + c)/(2 - c) for c = 1 - q, uniform."""
     found = spec.diffusivity(0.5 * ker.RectangularTeethLaw(1.0) + 0.5 * ker.lambertian())

@@ -1,8 +1,8 @@
-"""Tables in Markdown and HTML, and text that pictures show as it is."""
+"""Tables in Markdown, HTML and CSV, and text that pictures show as it is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 
 
@@ -26,6 +26,18 @@ def table_lines(heads: str, rows: Iterable[str | Iterable[object]]) -> Iterator[
 def table(heads: str, rows: Iterable[str | Iterable[object]]) -> str:
     """The whole table as one text; see `table_lines`."""
     return "\n".join(table_lines(heads, rows))
+
+
+def numbers_as_csv(comments: Iterable[str], rows: Iterable[Sequence[float]]) -> str:
+    """Lines of numbers, each as short as it is exact, below comments that begin with #.
+
+    Examples
+    --------
+    >>> numbers_as_csv(["radians"], [[0.1, 1.0]])
+    '# radians\\n0.1,1.0\\n'
+    """
+    lines = [f"# {' '.join(comment.split())}" for comment in comments]
+    return "\n".join([*lines, *(",".join(map(repr, row)) for row in rows), ""])
 
 
 def verbatim(text: str) -> str:

@@ -10,8 +10,8 @@ from ..core.errors import AsperityError
 from ..core.estimates import Estimate, estimate_as_dict, finite, rounded
 from ..geometry import Wall
 from ..kernels import Law
-from ..spectral import SpectralGap, Spectrum, diffusivity, mean_squared_slope
-from ..spectral.consequences.diffusion import Diffusivity
+from ..spectral import SpectralGap, Spectrum, mean_squared_slope
+from ..spectral.consequences.diffusion import Diffusivity, logarithmic_slope
 from ..spectral.consequences.mixing import relaxation_time, slem_from_gap
 
 
@@ -89,7 +89,7 @@ def consequences_of(
     modulus_gap, diffusion, refusal = _modulus_gap(gap, specular_gap, found), None, ""
     slem, time = (modulus_gap and derived(modulus_gap) for derived in (slem_from_gap, relaxation_time))
     try:
-        diffusion = diffusivity(law)
+        diffusion = logarithmic_slope(law, 1.0, 1.0, "mirror")
     except AsperityError as reason:
         refusal = str(reason)
     return Consequences(slem, time, diffusion, mean_squared_slope(wall), refusal)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from textwrap import shorten
 from typing import Any
+
+import numpy as np
 
 from ..core.estimates import Estimate, compact, estimate_as_dict, finite, rounded
 from ..core.version import __version__
@@ -12,9 +15,11 @@ from ..geometry import Wall
 from ..kernels import KernelMatrix
 from ..spectral import SpectralGap
 from ..spectral.bounds.enclosure import Enclosures
+from ..spectral.consequences.momentum_accommodation import Accommodation
 from ..spectral.plotting import CONVENTIONS
 from .result import StudyResult, TracerCheck
 
+AVERAGES = ("tangential", "normal", "maxwell_fraction", "misfit")
 # Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
 KAC_Z = 4.5
 # Characters; the detailed report has the whole reason.
@@ -127,6 +132,29 @@ def details_of(study: StudyResult) -> str:
     return "\n".join(
         f"{'' if number else title:11s}{line}" for title, lines in blocks.items() for number, line in enumerate(lines)
     )
+
+
+def accommodation_as_dict(found: Accommodation) -> dict[str, Any]:
+    """Plain values; a coefficient that is not defined is None."""
+    averages = {name: estimate_as_dict(getattr(found, name)) for name in AVERAGES}
+    columns = found.incidence_deg, found.tangential_at, found.tangential_errors, found.normal_at, found.normal_errors
+    names = "incidence_deg", "tangential", "tangential_error", "normal", "normal_error"
+    rows = [dict(zip(names, map(finite, row), strict=True)) for row in np.transpose(columns).tolist()]
+    return {**averages, "at": rows, "kind_at": found.kind_at}
+
+
+def accommodation_as_text(found: Accommodation) -> str:
+    """The coefficients on average, the nearest Maxwell law, and the coefficients at each angle."""
+    lines = [
+        f"tangential {found.tangential}, normal {found.normal}",
+        f"nearest Maxwell law: fraction {found.maxwell_fraction}, misfit {found.misfit}",
+    ]
+    tangential = zip(found.tangential_at, found.tangential_errors, strict=True)
+    normal = zip(found.normal_at, found.normal_errors, strict=True)
+    for degrees, *pair in zip(found.incidence_deg, tangential, normal, strict=True):
+        words = ["not defined" if math.isnan(one[0]) else compact(Estimate(*one, found.kind_at, "")) for one in pair]
+        lines.append(f"at {degrees:.6g} degrees: tangential {words[0]}, normal {words[1]}")
+    return "\n".join(f"{'' if k else 'momentum':11s}{line}" for k, line in enumerate(lines))
 
 
 def _tracer_lines(tracer: TracerCheck) -> list[str]:

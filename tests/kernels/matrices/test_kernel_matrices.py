@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity import kernels as ker
-from asperity.errors import InputError
+from asperity.errors import FileExistsRefusal, InputError
 from asperity.estimates import Estimate
 from asperity.kernels.matrices.matrix import frobenius_error
 
@@ -166,6 +166,34 @@ def test_files_keep_every_field_to_the_last_bit(matrix: ker.KernelMatrix, tmp_pa
         else:
             assert before == after
     assert repr(loaded) == repr(matrix)
+
+
+@pytest.mark.parametrize("frame", ["paper", "specular"])
+def test_a_csv_has_the_probabilities_between_the_edges_of_its_bins(frame: str, tmp_path: Path) -> None:
+    law = ker.maxwell(0.25) if frame == "paper" else ker.maxwell(0.25).in_specular_frame()
+    matrix = ker.discretise(law, ker.Bins([0.0, 0.5, 2.0, np.pi]))
+    path = matrix.save(tmp_path / "kernel.csv")
+    numbers = np.loadtxt(path, delimiter=",")
+    edges = matrix.basis.edges
+    assert np.array_equal(numbers[:2], [[0.0, 0.0, *edges[:-1]], [0.0, 0.0, *edges[1:]]])
+    assert np.array_equal(numbers[2:, :2], np.transpose([edges[:-1], edges[1:]]))
+    assert np.array_equal(numbers[2:, 2:], matrix.array)
+    header = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    same = {"paper": "retroreflection", "specular": "specular reflection"}[frame]
+    assert f"# convention of '{frame}': theta_out = theta_in is {same}" in header
+    assert f"# frobenius_error: {float(matrix.error)}" in header
+
+
+def test_a_csv_replaces_no_file_unasked_and_needs_bins(tmp_path: Path) -> None:
+    path = stochastic(2, np.random.default_rng(0)).save(tmp_path / "kernel.csv")
+    with pytest.raises(FileExistsRefusal):
+        stochastic(3, np.random.default_rng(0)).save(path)
+    assert np.loadtxt(path, delimiter=",").shape == (4, 4)
+    stochastic(3, np.random.default_rng(0)).save(path, overwrite=True)
+    assert np.loadtxt(path, delimiter=",").shape == (5, 5)
+    with pytest.raises(InputError, match="has no bins"):
+        ker.discretise(ker.lambertian(), ker.Legendre(3)).save(tmp_path / "legendre.csv")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["kernel.csv"]
 
 
 def test_a_path_is_used_as_it_stands(tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""Laws on the half sphere of velocities of walls with grooves, from planar laws."""

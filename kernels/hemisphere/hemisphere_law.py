@@ -1,0 +1,396 @@
+"""The law of a wall with grooves on the half sphere of velocities, and sums and products of such laws."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.checks import Floats, Rng, finite_number, foreign, frozen, generator, instance, shaped, whole_number
+from ...core.errors import InputError
+from ...core.estimates import ErrorKind, Estimate
+from ...core.rounding import EPS
+from ..bases.angles import clipped_inside
+from ..bases.basis import Basis
+from ..bases.given import seed_by_name
+from ..bases.legendre import Legendre
+from ..bases.zernike import Zernike
+from ..discretisation.discretisation import discretise
+from ..laws.law import Combination, Law, as_weight, drawn_terms, used_terms
+from ..laws.tensor_law import Discretiser, SpatialLaw
+from ..matrices.matrix import KernelMatrix, frobenius_error
+from .disc_matrices import in_the_plane, matrix_of_average, matrix_of_grooves
+
+# Ratio of the largest degree between the factors of a product to that of the matrix, and of the error that the limit on
+# the degree leaves to the change from half of it.
+BETWEEN_FACTORS, CHANGE = 2, 3.0
+
+# Weight, and the laws applied one after the other.
+Term: TypeAlias = "tuple[float, tuple[HemisphereLaw, ...]]"
+
+
+@dataclass(frozen=True)
+class AzimuthalBlock:
+    """The matrix of a rotation-invariant law on the Zernike functions of one azimuthal order.
+
+    Attributes
+    ----------
+    symmetric : array of shape (k, k)
+        <f_{n,m}, P f_{n',m}>, symmetric if the law is reversible. Read-only.
+    degrees : array of int, shape (k,)
+        n = m, m + 2, ..., at most the degree asked for.
+    order : int
+        m.
+    error : Estimate
+        The error in the operator norm, in value and half width: no eigenvalue of a symmetric matrix is wrong by more.
+    """
+
+    symmetric: Floats
+    degrees: NDArray[np.int64]
+    order: int
+    error: Estimate
+
+
+class DirectionLaw(SpatialLaw):
+    """A law of directions in three dimensions: a sum of products of laws of grooves.
+
+    Products are those of operators, ``first @ second``: after the first wall the particle crosses to the second with
+    its tangential velocity unchanged, as in a channel. A sum such as ``0.3 * H1 + 0.7 * H2`` reflects each particle by
+    one of the laws, and ``0.3 * H1`` need not have the sum 1 until it is used.
+    """
+
+    # A law is an operator, not an array: with None, numpy leaves ``np.float64(0.3) * H`` to this class.
+    __array_ufunc__ = None
+
+    @abstractmethod
+    def products(self) -> tuple[Term, ...]:
+        """(weight, laws applied one after the other), of which the law is the sum."""
+
+    @property
+    def parts(self) -> tuple[Term, ...]:
+        """The products; raises InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
+        return used_terms(self.products(), self)
+
+    @property
+    def rotation_invariant(self) -> bool:
+        """Whether every groove has a random direction."""
+        return all(law.orientation == "random" for _, laws in self.products() for law in laws)
+
+    @property
+    def reversible(self) -> bool | None:
+        """Whether the law is symmetric with respect to the cosine law; None if unknown.
+
+        Grooves of random direction are reversible with every reversible planar law P~: the mean of P~ J and of its
+        mirror image J P~ is symmetric.
+        """
+        palindromes = all(laws == laws[::-1] for _, laws in self.products())
+        known = all(
+            law.law.reversible if law.orientation == "random" else law.specular.reversible
+            for _, laws in self.products()
+            for law in laws
+        )
+        return True if palindromes and known else None
+
+    @seed_by_name
+    def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
+        """Draw an outgoing velocity for every incoming one, of the same speed.
+
+        Parameters
+        ----------
+        velocity : array_like of shape (..., 3)
+            Incoming velocities in any unit. The wall is the plane of the first two components, and the third, along
+            the outward normal, is negative.
+        rng : None, int or numpy.random.Generator
+
+        Returns
+        -------
+        array of shape (..., 3)
+            Outgoing velocities, with a positive third component.
+
+        Raises
+        ------
+        InputError
+            If the shape is wrong, a number is not finite or a third component is not negative.
+
+        Examples
+        --------
+        >>> from asperity import kernels as ker
+        >>> along_x = ker.HemisphereLaw(ker.retroreflection(), orientation=0.0)
+        >>> along_x.sample([[2.0, 3.0, -1.0]], rng=0).round(12).tolist()
+        [[2.0, -3.0, 1.0]]
+        """
+        incoming = shaped("velocity", velocity, "...", 3)
+        bad = np.argwhere(~(incoming[..., 2] < 0.0))
+        if bad.size:
+            raise InputError(
+                "velocity: expected incoming ones, with a negative component along the outward normal, the third, got "
+                f"{incoming[tuple(bad[0])].tolist()} at row {bad[0].tolist()} ({len(bad)} such)"
+            )
+        source, terms = generator(rng), self.parts
+        outgoing = incoming.reshape(-1, 3).copy()
+        chosen = drawn_terms(terms, outgoing.shape[:1], source)
+        for index, (_, laws) in enumerate(terms):
+            mine = np.flatnonzero(chosen == index)
+            for number, law in enumerate(laws):
+                # a wall on the other side of the channel
+                arriving = outgoing[mine] * [1.0, 1.0, -1.0 if number else 1.0]
+                outgoing[mine] = law.reflected(arriving, source)
+        return outgoing.reshape(incoming.shape)
+
+    def matrix(self, degree: int, m: int, **discretisation: Any) -> AzimuthalBlock:
+        r"""The block of azimuthal order m in the functions f_{n,m} = sqrt(n + 1) R_n^m(r) e^{i m phi}.
+
+        Parameters
+        ----------
+        degree : int
+            The largest degree n.
+        m : int
+            The order, from 0 to the degree. The block of -m is the same.
+        **discretisation
+            Keywords of `discretise` for the planar laws, such as ``tolerance``.
+
+        Returns
+        -------
+        AzimuthalBlock
+            A real matrix. The largest eigenvalue off the constants is a lower bound of the law's, but for the error.
+
+        Raises
+        ------
+        InputError
+            If a groove has a fixed direction, which couples different orders, or the order is above the degree.
+
+        Notes
+        -----
+        The entries need the planar matrix in polynomials of the same degree only and exact Gauss rules, so their error
+        is that of the planar matrix. The matrix of a product has polynomials of twice the degree between its factors;
+        an estimate of what this leaves out is added.
+
+        Examples
+        --------
+        >>> from asperity import kernels as ker
+        >>> block = ker.HemisphereLaw(ker.lambertian()).matrix(5, 1)
+        >>> block.degrees.tolist(), block.symmetric.diagonal().round(12).tolist()
+        ([1, 3, 5], [0.5, 0.25, 0.166666666667])
+        """
+        degree = whole_number("degree", degree, 0)
+        m = whole_number("m", m, 0, most=degree)
+        if not self.rotation_invariant:
+            raise InputError(
+                f"{self!r}: grooves of a fixed direction couple different orders; use "
+                f"ker.discretise(H, ker.Zernike({degree}))"
+            )
+        symmetric, error, kind = self.entries(degree, m, partial(discretise, **discretisation))
+        cosines = slice(symmetric.shape[0] // 2, None) if m else slice(None)
+        how = "error of the planar matrix, and of a product what polynomials between its factors leave out"
+        return AzimuthalBlock(
+            frozen(symmetric[cosines, cosines]), np.arange(m, degree + 1, 2), m, frobenius_error(error, kind, how)
+        )
+
+    def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
+        """The matrix in Zernike functions."""
+        instance("basis", basis, Zernike, "ker.Zernike(8) for a law of directions")
+        assert isinstance(basis, Zernike)
+        symmetric, error, kind = self.entries(basis.degree, None, discretise)
+        most = max(_between(basis.degree, laws) for _, laws in self.products())
+        total = frobenius_error(math.sqrt(most + 1.0) * error, kind, "error of the planar matrix on the disc")
+        return KernelMatrix(
+            symmetric, basis, total, method="quadrature", law=repr(self), reversible=self.reversible, frame="specular"
+        )
+
+    def entries(self, degree: int, order: int | None, discretise: Discretiser) -> tuple[Floats, float, ErrorKind]:
+        """The matrix in functions of degrees up to ``degree``, of one order or all, and its error as an operator.
+
+        Those of one order are sines, then cosines, by degree.
+        """
+        total, error, kinds = np.zeros(()), 0.0, set()
+        for weight, laws in self.parts:
+            most = _between(degree, laws)
+            degrees, orders = _functions(most, order)
+            planar = [discretise(law.specular, Legendre(most + 1)) for law in laws]
+            found = [law.on_disc(one.symmetric, degrees, orders) for law, one in zip(laws, planar, strict=True)]
+            product = _product(found, degrees <= degree, np.ones(degrees.size, dtype=bool))
+            wrong = math.prod(1.0 + float(one.error) for one in planar) - 1.0 + degrees.size * EPS
+            if len(laws) > 1:
+                coarser = _product(found, degrees <= degree, degrees <= max(degree, most // 2))
+                wrong += CHANGE * float(np.linalg.norm(product - coarser))
+            kinds |= {one.error.kind for one in planar} | ({"estimate"} if len(laws) > 1 else set())
+            total, error = total + weight * product, error + weight * wrong
+        if self.reversible:
+            total = 0.5 * (total + total.T)
+        return total, error, "bound" if kinds == {"bound"} else "estimate"
+
+    def __matmul__(self, other: DirectionLaw) -> DirectionLaw:
+        """This law, then the other."""
+        if not isinstance(other, DirectionLaw):
+            return foreign(other)
+        pairs = [(w * v, (*first, *second)) for w, first in self.products() for v, second in other.products()]
+        return HemisphereCombination(tuple(pairs))
+
+    def __rmul__(self, weight: float) -> DirectionLaw:
+        factor = as_weight(weight)
+        if factor is None:
+            return foreign(weight)  # type: ignore[no-any-return]
+        return HemisphereCombination(tuple((factor * own, laws) for own, laws in self.products()))
+
+    __mul__ = __rmul__
+
+    def __add__(self, other: DirectionLaw) -> DirectionLaw:
+        if not isinstance(other, DirectionLaw):
+            return foreign(other)
+        return HemisphereCombination(self.products() + other.products())
+
+
+@dataclass(frozen=True, repr=False)
+class HemisphereLaw(DirectionLaw):
+    r"""The law of velocities in space of a wall with grooves, whose cross section has a planar law.
+
+    A groove keeps the component b of the velocity along it. Across, it acts by the planar law on the direction in the
+    cross section, whose tangential component is a / sqrt(1 - b^2) for a particle of speed 1 with the component a across
+    the grooves. The law keeps the cosine law, which is the uniform measure on the disc of the tangential velocities
+    (v_x, v_y), and a smooth wall is the identity of this disc. In polar coordinates about the grooves the cosine law is
+    sin(theta) sin(psi)^2 d theta d psi: the law is that of `CollisionLaw`, without foreshortening.
+
+    Parameters
+    ----------
+    law : Law
+        The law of the cross section, in either convention.
+    orientation : float or "random"
+        Direction of the grooves in the plane of the wall, the angle with the x axis in radians; the cross section is
+        seen against the direction of the grooves, so that grooves along y (pi/2) have the wall's x along x.
+        ``"random"``: a direction that each particle finds at random, uniformly: an isotropic wall of patches of grooves
+        that are wide against the roughness.
+
+    Raises
+    ------
+    InputError
+        If the law is none or its weights do not sum to 1, or the orientation is no finite number and not "random".
+
+    Notes
+    -----
+    ``0.3 * H1 + 0.7 * H2`` is a mixture and ``H1 @ H2`` the product; see `DirectionLaw`.
+
+    Source: R. Feres and G. Yablonsky, Chemical Engineering Science 59 (2004) 1541, for grooves of arcs.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity import kernels as ker
+    >>> H = 0.25 * HemisphereLaw(ker.specular()) + 0.75 * HemisphereLaw(ker.lambertian())
+    >>> H.matrix(2, 0).symmetric.diagonal().round(12).tolist()
+    [1.0, 0.5]
+    """
+
+    law: Law
+    orientation: float | Literal["random"] = "random"
+
+    def __post_init__(self) -> None:
+        instance("law", self.law, Law, "ker.WallLaw(wall)")
+        if isinstance(self.law, Combination):
+            used_terms(self.law.terms, self.law)
+        if isinstance(self.orientation, str):
+            if self.orientation != "random":
+                raise InputError(f"orientation: expected an angle in radians or 'random', got {self.orientation!r}")
+        else:
+            object.__setattr__(self, "orientation", finite_number("orientation", self.orientation))
+
+    def products(self) -> tuple[Term, ...]:
+        """The only term, the law itself."""
+        return ((1.0, (self,)),)
+
+    @property
+    def specular(self) -> Law:
+        """The planar law in the specular frame, the convention of the disc."""
+        return self.law if self.law.frame == "specular" else self.law.in_specular_frame()
+
+    def on_disc(self, planar: Floats, degrees: NDArray[np.int64], orders: NDArray[np.int64]) -> Floats:
+        """The matrix in Zernike functions, from that of the planar law in Legendre polynomials."""
+        if isinstance(self.orientation, str):
+            return matrix_of_average(planar, degrees, orders)
+        return matrix_of_grooves(planar, degrees, orders, self.orientation)
+
+    def reflected(self, incoming: Floats, rng: np.random.Generator) -> Floats:
+        """`sample` for checked velocities of shape (n, 3)."""
+        # scaled, because products and sums of the largest doubles overflow
+        size = np.abs(incoming).max(axis=1, initial=0.0)[:, None]
+        x, y, down = (incoming / size).T
+        angle: Any = self.orientation
+        if isinstance(self.orientation, str):
+            angle = rng.uniform(0.0, 2.0 * np.pi, x.size)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        across, along = x * sine - y * cosine, x * cosine + y * sine
+        paper = self.law if self.law.frame == "paper" else self.law.in_specular_frame()
+        theta = paper.sample(clipped_inside(np.arctan2(-down, -across)), rng)
+        speed = np.hypot(across, down)
+        tangential = in_the_plane(speed * np.cos(theta), along, angle)
+        return np.asarray(size * np.column_stack([tangential, speed * np.sin(theta)]))
+
+    def __repr__(self) -> str:
+        angle = "" if isinstance(self.orientation, str) else f", orientation={self.orientation:.12g}"
+        return f"HemisphereLaw({self.law!r}{angle})"
+
+
+@dataclass(frozen=True, repr=False)
+class HemisphereCombination(DirectionLaw):
+    """A weighted sum of products of laws of grooves; made by ``0.3 * H1 + 0.7 * H2`` and ``H1 @ H2``.
+
+    Parameters
+    ----------
+    terms : tuple of (float, tuple of HemisphereLaw)
+        Weights, and laws applied one after the other.
+
+    Raises
+    ------
+    InputError
+        If a weight is not finite.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> rough = ker.HemisphereLaw(ker.lambertian())
+    >>> 0.5 * rough @ rough + 0.5 * ker.HemisphereLaw(ker.specular())
+    0.5*HemisphereLaw(lambertian()) @ HemisphereLaw(lambertian()) + 0.5*HemisphereLaw(specular())
+    """
+
+    terms: tuple[Term, ...]
+
+    def __post_init__(self) -> None:
+        for weight, _ in self.terms:
+            finite_number("weight", weight)
+
+    def products(self) -> tuple[Term, ...]:
+        """The terms."""
+        return self.terms
+
+    def __repr__(self) -> str:
+        factors = ("" if weight == 1.0 else f"{weight:.12g}*" for weight, _ in self.terms)
+        products = (" @ ".join(map(repr, laws)) for _, laws in self.terms)
+        return " + ".join(map("".join, zip(factors, products, strict=True)))
+
+
+def _between(degree: int, laws: Sequence[HemisphereLaw]) -> int:
+    """The largest degree between the factors of a product."""
+    return degree if len(laws) == 1 else BETWEEN_FACTORS * degree
+
+
+def _functions(degree: int, order: int | None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Degrees and orders of the Zernike functions, of one azimuthal order (sines, then cosines) or of all."""
+    if order is None:
+        every = Zernike(degree)
+        return every.degrees, every.orders
+    degrees = np.arange(order, degree + 1, 2)
+    signs = (-1, 1) if order else (1,)
+    return np.tile(degrees, len(signs)), np.repeat(order * np.array(signs), degrees.size)
+
+
+def _product(factors: Sequence[Floats], ends: NDArray[np.bool_], between: NDArray[np.bool_]) -> Floats:
+    """The product of matrices, restricted to ``between`` between its factors and to ``ends`` at both ends."""
+    product = np.eye(ends.size)[ends]
+    for number, factor in enumerate(factors):
+        product = (product * between if number else product) @ factor
+    return product[:, ends]

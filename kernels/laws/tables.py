@@ -1,0 +1,189 @@
+"""Inverse distribution functions of the outgoing angle on a grid of incoming angles and probabilities."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core.checks import Floats, Rng, angles, check_memory, frozen, generator, shortened, whole_number
+from ...core.errors import InputError
+from ...core.files import write_whole
+from ...core.tables import numbers_as_csv
+from ..bases.basis import Frame
+from ..bases.given import seed_by_name
+from ..bases.measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE
+from ..expectations.conditionals import Conditionals
+
+# Cells of equal angle whose masses give a distribution function: of coarse tables, and for each probability of others.
+LEAST_CELLS, CELLS_FOR_EACH = 512, 4
+# Probabilities at which a table is compared, for each of its own.
+COMPARED = 4
+# The quantile at 0 and at 1 is that at this distance from them: less is rounding of the masses.
+END = 1e-12
+# Incoming angles whose conditional distributions are in memory at a time.
+AT_ONCE = 32
+CONVENTIONS = {
+    "paper": "theta_out = theta_in is retroreflection, theta_out = pi - theta_in is specular reflection",
+    "specular": "theta_out = theta_in is specular reflection, theta_out = pi - theta_in is retroreflection",
+}
+
+# A law as a sum: weights, conditional distributions, and whether these consist of atoms.
+Parts: TypeAlias = Sequence[tuple[float, Callable[[Floats, float, int, Floats], Conditionals], bool]]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """The inverse distribution functions of a law on a grid, for other codes to interpolate.
+
+    Attributes
+    ----------
+    theta : array of shape (n_in,)
+        Incoming angles (i + 1/2) pi / n_in, radians. Retroreflection and specular reflection are linear in them.
+    probability : array of shape (n_out,)
+        Probabilities j / (n_out - 1).
+    quantile : array of shape (n_in, n_out)
+        Outgoing angles, radians: below ``quantile[i, j]`` the outgoing angle lies with ``probability[j]``, given
+        ``theta[i]``.
+    error : float
+        Mean error of the outgoing angle, radians: the difference from the law's own quantiles, integrated over the
+        probability and averaged over intermediate incoming angles with the weight sin(theta). It is an estimate, by
+        comparison with four times as many probabilities from cells half as wide. Add pi/2 times ``distribution_error``.
+    largest_error : float
+        The largest of the compared differences. Of a law with atoms, whose quantiles jump, it is up to the height of
+        a jump and does not decrease on finer grids; ``error`` does.
+    distribution_error : float
+        Error of the law's distribution functions, the largest at the grid's incoming angles; nan if the law does not
+        know it.
+    frame : {"paper", "specular"}
+        The convention.
+    law : str
+    """
+
+    theta: Floats
+    probability: Floats
+    quantile: Floats
+    error: float
+    largest_error: float
+    distribution_error: float
+    frame: Frame
+    law: str
+
+    @seed_by_name
+    def sample(self, theta: ArrayLike, rng: Rng = None) -> Floats:
+        """Draw one outgoing angle for every incoming angle from the table, by bilinear interpolation."""
+        source, incoming = generator(rng), angles("theta", theta)
+        return self._at(incoming, source.random(incoming.shape))
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """Write a file for other codes: .csv, or .npz, which has all attributes by their names.
+
+        In a .csv comments begin with #. The first row of numbers has 0 and the probabilities; each other row has an
+        incoming angle and its quantiles. An existing file is replaced only with ``overwrite``, when all is written.
+        """
+        target = Path(path)
+        if target.suffix.lower() == ".csv":
+            corner = np.concatenate(([0.0], self.probability))
+            rows = np.vstack([corner, np.column_stack([self.theta, self.quantile])])
+            write_whole(target, numbers_as_csv(self._header(), rows.tolist()), overwrite=overwrite)
+        elif target.suffix.lower() == ".npz":
+            content = {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}
+            content["header"] = np.array("\n".join(self._header()))
+            write_whole(target, lambda stream: np.savez_compressed(stream, **content), overwrite=overwrite)  # type: ignore[arg-type]
+        else:
+            raise InputError(f"path: expected a name that ends in .csv or .npz, got {shortened(str(path))}")
+        return target
+
+    def _header(self) -> list[str]:
+        n_in, n_out = self.quantile.shape
+        return [
+            f"asperity table 1: outgoing angles by incoming angle and probability of the law {json.dumps(self.law)}",
+            "unit: radians, in (0, pi), from the positive x-axis; theta_in of the reversed incoming velocity",
+            f"convention: {self.frame}; {CONVENTIONS[self.frame]}",
+            f"rows: theta_in = (i + 1/2) pi / {n_in}, i = 0 .. {n_in - 1}, equal steps of the angle",
+            f"columns: theta_in, then quantiles for p = j / {n_out - 1}, j = 0 .. {n_out - 1}; first row: 0, then p",
+            f"error of bilinear interpolation, estimated: {self.error:.3g} mean, {self.largest_error:.3g} largest",
+            f"error of the distribution functions: {self.distribution_error:.3g}",
+        ]
+
+    def _at(self, theta: Floats, probability: Floats) -> Floats:
+        """Quantiles by bilinear interpolation, continued linearly beyond the outer incoming angles."""
+        n_in, n_out = self.quantile.shape
+        row, column = theta * (n_in / np.pi) - 0.5, probability * (n_out - 1)
+        i = np.clip(row.astype(np.intp), 0, n_in - 2)
+        j = np.clip(column.astype(np.intp), 0, n_out - 2)
+        s, t = row - i, column - j
+        low = (1.0 - t) * self.quantile[i, j] + t * self.quantile[i, j + 1]
+        high = (1.0 - t) * self.quantile[i + 1, j] + t * self.quantile[i + 1, j + 1]
+        return np.asarray(np.clip((1.0 - s) * low + s * high, SMALLEST_ANGLE, LARGEST_ANGLE))
+
+
+def tabulated(parts: Parts, n_in: int, n_out: int, tolerance: float, frame: Frame, law: str) -> Table:
+    """The table of a law, compared with its quantiles at intermediate incoming angles."""
+    rows, columns = whole_number("n_in", n_in, 2), whole_number("n_out", n_out, 2)
+    check_memory("n_in, n_out", "the table", 2 * COMPARED * rows * columns)
+    cells = max(LEAST_CELLS, CELLS_FOR_EACH * columns)
+    theta = np.asarray((np.arange(rows) + 0.5) * (np.pi / rows))
+    probability = np.asarray(np.linspace(0.0, 1.0, columns), dtype=np.float64)
+    quantile, missed = _quantiles(parts, theta, probability, tolerance, cells)
+    unchecked = Table(frozen(theta), frozen(probability), frozen(quantile), 0.0, 0.0, missed, frame, law)
+    # the middle between neighbours, and the outer half cells, whose quantiles are extrapolated
+    between = np.concatenate(([0.25], np.arange(1, rows), [rows - 0.25])) * (np.pi / rows)
+    fine = (np.arange(COMPARED * (columns - 1)) + 0.5) / (COMPARED * (columns - 1))
+    own, _ = _quantiles(parts, between, fine, tolerance, 2 * cells)
+    difference = np.abs(unchecked._at(*np.broadcast_arrays(between[:, None], fine)) - own)
+    mean = float(np.average(difference.mean(axis=1), weights=SINE.density(between)))
+    return Table(
+        unchecked.theta, unchecked.probability, unchecked.quantile, mean, float(difference.max()), missed, frame, law
+    )
+
+
+def _quantiles(parts: Parts, theta: Floats, probability: Floats, tolerance: float, cells: int) -> tuple[Floats, float]:
+    """Quantiles, shape (angles, probabilities), and the largest error of the distribution functions."""
+    edges, at = np.linspace(0.0, np.pi, cells + 1), np.clip(probability, END, 1.0 - END)
+    found, missed = np.empty((theta.size, at.size)), 0.0
+    for start in range(0, theta.size, AT_ONCE):
+        chosen = theta[start : start + AT_ONCE]
+        smooth, error = np.zeros((chosen.size, cells)), np.zeros(chosen.size)
+        atoms: list[tuple[float, Conditionals]] = []
+        for weight, conditionals, atomic in parts:
+            each = conditionals(chosen, tolerance, 0, edges[1:-1])
+            error += weight * each.error
+            if atomic:
+                atoms.append((weight, each))
+            else:
+                smooth += weight * each.masses(edges)
+        mixed = Conditionals.mixed(atoms) if atoms else None
+        for k, masses in enumerate(smooth):
+            own = slice(0, 0) if mixed is None else slice(*mixed.starts[k : k + 2])
+            nodes, weights = (np.empty(0), np.empty(0)) if mixed is None else (mixed.nodes[own], mixed.weights[own])
+            found[start + k] = _inverted(edges, masses, nodes, weights, at)
+        missed = float(np.maximum(missed, error.max()))
+    return np.clip(found, SMALLEST_ANGLE, LARGEST_ANGLE), missed
+
+
+def _inverted(edges: Floats, masses: Floats, nodes: Floats, weights: Floats, probability: Floats) -> Floats:
+    """Quantiles of a distribution with masses spread evenly over cells, and atoms, at which quantiles stay constant.
+
+    Examples
+    --------
+    >>> _inverted(np.array([0.0, 1.0, 2.0]), np.array([0.5, 0.0]), np.array([1.5]), np.array([0.5]),
+    ...           np.array([0.25, 0.6, 0.9])).tolist()
+    [0.5, 1.5, 1.5]
+    """
+    order = np.argsort(nodes, kind="stable")
+    angle = np.concatenate([edges, np.repeat(nodes[order], 2)])
+    below = np.interp(angle, edges, np.concatenate(([0.0], np.cumsum(masses))))
+    after = np.concatenate(([0.0], np.cumsum(weights[order])))
+    # of an edge the atoms to its left; an atom occurs twice, without its own weight and with it
+    left = np.searchsorted(nodes[order], edges, side="right")
+    number = np.concatenate([left, np.arange(2 * order.size) // 2 + np.tile([0, 1], order.size)])
+    distribution = below + after[number]
+    sorting = np.lexsort((distribution, angle))
+    distribution = np.maximum.accumulate(distribution[sorting])
+    return np.asarray(np.interp(probability * distribution[-1], distribution, angle[sorting]))

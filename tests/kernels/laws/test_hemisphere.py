@@ -1,0 +1,303 @@
+"""Laws on the half sphere of velocities: closed forms, invariants, and rays in three dimensions."""
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import AccuracyError, InputError
+
+RNG = 20_260_401
+ROUGH, SMOOTH, RETRO = (ker.HemisphereLaw(law) for law in (ker.lambertian(), ker.specular(), ker.retroreflection()))
+ARCS = ker.HemisphereLaw(ker.CircularArcLaw(1.2))
+# Not mirror-symmetric: its planar law is reversible in the paper's convention only.
+LEANING = ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)]))
+LARGEST_Z = 4.5
+
+
+def cosine_law(rng, count):
+    """Incoming velocities of speed 1: uniform on the disc of tangential velocities."""
+    radius, phi = np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
+    return np.column_stack([radius * np.cos(phi), radius * np.sin(phi), -np.sqrt(1 - radius**2)])
+
+
+def z_score(values, wanted):
+    return (np.mean(values) - wanted) / (np.std(values) / np.sqrt(len(values)) + 1e-15)
+
+
+def correlations(incoming, outgoing, basis):
+    """Products f_i(v) f_i(v') of each function of a basis, shape (samples, size)."""
+    return basis.evaluate(incoming[:, :2]) * basis.evaluate(outgoing[:, :2])
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 5])
+def test_lambertian_grooves_of_random_direction_have_the_eigenvalue_of_the_degree(order):
+    block = ROUGH.matrix(13, order)
+    np.testing.assert_array_equal(block.degrees, np.arange(order, 14, 2))
+    np.testing.assert_allclose(block.symmetric, np.diag(1 / (block.degrees + 1)), atol=1e-14)
+    assert block.error.value < 1e-12
+
+
+def test_zernike_functions_are_orthonormal_and_those_of_low_degree_are_known():
+    basis = ker.Zernike(9)
+    np.testing.assert_allclose(basis.project(lambda at: np.ones(at.shape[:-1])), basis.constant, atol=1e-14)
+    coefficients = [basis.project(lambda at, i=i: basis.evaluate(at)[..., i]) for i in range(basis.size)]
+    np.testing.assert_allclose(coefficients, np.eye(basis.size), atol=1e-13)
+    x, y = np.array([[0.3, -0.9, 0.0], [0.2, 0.1, 0.0]])
+    square = x * x + y * y
+    known = [
+        np.ones(3), 2 * y, 2 * x, np.sqrt(6) * 2 * x * y, np.sqrt(3) * (2 * square - 1), np.sqrt(6) * (x * x - y * y),
+        np.sqrt(8) * (3 * x * x * y - y**3), np.sqrt(8) * (3 * square - 2) * y,
+    ]  # fmt: skip
+    np.testing.assert_allclose(basis.evaluate(np.stack([x, y], axis=-1))[:, :8], np.transpose(known), atol=1e-14)
+    coarse, embedding = basis.coarsened()
+    assert coarse == ker.Zernike(4) != basis and embedding.shape == (15, 55)
+
+
+@pytest.mark.parametrize("orientation", ["random", 0.4])
+def test_a_smooth_wall_is_the_identity(orientation):
+    law = ker.HemisphereLaw(ker.specular(), orientation)
+    matrix = ker.discretise(law, ker.Zernike(7))
+    np.testing.assert_allclose(matrix.symmetric, np.eye(36), atol=1e-14)
+    velocity = cosine_law(np.random.default_rng(RNG), 100)
+    np.testing.assert_allclose(law.sample(velocity, rng=0), velocity * [1, 1, -1], atol=1e-14)
+
+
+@pytest.mark.parametrize("orientation", [0.0, 0.7])
+def test_retroreflecting_grooves_of_a_fixed_direction_turn_the_velocity_across(orientation):
+    law = ker.HemisphereLaw(ker.retroreflection(), orientation)
+    along = np.array([np.cos(orientation), np.sin(orientation)])
+    turned = 2 * np.outer(along, along) - np.eye(2)
+    velocity = cosine_law(np.random.default_rng(RNG), 50)
+    outgoing = law.sample(velocity, rng=0)
+    np.testing.assert_allclose(outgoing[:, :2], velocity[:, :2] @ turned, atol=1e-14)
+    basis = ker.Zernike(5)
+    image = ker.discretise(law, basis).symmetric @ np.eye(basis.size)[:, 11]
+    np.testing.assert_allclose(
+        basis.evaluate(velocity[:, :2]) @ image, basis.evaluate(outgoing[:, :2])[:, 11], atol=1e-13
+    )
+
+
+def test_the_direction_of_a_leaning_profile_is_that_of_the_documentation():
+    """Grooves along y have the wall's x along x: against rays of the planar tracer."""
+    velocity = np.tile([0.3, 0.4, -0.5], (2000, 1))
+    outgoing = ker.HemisphereLaw(LEANING, np.pi / 2).sample(velocity, rng=RNG)
+    rays = geo.trace(
+        geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)]),
+        np.random.default_rng(RNG + 1).random(2000),
+        np.full(2000, np.arctan2(0.5, -0.3)),
+    )
+    across = np.hypot(0.3, 0.5) * np.cos(rays.theta)
+    spread = np.hypot(across.std(), outgoing[:, 0].std()) / np.sqrt(2000)
+    assert abs(outgoing[:, 0].mean() - across.mean()) < LARGEST_Z * spread
+    # leaning the other way the mean is another one
+    other = ker.HemisphereLaw(LEANING, -np.pi / 2).sample(velocity, rng=RNG)[:, 0]
+    assert abs(other.mean() - across.mean()) > 4 * LARGEST_Z * spread
+
+
+@pytest.mark.parametrize("law", [ARCS, ker.HemisphereLaw(LEANING), 0.5 * ARCS + 0.5 * ROUGH])
+def test_laws_of_random_direction_are_symmetric_and_contract(law):
+    assert law.reversible and law.rotation_invariant
+    matrix = ker.discretise(law, ker.Zernike(6), tolerance=1e-6)
+    np.testing.assert_allclose(matrix.symmetric, matrix.symmetric.T, atol=1e-15)
+    np.testing.assert_allclose(matrix.symmetric[0], np.eye(28)[0], atol=1e-6)
+    assert np.abs(np.linalg.eigvalsh(matrix.symmetric)).max() < 1 + 1e-6
+    # the blocks of the orders are those of the whole matrix, once for the sines and once for the cosines
+    for order in (0, 1, 4):
+        block = law.matrix(6, order, tolerance=1e-6)
+        for sign in {order, -order}:
+            here = matrix.basis.orders == sign
+            np.testing.assert_allclose(matrix.symmetric[np.ix_(here, here)], block.symmetric, atol=1e-14)
+
+
+def test_a_law_given_in_the_other_convention_is_the_same_law():
+    planar = ker.CircularArcLaw(1.2)
+    both = [ker.HemisphereLaw(law).matrix(4, 2, tolerance=1e-8) for law in (planar, planar.in_specular_frame())]
+    np.testing.assert_array_equal(both[0].symmetric, both[1].symmetric)
+    velocity = cosine_law(np.random.default_rng(RNG), 50)
+    first, second = (
+        ker.HemisphereLaw(law, 0.3).sample(velocity, rng=1) for law in (planar, planar.in_specular_frame())
+    )
+    np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("law", [ARCS, ker.HemisphereLaw(LEANING, 0.7), 0.3 * ARCS + 0.7 * ROUGH, ROUGH @ RETRO])
+def test_samples_keep_the_cosine_law_the_speed_and_what_the_matrix_says(law):
+    rng, count = np.random.default_rng(RNG), 40_000
+    speed = np.exp(rng.normal(size=(count, 1)))
+    incoming = cosine_law(rng, count)
+    outgoing = law.sample(speed * incoming, rng=rng) / speed
+    np.testing.assert_allclose(np.sum(outgoing**2, axis=1), 1.0, rtol=1e-13)
+    assert np.all(outgoing[:, 2] > 0)
+    basis = ker.Zernike(3)
+    scores = [z_score(values, 0.0) for values in basis.evaluate(outgoing[:, :2])[:, 1:].T]
+    matrix = ker.discretise(law, basis, tolerance=1e-6).symmetric
+    scores += list(map(z_score, correlations(incoming, outgoing, basis).T, matrix.diagonal()))
+    assert np.abs(scores).max() < LARGEST_Z
+
+
+def test_grooves_of_a_fixed_direction_keep_the_velocity_along_them():
+    velocity = 3e5 * cosine_law(np.random.default_rng(RNG), 200)
+    outgoing = ker.HemisphereLaw(ker.CircularArcLaw(1.2), 0.7).sample(velocity, rng=2)
+    along = [np.cos(0.7), np.sin(0.7), 0.0]
+    np.testing.assert_allclose(outgoing @ along, velocity @ along, rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize("scale", [5e-324 / 0.5, 1e-300, 1e300, 1.7e308])
+def test_speeds_of_every_size_are_kept(scale):
+    outgoing = ARCS.sample(scale * np.array([[0.5, 0.7, -0.5]]), rng=0)
+    size = np.linalg.norm(outgoing / scale)
+    assert size == pytest.approx(np.linalg.norm([0.5, 0.7, 0.5]), rel=1e-12) or scale < 1e-307
+
+
+def semicircular_grooves(incoming, rng):
+    """Outgoing velocities of rays in space that meet half cylinders x^2 + z^2 = 1, z < 0, along y."""
+    velocity = incoming.copy()
+    at = np.column_stack([2 * rng.random(len(velocity)) - 1, np.zeros((len(velocity), 2))])
+    inside = np.arange(len(velocity))
+    while inside.size:
+        p, v = at[inside], velocity[inside]
+        a, half = v[:, 0] ** 2 + v[:, 2] ** 2, p[:, 0] * v[:, 0] + p[:, 2] * v[:, 2]
+        c = p[:, 0] ** 2 + p[:, 2] ** 2 - 1
+        p = p + ((-half + np.sqrt(np.maximum(half**2 - a * c, 0))) / a)[:, None] * v
+        hits = p[:, 2] < 0
+        inside, p, v = inside[hits], p[hits], v[hits]
+        normal = p * [1, 0, 1] / np.hypot(p[:, 0], p[:, 2])[:, None]
+        at[inside], velocity[inside] = p, v - 2 * np.sum(v * normal, axis=1)[:, None] * normal
+    return velocity
+
+
+def test_semicircular_grooves_agree_with_rays_in_three_dimensions():
+    rng = np.random.default_rng(RNG)
+    incoming = cosine_law(rng, 100_000)
+    outgoing = semicircular_grooves(incoming, rng)
+    law = ker.HemisphereLaw(ker.CircularArcLaw(np.pi / 2))
+    accommodated = 1 - 2 * np.sum(incoming[:, :2] * outgoing[:, :2], axis=1)
+    coefficients = spec.accommodation(law, tolerance=1e-6)
+    assert abs(z_score(accommodated, float(coefficients.tangential))) < LARGEST_Z
+    normal = 1 - 18 * (-incoming[:, 2] - 2 / 3) * (outgoing[:, 2] - 2 / 3)
+    assert abs(z_score(normal, float(coefficients.normal))) < LARGEST_Z
+    # all directions are alike for the mean over an order; those of a fixed direction are told apart
+    basis = ker.Zernike(4)
+    products = correlations(incoming, outgoing, basis)
+    fixed = ker.discretise(ker.HemisphereLaw(law.law, np.pi / 2), basis, tolerance=1e-6).symmetric.diagonal()
+    assert np.abs([z_score(*pair) for pair in zip(products.T, fixed, strict=True)]).max() < LARGEST_Z
+    for order in (0, 1, 2, 3):
+        for k, degree in enumerate(range(order, 5, 2)):
+            of_order = products[:, (np.abs(basis.orders) == order) & (basis.degrees == degree)].mean(axis=1)
+            wanted = law.matrix(4, order, tolerance=1e-6).symmetric[k, k]
+            assert abs(z_score(of_order, wanted)) < LARGEST_Z
+
+
+def test_tangential_accommodation_is_half_the_planar_one():
+    found = spec.accommodation(ARCS)
+    assert float(found.tangential) == pytest.approx(0.663779, abs=5e-7)
+    planar = spec.accommodation(ARCS.law)
+    assert float(found.tangential) == pytest.approx(0.5 * float(planar.tangential), abs=1e-12)
+    assert found.tangential.error == pytest.approx(0.5 * planar.tangential.error, rel=1e-6)
+    assert 1 - ARCS.matrix(1, 1).symmetric[0, 0] == pytest.approx(float(found.tangential), abs=1e-9)
+    mixture = spec.accommodation(0.25 * SMOOTH + 0.75 * RETRO)
+    assert [float(x) for x in (mixture.tangential, mixture.normal)] == pytest.approx([0.75, 0.0], abs=1e-13)
+    assert float(mixture.maxwell_fraction) == pytest.approx(0.675, abs=1e-13)
+
+
+def test_normal_accommodation_of_lambertian_grooves_is_that_of_one_integral():
+    b, weight = np.polynomial.legendre.leggauss(60)
+    # E[v_n' | b] = pi sqrt(1 - b^2)/4, and v_n' is independent of v_n given b
+    correlation = np.sum(weight * 2 / np.pi * np.sqrt(1 - b * b) * (np.pi / 4) ** 2 * (1 - b * b))
+    wanted = 1 - 18 * (correlation - 4 / 9)
+    assert float(spec.accommodation(ROUGH).normal) == pytest.approx(wanted, abs=1e-5)
+
+
+def test_the_matrix_of_a_product_is_the_product_where_polynomials_are_kept_and_near_it_elsewhere():
+    lambertian = ROUGH.matrix(6, 2).symmetric
+    np.testing.assert_allclose((ROUGH @ ROUGH).matrix(6, 2).symmetric, lambertian @ lambertian, atol=1e-14)
+    product, arcs = (ARCS @ ROUGH).matrix(6, 2, tolerance=1e-8), ARCS.matrix(6, 2, tolerance=1e-8)
+    np.testing.assert_allclose(product.symmetric, arcs.symmetric @ lambertian, atol=1e-8)
+    twice, finer = (law.matrix(degree, 1, tolerance=1e-6) for law, degree in ((ARCS @ ARCS, 3), (ARCS, 17)))
+    wanted = (finer.symmetric @ finer.symmetric)[:2, :2]
+    assert np.linalg.norm(twice.symmetric - wanted, 2) <= twice.error.value < 0.02
+    assert (ARCS @ ROUGH).reversible is None and (ROUGH @ ARCS @ ROUGH).reversible
+
+
+def test_one_fixed_direction_is_a_planar_product():
+    planar = ker.henyey_greenstein(0.5)
+    twice = ker.HemisphereLaw(planar, 0.3) @ ker.HemisphereLaw(planar, 0.3)
+    composed = planar.in_specular_frame() @ planar.in_specular_frame()
+    found, wanted = (ker.discretise(law, ker.Zernike(5)).symmetric for law in (twice, ker.HemisphereLaw(composed, 0.3)))
+    np.testing.assert_allclose(found, wanted, atol=1e-8)
+
+
+def test_gaps_are_between_half_the_planar_gap_and_the_quotients_of_polynomials():
+    assert float(spec.spectral_gap(ROUGH)) == pytest.approx(0.5, abs=1e-13)
+    mixture = spec.spectral_gap(0.3 * ROUGH + 0.7 * SMOOTH)
+    assert float(mixture) == pytest.approx(0.15, abs=1e-12) and mixture.verdict == "isolated"
+    coarse = spec.spectral_gap(ARCS, tolerance=3e-3)
+    assert coarse.verdict == "isolated" and coarse.convention == "specular"
+    # with degree 32
+    assert abs(float(coarse) - 0.57755) < coarse.error
+    top = np.linalg.eigvalsh(ARCS.matrix(17, 1, tolerance=1e-6).symmetric)[-1]
+    assert float(coarse) - coarse.error < 1 - top <= float(coarse) + 1e-6
+    # half the planar gap is attained: scattering forward has the eigenfunction cos(theta)
+    scattering = spec.spectral_gap(ker.HemisphereLaw(ker.henyey_greenstein(-0.5)))
+    assert scattering.value == pytest.approx(0.25, abs=1e-9)
+
+
+def test_grooves_of_one_direction_have_no_gap_and_those_of_two_may():
+    fixed = ker.HemisphereLaw(ker.lambertian(), 0.3)
+    assert spec.spectral_gap(fixed).verdict == "no gap" == spec.spectral_gap(fixed @ fixed).verdict
+    crossed = 0.5 * ker.HemisphereLaw(ker.lambertian(), 0.0) + 0.5 * ker.HemisphereLaw(ker.lambertian(), np.pi / 2)
+    found = spec.spectral_gap(crossed)
+    assert found.verdict == "undecided"
+    # two projections: 1 - (1 + cosine of their angle)/2, where the maximal correlation of x and y on the disc is that
+    # of x^2 and y^2, 1/3
+    assert found.value == pytest.approx(1 / 3, abs=1e-9)
+
+
+def test_the_matrix_of_a_law_of_directions_is_saved_and_has_a_spectrum(tmp_path):
+    matrix = ker.discretise(ROUGH, ker.Zernike(4))
+    restored = ker.load_matrix(matrix.save(tmp_path / "disc.npz"))
+    np.testing.assert_array_equal(restored.symmetric, matrix.symmetric)
+    assert restored.basis == matrix.basis and restored.frame == "specular"
+    np.testing.assert_allclose(spec.spectrum(matrix, k=4).values, [1, 1 / 2, 1 / 2, 1 / 3], atol=1e-13)
+    assert (matrix @ (lambda at: at[..., 0])) == pytest.approx(0.5 * matrix.basis.project(lambda at: at[..., 0]))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: ker.HemisphereLaw(geo.flat()), "law: expected a Law"),
+        (lambda: ker.HemisphereLaw(0.5 * ker.lambertian()), "weights: expected a sum of 1"),
+        (lambda: ker.HemisphereLaw(ker.lambertian(), "along"), "orientation: expected an angle in radians or 'random'"),
+        (lambda: ker.HemisphereLaw(ker.lambertian(), np.nan), "orientation: expected finite"),
+        (lambda: ROUGH.sample([[0.0, 0.0, 1.0]]), r"incoming ones.*got \[0.0, 0.0, 1.0\] at row \[0\]"),
+        (lambda: ROUGH.sample([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0]]), r"at row \[1\]"),
+        (lambda: ROUGH.sample([[0.0, np.inf, -1.0]]), "velocity: expected finite"),
+        (lambda: ROUGH.sample([[0.0, -1.0]]), r"velocity: expected shape \(..., 3\)"),
+        (lambda: (0.5 * ROUGH).sample([[0.0, 0.0, -1.0]]), "weights: expected a sum of 1"),
+        (lambda: (2.0 * ROUGH + -1.0 * SMOOTH).matrix(2, 0), "weights: expected non-negative"),
+        (lambda: np.inf * ROUGH, "weight"),
+        (lambda: ROUGH.matrix(2, 3), "m: expected a whole number from 0 to 2"),
+        (lambda: ROUGH.matrix(-1, 0), "degree"),
+        (lambda: ker.HemisphereLaw(ker.lambertian(), 0.1).matrix(4, 1), r"use ker.discretise\(H, ker.Zernike\(4\)\)"),
+        (lambda: ker.discretise(ROUGH, ker.Legendre(4)), "basis: expected a Zernike"),
+        (lambda: ker.discretise(ker.lambertian(), ker.Zernike(4)), r"use it with ker.HemisphereLaw\(law\)"),
+        (lambda: ker.Zernike(-1), "degree"),
+        (lambda: ker.Zernike(2).evaluate([1.0, 0.0, 0.0]), "expected shape"),
+        (lambda: spec.accommodation(ROUGH @ ROUGH), r"1 - H.matrix\(1, 1\)"),
+        (lambda: spec.accommodation(ROUGH, theta=[1.0]), "theta: expected none"),
+    ],
+)
+def test_bad_input_is_refused_in_words(call, words):
+    with pytest.raises(InputError, match=words):
+        call()
+
+
+def test_operands_of_another_kind_and_laws_that_are_not_symmetric_are_refused():
+    for operation in (lambda: ROUGH + ker.lambertian(), lambda: ROUGH @ 1.0, lambda: "a" * ROUGH):
+        with pytest.raises(TypeError):
+            operation()
+    for law in (ARCS @ ROUGH, ker.HemisphereLaw(LEANING, 0.2)):
+        with pytest.raises(AccuracyError, match="not known to be symmetric"):
+            spec.spectral_gap(law)

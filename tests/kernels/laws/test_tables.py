@@ -1,0 +1,225 @@
+"""Tables of inverse distribution functions: exact cases, their errors, files, and what is drawn from them."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.errors import FileExistsRefusal, InputError
+
+LAWS = [
+    ker.lambertian(),
+    ker.maxwell(0.25),
+    ker.TriangularTeethLaw(0.7),
+    ker.CircularArcLaw(1.2),
+    ker.RectangularTeethLaw(1.0),
+    ker.henyey_greenstein(0.5),
+    ker.lambertian() @ ker.TriangularTeethLaw(0.7),
+    ker.CircularArcLaw(0.8).in_specular_frame(),
+]
+
+
+def transport_distance(first, second):
+    """The mean distance of two samples of equal size, matched in order."""
+    return float(np.abs(np.sort(first) - np.sort(second)).mean())
+
+
+def test_quantiles_of_the_lambertian_law_are_those_of_the_invariant_measure():
+    table = ker.lambertian().table(3, 33)
+    assert np.allclose(table.quantile, ker.SINE.quantile(table.probability), atol=1e-5)
+    assert table.theta.tolist() == pytest.approx([np.pi / 6, np.pi / 2, 5 * np.pi / 6])
+    assert np.all(np.diff(table.quantile, axis=1) > 0.0)
+
+
+def test_the_error_of_the_lambertian_law_is_that_of_linear_interpolation():
+    table = ker.lambertian().table(4, 17)
+    p = (np.arange(10**5) + 0.5) / 10**5
+    drawn = np.interp(p, table.probability, ker.SINE.quantile(table.probability))
+    assert table.error == pytest.approx(np.abs(drawn - ker.SINE.quantile(p)).mean(), rel=0.05)
+    assert table.largest_error == pytest.approx(np.abs(drawn - ker.SINE.quantile(p)).max(), rel=0.3)
+
+
+@pytest.mark.parametrize("law", [ker.specular(), ker.retroreflection()], ids=repr)
+@pytest.mark.parametrize("theta", [1e-6, 0.3, 1.5, 3.14])
+def test_reflections_are_exact_at_every_angle(law, theta):
+    table = law.table(5, 3)
+    assert table.sample(theta, np.random.default_rng(0)) == pytest.approx(law.sample(theta), abs=1e-14)
+    assert table.error < 1e-15 and table.distribution_error == 0.0
+
+
+def test_quantiles_of_a_mixture_stay_at_its_atom_for_the_weight_of_it():
+    table = (0.5 * ker.specular() + 0.5 * ker.lambertian()).table(8, 401)
+    for angle, quantile in zip(table.theta, table.quantile, strict=True):
+        assert np.mean(np.abs(quantile - (np.pi - angle)) < 1e-12) == pytest.approx(0.5, abs=2 / 401)
+
+
+def test_jumps_do_not_shrink_and_the_mean_error_does():
+    coarse, fine = (ker.TriangularTeethLaw(0.7).table(n, n) for n in (16, 64))
+    assert fine.error < 0.4 * coarse.error
+    assert fine.largest_error > 0.5
+
+
+@pytest.mark.parametrize("law", LAWS, ids=repr)
+def test_drawn_angles_agree_with_the_law_within_the_error(law):
+    table = law.table(24, 25)
+    rng = np.random.default_rng(5)
+    distances = []
+    # neither on the grid nor in the middle of its cells
+    angles = (np.arange(0, 24, 3) + 0.75) * np.pi / 24
+    for theta in angles:
+        incoming = np.full(20_000, theta)
+        distances.append(transport_distance(table.sample(incoming, rng), law.sample(incoming, rng)))
+    mean = np.average(distances, weights=np.sin(angles))
+    assert mean < 1.5 * table.error + 0.02
+    assert table.quantile.min() > 0.0 and table.quantile.max() < np.pi
+
+
+def test_a_finer_table_of_a_smooth_law_has_a_smaller_distance_than_a_coarse_one():
+    law = ker.henyey_greenstein(0.5)
+    rng = np.random.default_rng(2)
+    incoming = np.full(100_000, 0.7)
+    own = law.sample(incoming, rng)
+    coarse, fine = (law.table(n, n) for n in (4, 48))
+    assert transport_distance(coarse.sample(incoming, rng), own) > 3 * transport_distance(
+        fine.sample(incoming, rng), own
+    )
+    assert coarse.error > 10 * fine.error
+
+
+def test_a_table_of_a_traced_wall_has_its_moments():
+    wall = geo.dispersing_arcs(0.8)
+    law = ker.WallLaw(wall)
+    table = law.table(24, 24)
+    theta = np.full(40_000, 1.1)
+    found = np.cos(table.sample(theta, np.random.default_rng(1))).mean()
+    assert abs(found - float(law.apply(np.cos, 1.1))) < table.error + 4 / np.sqrt(theta.size)
+
+
+def test_draws_from_a_table_take_a_seed_by_name_and_repeat():
+    table = ker.maxwell(0.5).table(8, 9)
+    assert np.array_equal(table.sample([0.5, 1.0], rng=1), table.sample([0.5, 1.0], np.random.default_rng(1)))
+    assert table.sample(1.0, rng=1).shape == ()
+    with pytest.raises(InputError, match="theta"):
+        table.sample(0.0)
+
+
+def test_a_csv_is_read_by_numpy_and_states_units_and_convention(tmp_path):
+    table = ker.maxwell(0.25).in_specular_frame().table(6, 5)
+    path = table.save(tmp_path / "law.csv")
+    numbers = np.loadtxt(path, delimiter=",")
+    assert np.array_equal(numbers[0, 1:], table.probability) and numbers[0, 0] == 0.0
+    assert np.array_equal(numbers[1:, 0], table.theta) and np.array_equal(numbers[1:, 1:], table.quantile)
+    header = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    for words in ("radians", "convention: specular; theta_out = theta_in is specular", "rows: theta_in", "error"):
+        assert any(words in line for line in header), words
+
+
+def test_an_npz_has_every_attribute(tmp_path):
+    table = ker.CircularArcLaw(1.2).table(4, 5)
+    with np.load(table.save(tmp_path / "law.npz")) as stored:
+        for name in ("theta", "probability", "quantile", "error", "largest_error", "distribution_error"):
+            assert np.array_equal(stored[name], getattr(table, name)), name
+        assert str(stored["frame"]) == "paper" and "radians" in str(stored["header"])
+
+
+def test_files_are_replaced_on_request_only_and_other_formats_are_refused(tmp_path):
+    table = ker.lambertian().table(2, 2)
+    for name in ("law.csv", "law.npz"):
+        path = table.save(tmp_path / name)
+        before = path.read_bytes()
+        with pytest.raises(FileExistsRefusal):
+            table.save(path)
+        assert path.read_bytes() == before and table.save(path, overwrite=True) == path
+    for name in ("law.h5", "law", "law.txt"):
+        with pytest.raises(InputError, match=r"ends in \.csv or \.npz"):
+            table.save(tmp_path / name)
+    assert sorted(path.name for path in Path(tmp_path).iterdir()) == ["law.csv", "law.npz"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        ((1, 5), "n_in"),
+        ((5, 1), "n_out"),
+        ((2.5, 5), "n_in"),
+        ((5, 5, 0.0), "tolerance"),
+        ((10**9, 10**9), "n_in, n_out"),
+    ],
+)
+def test_grids_that_cannot_be_are_refused(arguments, name):
+    with pytest.raises(InputError, match=f"^{name}: "):
+        ker.lambertian().table(*arguments)
+
+
+def test_the_error_of_a_law_that_does_not_know_it_is_nan():
+    table = (ker.henyey_greenstein(0.5) @ ker.TriangularTeethLaw(0.7)).table(4, 4)
+    assert np.isnan(table.distribution_error) and 0.0 < table.error < 1.0
+
+
+def test_sums_that_are_no_laws_are_refused():
+    with pytest.raises(InputError, match="weights"):
+        (0.5 * ker.specular() + 0.4 * ker.lambertian()).table(4, 4)
+
+
+PAGE = (Path(__file__).parents[3] / "docs" / "tables.md").read_text(encoding="utf-8")
+
+
+def block_of(language, number=0):
+    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)[number]
+
+
+def assert_angles_of(law, table, theta, drawn):
+    """Mean, second moment and distribution of angles from a sampler, against the law and exact draws from the table."""
+    assert drawn.min() > 0.0 and drawn.max() < np.pi
+    for function in (np.cos, np.sin, lambda angle: np.cos(2.0 * angle)):
+        deviation = abs(function(drawn).mean() - float(law.apply(function, theta)))
+        assert deviation < table.largest_error + table.distribution_error + 5.0 / np.sqrt(drawn.size)
+    # Kolmogorov and Smirnov's distance to quantiles of the table; 2.0 / sqrt(n) is exceeded with probability 0.0007
+    p = (np.arange(4000) + 0.5) / 4000
+    quantile = np.sort(table._at(np.full(p.shape, theta), p))
+    distribution = np.searchsorted(np.sort(drawn), quantile) / drawn.size
+    assert np.abs(distribution - p).max() < 2.0 / np.sqrt(drawn.size) + 1.0 / p.size
+
+
+def test_the_sampler_in_numpy_on_the_page_draws_from_the_law(tmp_path, monkeypatch):
+    law, theta = ker.CircularArcLaw(1.2), 1.3
+    table = law.table(24, 25)
+    table.save(tmp_path / "law.csv")
+    monkeypatch.chdir(tmp_path)
+    names = {"law": law}
+    exec(compile(block_of("python", 1), "tables.md", "exec"), names)
+    drawn = names["sample"](names["read_table"]("law.csv"), np.full(50_000, theta), np.random.default_rng(4))
+    assert_angles_of(law, table, theta, drawn)
+    # at grazing angles too it does as the table does
+    grazing = np.array([1e-9, 0.01, 3.1, np.pi - 1e-9])
+    own = names["sample"](table.quantile, grazing, np.random.default_rng(7))
+    assert np.array_equal(own, table.sample(grazing, np.random.default_rng(7)))
+
+
+@pytest.mark.parametrize(
+    ("compiler", "language", "suffix", "flags", "sizes"),
+    [
+        ("cc", "c", ".c", ["-std=c99", "-Wall", "-Werror"], []),
+        ("gfortran", "fortran", ".f90", ["-std=f2008", "-Wall"], ["24", "25"]),
+    ],
+)
+def test_the_compiled_samplers_on_the_page_draw_from_the_law(compiler, language, suffix, flags, sizes, tmp_path):
+    if shutil.which(compiler) is None:
+        pytest.skip(f"{compiler} is not installed")
+    source, program, rows = tmp_path / f"sample{suffix}", tmp_path / "sample", 20_000
+    source.write_text(block_of(language))
+    subprocess.run([compiler, "-O2", *flags, str(source), "-o", str(program), "-lm"], check=True, cwd=tmp_path)
+    law = ker.CircularArcLaw(1.2)
+    table = law.table(24, 25)
+    table.save(tmp_path / "law.csv")
+    for theta in (0.05, 1.3, 3.1):
+        command = [str(program), str(tmp_path / "law.csv"), *sizes, str(theta), str(rows)]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        drawn = np.array(text.split(), dtype=np.float64)
+        assert drawn.size == rows
+        assert_angles_of(law, table, theta, drawn)

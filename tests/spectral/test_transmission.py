@@ -1,0 +1,260 @@
+"""Transmission of channels and tubes, against plain simulations and what is known of it."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import InputError
+from asperity.spectral.consequences import clausing
+
+# diffuse walls: own integral equations on other grids
+CHANNELS = {1.0: 0.68438, 2.0: 0.54206, 5.0: 0.35641, 10.0: 0.24056}
+TUBES = {1.0: 0.6719839, 2.0: 0.5142305, 5.0: 0.3105253, 10.0: 0.1909424}
+ARCS = ker.CircularArcLaw(1.2)
+# without mirror symmetry: teeth with one vertical side
+SAW = ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0, -0.6), (1, 0)]))
+SAW_TURNED = ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (1, -0.6), (1, 0)]))
+
+
+def direct(length):
+    return math.sqrt(1.0 + length * length) - length
+
+
+@pytest.mark.parametrize("length", CHANNELS)
+def test_diffuse_channels_have_the_known_transmission(length):
+    found = spec.transmission(ker.lambertian(), length)
+    assert abs(float(found) - CHANNELS[length]) < 5.5e-6 and found.error < 1e-9
+
+
+@pytest.mark.parametrize("length", TUBES)
+def test_diffuse_tubes_have_the_known_transmission(length):
+    found = spec.transmission(ker.lambertian(), length, section="tube")
+    assert abs(float(found) - TUBES[length]) < 1e-7 and found.error < 1e-9
+
+
+def grooved(velocity, along, angle, rng):
+    """Velocities after diffuse reflection in the cross section of grooves at this angle to the axis, in space.
+
+    The component along the grooves is kept; ``along`` holds the axis, the direction across it and the normal.
+    """
+    groove = np.cos(angle)[:, None] * along[0] + np.sin(angle)[:, None] * along[1]
+    kept = (velocity * groove).sum(1)
+    rest, cosine = np.sqrt(1.0 - kept**2), 2.0 * rng.random(len(kept)) - 1.0
+    normal = (rest * np.sqrt(1.0 - cosine**2))[:, None] * along[2]
+    return kept[:, None] * groove + (rest * cosine)[:, None] * np.cross(along[2], groove) + normal
+
+
+def in_space(section, length, diffuse, particles, rng, orientation=None):
+    """How many of these particles leave at the far end of a channel |y| < 1/2 or a tube of radius 1, in space.
+
+    With an orientation the diffuse reflections are those of grooves.
+    """
+    sine, turn = np.sqrt(rng.random(particles)), 2.0 * np.pi * rng.random(particles)
+    velocity = np.stack((np.sqrt(1.0 - sine**2), sine * np.cos(turn), sine * np.sin(turn)), axis=1)
+    place = np.zeros((particles, 3))
+    if section == "channel":
+        place[:, 1] = rng.random(particles) - 0.5
+    else:
+        radius, angle = np.sqrt(rng.random(particles)), 2.0 * np.pi * rng.random(particles)
+        place[:, 1], place[:, 2] = radius * np.cos(angle), radius * np.sin(angle)
+    through = 0
+    while len(place):
+        if section == "channel":
+            time = (0.5 * np.sign(velocity[:, 1]) - place[:, 1]) / velocity[:, 1]
+        else:
+            across, off = velocity[:, 1:], place[:, 1:]
+            a, b, c = (across**2).sum(1), (across * off).sum(1), (off**2).sum(1) - 1.0
+            time = (-b + np.sqrt(np.maximum(b * b - a * c, 0.0))) / a
+        place = place + time[:, None] * velocity
+        through += np.count_nonzero(place[:, 0] >= length)
+        inside = (place[:, 0] > 0.0) & (place[:, 0] < length)
+        place, velocity = place[inside], velocity[inside]
+        normal = np.zeros_like(place)
+        if section == "channel":
+            normal[:, 1] = -np.sign(place[:, 1])
+        else:
+            normal[:, 1:] = -place[:, 1:] / np.linalg.norm(place[:, 1:], axis=1)[:, None]
+        side = np.cross(normal, [1.0, 0.0, 0.0])
+        sine, turn = np.sqrt(rng.random(len(place))), 2.0 * np.pi * rng.random(len(place))
+        scattered = np.sqrt(1.0 - sine**2)[:, None] * normal + (sine * np.sin(turn))[:, None] * side
+        scattered[:, 0] += sine * np.cos(turn)
+        if orientation is not None:
+            angle = turn if orientation == "random" else np.full(len(place), orientation)
+            # walls of a channel are mirror images, so their grooves have one direction
+            beside = np.array([0.0, 0.0, 1.0]) if section == "channel" else side
+            scattered = grooved(velocity, (np.array([1.0, 0.0, 0.0]), beside, normal), angle, rng)
+        mirrored = velocity - 2.0 * (velocity * normal).sum(1)[:, None] * normal
+        velocity = np.where((rng.random(len(place)) < diffuse)[:, None], scattered, mirrored)
+    return through
+
+
+@pytest.mark.parametrize("section", ["channel", "tube"])
+@pytest.mark.parametrize(("diffuse", "length"), [(1.0, 3.0), (0.3, 3.0), (0.6, 0.7)])
+def test_particles_in_space_pass_as_often_as_the_integral_equation_says(section, diffuse, length):
+    particles = 100_000
+    found = float(spec.transmission(ker.maxwell(diffuse), length, section))
+    seen = in_space(section, length, diffuse, particles, np.random.default_rng(3)) / particles
+    assert abs(seen - found) < 3.5 * math.sqrt(found * (1.0 - found) / particles)
+
+
+@pytest.mark.parametrize("section", ["channel", "tube"])
+def test_smooth_walls_pass_all_particles_and_nearly_smooth_ones_nearly_all(section):
+    assert spec.transmission(ker.specular(), 7.0, section).value == 1.0
+    # to first order in a, half of the particles that a wall scatters return: by the number of their reflections
+    values = [float(spec.transmission(ker.maxwell(a), 2.0, section)) for a in (0.01, 0.02, 0.04)]
+    ratio = (1.0 - values[1]) / (1.0 - values[0]), (1.0 - values[2]) / (1.0 - values[1])
+    assert 1.9 < ratio[1] < ratio[0] < 2.0
+
+
+@pytest.mark.parametrize("length", [0.1, 0.75, 4.0])
+def test_retroreflecting_walls_pass_what_meets_no_wall(length):
+    found = spec.transmission(ker.retroreflection(), length, rng=0)
+    assert float(found) == pytest.approx(direct(length), rel=1e-12) and 0.0 < found.error <= 1e-4
+
+
+def test_the_error_of_the_integral_equation_holds_against_twice_the_nodes(monkeypatch):
+    lengths, laws = [0.3, 4.5, 40.0], [ker.lambertian(), ker.maxwell(0.2)]
+    cases = [(law, length, section) for law in laws for length in lengths for section in ("channel", "tube")]
+    usual = [spec.transmission(*case) for case in cases]
+    monkeypatch.setattr(clausing, "NODES", (18, 20))
+    for one, case in zip(usual, cases, strict=True):
+        assert abs(float(one) - float(spec.transmission(*case))) <= one.error < 1e-8
+
+
+def test_long_diffuse_channels_and_tubes_pass_as_diffusion_says():
+    """Tubes: 8/(3 L) for radius 1. Channels: (ln(2 L) - 1/2)/L."""
+    assert float(spec.transmission(ker.lambertian(), 600.0, "tube")) == pytest.approx(8 / 1800, rel=0.02)
+    assert float(spec.transmission(ker.lambertian(), 300.0)) == pytest.approx((math.log(600) - 0.5) / 300, rel=0.02)
+
+
+def by_flights(length, rng):
+    def reflect(angle):
+        return clausing._turn(ker.lambertian(), angle, rng)
+
+    return clausing._by_flights("channel", length, 0.01, rng, clausing._entered_in_plane, reflect)
+
+
+@pytest.mark.parametrize("length", [0.5, 3.0])
+def test_flights_agree_with_the_integral_equation_in_95_percent(monkeypatch, length):
+    monkeypatch.setattr(clausing, "TOGETHER", 2**12)
+    exact = float(spec.transmission(ker.lambertian(), length))
+    found = [by_flights(length, np.random.default_rng(seed)) for seed in range(20)]
+    assert all(one.error <= 0.01 for one in found)
+    assert sum(abs(float(one) - exact) > one.error for one in found) <= 3
+
+
+@pytest.mark.parametrize("section", ["channel", "tube"])
+@pytest.mark.parametrize("orientation", ["random", 0.7])
+def test_grooved_walls_pass_as_many_particles_in_space_as_a_plain_simulation(section, orientation):
+    particles = 60_000
+    law = 0.8 * ker.HemisphereLaw(ker.lambertian(), orientation) + 0.2 * ker.HemisphereLaw(ker.specular())
+    found = spec.transmission(law, 2.0, section, tolerance=2e-3, rng=1)
+    seen = in_space(section, 2.0, 0.8, particles, np.random.default_rng(3), orientation) / particles
+    assert abs(seen - float(found)) < 1.5 * (found.error + 1.96 * math.sqrt(seen * (1.0 - seen) / particles))
+    assert abs(seen - float(spec.transmission(ker.maxwell(0.8), 2.0, section))) > 10.0 * found.error
+
+
+@pytest.mark.parametrize("section", ["channel", "tube"])
+def test_grooves_along_the_axis_pass_all_particles_and_retroreflecting_ones_across_it_none(section):
+    passing = {"channel": direct(2.0), "tube": direct(1.0) ** 2}[section]
+    along, across = (ker.HemisphereLaw(ker.retroreflection(), angle) for angle in (0.0, np.pi / 2.0))
+    for law, expected in ((along, 1.0), (ker.HemisphereLaw(ker.specular()), 1.0), (across, passing)):
+        found = spec.transmission(law, 2.0, section, rng=4)
+        assert float(found) == pytest.approx(expected, abs=1e-12) and 0.0 < found.error <= 1e-4
+
+
+@pytest.mark.parametrize("law", [ARCS, SAW], ids=["arcs", "saw"])
+def test_grooves_across_a_channel_in_space_pass_as_many_particles_as_the_planar_law(law):
+    planar = spec.transmission(law, 2.0, tolerance=2e-3, rng=5)
+    spatial = spec.transmission(ker.HemisphereLaw(law, np.pi / 2.0), 2.0, tolerance=2e-3, rng=6)
+    assert abs(float(planar) - float(spatial)) < planar.error + spatial.error
+
+
+def test_a_channel_too_short_for_collisions_has_an_error_all_the_same():
+    found = spec.transmission(ker.HemisphereLaw(ker.lambertian()), 1e-9, tolerance=1e-12, rng=0)
+    assert abs(float(found) - (1.0 - 0.5e-9)) <= found.error < 1e-8
+
+
+def in_plane(law, length, particles, rng):
+    """How many of these particles leave at the far end of a channel 0 < y < 1 with mirrored walls, in the plane."""
+    velocity = np.sqrt(1.0 - (2.0 * rng.random(particles) - 1.0) ** 2)
+    velocity = np.stack((velocity, np.sqrt(1.0 - velocity**2) * rng.choice([-1.0, 1.0], particles)), axis=1)
+    x, y, through = np.zeros(particles), rng.random(particles), 0
+    while len(x):
+        up = velocity[:, 1] > 0.0
+        time = np.where(up, 1.0 - y, y) / np.abs(velocity[:, 1])
+        x, y = x + time * velocity[:, 0], up.astype(float)
+        through += np.count_nonzero(x >= length)
+        inside = (x > 0.0) & (x < length)
+        x, y, velocity, up = x[inside], y[inside], velocity[inside], up[inside]
+        # the paper's angle is that of minus the incoming velocity
+        theta = law.sample(np.arctan2(np.abs(velocity[:, 1]), -velocity[:, 0]), rng)
+        velocity = np.stack((np.cos(theta), np.where(up, -1.0, 1.0) * np.sin(theta)), axis=1)
+    return through
+
+
+@pytest.mark.parametrize("law", [ARCS, SAW], ids=["arcs", "saw"])
+def test_particles_in_the_plane_pass_as_often_as_the_flights(law):
+    particles = 30_000
+    for asked in (law, law.in_specular_frame()):
+        found = spec.transmission(asked, 2.0, tolerance=2e-3, rng=8)
+        seen = in_plane(law, 2.0, particles, np.random.default_rng(9)) / particles
+        assert abs(seen - float(found)) < 1.5 * (found.error + 1.96 * math.sqrt(seen * (1.0 - seen) / particles))
+
+
+def test_a_channel_passes_as_many_particles_in_both_directions():
+    there, back = (spec.transmission(law, 3.0, tolerance=2e-3, rng=2) for law in (SAW, SAW_TURNED))
+    assert abs(float(there) - float(back)) < there.error + back.error
+    # the direct passage is a third of it only, and the wall is far from diffuse
+    assert abs(float(there) - float(spec.transmission(ker.lambertian(), 3.0))) > 10.0 * there.error
+
+
+def test_longer_channels_pass_fewer_particles():
+    found = [spec.transmission(ARCS, length, tolerance=3e-3, rng=5) for length in (0.5, 1.0, 2.0, 4.0, 8.0)]
+    for short, long in pairwise(found):
+        assert float(short) - short.error > float(long) + long.error
+
+
+def test_flights_end_at_their_limit_and_count_particles_inside_as_error(monkeypatch):
+    monkeypatch.setattr(clausing, "MOST_REFLECTIONS", 2 * 10**6)
+    monkeypatch.setattr(clausing, "TOGETHER", 2**12)
+    long = spec.transmission(ker.lambertian(), 2000.0, rng=0)
+    assert "still inside" in long.method and long.error > 1e-4
+    assert abs(float(long) - (math.log(4000) - 0.5) / 2000) < long.error
+    short = spec.transmission(ARCS, 1.0, tolerance=1e-9, rng=0)
+    assert 2e-4 < short.error < 3e-3 and "still inside" not in short.method
+
+
+def test_a_seed_gives_the_same_number_again():
+    first, second = (spec.transmission(ARCS, 1.0, tolerance=3e-3, rng=rng) for rng in (4, np.random.default_rng(4)))
+    assert first == second and first != spec.transmission(ARCS, 1.0, tolerance=3e-3, rng=5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"law": "diffuse"}, "law: expected a law"),
+        ({"length": 0.0}, r"length: expected a number in \(0, "),
+        ({"length": -1.0}, r"length: expected a number in \(0, "),
+        ({"length": math.inf}, "length: expected finite"),
+        ({"length": [1.0, 2.0]}, "length: expected one number"),
+        ({"section": "square"}, "section: expected 'channel' or 'tube'"),
+        ({"tolerance": 0.0}, "tolerance: expected a number greater than 0"),
+        ({"section": "tube", "law": ARCS}, "law: in a tube expected lambertian"),
+        ({"section": "tube", "length": 601.0}, "length: in a tube expected at most 600 radii"),
+        ({"section": "tube", "law": ker.maxwell(0.001)}, "diffuse fraction of at least 0.01"),
+        ({"law": 2.0 * ker.lambertian()}, "weights"),
+        ({"law": 0.5 * ker.HemisphereLaw(ARCS), "section": "tube"}, "weights"),
+        ({"law": ker.CollisionLaw(ARCS, geo.Disk())}, "law: expected a law"),
+        ({"rng": -1}, "rng: expected"),
+    ],
+    ids=str,
+)
+def test_a_wrong_argument_ends_in_one_clear_error(arguments, words):
+    with pytest.raises(InputError, match=words):
+        spec.transmission(**{"law": ker.lambertian(), "length": 1.0, **arguments})
