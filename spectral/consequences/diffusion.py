@@ -67,12 +67,12 @@ class Diffusivity(Estimate):
 
     def __str__(self) -> str:
         digits = f"{self.value:.4g}" if self.error <= 1e-4 * abs(self.value) else super().__str__()
-        same = ", the same for all walls that turn grazing flights" if abs(self.eta - 1.0) <= self.eta_error else ""
         far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "beyond 2000 r at least"
-        return f"{digits}, the slope of L^2/tau against ln(L/r) for L {far}{same}"
+        return f"{digits}, the slope of L^2/tau against ln(L/r) for L {far}"
 
     def __repr__(self) -> str:
-        return f"Diffusivity({self}; eta={self.eta:.6g}, zeta={self.zeta:.6g}, kind={self.kind!r})"
+        same = ", the same for all walls that turn grazing flights" if abs(self.eta - 1.0) <= self.eta_error else ""
+        return f"Diffusivity({self}{same}; eta={self.eta:.6g}, zeta={self.zeta:.6g}, kind={self.kind!r})"
 
 
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
