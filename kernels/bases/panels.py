@@ -162,15 +162,17 @@ class Panels(Basis):
     def positions(self, angle: Floats) -> tuple[NDArray[np.int64], Floats]:
         """The panel of each angle and the angle's position in it, from -1 to 1."""
         panel = self._cells.index(angle)
+        return panel, self._position(angle, panel)
+
+    def _position(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
         low, high = self.edges[panel], self.edges[panel + 1]
-        return panel, (2.0 * angle - low - high) / (high - low)
+        return np.asarray((2.0 * angle - low - high) / (high - low))
 
     def legendre(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
         """The Legendre polynomials of the given panels at the angles, shape ``angle.shape + (degree + 1,)``."""
         angle, panel = finite_array("angle", angle), indices("panel", panel, self._cells.size)
         common_shape(angle=angle, panel=panel)
-        low, high = self.edges[panel], self.edges[panel + 1]
-        return np.asarray(np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), self.degree))
+        return np.asarray(np.polynomial.legendre.legvander(self._position(angle, panel), self.degree))
 
     def of_legendre(self, moments: Floats) -> Floats:
         """Integrals of the functions, shape (..., size), from the integrals of the panels' Legendre polynomials.
@@ -272,7 +274,3 @@ def _graded_edges(special: list[float], followed: list[float], smallest: float) 
 def _grading(smallest: float) -> Floats:
     levels = int(np.ceil(np.log(smallest) / np.log(RATIO)))
     return np.asarray(RATIO ** np.arange(1, levels + 1, dtype=np.float64))
-
-
-# For queries of laws whose answer is the same on all panels.
-ONE_PANEL = Panels([0.0, np.pi], 0)

@@ -19,7 +19,7 @@ PROBE = np.array([1.0])
 # Fewest cells of the outgoing angle.
 CELLS = 32
 # Edges and atoms in memory at a time; on each cell a conditional distribution has some nodes.
-NUMBERS_AT_ONCE = 2**16
+POINTS_AT_ONCE = 2**16
 # The cells, and the laws by their tolerance, contribute at most this fraction of the tolerance.
 CELLS_PART = 0.1
 # Where a distribution is narrower than a cell, its error halves when cells are halved. The largest change is then as
@@ -89,7 +89,7 @@ class ConditionalDistance:
         edges = np.unique(np.concatenate((np.linspace(0.0, np.pi, (1 if self.is_atomic else cells) + 1), *outgoing)))
         points = _with_middles(edges)
         found, error = np.empty(theta.size), np.empty(theta.size)
-        step = max(1, NUMBERS_AT_ONCE // max(points.size, self.atoms))
+        step = max(1, POINTS_AT_ONCE // max(points.size, self.atoms))
         with progress_bar(theta.size, "angle", "distance") as bar:
             for start in range(0, theta.size, step):
                 part = slice(start, start + step)

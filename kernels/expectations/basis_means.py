@@ -15,10 +15,6 @@ from ..bases.legendre import legendre_moments
 from ..bases.measure import gauss_rule
 from ..bases.panels import Panels
 
-# Incoming angle and tolerance at which a law is asked whether its errors are known.
-PROBE, PROBE_TOLERANCE = np.array([1.0]), 1e-2
-# Incoming angles at a time.
-ANGLES_AT_ONCE = 512
 # Angles on an interval at which the largest absolute value of functions is sought.
 HEIGHT_PROBES = 5
 

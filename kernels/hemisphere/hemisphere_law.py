@@ -22,7 +22,7 @@ from ..bases.given import seed_by_name
 from ..bases.legendre import Legendre
 from ..bases.zernike import Zernike
 from ..discretisation.discretisation import discretise
-from ..laws.law import Combination, Law, as_weight, drawn_terms, used_terms
+from ..laws.law import Law, as_weight, drawn_terms, used_terms
 from ..laws.tensor_law import Discretiser, SpatialLaw
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from .disc_matrices import in_the_plane, matrix_of_average, matrix_of_grooves
@@ -291,8 +291,7 @@ class HemisphereLaw(DirectionLaw):
 
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.WallLaw(wall)")
-        if isinstance(self.law, Combination):
-            used_terms(self.law.terms, self.law)
+        _ = self.law.parts  # raises InputError unless the weights of a combination make it a law
         if isinstance(self.orientation, str):
             if self.orientation != "random":
                 raise InputError(f"orientation: expected an angle in radians or 'random', got {self.orientation!r}")
