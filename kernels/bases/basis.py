@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -142,3 +142,23 @@ def largest(angle: Floats, squares: Floats) -> tuple[Floats, Floats]:
     """The magnitudes of a basis from the sums of squares at the angles, both of shape (intervals, angles)."""
     weighted = squares * np.sin(angle)
     return np.sqrt(squares.max(axis=1)), BETWEEN * np.sqrt(weighted.max(axis=1))
+
+
+class BasisOfPoints(Basis):
+    """A basis of functions of points, which has no measure, edges and nodes of functions of one angle."""
+
+    @property
+    def measure(self) -> AngularMeasure:
+        self._refuse("measure")
+
+    @property
+    def edges(self) -> Floats:
+        self._refuse("edges")
+
+    @property
+    def nodes_per_interval(self) -> int:
+        self._refuse("nodes_per_interval")
+
+    @abstractmethod
+    def _refuse(self, what: str) -> NoReturn:
+        """Raise an InputError that says what to use in place of a property."""

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, sequence
 from ...core.errors import InputError
-from .basis import Basis
+from .basis import Basis, BasisOfPoints
 from .given import Vectorised
-from .measure import AngularMeasure
 
 
 def _kron(parts: Sequence[Floats]) -> Floats:
@@ -24,7 +23,7 @@ def _kron(parts: Sequence[Floats]) -> Floats:
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class TensorBasis(Basis):
+class TensorBasis(BasisOfPoints):
     """All products e_i(theta) f_k(psi), with the last factor's index running fastest; the basis of ``P.tensor(Q)``.
 
     Parameters
@@ -67,18 +66,6 @@ class TensorBasis(Basis):
     @property
     def size(self) -> int:
         return int(np.prod([factor.size for factor in self.factors]))
-
-    @property
-    def measure(self) -> AngularMeasure:
-        self._refuse("measure")
-
-    @property
-    def edges(self) -> Floats:
-        self._refuse("edges")
-
-    @property
-    def nodes_per_interval(self) -> int:
-        self._refuse("nodes_per_interval")
 
     @property
     def constant(self) -> Floats:

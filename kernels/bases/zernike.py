@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, shaped, whole_number
 from ...core.errors import InputError
-from .basis import Basis
+from .basis import BasisOfPoints
 from .given import Vectorised
-from .measure import AngularMeasure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Zernike(Basis):
+class Zernike(BasisOfPoints):
     r"""The Zernike functions of degree 0, ..., ``degree`` on the unit disc, orthonormal for its uniform measure.
 
     They are f_{n,0} = sqrt(n + 1) R_n^0(r), and for m > 0 f_{n,m} = sqrt(2 (n + 1)) R_n^m(r) cos(m phi) and f_{n,-m}
@@ -66,18 +65,6 @@ class Zernike(Basis):
     @property
     def size(self) -> int:
         return (self.degree + 1) * (self.degree + 2) // 2
-
-    @property
-    def measure(self) -> AngularMeasure:
-        self._refuse("measure")
-
-    @property
-    def edges(self) -> Floats:
-        self._refuse("edges")
-
-    @property
-    def nodes_per_interval(self) -> int:
-        self._refuse("nodes_per_interval")
 
     @property
     def constant(self) -> Floats:
