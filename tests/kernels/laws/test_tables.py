@@ -58,6 +58,17 @@ def test_quantiles_of_a_mixture_stay_at_its_atom_for_the_weight_of_it():
         assert np.mean(np.abs(quantile - (np.pi - angle)) < 1e-12) == pytest.approx(0.5, abs=2 / 401)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_quantiles_of_a_traced_wall_stay_at_the_angle_of_its_flat_tops(turned):
+    law = ker.WallLaw(geo.mushrooms())
+    flat = law.wall.flat_top / law.wall.period
+    table = (law.in_specular_frame() if turned else law).table(6, 1001)
+    assert 0.2 < flat < 0.9
+    for angle, quantile in zip(table.theta, table.quantile, strict=True):
+        specular = angle if turned else np.pi - angle
+        assert np.mean(np.abs(quantile - specular) < 1e-12) == pytest.approx(flat, abs=2 / 1001)
+
+
 def test_jumps_do_not_shrink_and_the_mean_error_does():
     coarse, fine = (ker.TriangularTeethLaw(0.7).table(n, n) for n in (16, 64))
     assert fine.error < 0.4 * coarse.error
