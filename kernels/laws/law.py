@@ -185,7 +185,7 @@ class Law(ABC):
         -------
         Table
             Angles, probabilities, quantiles and the error of bilinear interpolation between them; ``save`` writes a
-            .csv or .npz file, ``sample`` draws from the table.
+            .csv, .npz or .h5 file, ``sample`` draws from the table.
 
         Examples
         --------

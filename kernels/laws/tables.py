@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TypeAlias
+from typing import IO, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, Rng, angles, check_memory, frozen, generator, shortened, whole_number
 from ...core.errors import InputError
 from ...core.files import write_whole
+from ...core.frames import needed
 from ...core.tables import numbers_as_csv
 from ..bases.basis import Frame
 from ..bases.given import seed_by_name
@@ -84,7 +85,7 @@ class Table:
         return self._at(incoming, source.random(incoming.shape))
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """Write a file for other codes: .csv, or .npz, which has all attributes by their names.
+        """Write a file for other codes: .csv, or .npz or .h5 (extra ``hdf5``), with all attributes by their names.
 
         In a .csv comments begin with #. The first row of numbers has 0 and the probabilities; each other row has an
         incoming angle and its quantiles. An existing file is replaced only with ``overwrite``, when all is written.
@@ -95,12 +96,24 @@ class Table:
             rows = np.vstack([corner, np.column_stack([self.theta, self.quantile])])
             write_whole(target, numbers_as_csv(self._header(), rows.tolist()), overwrite=overwrite)
         elif target.suffix.lower() == ".npz":
-            content = {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}
-            content["header"] = np.array("\n".join(self._header()))
-            write_whole(target, lambda stream: np.savez_compressed(stream, **content), overwrite=overwrite)  # type: ignore[arg-type]
+            write_whole(target, lambda stream: np.savez_compressed(stream, **self._content()), overwrite=overwrite)
+        elif target.suffix.lower() == ".h5":
+            library = needed("h5py", "save", "hdf5")
+            write_whole(target, lambda stream: self._write_hdf5(library, stream), overwrite=overwrite)
         else:
-            raise InputError(f"path: expected a name that ends in .csv or .npz, got {shortened(str(path))}")
+            raise InputError(f"path: expected a name that ends in .csv, .npz or .h5, got {shortened(str(path))}")
         return target
+
+    def _content(self) -> dict[str, Any]:
+        """All attributes by their names, and the header."""
+        content = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {**content, "header": "\n".join(self._header())}
+
+    def _write_hdf5(self, library: Any, stream: IO[bytes]) -> None:
+        """Write arrays as data sets in radians, other attributes as those of the file."""
+        with library.File(stream, "w") as file:
+            for name, value in self._content().items():
+                (file if isinstance(value, np.ndarray) else file.attrs)[name] = value
 
     def _header(self) -> list[str]:
         n_in, n_out = self.quantile.shape

@@ -3,6 +3,8 @@
 import re
 import shutil
 import subprocess
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -138,18 +140,37 @@ def test_an_npz_has_every_attribute(tmp_path):
         assert str(stored["frame"]) == "paper" and "radians" in str(stored["header"])
 
 
+def test_an_hdf5_file_has_every_attribute(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    table = ker.CircularArcLaw(1.2).in_specular_frame().table(4, 5)
+    with h5py.File(table.save(tmp_path / "law.h5"), "r") as stored:
+        for name in ("theta", "probability", "quantile"):
+            assert np.array_equal(stored[name][:], getattr(table, name)), name
+        for name in ("error", "largest_error", "distribution_error", "frame", "law"):
+            assert stored.attrs[name] == getattr(table, name), name
+        assert "radians" in stored.attrs["header"]
+
+
+def test_without_h5py_the_message_names_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(InputError, match=r"asperity\[hdf5\]"):
+        ker.lambertian().table(2, 2).save(tmp_path / "law.h5")
+    assert not list(tmp_path.iterdir())
+
+
 def test_files_are_replaced_on_request_only_and_other_formats_are_refused(tmp_path):
     table = ker.lambertian().table(2, 2)
-    for name in ("law.csv", "law.npz"):
+    names = ["law.csv", "law.npz"] + ["law.h5"] * (find_spec("h5py") is not None)
+    for name in names:
         path = table.save(tmp_path / name)
         before = path.read_bytes()
         with pytest.raises(FileExistsRefusal):
             table.save(path)
         assert path.read_bytes() == before and table.save(path, overwrite=True) == path
-    for name in ("law.h5", "law", "law.txt"):
-        with pytest.raises(InputError, match=r"ends in \.csv or \.npz"):
+    for name in ("law.hdf5", "law", "law.txt"):
+        with pytest.raises(InputError, match=r"ends in \.csv, \.npz or \.h5"):
             table.save(tmp_path / name)
-    assert sorted(path.name for path in Path(tmp_path).iterdir()) == ["law.csv", "law.npz"]
+    assert sorted(path.name for path in Path(tmp_path).iterdir()) == sorted(names)
 
 
 @pytest.mark.parametrize(
