@@ -201,7 +201,9 @@ def accommodation(
     if incidence_deg is not None:
         if theta is not None:
             raise InputError("incidence_deg: expected either this or theta, got both")
-        incoming = _from_degrees(incidence_deg)
+        incoming = incoming_angles(incidence_deg)
+        if (oblique := incoming[incoming != 0.5 * np.pi]).size:
+            _checked("incidence_deg", oblique)
     else:
         incoming = midpoints if theta is None else _checked("theta", theta)
     paper = in_paper_frame(law)
@@ -218,17 +220,16 @@ def accommodation(
     )  # fmt: skip
 
 
-def _from_degrees(incidence: ArrayLike) -> Floats:
+def incoming_angles(incidence: ArrayLike) -> Floats:
     """Incoming angles in radians from degrees from the normal, normal incidence among them."""
     given = np.atleast_1d(finite_array("incidence_deg", incidence)).ravel()
     incoming = np.asarray(np.radians(90.0 - given))
     bad = (np.abs(given) >= 90.0) | (incoming <= 0.0) | (incoming >= np.pi)
     if bad.any():
         raise InputError(f"incidence_deg: expected degrees from the normal, in (-90, 90), got {float(given[bad][0])!r}")
-    oblique = np.abs(np.cos(incoming)) >= POLE
-    if oblique.any() or not given.size:
-        _checked("incidence_deg", incoming[oblique])
-    return np.where(oblique, incoming, 0.5 * np.pi)
+    if not given.size:
+        raise InputError("incidence_deg: expected at least one angle, got none")
+    return np.where(np.abs(np.cos(incoming)) >= POLE, incoming, 0.5 * np.pi)
 
 
 def _checked(name: str, theta: ArrayLike) -> Floats:
