@@ -201,7 +201,7 @@ def accommodation(
     if incidence_deg is not None:
         if theta is not None:
             raise InputError("incidence_deg: expected either this or theta, got both")
-        incoming = _from_degrees(incidence_deg)
+        incoming = from_degrees(incidence_deg)
     else:
         incoming = midpoints if theta is None else _checked("theta", theta)
     paper = in_paper_frame(law)
@@ -218,7 +218,7 @@ def accommodation(
     )  # fmt: skip
 
 
-def _from_degrees(incidence: ArrayLike) -> Floats:
+def from_degrees(incidence: ArrayLike) -> Floats:
     """Incoming angles in radians from degrees from the normal, normal incidence among them."""
     given = np.atleast_1d(finite_array("incidence_deg", incidence)).ravel()
     incoming = np.asarray(np.radians(90.0 - given))
