@@ -210,9 +210,7 @@ def accommodation(
     if incidence_deg is not None:
         if theta is not None:
             raise InputError("incidence_deg: expected either this or theta, got both")
-        incoming = incoming_angles(incidence_deg)
-        if (oblique := incoming[incoming != 0.5 * np.pi]).size:
-            _checked("incidence_deg", oblique)
+        incoming = from_degrees(incidence_deg)
     else:
         incoming = midpoints if theta is None else _checked("theta", theta)
     paper = in_paper_frame(law)
@@ -230,6 +228,15 @@ def accommodation(
         normal_at, normal_errors, missed[:, 1], frozen(fraction_at),
         frozen(fraction_errors), frozen(misfit_at), frozen(misfit_errors), kind,
     )  # fmt: skip
+
+
+def from_degrees(incidence: ArrayLike) -> Floats:
+    """Angles at which accommodation is defined, from degrees from the normal, normal incidence among them."""
+    incoming = incoming_angles(incidence)
+    oblique = incoming[incoming != 0.5 * np.pi]
+    if oblique.size:
+        _checked("incidence_deg", oblique)
+    return incoming
 
 
 def incoming_angles(incidence: ArrayLike) -> Floats:

@@ -89,8 +89,10 @@ def main() -> None:
 
 @main.command(epilog=WALL_HELP)
 @click.argument("wall")
-@click.option("--mass", default=1.0, help="Mass m of the disk.")
-@click.option("--inertia", default=0.5, help="Moment of inertia J; 0.5 is a uniform disk of mass 1.")
+@click.option(
+    "--mass", type=float, help="Mass m of the disk, by default 1. The summary begins with a disk that is given."
+)
+@click.option("--inertia", type=float, help="Moment of inertia J, by default 0.5: a uniform disk of mass 1.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for pictures, matrix and JSON; made if missing.")
 @click.option("--tolerance", default=1e-3, help="Error asked of gaps, and of matrices for every bin.")
 @click.option("--bins", default=128, help="Number of equal-measure bins of the matrix.")
@@ -106,8 +108,8 @@ def main() -> None:
 )
 @click.option("--table", type=NEW_FILE, help="Also write a table of the law for other codes, .csv, .npz or .h5.")
 def study(
-    wall: str, mass: float, inertia: float, seed: int, out: Path | None, force: bool, picture_format: str, dpi: float,
-    as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, **asked: Any,
+    wall: str, mass: float | None, inertia: float | None, seed: int, out: Path | None, force: bool, picture_format: str,
+    dpi: float, as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, **asked: Any,
 ) -> None:  # fmt: skip
     """Study WALL: law, symmetry, spectrum, gap, and the collision law of a disk.
 
@@ -117,37 +119,30 @@ def study(
       asperity study profile.txt --mass 1 --inertia 0.5 --json
       asperity study triangular-teeth --incidence 0,30,60 --table law.csv
     """
-    import json
-
     from .core.files import removed_on_failure
     from .geometry import Disk, wall_from_text
     from .kernels import WallLaw
-    from .spectral import accommodation
     from .study import prepare_folder, study_wall
-    from .study.report import accommodation_as_dict, accommodation_as_text
 
     if quiet and (as_json or verbose):
         raise click.UsageError("--quiet prints nothing; leave --json and --verbose out")
-    disk = Disk(mass, inertia)
+    given = {name: value for name, value in (("mass", mass), ("inertia", inertia)) if value is not None}
+    disk = Disk(**given) if given else None
     found_wall = wall_from_text(wall)
     # what may be refused comes before the work
-    momentum = None
-    if incidence is not None:
-        momentum = accommodation(WallLaw(found_wall), asked["tolerance"], rng=seed, incidence_deg=numbers_of(incidence))
+    degrees = None if incidence is None else numbers_of(incidence)
     if table is not None:
         WallLaw(found_wall).table(*TABLE_SIZE).save(table, overwrite=force)
     with removed_on_failure(out):
         if out is not None:
             # refuse before the work, not after it
             prepare_folder(out, overwrite=force, picture_format=picture_format)
-        report = study_wall(found_wall, Path(wall).name, disk, rng=seed, progress=not quiet, **asked)
-        if as_json and momentum is not None:
-            plain = {**report.as_dict(), "accommodation": accommodation_as_dict(momentum)}
-            click.echo(json.dumps(plain, indent=2, allow_nan=False))
-        elif not quiet:
-            click.echo(report.to_json() if as_json else report.summary(verbose=verbose))
-            if momentum is not None:
-                click.echo(accommodation_as_text(momentum))
+        report = study_wall(
+            found_wall, Path(wall).name, disk, rng=seed, progress=not quiet, incidence_deg=degrees, **asked
+        )
+        if not quiet:
+            text = report.to_json() if as_json else report.summary(verbose=verbose, by_angle=degrees is not None)
+            click.echo(text)
         if table is not None and not quiet:
             click.echo(f"wrote      {table}", err=as_json)
         if out is not None:

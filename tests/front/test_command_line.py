@@ -72,7 +72,7 @@ def test_a_study_prints_accommodation_by_degrees_and_writes_a_table(tmp_path):
 
 
 def test_incidence_and_table_are_refused_before_the_work(tmp_path, monkeypatch):
-    monkeypatch.setattr("asperity.study.study_wall", lambda *_, **__: pytest.fail("the work began"))
+    monkeypatch.setattr("asperity.study.study.discretise", lambda *_, **__: pytest.fail("the work began"))
     (tmp_path / "law.csv").write_text("mine")
     assert "joined by commas" in refused("study", "flat", "--incidence", "30 60")
     assert "(-90, 90)" in refused("study", "flat", "--incidence", "0,95")
@@ -96,7 +96,10 @@ def test_json_goes_alone_to_standard_output(tmp_path):
 
 
 def test_mass_and_inertia_reach_the_disk():
-    printed = json.loads(run("study", "flat", "--bins", 8, "--mass", 2, "--inertia", 0.25, "--json").stdout)
+    options = ("study", "flat", "--bins", 8, "--mass", 2, "--inertia", 0.25)
+    assert run(*options).stdout.splitlines()[1].startswith("disk       mass 2, inertia 0.25: ")
+    assert "disk" not in run(*options[:4]).stdout
+    printed = json.loads(run(*options, "--json").stdout)
     collision = printed["collision"]
     assert (collision["mass"], collision["inertia"]) == (2.0, 0.25)
     assert collision["foreshortening"] == pytest.approx(1 / 3, rel=1e-15)

@@ -2,7 +2,9 @@
 
 import json
 import math
+import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,11 +17,13 @@ from asperity.study import DATA, PICTURES, check_tracer, pictures, study_wall
 from asperity.study.pictures import draw_study_wall
 
 TOLERANCE = 1e-2
+POST = [(0.4, -0.4), (0.4, -0.2), (0.6, -0.2), (0.6, -0.4), (0.4, -0.4)]
+ISLAND = [geo.Segment(p, q) for p, q in pairwise(POST)]
 
 
 @pytest.fixture(scope="module")
 def arcs():
-    return study_wall(geo.focusing_arcs(1.2), "arcs", geo.Disk(1.0, 0.5), tolerance=TOLERANCE, bins=32)
+    return study_wall(geo.focusing_arcs(1.2), "arcs", tolerance=TOLERANCE, bins=32)
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +90,7 @@ def test_too_many_collisions_are_called_a_defect(teeth):
 def test_a_polygon_has_no_gap_and_the_summary_says_so(teeth):
     assert teeth.gap.verdict == teeth.specular_gap.verdict == teeth.collision_gap.verdict == "no gap"
     text = teeth.summary(verbose=True)
-    assert text.count("none (no gap)") == 3 and "they belong to the grid" in text
+    assert text.count("0 (no gap)") == 3 and "they belong to the grid" in text
 
 
 def test_the_summary_names_method_error_tolerance_and_both_conventions(arcs):
@@ -224,8 +228,50 @@ def test_the_summary_is_ten_short_lines_with_errors_in_brackets(which, request):
     report = request.getfixturevalue(which)
     lines = report.summary().splitlines()
     assert len(lines) == 10 and max(map(len, lines)) <= 130
-    assert lines[3].startswith("gap        0.63297(5) isolated" if which == "arcs" else "gap        0 no gap")
+    gap = "gap        0.63297(5) isolated" if which == "arcs" else "gap        0 no gap"
+    assert sum(line.startswith(gap) for line in lines) == 1
     assert repr(report) == f"<Study\n{report.summary()}>"
+
+
+def test_the_summary_of_a_profile_begins_with_momentum_and_any_with_a_disk_that_was_given(arcs, teeth):
+    profile, of_disk = ["momentum", "resistance", "Maxwell"], ["disk", "collision", "conserved"]
+
+    def titles(report, **options):
+        return [line[:11].strip() for line in report.summary(**options).splitlines()]
+
+    assert titles(teeth)[:5] == ["wall", *profile, "rays"] and "disk" not in titles(teeth)
+    assert titles(arcs)[:2] == ["wall", "rays"] and titles(arcs)[-3:] == of_disk
+    assert titles(replace(arcs, disk_given=True))[:5] == ["wall", *of_disk, "rays"]
+    assert titles(replace(teeth, disk_given=True))[:5] == ["wall", *of_disk, "momentum"]
+    smooth = geo.Wall([geo.Bezier([(k, 0), (k + 0.3, -0.1), (k + 0.7, -0.1), (k + 1, 0)]) for k in range(9)], 9.0)
+    assert titles(replace(arcs, wall=smooth))[:4] == ["wall", *profile]
+    assert titles(arcs, by_angle=True)[1:4] == profile and titles(arcs, by_angle=True)[-32] == "by angle"
+    assert study_wall(geo.flat(), disk=geo.Disk(), bins=4).disk_given
+
+
+def test_no_line_of_a_report_says_none(arcs, teeth):
+    open_wall = study_wall(geo.Wall([geo.Segment((0, -0.5), (1, -0.5))], 1.0, [ISLAND]), bins=4, tolerance=0.1)
+    skew = study_wall(geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (0.7, -0.1), (1, 0)]), bins=8, tolerance=0.1)
+    refused = replace(teeth, accommodation=None, refusals={**teeth.refusals, "accommodation": "too rough"})
+    for report in (arcs, teeth, open_wall, skew, refused):
+        for verbose in (False, True):
+            assert not re.search("none", report.summary(verbose=verbose, by_angle=True), re.IGNORECASE)
+    assert "momentum   refused: too rough" in refused.summary()
+
+
+@pytest.mark.parametrize("which", ["arcs", "teeth"])
+def test_momentum_and_resistance_are_those_of_the_library(which, request):
+    report = request.getfixturevalue(which)
+    law = ker.WallLaw(report.wall)
+    found, drag = report.accommodation, ker.resistance(law, TOLERANCE)
+    expected = spec.accommodation(law, 1e-10)
+    for name in ("tangential", "normal", "maxwell_fraction", "misfit"):
+        one, other = getattr(found, name), getattr(expected, name)
+        assert abs(one.value - other.value) <= one.error + other.error
+        assert report.as_dict()["accommodation"][name]["value"] == one.value
+    # two different methods
+    assert abs(report.resistance.value - drag.value) <= report.resistance.error + drag.error < 1e-6
+    assert report.as_dict()["resistance"]["error"] == report.resistance.error
 
 
 @pytest.mark.parametrize(("kind", "start"), [("svg", b"<?xml"), ("pdf", b"%PDF")])

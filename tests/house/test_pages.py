@@ -71,6 +71,38 @@ def test_the_disk_conserves_energy_and_rolling_momentum(run):
     assert np.allclose(disk.rolling_momentum(after), disk.rolling_momentum(before), atol=1e-12)
 
 
+def test_the_table_falls_in_error_and_its_draws_keep_the_cosine_law(run):
+    names = run("a_table_for_dsmc")
+    error = {name: [table.error for table in found] for name, found in names["tables"].items()}
+    rate = {name: math.log2(found[0] / found[-1]) / 4 for name, found in error.items()}
+    assert rate["round bumps"] > 1.5 and 0.8 < rate["triangular teeth"] < 1.2
+    assert abs(np.mean(names["cosines"] ** 2) - 1 / 3) < 5 * 0.0018 / 1.96
+    assert "error of bilinear interpolation" in names["path"].read_text(encoding="utf-8")
+
+
+def test_grains_conserve_energy_and_momentum_and_slide_if_smooth_and_roll_back_if_not(run):
+    names = run("a_granular_collision")
+    disks, before, rest = (names["first"], names["second"]), names["before"], names["rest"]
+    contact = names["contact"]
+    for law, restitution in (("smooth", -1.0), ("no-slip", 1.0)):
+        after = names["laws"][law].sample(names["normal"], before, rest, rng=1)
+        for one, other, factor in zip(contact(*after), contact(before, rest), (restitution, 1.0), strict=True):
+            assert np.allclose(one, -factor * other)
+    after = names["laws"]["rough"].sample(names["normal"], before, rest, rng=1)
+
+    def energy(*velocities):
+        return sum(
+            disk.mass * (v[..., 0] ** 2 + v[..., 1] ** 2) + disk.inertia * v[..., 2] ** 2
+            for disk, v in zip(disks, velocities, strict=True)
+        )
+
+    assert np.allclose(energy(*after), energy(before, rest), rtol=1e-12)
+    momentum = [
+        sum(disk.mass * v[..., :2] for disk, v in zip(disks, pair, strict=True)) for pair in (after, (before, rest))
+    ]
+    assert np.allclose(*momentum, rtol=1e-12)
+
+
 def test_no_slip_plates_confine_and_rough_plates_do_not(run):
     ratio = run("no_slip_billiards")["ratio"]
     assert ratio["no-slip plates"].max() <= 1 + 1e-12 and np.median(ratio["rough plates"]) > 1
@@ -94,13 +126,23 @@ def test_sobol_sequences_beat_independent_rays(run):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["knudsen_diffusion", "two_laws_compared", "a_sweep"])
+@pytest.mark.parametrize("name", ["knudsen_diffusion", "two_laws_compared", "a_sweep", "a_gas_channel", "a_tube"])
 def test_the_slower_examples_agree_with_what_is_known(run, name):
     names = run(name)
     if name == "knudsen_diffusion":
         eta = [found.eta for found in names["found"].values()]
         zeta = -math.log(9) / 8
         assert eta == pytest.approx([1, 1, 1, (1 + zeta) / (1 - zeta), 3], abs=1e-6)
+    elif name in ("a_gas_channel", "a_tube"):
+        # L/h = 10 and L/R = 10
+        passing, clausing = names["passing"], {"a_gas_channel": 0.24056, "a_tube": 0.1909424}[name]
+        diffuse = passing["diffuse"] if name == "a_gas_channel" else passing["diffuse"][-1]
+        assert float(diffuse) == pytest.approx(clausing, abs=5e-6)
+        if name == "a_tube":
+            least, _, mixed, half, most = (float(passing[key][-1]) for key in (
+                "grooves across", "diffuse", "Maxwell, 80 % diffuse", "grooves at random", "grooves along",
+            ))  # fmt: skip
+            assert least < clausing < mixed < half < most == pytest.approx(1.0)
     elif name == "two_laws_compared":
         distances = [float(found) for found in names["distances"]]
         # the distance is convex in the fraction

@@ -1,4 +1,4 @@
-"""A study as ten short lines, as text, and as plain values for JSON."""
+"""A study as some ten short lines, as text, and as plain values for JSON."""
 
 from __future__ import annotations
 
@@ -24,15 +24,32 @@ AVERAGES = ("tangential", "normal", "maxwell_fraction", "misfit")
 KAC_Z = 4.5
 # Characters; the detailed report has the whole reason.
 LONGEST_REFUSAL = 110
+# Pieces of a curved wall, above which it is a profile: the named curved walls have at most five.
+MOST_PIECES = 8
 
 
-def summary_of(study: StudyResult) -> str:
-    """What was found, one fact a line; an error in brackets belongs to the last digits."""
+def summary_of(study: StudyResult, by_angle: bool) -> str:
+    """What was found, one fact a line; an error in brackets belongs to the last digits.
+
+    A disk that was given comes first. Of a profile the momentum that it takes on comes before its gap.
+    """
     wall, disk, found = study.wall, study.disk, study.consequences
     unit = f" {wall.unit}" if wall.unit else ""
     lines = {
         "wall": f"{study.name}: period {wall.period:g}{unit}, depth {wall.depth:.6g}{unit}, "
         f"{counted(len(wall.pieces), 'piece')}, {_symmetry(wall)}",
+    }
+    of_disk = {
+        "disk": f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
+        "as deep",
+        "collision": f"gap of that wall {_gap_words(study, 'collision_gap')}",
+        "conserved": f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
+        f"{study.conservation['rolling_momentum_defect']:.0e}",
+    }
+    of_profile = wall.is_polygonal or len(wall.pieces) > MOST_PIECES
+    lines |= of_disk if study.disk_given else {}
+    lines |= _momentum_lines(study, verbose=False) if of_profile or by_angle else {}
+    lines |= {
         "rays": _rays(study.tracer),
         "law": _law_line(study.matrix),
         "gap": _gap_words(study, "gap"),
@@ -41,13 +58,43 @@ def summary_of(study: StudyResult) -> str:
         "diffusion": _refused(found.refusal)
         if found.diffusion is None
         else f"D = {found.diffusion}; half-width 1, speed 1, tau the exit time",
-        "disk": f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
-        "as deep",
-        "collision": f"gap of that wall {_gap_words(study, 'collision_gap')}",
-        "conserved": f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
-        f"{study.conservation['rolling_momentum_defect']:.0e}",
     }
-    return "\n".join(f"{title:11s}{line}" for title, line in lines.items())
+    lines |= {} if study.disk_given or of_profile else of_disk
+    titled = {title: [line] for title, line in lines.items()}
+    return _joined({**titled, "by angle": _at_angles(study.accommodation) if by_angle else []})
+
+
+def _joined(blocks: dict[str, list[str]]) -> str:
+    return "\n".join(
+        f"{'' if number else title:11s}{line}" for title, lines in blocks.items() for number, line in enumerate(lines)
+    )
+
+
+def _momentum_lines(study: StudyResult, verbose: bool) -> dict[str, str]:
+    """The momentum of a gas that the wall takes on, and the resistance of a body with it."""
+    found, flatness = study.accommodation, study.consequences.flatness
+    if found is None:
+        return {"momentum": _refused(study.refusals["accommodation"])}
+    method = f" ({found.tangential.kind}: {found.tangential.method})" if verbose else ""
+    slope = f"; mean squared slope {flatness:.6g}" if math.isfinite(flatness) else ""
+    return {
+        "momentum": f"accommodation tangential {found.tangential}, normal {found.normal}{method}",
+        "resistance": f"{study.resistance} times that of a smooth tumbling body{slope}",
+        "Maxwell": f"fraction {found.maxwell_fraction} has the nearest mean velocities, misfit {found.misfit}",
+    }
+
+
+def _at_angles(found: Accommodation | None) -> list[str]:
+    """The coefficients at each angle."""
+    if found is None:
+        return []
+    lines = []
+    tangential = zip(found.tangential_at, found.tangential_errors, strict=True)
+    normal = zip(found.normal_at, found.normal_errors, strict=True)
+    for degrees, *pair in zip(found.incidence_deg, tangential, normal, strict=True):
+        words = ["not defined" if math.isnan(one[0]) else compact(Estimate(*one, found.kind_at, "")) for one in pair]
+        lines.append(f"at {degrees:.6g} degrees: tangential {words[0]}, normal {words[1]}")
+    return lines
 
 
 def _symmetry(wall: Wall) -> str:
@@ -94,11 +141,11 @@ def _relaxation(time: Estimate | None, without_gap: bool) -> str:
     if time is None:
         return "refused with the gap"
     if time.error == float("inf"):
-        return f"none: a modulus in the spectrum {'is' if without_gap else 'may be'} 1"
+        return "infinite: a modulus in the spectrum is 1" if without_gap else "not known: slem may be 1"
     return f"{compact(time)} steps"
 
 
-def details_of(study: StudyResult) -> str:
+def details_of(study: StudyResult, by_angle: bool) -> str:
     """The study as text, with methods, errors and evidence."""
     wall, disk = study.wall, study.disk
     cells = counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell"
@@ -117,6 +164,8 @@ def details_of(study: StudyResult) -> str:
         if study.enclosures is None
         else enclosures_as_text(study.enclosures),
         "follows": study.consequences.lines(),
+        **{title: [line] for title, line in _momentum_lines(study, verbose=True).items()},
+        "by angle": _at_angles(study.accommodation) if by_angle else [],
         "disk": [
             f"mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, "
             f"so it feels the wall {1.0 / disk.foreshortening:.6g} times as deep"
@@ -129,32 +178,16 @@ def details_of(study: StudyResult) -> str:
             f"to {study.conservation['rolling_momentum_defect']:.1e} (relative)",
         ],
     }
-    return "\n".join(
-        f"{'' if number else title:11s}{line}" for title, lines in blocks.items() for number, line in enumerate(lines)
-    )
+    return _joined(blocks)
 
 
-def accommodation_as_dict(found: Accommodation) -> dict[str, Any]:
+def _accommodation(found: Accommodation) -> dict[str, Any]:
     """Plain values; a coefficient that is not defined is None."""
     averages = {name: estimate_as_dict(getattr(found, name)) for name in AVERAGES}
     columns = found.incidence_deg, found.tangential_at, found.tangential_errors, found.normal_at, found.normal_errors
     names = "incidence_deg", "tangential", "tangential_error", "normal", "normal_error"
     rows = [dict(zip(names, map(finite, row), strict=True)) for row in np.transpose(columns).tolist()]
     return {**averages, "at": rows, "kind_at": found.kind_at}
-
-
-def accommodation_as_text(found: Accommodation) -> str:
-    """The coefficients on average, the nearest Maxwell law, and the coefficients at each angle."""
-    lines = [
-        f"tangential {found.tangential}, normal {found.normal}",
-        f"nearest Maxwell law: fraction {found.maxwell_fraction}, misfit {found.misfit}",
-    ]
-    tangential = zip(found.tangential_at, found.tangential_errors, strict=True)
-    normal = zip(found.normal_at, found.normal_errors, strict=True)
-    for degrees, *pair in zip(found.incidence_deg, tangential, normal, strict=True):
-        words = ["not defined" if math.isnan(one[0]) else compact(Estimate(*one, found.kind_at, "")) for one in pair]
-        lines.append(f"at {degrees:.6g} degrees: tangential {words[0]}, normal {words[1]}")
-    return "\n".join(f"{'' if k else 'momentum':11s}{line}" for k, line in enumerate(lines))
 
 
 def _tracer_lines(tracer: TracerCheck) -> list[str]:
@@ -196,7 +229,7 @@ def _gap_line(study: StudyResult, which: str) -> str:
     if not gap.self_adjoint:
         return words + _contraction(gap, study.tolerance)
     if gap.verdict == "no gap":
-        return words + "none (no gap): " + gap.evidence[0].split(":")[0]
+        return words + "0 (no gap): " + gap.evidence[0].split(":")[0]
     met = _met(gap.error <= study.tolerance, study.tolerance)
     if gap.verdict == "undecided" and gap.error >= abs(gap.value):
         # rounding to its error would leave nothing of the number
@@ -281,6 +314,8 @@ def study_as_dict(study: StudyResult) -> dict[str, Any]:
             "law": _matrix(study.collision_matrix), "gap": gaps[2], **study.conservation,
         },
         "consequences": study.consequences.as_dict(),
+        "accommodation": study.accommodation and _accommodation(study.accommodation),
+        "resistance": study.resistance and estimate_as_dict(study.resistance),
         "refusals": dict(study.refusals),
     }  # fmt: skip
 

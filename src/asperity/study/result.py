@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..core.estimates import NORMAL_95, Estimate
+from ..core.rounding import EPS
 from ..geometry import Disk, Wall
 from ..kernels import CollisionLaw, KernelMatrix
 from ..spectral import SpectralGap, Spectrum
 from ..spectral.bounds.enclosure import Enclosures
+from ..spectral.consequences.momentum_accommodation import WEIGHTS, Accommodation
 from .consequences import Consequences
 
 
@@ -48,6 +50,8 @@ class StudyResult:
     name : str
     wall : Wall
     disk : Disk
+    disk_given : bool
+        Whether somebody asked for this disk; the summary begins with it then.
     tolerance : float
         What was asked of the gaps, and of the image of every bin: times the root of their number in the Frobenius norm
         of the matrices.
@@ -73,11 +77,14 @@ class StudyResult:
         By the name of the attribute, why a spectral quantity is missing.
     consequences : Consequences
         Relaxation time, diffusivity of a channel, mean squared slope.
+    accommodation : Accommodation or None
+        Of momentum, at 32 angles or those asked for.
     """
 
     name: str
     wall: Wall
     disk: Disk
+    disk_given: bool
     tolerance: float
     tracer: TracerCheck | None
     matrix: KernelMatrix
@@ -91,3 +98,17 @@ class StudyResult:
     conservation: Mapping[str, float]
     refusals: Mapping[str, str]
     consequences: Consequences
+    accommodation: Accommodation | None
+
+    @property
+    def resistance(self) -> Estimate | None:
+        """That of a tumbling body with this wall, where a smooth one has 1; None where accommodation is.
+
+        With c = cos(theta) and s = sin(theta), R = (3/4)(1 + <c, P c> + <s, P s>), and accommodation has both entries.
+        """
+        if (found := self.accommodation) is None:
+            return None
+        across, along = found.normal, found.tangential
+        value = 1.0 + 0.75 * (WEIGHTS[0] * along.value - WEIGHTS[1] * across.value)
+        error = 0.75 * (WEIGHTS[0] * along.error + WEIGHTS[1] * across.error) + EPS
+        return Estimate(value, error, along.kind, along.method)

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core.checks import Rng, choice, generator, instance, positive_number
 from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
@@ -24,8 +25,9 @@ from ..geometry import Disk, Wall, trace
 from ..geometry.cells.miniature import wall_miniature
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
 from ..kernels.bases.measure import SINE
-from ..spectral import SpectralGap, Spectrum, enclosures, spectral_gap, spectrum
+from ..spectral import SpectralGap, Spectrum, accommodation, enclosures, spectral_gap, spectrum
 from ..spectral.bounds.enclosure import Enclosures
+from ..spectral.consequences.momentum_accommodation import from_degrees
 from ..spectral.gap.law_spectrum import with_gap
 from ..spectral.gap.methods import law_eigenvalues
 from .consequences import consequences_of
@@ -66,9 +68,12 @@ class Study(StudyResult):
         """The study as JSON."""
         return json.dumps(self.as_dict(), indent=2, allow_nan=False)
 
-    def summary(self, *, verbose: bool = False) -> str:
-        """The study as ten short lines; with ``verbose`` also methods, spectrum, enclosures and evidence."""
-        return details_of(self) if verbose else summary_of(self)
+    def summary(self, *, verbose: bool = False, by_angle: bool = False) -> str:
+        """The study as some ten short lines; with ``verbose`` also methods, spectrum, enclosures and evidence.
+
+        With ``by_angle`` also the accommodation of momentum at each angle.
+        """
+        return details_of(self, by_angle) if verbose else summary_of(self, by_angle)
 
     def __repr__(self) -> str:
         return f"<Study\n{self.summary()}>"
@@ -122,6 +127,7 @@ def study_wall(
     bins: int = BINS,
     rng: Rng = None,
     progress: bool = True,
+    incidence_deg: ArrayLike | None = None,
 ) -> Study:
     """Study a wall: trace it, make its law and matrix, test the symmetry, find the gap, collide a disk with it.
 
@@ -131,7 +137,7 @@ def study_wall(
     name : str
         What the wall is called in summaries and titles.
     disk : Disk, optional
-        By default the uniform disk, mass 1 and inertia 1/2.
+        By default the uniform disk, mass 1 and inertia 1/2. The summary begins with a disk that is given.
     tolerance : float
         Error asked of the gaps and of the matrices; what was reached is reported.
     bins : int
@@ -140,6 +146,8 @@ def study_wall(
         ``np.random.default_rng(0)`` by default, so that a study repeats.
     progress : bool
         Whether a bar is shown on a terminal after two seconds.
+    incidence_deg : array_like, optional
+        Angles of the accommodation of momentum, in degrees from the normal: see `accommodation`.
 
     Returns
     -------
@@ -150,7 +158,7 @@ def study_wall(
     Raises
     ------
     InputError
-        If the tolerance or the number of bins is unsuitable.
+        If the tolerance, the number of bins or an angle is unsuitable.
     AccuracyError
         If more than 1e-4 of the rays do not escape.
 
@@ -165,9 +173,12 @@ def study_wall(
     positive_number("tolerance", tolerance)
     basis = Bins(bins)
     rng = generator(rng, 0)
-    disk = disk or Disk()
+    if incidence_deg is not None:
+        # refused before the work
+        from_degrees(incidence_deg)
+    given, disk = disk is not None, disk or Disk()
     refusals: dict[str, str] = {}
-    with progress_bar(8, "part", name, shown=progress) as bar:
+    with progress_bar(9, "part", name, shown=progress) as bar:
         tracer = check_tracer(wall, rng) if wall.hollows else None
         bar.update()
         law = WallLaw(wall)
@@ -186,10 +197,15 @@ def study_wall(
         collision_gap = _or_refusal(lambda: spectral_gap(collision.law, tolerance, rng), refusals, "collision_gap")
         bar.update()
         consequences = consequences_of(wall, law, gap, specular_gap, found)
+        conservation = _conservation(collision, rng)
+        momentum = _or_refusal(
+            lambda: accommodation(law, tolerance, rng=rng, incidence_deg=incidence_deg), refusals, "accommodation"
+        )
+        bar.update()
     return Study(
-        name, wall, disk, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed, collision,
-        collision_matrix, collision_gap, MappingProxyType(_conservation(collision, rng)), MappingProxyType(refusals),
-        consequences,
+        name, wall, disk, given, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed, collision,
+        collision_matrix, collision_gap, MappingProxyType(conservation), MappingProxyType(refusals), consequences,
+        momentum,
     )  # fmt: skip
 
 
