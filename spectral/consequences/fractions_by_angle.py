@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import overload
 
 import numpy as np
@@ -15,7 +16,6 @@ from ...geometry import Segment, Wall, trace
 from ...geometry.cells.hollow_shape import distinct_hollows
 from ...geometry.polygons.beams import Beams, beams_of
 from ...kernels import SINE, Bins, CircularArcLaw, DensityLaw, Law, WallLaw
-from ...kernels.laws.crevice import crevice_retro
 from ...kernels.laws.isometry_table import SAME_OFFSET, IsometryTable
 from ...kernels.laws.law import Composition, DrivenLaw, SpecularFrame, specular
 from ...kernels.laws.structure import law_of, words_of
@@ -28,6 +28,8 @@ from .momentum_accommodation import incoming_angles
 RAYS = 2**16
 # Traced rays this close to specular reflection hit straight pieces only; by curved pieces so many are there by chance.
 CLOSE = 1e-9
+# Rays at normal incidence, where retroreflection is specular, come so much beside it, radians.
+BESIDE = 1e-6
 
 
 def bounce_shares(
@@ -94,12 +96,9 @@ def _of_beams(cell: Wall, theta: Floats, most: int) -> list[tuple[Estimate, ...]
     for shape, hollows in distinct_hollows(cell):
         width = sum(hollow.width for hollow in hollows) / cell.period
         ratio = shape.height_to_width
-        beams = beams_of(shape.vertices) if ratio is None else None
+        of_hollow = partial(_in_hollow, beams_of(shape.vertices)) if ratio is None else partial(_in_rectangle, ratio)
         for k, angle in enumerate(theta.tolist()):
-            if beams is not None:
-                own, wrong = _in_hollow(beams, angle, most, shape.rounding)
-            else:
-                own, wrong = _in_rectangle(float(ratio or 0.0), angle, most, shape.rounding)
+            own, wrong = of_hollow(angle, most, shape.rounding)
             fractions[k] += width * own
             errors[k] += width * wrong
     errors += 4.0 * EPS
@@ -217,7 +216,7 @@ def _specular_part(law: Law, theta: Floats | None, rng: np.random.Generator) -> 
         value, error = _specular_mass(table) if theta is None else _specular_at(table, theta)
         missed = table.unresolved if theta is None else np.sqrt(table.unresolved)
         kind: ErrorKind = "bound" if theta is None or not missed else "estimate"
-        return value, zero + error + missed, kind, "isometries of the law"
+        return value, error + missed, kind, "isometries of the law"
     inner = law.law if isinstance(law, SpecularFrame) else law
     factors = inner.laws if isinstance(inner, Composition) else (inner,)
     if any(isinstance(one, (DensityLaw, CircularArcLaw)) for one in factors):
@@ -242,6 +241,7 @@ def _specular_part(law: Law, theta: Floats | None, rng: np.random.Generator) -> 
 
 def _near_specular(law: Law, inner: DrivenLaw, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], float]:
     """Which rays are reflected specularly, of a law in the other frame retroreflected, and the unresolved fraction."""
+    theta = np.where(np.abs(theta - 0.5 * np.pi) < BESIDE, 0.5 * np.pi + BESIDE, theta)
     outgoing, escaped = inner.reflect_with_status(np.maximum(x, EPS), theta)
     target = np.pi - theta if law is inner else theta
     return np.abs(outgoing - target) < CLOSE, 0.0 if escaped is None else 1.0 - float(np.mean(escaped))
@@ -253,29 +253,25 @@ def _has_curved_hollows(cell: Wall) -> bool:
     return cell.closes and not any(straight & set(range(one.first, one.last)) for one in cell.hollows)
 
 
-def _is_specular_piece(table: IsometryTable) -> NDArray[np.bool_]:
-    return np.asarray((table.sign < 0.0) & (np.abs(table.offset - np.pi) <= SAME_OFFSET + table.offset_error))
+def _are_specular(table: IsometryTable, sign: Floats, offset: Floats) -> NDArray[np.bool_]:
+    """Which isometries are specular reflection, to the rounding of offsets."""
+    return np.asarray((sign < 0.0) & (np.abs(offset - np.pi) <= SAME_OFFSET + table.offset_error))
 
 
-def _specular_at(table: IsometryTable, theta: Floats) -> tuple[Floats, float]:
+def _specular_at(table: IsometryTable, theta: Floats) -> tuple[Floats, Floats]:
     """The probability of specular reflection at angles, and its rounding."""
-    pieces, found = np.flatnonzero(_is_specular_piece(table)), np.zeros(theta.size)
-    for k, angle in enumerate(theta.tolist()):
-        here = pieces[(table.low[pieces] <= angle) & (angle < table.high[pieces])]
-        found[k] = table.density(np.full(here.size, angle), here).sum() / np.sin(angle)
-    for crevice in table.crevices:
-        retro = crevice.fraction * crevice_retro(crevice.height_to_width, theta)
-        found += retro if crevice.exchanged else crevice.fraction - retro
-    return found, SAME_OFFSET
+    probability, sign, offset = table.conditionals(theta)
+    found = np.where(_are_specular(table, sign, offset), probability, 0.0).sum(axis=-1)
+    return np.asarray(found), SAME_OFFSET / np.sin(theta)
 
 
-def _specular_mass(table: IsometryTable) -> tuple[Floats, float]:
+def _specular_mass(table: IsometryTable) -> tuple[Floats, Floats]:
     """The average of the probability of specular reflection, and a bound on its error."""
-    mass, error = float(table.masses()[_is_specular_piece(table)].sum()), SAME_OFFSET
+    mass, error = float(table.masses()[_are_specular(table, table.sign, table.offset)].sum()), SAME_OFFSET
     for crevice in table.crevices:
         listed = crevice_pieces(crevice.height_to_width, FIRST_CROSSING)
         _, *others, omitted = crevice_nodes(crevice.height_to_width, Bins(1))
         kept = int(crevice.exchanged)
         own = float(listed.masses()[listed.sign == (-1.0, 1.0)[kept]].sum()) + 2.0 * float(others[kept].sum())
         mass, error = mass + crevice.fraction * own, error + 4.0 * crevice.fraction * omitted
-    return np.array([mass]), error
+    return np.array([mass]), np.array([error])
