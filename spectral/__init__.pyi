@@ -5,6 +5,8 @@ from .consequences.cheeger import conductance as conductance
 from .consequences.clausing import transmission as transmission
 from .consequences.diffusion import channel_diffusivity as channel_diffusivity
 from .consequences.diffusion import diffusivity as diffusivity
+from .consequences.fractions_by_angle import bounce_shares as bounce_shares
+from .consequences.fractions_by_angle import specular_share as specular_share
 from .consequences.laplacian import laplacian_comparison as laplacian_comparison
 from .consequences.laplacian import mean_squared_slope as mean_squared_slope
 from .consequences.mixing import mixing_time as mixing_time

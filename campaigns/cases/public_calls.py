@@ -220,6 +220,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "mixing_time": (spec.mixing_time, {"kernel": MATRIX, "within": 0.25, "distance": "total variation",
                                        "density": None, "start": None, "initial": 1.0}),
     "accommodation": (spec.accommodation, {"law": LAW, "theta": [1.0], "tolerance": 0.1, "rng": 0}),
+    "bounce_shares": (spec.bounce_shares, {"wall": TEETH, "incidence_deg": [30.0], "most": 2, "rng": 0}),
+    "specular_share": (spec.specular_share, {"law": LAW, "incidence_deg": [30.0], "rng": 0}),
     "Between": (spec.Between, {"low": 0.2, "high": 0.4, "points": 4, "resolution": 0.1}),
     "transmission": (spec.transmission, {"law": LAW, "length": 1.0, "section": "channel", "tolerance": 0.1, "rng": 0}),
     "sweep": (spec.sweep, {"family": ker.maxwell, "grid": {"diffuse_fraction": [0.5]}, "quantities": "gap",
