@@ -208,7 +208,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "hilbert_schmidt_norm": (spec.hilbert_schmidt_norm, {"law": LAW, "tolerance": 0.1}),
     "channel_paths": (spec.channel_paths, {"law": LAW, "times": [1.0, 2.0, 4.0], "particles": 4, "rng": 0,
         "radius": 1.0, "speed": 1.0, "bend": 3.0, "arrangement": "mirror"}),
-    "curvature_gap_bounds": (spec.curvature_gap_bounds, {"curvature": 1.0, "bins": 50}),
+    "prove_gap": (spec.prove_gap, {"law": ker.henyey_greenstein(0.5), "width": 0.1}),
     "essential_edge": (spec.essential_edge, {"law": LAW}),
     "channel_diffusivity": (spec.channel_diffusivity, {"law": LAW, "lengths": [1.0, 2.0], "particles": 4, "rng": 0,
         "radius": 1.0, "speed": 1.0, "arrangement": "mirror"}),
