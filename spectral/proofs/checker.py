@@ -128,8 +128,7 @@ class Bumps:
             if hit[side] is False or hit[-side]:
                 continue
             square = (near / 2).sin() ** 2 - self.K * direction.sin() / 2
-            low, high = (min(max(x, ZERO), ONE).sqrt().asin() for x in (square.lower(), square.upper()))
-            w = 2 * ball(low, high)
+            w = 2 * ball(*(min(max(x, ZERO), ONE).sqrt().asin() for x in (square.lower(), square.upper())))
             dw = ds and [(s.sin() * x * side - self.K * a.cos() * y) / w.sin() for x, y in zip(ds, da, strict=True)]
             turned = dw and [y + 2 * side * x for x, y in zip(dw, da, strict=True)]
             glance = w if side == 1 else PI - w

@@ -109,19 +109,17 @@ def prove_gap(law: Law, width: float = 1e-4) -> Proof:
     [0.75, 0.75]
     """
     described, wanted = Description.of(law), number_between("width", width, 0.0, 1.0)
-    reason = ""
-    for certificate in certificates(described, wanted):
-        certificate["format"] = FORMAT
-        try:
+    try:
+        for certificate in certificates(described, wanted):
+            certificate["format"] = FORMAT
             low, high = enclose(certificate)
-        except Refused as refusal:
-            reason = f"expected {refusal}"
-            continue
-        ends = _decimal(low, down=True), _decimal(high, down=False)
-        certificate["interval"] = [str(end) for end in ends]
-        if ends[1] - ends[0] <= Decimal(wanted) * ends[1]:
-            return _proof(certificate, described.text)
-        reason = f"the interval [{ends[0]}, {ends[1]}] is wider than asked; ask for a greater width"
+            ends = _decimal(low, down=True), _decimal(high, down=False)
+            certificate["interval"] = [str(end) for end in ends]
+            if ends[1] - ends[0] <= Decimal(wanted) * ends[1]:
+                return _proof(certificate, described.text)
+            reason = f"the interval [{ends[0]}, {ends[1]}] is wider than asked; ask for a greater width"
+    except Refused as refusal:
+        reason = f"expected {refusal}"
     raise ProofError(f"the gap of {described.text} is not proved: {reason}")
 
 
