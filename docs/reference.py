@@ -65,7 +65,6 @@ RETURNED = {
     "kernels.design_wall": "WallDesign",
     "kernels.exchange_hollow": "ExchangeHollow Generations",
     "kernels.dichotomy": "Dichotomy",
-    "spectral.curvature_gap_bounds": "GapBounds",
     "spectral.enclosures": "Enclosures Enclosure Separation",
     "spectral.exit_times": "ExitTimes",
     "spectral.conductance": "Conductance",

@@ -1,10 +1,11 @@
-from .bounds.curvature import curvature_gap_bounds as curvature_gap_bounds
 from .bounds.enclosure import enclosures as enclosures
 from .consequences.channel import exit_times as exit_times
 from .consequences.cheeger import conductance as conductance
 from .consequences.clausing import transmission as transmission
 from .consequences.diffusion import channel_diffusivity as channel_diffusivity
 from .consequences.diffusion import diffusivity as diffusivity
+from .consequences.fractions_by_angle import bounce_shares as bounce_shares
+from .consequences.fractions_by_angle import specular_share as specular_share
 from .consequences.laplacian import laplacian_comparison as laplacian_comparison
 from .consequences.laplacian import mean_squared_slope as mean_squared_slope
 from .consequences.mixing import mixing_time as mixing_time
@@ -16,6 +17,9 @@ from .essential.edge import essential_edge as essential_edge
 from .gap.gap import spectral_gap as spectral_gap
 from .gap.law_spectrum import spectrum as spectrum
 from .gap.verdict import SpectralGap as SpectralGap
+from .proofs.proof import Proof as Proof
+from .proofs.proof import check_proof as check_proof
+from .proofs.proof import prove_gap as prove_gap
 from .sweeps.ensembles import ensemble as ensemble
 from .sweeps.ensembles import mean_law as mean_law
 from .sweeps.points import Between as Between

@@ -6,19 +6,27 @@ from functools import lru_cache
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ..bases.angles import mirrored_angle
 from ..bases.bins import Bins
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE
 from ..discretisation.discretisation import discretise
-from ..expectations.conditionals import Conditionals
-from ..laws.law import Combination, Composition, Law, Power, SpecularFrame, has_fixed_nodes, is_atomic, knows_errors
+from ..expectations.distribution_functions import Distributions
+from ..laws.law import (
+    Combination,
+    Composition,
+    Law,
+    Power,
+    SpecularFrame,
+    has_fixed_nodes,
+    is_atomic,
+    is_flat_top,
+    knows_errors,
+)
 from ..laws.structure import law_of, words_of
 from ..matrices.matrix import KernelMatrix
-from .transport import Distributions, power_mean, wasserstein
+from .transport import power_mean, wasserstein
 
 # Incoming angles at which the error from entry points is estimated, and the number of cells for products.
 ANGLES = 64
@@ -138,7 +146,7 @@ def cells_and_atoms(
             position, mass = (part[:, entries] if term.is_sampled else part for part in given.atoms())
             atoms.append(np.stack((position, weight * mass / mass.sum(axis=1, keepdims=True))))
             continue
-        level = _is_flat_top(term.law, incoming, given)
+        level = is_flat_top(term.law, incoming, given)
         total += weight * given._replace(weights=np.where(level, 0.0, given.weights)).masses(edges)
         if level.any():
             flat = np.bincount(given.owner, weights=np.where(level, given.weights, 0.0), minlength=theta.size)
@@ -146,13 +154,6 @@ def cells_and_atoms(
             atoms.append(np.stack((position, weight * flat))[..., None])
     position, mass = np.concatenate(atoms, axis=2)
     return CellsAndAtoms(total, position, mass, wrong)
-
-
-def _is_flat_top(law: Law, theta: Floats, given: Conditionals) -> NDArray[np.bool_]:
-    """Which nodes are those of flat tops, the only atoms of traced walls."""
-    specular = np.pi - theta
-    found = mirrored_angle(specular) if isinstance(law, SpecularFrame) else specular
-    return np.asarray((given.nodes == found[given.owner]) & (not law.is_lambertian))
 
 
 @lru_cache(maxsize=MATRICES)

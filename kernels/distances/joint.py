@@ -16,12 +16,13 @@ from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
+from ..expectations.distribution_functions import Distributions
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .cell_transport import MOST_PIVOTS, NO_MASS, Level, levels_of_transport
 from .resampling import cell_middles, matrices_error, stochastic_rows
 from .rowwise import matrix_distance
-from .transport import Distributions, power_mean, wasserstein
+from .transport import power_mean, wasserstein
 
 # Limit on the pairs of occupied cells for an exact solution, at about 40 bytes per pair, 160 MB, and a few seconds.
 MOST_PAIRS = 2**22

@@ -213,8 +213,12 @@ class IsometryTable:
 
     def mass(self) -> float:
         """The total measure of all pieces and crevices: 1 up to rounding if the table is complete."""
+        return float(self.masses().sum() + sum(crevice.fraction for crevice in self.crevices))
+
+    def masses(self) -> Floats:
+        """The measure of each piece."""
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
-        return float(np.sum(np.sin(half) * self.density(middle)) + sum(crevice.fraction for crevice in self.crevices))
+        return np.asarray(np.sin(half) * self.density(middle))
 
     def density(self, theta: Floats, piece: Whole | slice = slice(None)) -> Floats:
         """p(theta) sin(theta) of the given piece at each angle."""

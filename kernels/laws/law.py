@@ -37,7 +37,7 @@ from ..bases.given import Vectorised, seed_by_name
 from ..expectations.conditionals import Conditionals, degree_of
 from .branches import MOST_BRANCHES, chained, chained_breakpoints, joined, merged
 from .isometry_table import IsometryTable
-from .tables import Table, tabulated
+from .tables import Table, WithAtoms, tabulated
 
 # Half the spacing of rng.random(). It replaces draws of exactly 0, for which the ray would enter at a tip of the wall.
 SMALLEST_DRAW = 2.0**-54
@@ -185,7 +185,7 @@ class Law(ABC):
         -------
         Table
             Angles, probabilities, quantiles and the error of bilinear interpolation between them; ``save`` writes a
-            .csv or .npz file, ``sample`` draws from the table.
+            .csv, .npz or .h5 file, ``sample`` draws from the table.
 
         Examples
         --------
@@ -200,8 +200,8 @@ class Law(ABC):
         (0.087, 0.0016)
         """
         wanted = number_between("tolerance", tolerance, EPS, 1.0, closed="low high")
-        parts = [(weight, part._conditionals, has_fixed_nodes(part)) for weight, part in self.parts]
-        return tabulated(parts, n_in, n_out, wanted, self.frame, repr(self))
+        parts = [(weight, _with_atoms(part, wanted)) for weight, part in self.parts]
+        return tabulated(parts, n_in, n_out, self.frame, repr(self))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles of a law made of isometries theta' = +-theta + const.
@@ -782,6 +782,24 @@ def has_fixed_nodes(law: Law) -> bool:
     """Whether conditional distributions have the same nodes for all functions: they are atoms, or those of samples."""
     whole, cut = (law._conditionals(PROBE, PROBE_TOLERANCE, degree, edges) for degree, edges in PROBE_FUNCTIONS)
     return np.array_equal(whole.nodes, cut.nodes)
+
+
+def is_flat_top(law: Law, theta: Floats, given: Conditionals) -> NDArray[np.bool_]:
+    """Which nodes of conditional distributions at ``theta`` are those of flat tops, the only atoms of traced walls."""
+    specular = np.pi - theta
+    found = mirrored_angle(specular) if isinstance(law, SpecularFrame) else specular
+    return np.asarray((given.nodes == found[given.owner]) & (not law.is_lambertian))
+
+
+def _with_atoms(law: Law, tolerance: float) -> WithAtoms:
+    """The conditional distributions for functions constant between edges, and which of their nodes are atoms."""
+    fixed = has_fixed_nodes(law)
+
+    def given_and_atoms(theta: Floats, edges: Floats) -> tuple[Conditionals, NDArray[np.bool_]]:
+        given = law._conditionals(theta, tolerance, 0, edges)
+        return given, np.ones(given.nodes.shape, dtype=bool) if fixed else is_flat_top(law, theta, given)
+
+    return given_and_atoms
 
 
 def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:

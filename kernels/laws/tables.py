@@ -6,19 +6,21 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TypeAlias
+from typing import IO, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, angles, check_memory, frozen, generator, shortened, whole_number
 from ...core.errors import InputError
 from ...core.files import write_whole
+from ...core.frames import needed
 from ...core.tables import numbers_as_csv
 from ..bases.basis import Frame
 from ..bases.given import seed_by_name
 from ..bases.measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE
 from ..expectations.conditionals import Conditionals
+from ..expectations.distribution_functions import Distributions
 
 # Cells of equal angle whose masses give a distribution function: of coarse tables, and for each probability of others.
 LEAST_CELLS, CELLS_FOR_EACH = 512, 4
@@ -33,8 +35,10 @@ CONVENTIONS = {
     "specular": "theta_out = theta_in is specular reflection, theta_out = pi - theta_in is retroreflection",
 }
 
-# A law as a sum: weights, conditional distributions, and whether these consist of atoms.
-Parts: TypeAlias = Sequence[tuple[float, Callable[[Floats, float, int, Floats], Conditionals], bool]]
+# Of a part of a law: its conditional distributions at incoming angles, for edges, and which of their nodes are atoms.
+WithAtoms: TypeAlias = Callable[[Floats, Floats], tuple[Conditionals, NDArray[np.bool_]]]
+# A law as a sum, with weights.
+Parts: TypeAlias = Sequence[tuple[float, WithAtoms]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +85,7 @@ class Table:
         return self._at(incoming, source.random(incoming.shape))
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """Write a file for other codes: .csv, or .npz, which has all attributes by their names.
+        """Write a file for other codes: .csv, or .npz or .h5 (extra ``hdf5``), with all attributes by their names.
 
         In a .csv comments begin with #. The first row of numbers has 0 and the probabilities; each other row has an
         incoming angle and its quantiles. An existing file is replaced only with ``overwrite``, when all is written.
@@ -92,12 +96,24 @@ class Table:
             rows = np.vstack([corner, np.column_stack([self.theta, self.quantile])])
             write_whole(target, numbers_as_csv(self._header(), rows.tolist()), overwrite=overwrite)
         elif target.suffix.lower() == ".npz":
-            content = {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}
-            content["header"] = np.array("\n".join(self._header()))
-            write_whole(target, lambda stream: np.savez_compressed(stream, **content), overwrite=overwrite)  # type: ignore[arg-type]
+            write_whole(target, lambda stream: np.savez_compressed(stream, **self._content()), overwrite=overwrite)
+        elif target.suffix.lower() == ".h5":
+            library = needed("h5py", "save", "hdf5")
+            write_whole(target, lambda stream: self._write_hdf5(library, stream), overwrite=overwrite)
         else:
-            raise InputError(f"path: expected a name that ends in .csv or .npz, got {shortened(str(path))}")
+            raise InputError(f"path: expected a name that ends in .csv, .npz or .h5, got {shortened(str(path))}")
         return target
+
+    def _content(self) -> dict[str, Any]:
+        """All attributes by their names, and the header."""
+        content = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {**content, "header": "\n".join(self._header())}
+
+    def _write_hdf5(self, library: Any, stream: IO[bytes]) -> None:
+        """Write arrays as data sets in radians, other attributes as those of the file."""
+        with library.File(stream, "w") as file:
+            for name, value in self._content().items():
+                (file if isinstance(value, np.ndarray) else file.attrs)[name] = value
 
     def _header(self) -> list[str]:
         n_in, n_out = self.quantile.shape
@@ -123,19 +139,19 @@ class Table:
         return np.asarray(np.clip((1.0 - s) * low + s * high, SMALLEST_ANGLE, LARGEST_ANGLE))
 
 
-def tabulated(parts: Parts, n_in: int, n_out: int, tolerance: float, frame: Frame, law: str) -> Table:
+def tabulated(parts: Parts, n_in: int, n_out: int, frame: Frame, law: str) -> Table:
     """The table of a law, compared with its quantiles at intermediate incoming angles."""
     rows, columns = whole_number("n_in", n_in, 2), whole_number("n_out", n_out, 2)
     check_memory("n_in, n_out", "the table", 2 * COMPARED * rows * columns)
     cells = max(LEAST_CELLS, CELLS_FOR_EACH * columns)
     theta = np.asarray((np.arange(rows) + 0.5) * (np.pi / rows))
     probability = np.asarray(np.linspace(0.0, 1.0, columns), dtype=np.float64)
-    quantile, missed = _quantiles(parts, theta, probability, tolerance, cells)
+    quantile, missed = _quantiles(parts, theta, probability, cells)
     unchecked = Table(frozen(theta), frozen(probability), frozen(quantile), 0.0, 0.0, missed, frame, law)
     # the middle between neighbours, and the outer half cells, whose quantiles are extrapolated
     between = np.concatenate(([0.25], np.arange(1, rows), [rows - 0.25])) * (np.pi / rows)
     fine = (np.arange(COMPARED * (columns - 1)) + 0.5) / (COMPARED * (columns - 1))
-    own, _ = _quantiles(parts, between, fine, tolerance, 2 * cells)
+    own, _ = _quantiles(parts, between, fine, 2 * cells)
     difference = np.abs(unchecked._at(*np.broadcast_arrays(between[:, None], fine)) - own)
     mean = float(np.average(difference.mean(axis=1), weights=SINE.density(between)))
     return Table(
@@ -143,47 +159,24 @@ def tabulated(parts: Parts, n_in: int, n_out: int, tolerance: float, frame: Fram
     )
 
 
-def _quantiles(parts: Parts, theta: Floats, probability: Floats, tolerance: float, cells: int) -> tuple[Floats, float]:
+def _quantiles(parts: Parts, theta: Floats, probability: Floats, cells: int) -> tuple[Floats, float]:
     """Quantiles, shape (angles, probabilities), and the largest error of the distribution functions."""
     edges, at = np.linspace(0.0, np.pi, cells + 1), np.clip(probability, END, 1.0 - END)
     found, missed = np.empty((theta.size, at.size)), 0.0
     for start in range(0, theta.size, AT_ONCE):
-        chosen = theta[start : start + AT_ONCE]
-        smooth, error = np.zeros((chosen.size, cells)), np.zeros(chosen.size)
-        atoms: list[tuple[float, Conditionals]] = []
-        for weight, conditionals, atomic in parts:
-            each = conditionals(chosen, tolerance, 0, edges[1:-1])
+        own = slice(start, start + AT_ONCE)
+        chosen = theta[own]
+        below, error = np.zeros((chosen.size, cells + 1)), np.zeros(chosen.size)
+        atoms = [np.empty((2, chosen.size, 0))]
+        for weight, with_atoms in parts:
+            each, atomic = with_atoms(chosen, edges[1:-1])
             error += weight * each.error
-            if atomic:
-                atoms.append((weight, each))
-            else:
-                smooth += weight * each.masses(edges)
-        mixed = Conditionals.mixed(atoms) if atoms else None
-        for k, masses in enumerate(smooth):
-            own = slice(0, 0) if mixed is None else slice(*mixed.starts[k : k + 2])
-            nodes, weights = (np.empty(0), np.empty(0)) if mixed is None else (mixed.nodes[own], mixed.weights[own])
-            found[start + k] = _inverted(edges, masses, nodes, weights, at)
+            spread = each._replace(weights=weight * np.where(atomic, 0.0, each.weights))
+            below[:, 1:] += np.cumsum(spread.masses(edges), axis=1)
+            if atomic.any():
+                atoms.append(np.stack(each._replace(weights=weight * np.where(atomic, each.weights, 0.0)).atoms()))
+        found[own] = Distributions.of_parts(edges, below, *np.concatenate(atoms, axis=2)).quantile(
+            np.tile(at, (chosen.size, 1))
+        )
         missed = float(np.maximum(missed, error.max()))
     return np.clip(found, SMALLEST_ANGLE, LARGEST_ANGLE), missed
-
-
-def _inverted(edges: Floats, masses: Floats, nodes: Floats, weights: Floats, probability: Floats) -> Floats:
-    """Quantiles of a distribution with masses spread evenly over cells, and atoms, at which quantiles stay constant.
-
-    Examples
-    --------
-    >>> _inverted(np.array([0.0, 1.0, 2.0]), np.array([0.5, 0.0]), np.array([1.5]), np.array([0.5]),
-    ...           np.array([0.25, 0.6, 0.9])).tolist()
-    [0.5, 1.5, 1.5]
-    """
-    order = np.argsort(nodes, kind="stable")
-    angle = np.concatenate([edges, np.repeat(nodes[order], 2)])
-    below = np.interp(angle, edges, np.concatenate(([0.0], np.cumsum(masses))))
-    after = np.concatenate(([0.0], np.cumsum(weights[order])))
-    # of an edge the atoms to its left; an atom occurs twice, without its own weight and with it
-    left = np.searchsorted(nodes[order], edges, side="right")
-    number = np.concatenate([left, np.arange(2 * order.size) // 2 + np.tile([0, 1], order.size)])
-    distribution = below + after[number]
-    sorting = np.lexsort((distribution, angle))
-    distribution = np.maximum.accumulate(distribution[sorting])
-    return np.asarray(np.interp(probability * distribution[-1], distribution, angle[sorting]))

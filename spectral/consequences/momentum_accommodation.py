@@ -69,6 +69,11 @@ class Accommodation:
     tangential_missed, normal_missed : array of bool, shape (n,)
         Where such an error is larger than the tolerance times the coefficient, or the coefficient is not defined: at
         normal incidence the tangential one is nan, with an infinite error.
+    maxwell_fraction_at, maxwell_fraction_errors : array of shape (n,)
+        The f in [0, 1] whose Maxwell law has the nearest mean reflected velocity at the angle, defined at normal
+        incidence too, and its error.
+    misfit_at, misfit_errors : array of shape (n,)
+        The distance between the two mean reflected velocities there, in units of the speed, and its error.
     kind_at : {"bound", "estimate"}
     """
 
@@ -83,6 +88,10 @@ class Accommodation:
     normal_at: Floats
     normal_errors: Floats
     normal_missed: NDArray[np.bool_]
+    maxwell_fraction_at: Floats
+    maxwell_fraction_errors: Floats
+    misfit_at: Floats
+    misfit_errors: Floats
     kind_at: ErrorKind
 
     @property
@@ -207,28 +216,39 @@ def accommodation(
     paper = in_paper_frame(law)
     parts = _parts(paper, wanted, generator(rng, 0))
     tangential, normal, fraction = _averaged(parts)
-    values, errors, missed = _coefficients(parts, incoming, wanted)
+    changes, uncertainty, missed = _changes_at(parts, incoming, wanted)
     missed.setflags(write=False)
+    values, errors = _coefficients(incoming, changes, uncertainty)
     (tangential_at, normal_at), (tangential_errors, normal_errors) = frozen(values.T), frozen(errors.T)
+    (fraction_at, fraction_errors), (misfit_at, misfit_errors) = _nearest_maxwell(incoming, changes, uncertainty)
     kind: ErrorKind = "bound" if all(part.kind == "bound" for _, part in parts) else "estimate"
     misfit = _misfit(paper, parts, fraction, wanted)
     return Accommodation(
         tangential, normal, fraction, misfit, frozen(incoming), tangential_at, tangential_errors, missed[:, 0],
-        normal_at, normal_errors, missed[:, 1], kind,
+        normal_at, normal_errors, missed[:, 1], frozen(fraction_at),
+        frozen(fraction_errors), frozen(misfit_at), frozen(misfit_errors), kind,
     )  # fmt: skip
 
 
 def from_degrees(incidence: ArrayLike) -> Floats:
+    """Angles at which accommodation is defined, from degrees from the normal, normal incidence among them."""
+    incoming = incoming_angles(incidence)
+    oblique = incoming[incoming != 0.5 * np.pi]
+    if oblique.size:
+        _checked("incidence_deg", oblique)
+    return incoming
+
+
+def incoming_angles(incidence: ArrayLike) -> Floats:
     """Incoming angles in radians from degrees from the normal, normal incidence among them."""
     given = np.atleast_1d(finite_array("incidence_deg", incidence)).ravel()
     incoming = np.asarray(np.radians(90.0 - given))
     bad = (np.abs(given) >= 90.0) | (incoming <= 0.0) | (incoming >= np.pi)
     if bad.any():
         raise InputError(f"incidence_deg: expected degrees from the normal, in (-90, 90), got {float(given[bad][0])!r}")
-    oblique = np.abs(np.cos(incoming)) >= POLE
-    if oblique.any() or not given.size:
-        _checked("incidence_deg", incoming[oblique])
-    return np.where(oblique, incoming, 0.5 * np.pi)
+    if not given.size:
+        raise InputError("incidence_deg: expected at least one angle, got none")
+    return np.where(np.abs(np.cos(incoming)) >= POLE, incoming, 0.5 * np.pi)
 
 
 def _checked(name: str, theta: ArrayLike) -> Floats:
@@ -375,15 +395,14 @@ def _summed(parts: list[tuple[float, _Changes]], theta: Floats, tolerance: float
     return changes, np.asarray(sum(weight * error for weight, _, error in found)) + 4.0 * EPS * np.abs(changes)
 
 
-def _coefficients(
+def _changes_at(
     parts: list[tuple[float, _Changes]], theta: Floats, wanted: float
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """The coefficients, their errors, and where an error exceeds the wanted one, relative to the coefficient.
+    """The changes at angles, their errors, and where an error exceeds the wanted one, relative to the change.
 
-    A coefficient is nan where complete accommodation changes nothing.
+    Where complete accommodation changes nothing there is no coefficient, and it counts as missed.
     """
-    complete = _complete(theta)
-    pole = np.abs(complete) < POLE
+    pole = np.abs(_complete(theta)) < POLE
     changes, errors = _summed(parts, theta, RULE_SHARE * wanted)
     missed = (errors > wanted * np.abs(changes)) & ~pole
     again = missed.any(axis=1)
@@ -397,8 +416,30 @@ def _coefficients(
             np.where(better, new, old[again]) for new, old in zip(finer, (changes, errors), strict=True)
         )
         missed = errors > wanted * np.abs(changes)
+    return changes, errors, missed | pole
+
+
+def _coefficients(theta: Floats, changes: Floats, errors: Floats) -> tuple[Floats, Floats]:
+    """The coefficients and their errors; nan where complete accommodation changes nothing."""
+    complete = _complete(theta)
+    pole = np.abs(complete) < POLE
     divisor = np.where(pole, np.nan, complete)
-    return changes / divisor, np.where(pole, np.inf, errors / np.abs(divisor)), missed | pole
+    return changes / divisor, np.where(pole, np.inf, errors / np.abs(divisor))
+
+
+def _nearest_maxwell(
+    theta: Floats, changes: Floats, errors: Floats
+) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+    """The nearest point f times the complete changes, 0 <= f <= 1, and the distance from it, each with its error.
+
+    Neither the point nor the distance moves farther than the changes do.
+    """
+    complete = _complete(theta)
+    size = np.hypot(*complete.T)
+    fraction = np.clip(np.sum(changes * complete, axis=1) / size**2, 0.0, 1.0)
+    misfit = np.hypot(*(changes - fraction[:, None] * complete).T)
+    moved = np.hypot(*errors.T) + 8.0 * EPS * np.hypot(*changes.T)
+    return (fraction, moved / size), (misfit, moved)
 
 
 def _misfit(law: Law, parts: list[tuple[float, _Changes]], fraction: Estimate, wanted: float) -> Estimate:

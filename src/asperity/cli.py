@@ -106,7 +106,7 @@ def main() -> None:
 @click.option(
     "--incidence", help="Also print the accommodation of momentum: degrees from the normal, joined by commas."
 )
-@click.option("--table", type=NEW_FILE, help="Also write a table of the law for other codes, .csv or .npz.")
+@click.option("--table", type=NEW_FILE, help="Also write a table of the law for other codes, .csv, .npz or .h5.")
 def study(
     wall: str, mass: float | None, inertia: float | None, seed: int, out: Path | None, force: bool, picture_format: str,
     dpi: float, as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, **asked: Any,

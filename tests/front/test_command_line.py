@@ -77,7 +77,7 @@ def test_incidence_and_table_are_refused_before_the_work(tmp_path, monkeypatch):
     assert "joined by commas" in refused("study", "flat", "--incidence", "30 60")
     assert "(-90, 90)" in refused("study", "flat", "--incidence", "0,95")
     assert "exists" in refused("study", "flat", "--table", tmp_path / "law.csv")
-    assert ".csv or .npz" in refused("study", "flat", "--table", tmp_path / "law.h5")
+    assert ".csv, .npz or .h5" in refused("study", "flat", "--table", tmp_path / "law.txt")
     assert (tmp_path / "law.csv").read_text() == "mine"
 
 

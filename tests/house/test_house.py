@@ -89,7 +89,7 @@ def test_the_version_is_the_same_wherever_it_stands():
 def test_the_lower_bounds_are_the_versions_that_the_tests_are_run_with():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     bounds = [bound.replace(">=", "==") for bound in project["dependencies"]]
-    for extra in ("profiles", "distributed", "studies", "explore"):
+    for extra in ("profiles", "distributed", "studies", "hdf5", "explore"):
         bounds += [bound.replace(">=", "==") for bound in project["optional-dependencies"][extra]]
     lines = (ROOT / "constraints/lowest.txt").read_text().splitlines()
     assert [line for line in lines if "==" in line] == bounds

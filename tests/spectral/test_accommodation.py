@@ -141,6 +141,41 @@ def test_at_normal_incidence_only_the_normal_coefficient_is_defined(law):
     assert found.tangential_missed[1] == alone.tangential_missed[0] and not found.normal_missed[0]
 
 
+@pytest.mark.parametrize("law", [ker.maxwell(0.25), ker.CircularArcLaw(1.2), ker.retroreflection(),
+                                 0.5 * ker.lambertian() + 0.5 * ker.TriangularTeethLaw(0.7)], ids=repr)  # fmt: skip
+def test_the_fraction_at_an_angle_is_where_the_misfit_is_least(law):
+    found = spec.accommodation(law, incidence_deg=[0.0, 20.0, -65.0])
+    along, across = law.apply(np.cos, found.theta), law.apply(np.sin, found.theta)
+
+    def misfits(fraction):
+        keeps = 1.0 - fraction
+        mean_sine = keeps * np.sin(found.theta) + fraction * np.pi / 4.0
+        return np.hypot(along + keeps * np.cos(found.theta), across - mean_sine)
+
+    every = np.array([misfits(fraction) for fraction in np.linspace(0.0, 1.0, 20_001)])
+    assert np.all(np.abs(every.argmin(axis=0) / 20_000 - found.maxwell_fraction_at) < 1e-4)
+    assert np.all(np.abs(misfits(found.maxwell_fraction_at) - found.misfit_at) <= found.misfit_errors + 1e-8)
+    assert np.all(every.min(axis=0) >= found.misfit_at - found.misfit_errors - 1e-8)
+    if law == ker.maxwell(0.25):
+        assert np.all(np.abs(found.maxwell_fraction_at - 0.25) <= found.maxwell_fraction_errors)
+        assert np.all(found.misfit_at <= found.misfit_errors) and found.misfit_errors.max() < 1e-14
+
+
+def test_errors_of_the_fraction_at_an_angle_hold_for_sampled_laws():
+    one = ker.WallLaw(geo.dispersing_arcs(0.5))
+    sampled = spec.accommodation(one @ one, 1e-3, incidence_deg=[10.0, 50.0])
+    theta, exact = sampled.theta, []
+    for function in (np.cos, np.sin):
+        exact.append(one.apply(lambda t, function=function: one.apply(function, t), theta))
+    changes = np.stack([np.cos(theta) + exact[0], np.sin(theta) - exact[1]], axis=1)
+    complete = np.stack([np.cos(theta), np.sin(theta) - np.pi / 4.0], axis=1)
+    fraction = np.clip(np.sum(changes * complete, axis=1) / np.sum(complete**2, axis=1), 0.0, 1.0)
+    misfit = np.linalg.norm(changes - fraction[:, None] * complete, axis=1)
+    assert np.all(np.abs(fraction - sampled.maxwell_fraction_at) < 1.5 * sampled.maxwell_fraction_errors)
+    assert np.all(np.abs(misfit - sampled.misfit_at) < 1.5 * sampled.misfit_errors)
+    assert np.all(sampled.misfit_errors > 1e-4)
+
+
 def test_incidence_from_thirty_degrees_on_keeps_relative_accuracy_for_shallow_walls():
     wall = geo.dispersing_arcs(1e-4)
     found = spec.accommodation(ker.WallLaw(wall), 1e-6, incidence_deg=[0, 30, 60])

@@ -42,6 +42,10 @@ class AccuracyError(AsperityError, ArithmeticError):
         return type(self), (str(self), self.defect), self.__dict__
 
 
+class ProofError(AsperityError, ArithmeticError):
+    """A step of a proof fails, or a certificate does not prove what it claims; the message says which step."""
+
+
 # users catch them, and read them in messages, by this name
-for _error in (AsperityError, InputError, WallError, FileExistsRefusal, AccuracyError):
+for _error in (AsperityError, InputError, WallError, FileExistsRefusal, AccuracyError, ProofError):
     _error.__module__ = "asperity.errors"

@@ -9,8 +9,8 @@ from typing import Any
 from .errors import InputError
 
 
-def needed(library: str, method: str) -> Any:
-    """The module of the extra ``studies`` that a method needs.
+def needed(library: str, method: str, extra: str = "studies") -> Any:
+    """The module of an extra that a method needs.
 
     Raises
     ------
@@ -20,7 +20,7 @@ def needed(library: str, method: str) -> Any:
     try:
         return import_module(library)
     except ImportError as reason:
-        raise InputError(f"{method}: needs {library}; install it with: pip install 'asperity[studies]'") from reason
+        raise InputError(f"{method}: needs {library}; install it with: pip install 'asperity[{extra}]'") from reason
 
 
 def data_frame(columns: Mapping[str, Any]) -> Any:

@@ -22,8 +22,9 @@ from asperity.kernels.distances.cell_transport import levels_of_transport
 from asperity.kernels.distances.conditional import ConditionalDistance
 from asperity.kernels.distances.distributions import cells_and_atoms, entry_error, terms_of
 from asperity.kernels.distances.pseudometric import flux_means
-from asperity.kernels.distances.transport import Distributions, absolute_area, grid_wasserstein, wasserstein
+from asperity.kernels.distances.transport import absolute_area, grid_wasserstein, wasserstein
 from asperity.kernels.expectations.conditionals import Conditionals
+from asperity.kernels.expectations.distribution_functions import Distributions
 from asperity.kernels.laws.law import DrivenLaw
 
 KINDS = ("rows", "sup", "joint", "pseudometric")

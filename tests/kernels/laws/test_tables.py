@@ -3,10 +3,13 @@
 import re
 import shutil
 import subprocess
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import ks_2samp
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -56,6 +59,17 @@ def test_quantiles_of_a_mixture_stay_at_its_atom_for_the_weight_of_it():
     table = (0.5 * ker.specular() + 0.5 * ker.lambertian()).table(8, 401)
     for angle, quantile in zip(table.theta, table.quantile, strict=True):
         assert np.mean(np.abs(quantile - (np.pi - angle)) < 1e-12) == pytest.approx(0.5, abs=2 / 401)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_quantiles_of_a_traced_wall_stay_at_the_angle_of_its_flat_tops(turned):
+    law = ker.WallLaw(geo.mushrooms())
+    flat = law.wall.flat_top / law.wall.period
+    table = (law.in_specular_frame() if turned else law).table(6, 1001)
+    assert 0.2 < flat < 0.9
+    for angle, quantile in zip(table.theta, table.quantile, strict=True):
+        specular = angle if turned else np.pi - angle
+        assert np.mean(np.abs(quantile - specular) < 1e-12) == pytest.approx(flat, abs=2 / 1001)
 
 
 def test_jumps_do_not_shrink_and_the_mean_error_does():
@@ -127,18 +141,37 @@ def test_an_npz_has_every_attribute(tmp_path):
         assert str(stored["frame"]) == "paper" and "radians" in str(stored["header"])
 
 
+def test_an_hdf5_file_has_every_attribute(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    table = ker.CircularArcLaw(1.2).in_specular_frame().table(4, 5)
+    with h5py.File(table.save(tmp_path / "law.h5"), "r") as stored:
+        for name in ("theta", "probability", "quantile"):
+            assert np.array_equal(stored[name][:], getattr(table, name)), name
+        for name in ("error", "largest_error", "distribution_error", "frame", "law"):
+            assert stored.attrs[name] == getattr(table, name), name
+        assert "radians" in stored.attrs["header"]
+
+
+def test_without_h5py_the_message_names_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(InputError, match=r"asperity\[hdf5\]"):
+        ker.lambertian().table(2, 2).save(tmp_path / "law.h5")
+    assert not list(tmp_path.iterdir())
+
+
 def test_files_are_replaced_on_request_only_and_other_formats_are_refused(tmp_path):
     table = ker.lambertian().table(2, 2)
-    for name in ("law.csv", "law.npz"):
+    names = ["law.csv", "law.npz"] + ["law.h5"] * (find_spec("h5py") is not None)
+    for name in names:
         path = table.save(tmp_path / name)
         before = path.read_bytes()
         with pytest.raises(FileExistsRefusal):
             table.save(path)
         assert path.read_bytes() == before and table.save(path, overwrite=True) == path
-    for name in ("law.h5", "law", "law.txt"):
-        with pytest.raises(InputError, match=r"ends in \.csv or \.npz"):
+    for name in ("law.hdf5", "law", "law.txt"):
+        with pytest.raises(InputError, match=r"ends in \.csv, \.npz or \.h5"):
             table.save(tmp_path / name)
-    assert sorted(path.name for path in Path(tmp_path).iterdir()) == ["law.csv", "law.npz"]
+    assert sorted(path.name for path in Path(tmp_path).iterdir()) == sorted(names)
 
 
 @pytest.mark.parametrize(
@@ -223,3 +256,109 @@ def test_the_compiled_samplers_on_the_page_draw_from_the_law(compiler, language,
         drawn = np.array(text.split(), dtype=np.float64)
         assert drawn.size == rows
         assert_angles_of(law, table, theta, drawn)
+
+
+def lopsided(theta, theta_out):
+    """A reversible density that is not mirror-symmetric: the sides of the grooves differ."""
+    raised, raised_out = np.sin(theta) - np.pi / 4, np.sin(theta_out) - np.pi / 4
+    return 0.5 * np.sin(theta_out) * (1.0 + 0.6 * (np.cos(theta) * raised_out + raised * np.cos(theta_out)))
+
+
+LOPSIDED = ker.DensityLaw(lopsided)
+# across grooves of either direction the first comes obliquely, the second nearly along them
+VELOCITIES = np.repeat([[2.0, -1.0, -1.5], [-0.5, 3.0, -0.4]], 20_000, axis=0)
+
+
+def assert_velocities_of(law, orientation, drawn):
+    """Speed, what grooves keep, means and distributions of velocities from a sampler, against the law in space."""
+    own = ker.HemisphereLaw(law, orientation).sample(VELOCITIES, np.random.default_rng(21))
+    assert drawn.shape == own.shape and drawn[:, 2].min() > 0.0
+    assert np.allclose(np.linalg.norm(drawn, axis=1), np.linalg.norm(VELOCITIES, axis=1), rtol=1e-12)
+    if orientation != "random":
+        along = np.array([np.cos(orientation), np.sin(orientation), 0.0])
+        assert np.allclose(drawn @ along, VELOCITIES @ along, atol=1e-12)
+    for half in (slice(20_000), slice(20_000, None)):
+        for one, other in zip(drawn[half].T, own[half].T, strict=True):
+            assert abs(one.mean() - other.mean()) < 5.0 * np.sqrt((one.var() + other.var()) / 20_000) + 0.01
+            # two samples; 2.0 sqrt(2 / n) is exceeded with probability 0.0007, and the table adds its error
+            assert ks_2samp(one, other).statistic < 2.0 * np.sqrt(2.0 / 20_000) + 0.01
+
+
+@pytest.mark.parametrize("orientation", ["random", 0.4])
+def test_the_sampler_in_space_in_numpy_draws_from_the_law(orientation, tmp_path, monkeypatch):
+    LOPSIDED.table(64, 65).save(tmp_path / "law.csv")
+    monkeypatch.chdir(tmp_path)
+    names = {"law": LOPSIDED}
+    exec(compile(block_of("python", 1) + block_of("python", 2), "tables.md", "exec"), names)
+    angle = None if orientation == "random" else orientation
+    drawn = names["reflect"](names["read_table"]("law.csv"), VELOCITIES, np.random.default_rng(3), angle)
+    assert_velocities_of(LOPSIDED, orientation, drawn)
+
+
+C_MAIN = """
+int main(int argc, char **argv) {
+    Table table = read_table(argv[1]);
+    double v[3], phi = atof(argv[2]);
+    if (argc != 3) return 2;
+    while (scanf("%lf %lf %lf", v, v + 1, v + 2) == 3) {
+        double angle = phi < 0 ? 6.283185307179586 * drand48() : phi;
+        reflect(&table, v, angle, drand48());
+        printf("%.17g %.17g %.17g\\n", v[0], v[1], v[2]);
+    }
+    return 0;
+}
+"""
+FORTRAN_MAIN = """
+program draw
+  use tables
+  implicit none
+  real(dp), allocatable :: quantile(:, :)
+  character(1000) :: path, text
+  real(dp) :: v(3), phi, angle, u
+  integer :: unit
+  call get_command_argument(1, path)
+  call get_command_argument(2, text)
+  read (text, *) phi
+  call read_table(trim(path), 64, 65, quantile)
+  do
+    read (*, *, iostat=unit) v
+    if (unit /= 0) exit
+    angle = phi
+    if (phi < 0) then
+      call random_number(angle)
+      angle = 2*pi*angle
+    end if
+    call random_number(u)
+    call reflect(quantile, v, angle, u)
+    print "(3es26.17)", v
+  end do
+end program draw
+"""
+
+
+def program_in_space(language):
+    """The blocks of the page, with a main program that reflects the velocities that it reads."""
+    plain, added = block_of(language), block_of(language, 1)
+    if language == "c":
+        return plain[: plain.index("int main")] + added + C_MAIN
+    head = plain[: plain.index("end module tables")]
+    return head + added + "end module tables\n" + FORTRAN_MAIN
+
+
+@pytest.mark.parametrize(("compiler", "language", "suffix", "flags"), [
+    ("cc", "c", ".c", ["-std=c99", "-Wall", "-Werror"]),
+    ("gfortran", "fortran", ".f90", ["-std=f2008", "-Wall"]),
+])  # fmt: skip
+def test_the_compiled_samplers_in_space_draw_from_the_law(compiler, language, suffix, flags, tmp_path):
+    if shutil.which(compiler) is None:
+        pytest.skip(f"{compiler} is not installed")
+    source, program = tmp_path / f"sample{suffix}", tmp_path / "sample"
+    source.write_text(program_in_space(language))
+    subprocess.run([compiler, "-O2", *flags, str(source), "-o", str(program), "-lm"], check=True, cwd=tmp_path)
+    LOPSIDED.table(64, 65).save(tmp_path / "law.csv")
+    given = "\n".join(" ".join(map(repr, row)) for row in VELOCITIES.tolist())
+    for orientation in ("random", 0.4):
+        phi = "-1.0" if orientation == "random" else str(orientation)
+        command = [str(program), str(tmp_path / "law.csv"), phi]
+        text = subprocess.run(command, input=given, check=True, capture_output=True, text=True).stdout
+        assert_velocities_of(LOPSIDED, orientation, np.array(text.split(), dtype=np.float64).reshape(-1, 3))

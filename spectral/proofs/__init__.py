@@ -1,0 +1,1 @@
+"""Theorems on spectral gaps, with certificates that python-flint alone can check."""

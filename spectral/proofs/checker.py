@@ -1,0 +1,343 @@
+"""Check the certificate of a proved spectral gap: python checker.py < gap.json. It needs python-flint alone.
+
+Every inequality is decided in balls, and nothing of asperity is imported. The theorem and the lemmas that the
+docstrings name are proved in docs/theory/proved-gaps.md.
+"""
+
+import heapq
+import json
+import sys
+from itertools import pairwise
+
+from flint import acb, arb, ctx
+
+PI, UNIT, ZERO, ONE = arb.pi(), acb(0, 1), arb(0), arb(1)
+
+
+class Refused(Exception):
+    """An inequality of the certificate that does not hold."""
+
+
+def demand(true, what):
+    if not true:
+        raise Refused(what)
+
+
+def ball(low, high):
+    return arb(low).union(arb(high))
+
+
+def up_to(most):
+    """From 0 to the upper end of a ball."""
+    return ball(0, most.upper())
+
+
+def spread(values):
+    """From the least to the greatest number of some balls."""
+    return ball(min(x.lower() for x in values), max(x.upper() for x in values))
+
+
+def increasing(numbers):
+    return all(x < y for x, y in pairwise(numbers))
+
+
+def exact(number):
+    """The ball of a text, or of a middle and a radius."""
+    return arb(number) if isinstance(number, str) else arb(*number)
+
+
+def product(first, second):
+    total = {}
+    for m, x in first.items():
+        for n, y in second.items():
+            total[m + n] = total.get(m + n, 0) + x * y
+    return total
+
+
+def weighted(fourier, a):
+    """Integral of a Fourier sum times sin(beta) over beta from a to pi - a."""
+    h = PI / 2 - a
+    waves = {p: (h * p).sin() / p if p else h for m in fourier for p in (m - 1, m + 1)}
+    return sum((x * UNIT**m * (waves[m + 1] + waves[m - 1]) for m, x in fourier.items()), acb(0))
+
+
+class Trial:
+    """v = cos(theta)^odd p(sin(theta)), less its mean; also the sum of fourier[m] e^(i m theta)."""
+
+    def __init__(self, coefficients, odd):
+        self.p, self.odd = [arb(c) for c in coefficients], odd
+        if not odd:
+            self.p[0] -= weighted(self.expansion(), ZERO).real / 2
+        self.fourier = self.expansion()
+        self.norm = weighted(product(self.fourier, self.fourier), ZERO).real / 2
+        self.largest = max(abs(self(ball(PI * i / 512, PI * (i + 1) / 512))).upper() for i in range(512))
+
+    def expansion(self):
+        total, power = {}, {1: acb(0.5), -1: acb(0.5)} if self.odd else {0: acb(1)}
+        for c in self.p:
+            for m, x in power.items():
+                total[m] = total.get(m, 0) + c * x
+            power = product(power, {1: -UNIT / 2, -1: UNIT / 2})
+        return total
+
+    def jet(self, t):
+        """Value and derivative by Horner's rule."""
+        s, c = t.sin(), t.cos()
+        value = slope = s * 0
+        for a in reversed(self.p):
+            slope, value = slope * s + value, value * s + a
+        return (value * c, c * c * slope - s * value) if self.odd else (value, slope * c)
+
+    def __call__(self, t):
+        """Value by the mean value theorem."""
+        middle = arb(t.mid())
+        return self.jet(middle)[0] + self.jet(t)[1] * (t - middle)
+
+
+class Bumps:
+    """Dispersing arcs of curvature K and period 1, in the specular frame.
+
+    A ray of direction theta that meets the point of slope -psi leaves in the direction a = theta - 2 psi, at the angle
+    s = theta - psi with the arc.
+    """
+
+    def __init__(self, curvature, effort):
+        self.K, self.R, self.effort = curvature, 1 / curvature, effort
+        demand(self.K > 0 and self.K * self.K < 2, "a curvature between 0 and sqrt(2)")
+        self.steepest = (self.K / 2).asin()
+
+    def hits(self, s, a):
+        """Whether a ray that leaves an arc hits the next one on the right (lemma 2); None: undecided."""
+        ahead, near = self.K * a.cos() - s.sin(), 2 * (s / 2).sin() ** 2 - self.K * a.sin()
+        return False if ahead <= 0 or near <= 0 else (ahead > 0 and near > 0) or None
+
+    def sees(self, s, a):
+        """Whether a ray that leaves an arc leaves the wall; None: undecided."""
+        found = self.hits(s, a), self.hits(PI - s, PI - a)
+        return False if True in found else None if None in found else True
+
+    def follow(self, s, a, ds=None, da=None, count=1, came=None):
+        """(reflections, direction, its derivatives) of every way that a ray can take after a reflection (lemma 3)."""
+        if count > 12:
+            # too many to follow: these may leave at any angle
+            return [(count, ball(0, PI), None)]
+        views = {1: (s, a), -1: (PI - s, PI - a)}
+        hit = {side: False if side == came else self.hits(*view) for side, view in views.items()}
+        ends = [] if True in hit.values() else [(count, a, da)]
+        for side, (near, direction) in views.items():
+            if hit[side] is False or hit[-side]:
+                continue
+            square = (near / 2).sin() ** 2 - self.K * direction.sin() / 2
+            low, high = (min(max(x, ZERO), ONE).sqrt().asin() for x in (square.lower(), square.upper()))
+            w = 2 * ball(low, high)
+            dw = ds and [(s.sin() * x * side - self.K * a.cos() * y) / w.sin() for x, y in zip(ds, da, strict=True)]
+            turned = dw and [y + 2 * side * x for x, y in zip(dw, da, strict=True)]
+            glance = w if side == 1 else PI - w
+            ends += self.follow(glance, a + 2 * side * w, dw and [side * x for x in dw], turned, count + 1, side)
+        return ends
+
+    def form_and_residual(self, v, sign, guess):
+        """<v, (1 - sign P) v>, and a bound of |(1 - sign P - guess) v|^2."""
+        angles = [arb(t) for t in self.effort["angles"]]
+        demand(increasing([ZERO, *angles]) and angles[-1] > PI / 2, "increasing angles up to pi/2")
+        square = (angles[0] * v.largest * (2 + abs(guess))) ** 2 / 2
+        square += sum((self.residual(v, sign, guess, *ends) for ends in pairwise(angles)), ZERO)
+        return self.once(v, sign) + self.several(v, sign), square
+
+    def once(self, v, sign):
+        """The form of the rays that are reflected once (lemma 5)."""
+
+        def integrand(psi, analytic):
+            root = (1 - 2 * self.R * psi.sin()).sqrt(analytic=analytic)
+            tangent = PI / 2 - (self.K * root).atan() - (psi.cos() / (self.K - psi.sin())).atan()
+            turns = {m: UNIT * (psi * m).sin() if sign > 0 else (psi * m).cos() for m in v.fourier}
+            waves = {m: 2 * c * turns[m] for m, c in v.fourier.items()}
+            return weighted(product(waves, waves), psi + tangent)
+
+        end = self.steepest * (1 - ONE / 2**40)
+        most = acb.integral(integrand, 0, acb(end), rel_tol=ONE / 2**40, abs_tol=ONE / 2**44).real
+        return (most + up_to((self.steepest - end) * 8 * v.largest**2)) * self.R / 2
+
+    def chord(self, u, t):
+        """Slopes of two points that face each other, direction between them, distance over u, angles with the arcs."""
+        p, q, skew, edge = u * (1 - t) / 2, u * t / 2, u * (2 * t - 1) / 2, self.steepest
+        along = self.R * ((edge - p).cos() * p.sinc() * (1 - t) + (edge - q).cos() * q.sinc() * t)
+        up = self.R * (edge - u / 2).sin() * skew.sinc() * (2 * t - 1)
+        a = (up / along).atan() if along > 0 else ball(-edge, edge)
+        return edge - 2 * p, edge - 2 * q, a, (along * along + up * up).sqrt(), a + edge - 2 * p, edge - 2 * q - a
+
+    def several(self, v, sign):
+        """The form of other rays, by boxes of their first two points; the least certain is halved next (lemma 5)."""
+        heap = [(0.0, 0, (ZERO, 2 * arb(self.steepest.upper()), ZERO, ONE), ZERO)]
+        for _ in range(self.effort["halvings"]):
+            u0, u1, t0, t1 = heapq.heappop(heap)[2]
+            u, t = arb(((u0 + u1) / 2).mid()), (t0 + t1) / 2
+            for half in ((u0, u, t0, t1), (u, u1, t0, t1)) if u1 - u0 > t1 - t0 else ((u0, u1, t0, t), (u0, u1, t, t1)):
+                found = self.facing(v, sign, *half)
+                heapq.heappush(heap, (-float(found.rad()), len(heap), half, found))
+        return sum((found for *_, found in heap), ZERO) * self.R / 2
+
+    def facing(self, v, sign, u0, u1, t0, t1):
+        """R times the integral of sin(s) sin(w) (v - sign v')^2 / distance over a box."""
+        u, t, R = ball(u0, u1), ball(t0, t1), self.R
+        one, two, a, r, s, w = self.chord(u, t)
+        theta, out = a + 2 * one, 2 * two - a
+        seen = False if s <= 0 or w <= 0 or one < 0 or two < 0 else self.sees(s, theta)
+        if seen is False:
+            return ZERO
+        sure = seen and s > 0 and w > 0 and one > 0 and two > 0
+        area, m = R * (u1 - u0) * (t1 - t0), s.sin() * w.sin() / r
+        ends = self.follow(w, out, count=2, came=1)
+        changes = [v(theta) - sign * v(end) for _, end, _ in ends]
+        if not sure or not u > 0 or [count for count, *_ in ends] != [2]:
+            squares = spread([abs(d) for d in changes])
+            most = up_to(area * m * squares.upper() ** 2)
+            return area * m * spread([max(squares.lower(), ZERO) ** 2, squares.upper() ** 2]) if sure else most
+        (d,), before, after = changes, v.jet(theta)[1], sign * v.jet(out)[1]
+        turn, stretch = R * (t * w.sin() - (1 - t) * s.sin()) / r, R * ((1 - t) * s.cos() + t * w.cos()) - r
+        by_u = t - 1, -t, turn / u, stretch / u
+        by_t = u, -u, R * (s.sin() + w.sin()) / r, R * (w.cos() - s.cos())
+        off, x, y = ZERO, (u0 + u1) / 2, (t0 + t1) / 2
+        for (first, second, bend, longer), step in ((by_u, u - x), (by_t, t - y)):
+            m_slope = s.cos() * w.sin() * (bend + first) + s.sin() * w.cos() * (second - bend) - m * longer
+            slope = m_slope / r * d * d + 2 * m * d * (before * (bend + 2 * first) - after * (2 * second - bend))
+            off += (slope - arb(slope.mid())) * step
+        # to the second order, because the box is symmetric about its middle
+        one, two, a, r, s, w = self.chord(x, y)
+        d = v(a + 2 * one) - sign * v(2 * two - a)
+        return area * (s.sin() * w.sin() / r * d * d + off)
+
+    def residual(self, v, sign, guess, first, last):
+        """The squared residual between two angles, by boxes of theta and psi (lemma 6)."""
+        theta = ball(first, last)
+        t = arb(theta.mid())
+        off, own, cot = theta - t, v(theta), theta.cos() / theta.sin()
+        (value_t, _), slope = v.jet(t), v.jet(theta)[1]
+        tolerance, finest, edge = self.K * arb(self.effort["tolerance"]) / t, (last - first) / 32, self.steepest.upper()
+        stack, constant, linear = [(-edge, min(edge, arb(last.upper())))], ZERO, ZERO
+        while stack:
+            low, high = stack.pop()
+            psi, x = ball(low, high), arb(((low + high) / 2).mid())
+            s = theta - psi
+            seen = False if s <= 0 or psi > self.steepest or psi < -self.steepest else self.sees(s, theta)
+            if seen is False:
+                continue
+            sure = seen and s > 0 and abs(psi) < self.steepest
+            up, down = high.sin() - low.sin(), high.cos() - low.cos()
+            ends = self.follow(s, s - psi, [ONE, -ONE], [ONE, -2 * ONE])
+            _, a, gradient = ends[0]
+            if sure and len(ends) == 1 and gradient and gradient[1].is_finite():
+                ((_, middle, _),) = self.follow(t - x, t - 2 * x)
+                by_theta, by_psi = (y - sign * v.jet(a)[1] * z for y, z in zip((slope, 0), gradient, strict=True))
+                value, steady, tilt = value_t - sign * v.jet(middle)[0], arb(by_theta.mid()), arb(by_psi.mid())
+                rest = (by_psi - tilt) * (psi - x) + (by_theta - steady) * off
+                # integrals of sin(s)/sin(theta), of its derivative, and of it times psi - x
+                mass, falling = up + t.cos() / t.sin() * down, -down / theta.sin() ** 2
+                moment = (high - x) * high.sin() - (low - x) * low.sin() + down
+                moment += cot * ((high - x) * high.cos() - (low - x) * low.cos() - up)
+                uncertain = mass * rest + tilt * moment + falling * off * (rest + steady * off)
+                flat, rising = mass * value + uncertain, mass * steady + value * falling
+            else:
+                rising, mass = ZERO, up + cot * down if sure else up_to(up + cot * down)
+                flat = uncertain = mass * spread([own - sign * v(end) for _, end, _ in ends])
+            if uncertain.rad() < tolerance or high - low < finest:
+                constant, linear = constant + flat, linear + rising
+            else:
+                stack += [(low, x), (x, high)]
+        missed = self.R * constant - guess * value_t + (self.R * linear - guess * slope) * off
+        return missed * missed * theta.sin() * (last - first)
+
+    def count(self, angles, odd, sign, threshold):
+        """At most how many eigenvalues of 1 - sign P lie below which number (lemmas 1 and 4)."""
+        half = [arb(t) for t in angles]
+        demand(increasing([ZERO, *half, PI / 2]), "increasing angles of bins")
+        edges, n, fold = [*half, PI / 2, *(PI - t for t in reversed(half))], len(half), -1 if odd else 1
+        bins = [ball(x, y) for x, y in pairwise(edges)]
+        weight = [(x.cos() - y.cos()) / 2 for x, y in pairwise(edges)]
+        # densities between bins on one side and on both sides, both symmetric
+        near, far = ([[self.least(bins[i], b) for b in side[: i + 1]] for i in range(n)] for side in (bins, bins[::-1]))
+        matrix = []
+        for i in range(n):
+            row = sum((weight[j] * (near[max(i, j)][min(i, j)] + far[max(i, j)][min(i, j)]) for j in range(n)), ZERO)
+            demand(row > threshold, "a threshold below the chance to leave each bin")
+            folded = [near[i][j] + fold * far[i][j] for j in range(i + 1)]
+            matrix.append([-sign * (weight[i] * weight[j]).sqrt() * x for j, x in enumerate(folded)])
+            matrix[i][i] += row - threshold
+        negative = 0
+        for k in range(n):
+            pivot = matrix[k][k]
+            demand(pivot > 0 or pivot < 0, "pivots of known sign")
+            negative += pivot < 0
+            column = [(i, matrix[i][k], matrix[i][k] / pivot) for i in range(k + 1, n) if matrix[i][k] != 0]
+            for number, (i, _, factor) in enumerate(column):
+                for j, x, _ in column[: number + 1]:
+                    matrix[i][j] -= factor * x
+        once, block, entering = self.grazing(half[0])
+        share = once - block - threshold
+        demand(share > 0, "a threshold below the chance to leave grazing angles")
+        return negative, threshold - (1 / share - 1) * entering
+
+    def least(self, theta, eta):
+        """The least density, from bin to bin, of rays that are certainly reflected once."""
+        s, psi = (theta + eta) / 2, (theta - eta) / 2
+        sure = abs(psi) < self.steepest and self.sees(s, eta) and self.sees(s, theta)
+        most = arb(theta.sin().upper()) * arb(eta.sin().upper())
+        return self.R * arb(s.sin().lower()) / most if sure else ZERO
+
+    def grazing(self, eps):
+        """The least chance of one reflection, the norm of the grazing block, the chance to enter it (lemma 4)."""
+        ratio, width, reach = eps.sin() / eps, 8 * self.K / (eps / 2).sinc() ** 2, 2 * self.steepest + eps
+        small = eps.tan() < self.K and (width * eps).sqrt() < PI / 2 and reach + eps < PI
+        demand(small, "a first bin nearer to 0")
+        block = self.R * eps / (2 * ratio) * ((width / eps).log() + ONE / 2).sqrt()
+        return 1 - self.R * (eps / 2).tan(), block, self.R * eps / 2 * (1 if reach < PI / 2 else 2 / reach.sin())
+
+
+def of_bumps(curvature, certificate, signs):
+    """Bounds of the least eigenvalues of 1 - sign P on odd functions, and on even ones of mean 0 (lemma 9)."""
+    law, odd = Bumps(exact(curvature), certificate["effort"]), certificate["odd"]
+    found, above = law.count(certificate["bins"], odd, signs[odd], exact(certificate["threshold"]))
+    demand(found <= (1 if odd else 2), "one eigenvalue of the trial function's parity below the threshold")
+    found, other = law.count(certificate["bins"], not odd, signs[not odd], exact(certificate["other"]))
+    demand(found <= (1 if odd else 0), "no eigenvalue of the other parity below its threshold")
+    v, guess = Trial(certificate["trial"], odd), arb(certificate["guess"])
+    form, square = law.form_and_residual(v, signs[odd], guess)
+    ends, square = [arb(x) for x in ((form / v.norm).lower(), (form / v.norm).upper())], arb((square / v.norm).upper())
+    demand(above > ends[1], "a quotient below the next eigenvalue")
+    # concave in the quotient, so least at an end
+    least = min((x - square / (above - x)).lower() for x in ends)
+    return {odd: (least, ends[1]), not odd: (other, arb(2))}
+
+
+def enclose(certificate):
+    """The interval of the gap that the certificate proves."""
+    ctx.prec, frame, law = certificate["precision"], certificate["frame"], certificate["law"]
+    demand(ctx.prec >= 53 and frame in ("specular", "paper"), "53 bits or more, and a known convention")
+    weights = {name: exact(number) for name, number in certificate["weights"].items()}
+    demand(all(w >= 0 for w in weights.values()) and sum(weights.values()).contains(1), "weights that sum to 1")
+    signs = {True: 1 if frame == "specular" else -1, False: 1}
+    if law["family"] == "powers":
+        # the eigenvalue g^l on the Legendre polynomial of degree l in the paper's convention (lemma 8)
+        g = exact(law["mean_cosine"])
+        demand(abs(g) < 1, "a mean cosine between -1 and 1")
+        tops = {odd: -signs[odd] * g if odd else g * g for odd in signs}
+        values = {odd: [1 - max(x, ZERO) for x in (top.upper(), top.lower())] for odd, top in tops.items()}
+    else:
+        demand(law["family"] == "dispersing arcs", "a known family")
+        values = of_bumps(law["curvature"], certificate, signs)
+    # a mixture (lemma 7)
+    plane = {odd: weights["specular"] + (-1 if odd else 1) * weights["retroreflection"] for odd in signs}
+    mixed = [[1 - signs[odd] * plane[odd] - weights["law"] * (1 - x) for x in values[odd]] for odd in signs]
+    return min(arb(low.lower()) for low, _ in mixed), min(arb(high.upper()) for _, high in mixed)
+
+
+def check(certificate):
+    """Raise Refused unless the certificate proves its interval."""
+    demand(certificate["format"] == "asperity proved gap 1", "a certificate of a proved gap")
+    (low, high), (first, last) = enclose(certificate), map(exact, certificate["interval"])
+    demand(first <= low and high <= last, f"the interval from {low.str(12)} to {high.str(12)}")
+
+
+if __name__ == "__main__":
+    check(json.load(sys.stdin))
+    print("The certificate proves its interval.")

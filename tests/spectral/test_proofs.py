@@ -1,0 +1,220 @@
+"""Proved gaps: each step against rays and quadrature of the library, and certificates that were tampered with."""
+
+import ast
+import copy
+import json
+import subprocess
+import sys
+from decimal import Decimal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import InputError, ProofError
+from asperity.spectral.proofs import checker, search
+from asperity.spectral.proofs.checker import Bumps, Refused, Trial, arb, exact
+
+CHECKER = Path(checker.__file__)
+HG, DIFFUSE, MIRROR, RETRO = ker.henyey_greenstein, ker.lambertian(), ker.specular(), ker.retroreflection()
+# a rough trial function for curvature 1, odd
+TRIAL = ["1.1", "-0.2", "0.9", "-0.5"]
+
+
+def bumps(curvature):
+    return ker.WallLaw(geo.dispersing_arcs(curvature)).in_specular_frame()
+
+
+def values(trial, theta):
+    powers = np.sin(theta)[..., None] ** np.arange(len(trial))
+    return np.cos(theta) * (powers @ np.array(trial, dtype=float))
+
+
+@pytest.fixture(scope="module")
+def proof():
+    """A coarse one, which takes a few seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "BINS", 60)
+        patch.setattr(search, "GRAZING", 1e-3)
+        return spec.prove_gap(bumps(1.0), width=0.2)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        HG(0.5), HG(-0.5), HG(0.5).in_specular_frame(), DIFFUSE, ker.maxwell(0.3),
+        0.3 * MIRROR + 0.7 * HG(0.5), 0.2 * RETRO + 0.8 * HG(-0.5), (0.2 * RETRO + 0.8 * HG(-0.5)).in_specular_frame(),
+        0.1 * RETRO + 0.2 * MIRROR + 0.3 * DIFFUSE + 0.4 * HG(0.9),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_gaps_of_powers_are_proved_to_rounding(law):
+    low, high = spec.prove_gap(law, width=1e-9).interval
+    gap = spec.spectral_gap(law)
+    assert high - low < Decimal("1e-14")
+    assert float(low) - gap.error <= gap.value <= float(high) + gap.error
+
+
+def test_the_interval_of_bumps_contains_the_gap_and_the_weight_of_others_scales_it(proof):
+    low, high = map(float, proof.interval)
+    # by a textbook tracer and polynomials, and by indexed enclosures
+    assert low < 0.342535 < high
+    assert high - low < 0.2 * high
+    certificate = copy.deepcopy(proof.certificate)
+    certificate["weights"] = {"law": "0.7", "specular": "0.3", "retroreflection": "0", "lambertian": "0"}
+    mixed = checker.enclose(certificate)
+    assert [float(end) for end in mixed] == pytest.approx([0.7 * low, 0.7 * high], rel=1e-12)
+
+
+@pytest.mark.slow
+def test_the_published_gap_of_a_third_and_the_estimate_are_in_the_interval():
+    found = spec.prove_gap(bumps(1 / 3), width=1e-3)
+    gap = spec.spectral_gap(bumps(1 / 3))
+    low, high = map(float, found.interval)
+    assert low <= gap.value + gap.error
+    assert gap.value - gap.error <= high
+    assert f"{low:.4f}" == f"{high:.4f}" == "0.0373"
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("curvature", ["1/3", "1", "1.4"])
+def test_the_form_is_that_of_traced_rays(curvature, sign):
+    size = eval(curvature)
+    rng, wall, rays = np.random.default_rng(4), geo.dispersing_arcs(size), 2**18
+    theta = np.arccos(1.0 - 2.0 * rng.random(rays))
+    ray = geo.trace(wall, rng.random(rays), theta)
+    changes = 0.5 * (values(TRIAL, theta) - sign * values(TRIAL, np.pi - ray.theta)) ** 2
+    law, v = Bumps(exact(repr(size)), {"halvings": 3000}), Trial(TRIAL, True)
+    for found, chosen in ((law.once(v, sign), ray.collisions == 1), (law.several(v, sign), ray.collisions > 1)):
+        each = np.where(chosen, changes, 0.0)
+        deviation = 5.0 * each.std() / np.sqrt(rays)
+        assert float(found.lower()) - deviation < each.mean() < float(found.upper()) + deviation
+
+
+def test_the_residual_is_that_of_quadrature():
+    law, v = Bumps(exact("1"), {"tolerance": "1e-6"}), Trial(TRIAL, True)
+    node, weight = np.polynomial.legendre.leggauss(6)
+    for first, last in ((0.2, 0.202), (0.7, 0.702), (1.4, 1.402)):
+        theta = 0.5 * (first + last) + 0.5 * (last - first) * node
+        after = bumps(1.0).apply(lambda angle: values(TRIAL, angle), theta)
+        missed = values(TRIAL, theta) - after - 0.34 * values(TRIAL, theta)
+        known = 0.5 * (last - first) * float(weight @ (missed**2 * np.sin(theta)))
+        found = law.residual(v, 1, arb("0.34"), arb(repr(first)), arb(repr(last)))
+        assert known < float(found.upper()) < 1.2 * known + 1e-8
+        assert float(found.lower()) < known
+
+
+def test_eigenvalues_are_counted(proof):
+    """Odd ones of curvature 1: 0.3425 and 0.871; even ones: 0 and 0.716."""
+    law, bins = Bumps(exact("1"), {}), proof.certificate["bins"]
+    assert [law.count(bins, True, 1, exact(text))[0] for text in ("0.3", "0.55")] == [0, 1]
+    assert [law.count(bins, False, 1, exact(text))[0] for text in ("0.3", "0.55")] == [1, 1]
+    found, moved = law.count(bins, True, 1, exact("0.55"))
+    assert found == 1
+    assert 0.549 < float(moved) < 0.55
+    with pytest.raises(Refused):
+        law.count(bins, True, 1, exact("0.99"))
+
+
+def changed(certificate, path, value):
+    new = copy.deepcopy(certificate)
+    place = new
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return new
+
+
+@pytest.mark.parametrize(
+    ("path", "change"),
+    [
+        pytest.param(*(("interval", 0), lambda text: str(Decimal(text) + Decimal("1e-9"))), marks=pytest.mark.slow),
+        pytest.param(*(("interval", 1), lambda text: str(Decimal(text) - Decimal("1e-9"))), marks=pytest.mark.slow),
+        pytest.param(
+            *(("law", "curvature"), lambda pair: [str(float(pair[0]) * 1.001), pair[1]]), marks=pytest.mark.slow
+        ),
+        (("law", "family"), lambda text: "focusing arcs"),
+        (("weights", "law"), lambda pair: ["0.9", "0"]),
+        pytest.param(*(("weights", "specular"), lambda pair: ["1e-6", "0"]), marks=pytest.mark.slow),
+        (("weights", "lambertian"), lambda pair: ["-1e-6", "0"]),
+        (("frame",), lambda text: "paper"),
+        pytest.param(*(("odd",), lambda odd: False), marks=pytest.mark.slow),
+        pytest.param(*(("trial", 0), lambda text: str(float(text) * 1.01)), marks=pytest.mark.slow),
+        pytest.param(*(("trial", 3), lambda text: str(float(text) * 1.05)), marks=pytest.mark.slow),
+        pytest.param(*(("guess",), lambda text: str(float(text) * 1.05)), marks=pytest.mark.slow),
+        (("threshold",), lambda text: "0.95"),
+        (("other",), lambda text: "0.95"),
+        (("bins", 5), lambda text: "1.0"),
+        (("bins", -1), lambda text: "1.6"),
+        (("effort", "angles", 0), lambda text: "-0.1"),
+        pytest.param(*(("effort", "angles", -1), lambda text: "1.5"), marks=pytest.mark.slow),
+        pytest.param(*(("effort", "halvings"), lambda number: 10), marks=pytest.mark.slow),
+        pytest.param(*(("effort", "tolerance"), lambda text: "0.1"), marks=pytest.mark.slow),
+        (("precision",), lambda bits: 20),
+        (("format",), lambda text: "asperity proved gap 2"),
+    ],
+)
+def test_a_certificate_that_was_tampered_with_is_refused(proof, path, change):
+    old = proof.certificate
+    for key in path:
+        old = old[key]
+    with pytest.raises(Refused):
+        checker.check(changed(proof.certificate, path, change(old)))
+
+
+def test_a_saved_certificate_is_checked_without_asperity(proof, tmp_path):
+    imported = {
+        name.name if isinstance(node, ast.Import) else node.module
+        for node in ast.walk(ast.parse(CHECKER.read_text(encoding="utf-8")))
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for name in node.names
+    }
+    assert imported == {"flint", "heapq", "itertools", "json", "sys"}
+    path = proof.save(tmp_path / "gap.json")
+    with pytest.raises(FileExistsError):
+        proof.save(path)
+    assert spec.check_proof(path) == proof
+    for name, code in (("interval", 0), ("wrong", 1)):
+        content = dict(proof.certificate)
+        if name == "wrong":
+            content["interval"] = ["0.3425", "0.3426"]
+        done = subprocess.run(
+            [sys.executable, "-I", str(CHECKER)], input=json.dumps(content), text=True, capture_output=True, check=False
+        )
+        assert done.returncode == code, done.stderr
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(ProofError, match="the interval from"):
+        spec.check_proof(path)
+    path.write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match=r"Proof\.save"):
+        spec.check_proof(path)
+    with pytest.raises(InputError, match="cannot read"):
+        spec.check_proof(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        ker.WallLaw(geo.focusing_arcs(0.5)), ker.WallLaw(geo.triangular_teeth(0.5)), HG(0.5) @ DIFFUSE @ HG(0.2),
+        0.5 * HG(0.5) + 0.5 * HG(0.2), 0.5 * bumps(1.0) + 0.5 * HG(0.2).in_specular_frame(),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_laws_without_a_theorem_are_refused(law):
+    with pytest.raises(InputError, match="law: expected the law of"):
+        spec.prove_gap(law)
+
+
+def test_what_is_not_proved_says_so(monkeypatch):
+    with pytest.raises(ProofError, match=r"between 0 and sqrt\(2\)"):
+        spec.prove_gap(bumps(1.9))
+
+    def refuse(certificate):
+        raise Refused("a step")
+
+    monkeypatch.setattr("asperity.spectral.proofs.proof.enclose", refuse)
+    with pytest.raises(ProofError, match="not proved: expected a step"):
+        spec.prove_gap(HG(0.5))
