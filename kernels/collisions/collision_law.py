@@ -126,7 +126,7 @@ class VelocityLaw(TensorLaw):
         for chosen, (_, law, _) in zip((first, ~first), terms, strict=True):
             if chosen.any():
                 outgoing[chosen] = law.sample(theta[chosen], rng)
-        return outgoing, np.where(first, terms[0][2], terms[1][2])
+        return outgoing, first == terms[0][2]
 
     @seed_by_name
     def sample_states(self, position: ArrayLike, velocity: ArrayLike, rng: Rng = None) -> tuple[Floats, Floats]:
@@ -267,16 +267,14 @@ class VelocityLaw(TensorLaw):
 
         theta_basis, psi_basis = checked_pair(basis).factors
         exact = Estimate(0.0, 0.0, "bound", "the flip of psi")
-        total: KernelMatrix | None = None
+        terms = []
         for weight, law, flip in self.parts_checked():
             rolled = reflection_matrix(psi_basis) if flip else np.eye(psi_basis.size)
             name = "psi -> pi - psi" if flip else "psi -> psi"
             factor = KernelMatrix(rolled, psi_basis, exact, law=name, reversible=True, mirror_symmetric=True)
             term = discretise(law, theta_basis).tensor(factor)
-            term = term if weight == 1.0 else weight * term
-            total = term if total is None else total + term
-        assert total is not None  # a law has at least one term
-        return total
+            terms.append(term if weight == 1.0 else weight * term)
+        return sum(terms[1:], terms[0])
 
     def symmetry_defect(
         self, theta_basis: Basis | None = None, psi_basis: Basis | None = None, **discretisation: object

@@ -119,14 +119,6 @@ def test_an_encoding_that_reads_no_text_is_refused_by_name(encoding, tmp_path):
         geo.read_profile(tmp_path / "scan.txt", encoding=encoding)
 
 
-def test_a_text_in_another_encoding_is_refused_with_its_name(tmp_path):
-    for encoding in ("latin-1", "utf-16"):
-        (tmp_path / "scan.txt").write_bytes("x [µm]; z [nm]\n0 1000\n1 2000\n".encode(encoding))
-        with pytest.raises(InputError, match=f"pass encoding='{encoding}'"):
-            geo.read_profile(tmp_path / "scan.txt")
-        assert geo.read_profile(tmp_path / "scan.txt", encoding=encoding).height.tolist() == [1.0, 2.0]
-
-
 @pytest.mark.skipif(not Path("/proc/kcore").exists(), reason="not on this system")
 def test_a_file_larger_than_the_memory_is_not_read():
     if Path("/proc/kcore").stat().st_size < 2**45:

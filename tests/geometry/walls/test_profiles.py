@@ -216,7 +216,7 @@ def test_the_unit_reaches_the_axes_and_the_file_of_the_wall(tmp_path):
 
 
 def test_a_slope_above_a_hundred_is_taken_for_mixed_units():
-    x, height = np.arange(5.0), np.array([0, 1, 0, 1, 0])
+    x, height = np.arange(7.0, 12.0), np.array([0, 1, 0, 1, 0])
     with pytest.warns(UserWarning, match="mean slope is 100: are the heights in a smaller unit"):
         geo.Wall.from_profile(x, 100.1 * height)
     geo.Wall.from_profile(x, 100.0 * height)
@@ -245,6 +245,14 @@ def test_columns_are_read_as_the_options_say(text, options, tmp_path):
     (tmp_path / "scan.txt").write_text(text, encoding="utf-8")
     x, height = geo.read_profile(tmp_path / "scan.txt", **options)
     assert x.tolist() == [0, 1] and height.tolist() == [1.5, 2.5]
+
+
+def test_a_text_in_another_encoding_is_refused_with_its_name(tmp_path):
+    for encoding in ("latin-1", "utf-16"):
+        (tmp_path / "scan.txt").write_bytes("x [µm]; z [nm]\n0 1000\n1 2000\n".encode(encoding))
+        with pytest.raises(InputError, match=f"pass encoding='{encoding}'"):
+            geo.read_profile(tmp_path / "scan.txt")
+        assert geo.read_profile(tmp_path / "scan.txt", encoding=encoding).height.tolist() == [1.0, 2.0]
 
 
 def test_an_empty_field_is_an_undefined_height(tmp_path):
@@ -401,6 +409,8 @@ def test_a_computed_periodic_profile_wraps_round():
     x = np.arange(4) / 4.0
     wall = geo.Wall.from_profile(x, [0.0, -1.0, -2.0, -1.0], seam="wrap")
     assert wall.vertices.tolist() == [[0, 0], [0.25, -1], [0.5, -2], [0.75, -1], [1, 0]]
+    # steps that differ from their mean by a thousandth of it
+    assert geo.Wall.from_profile([10, 1009, 2010], [0.0, -1.0, -2.0], seam="wrap").period == 3000
 
 
 @pytest.mark.parametrize(
@@ -408,7 +418,7 @@ def test_a_computed_periodic_profile_wraps_round():
     [
         ("m", 160.0, 3e-6, True), ("mm", 160.0, 3e-3, False), ("m", 160.0, 3.0, False), ("m", 0.5, 1e-8, False),
         ("", 1000.0, 1e-8, True), ("m", 160.0, 0.0, False), ("", 1.0, 1e-9, False),
-        ("", 160.0, 3e-6, False),
+        ("", 160.0, 3e-6, False), ("m", 10.5, 1e-6, True), ("m", 10.0, 1e-6, False),
     ],
 )  # fmt: skip
 def test_a_width_of_160_metres_for_micrometres_is_taken_for_mixed_units(unit, width, height, warns):
@@ -417,6 +427,7 @@ def test_a_width_of_160_metres_for_micrometres_is_taken_for_mixed_units(unit, wi
         warnings.simplefilter("always")
         geo.Wall.from_profile(profile)
     assert [("positions in a smaller unit" in str(one.message)) for one in told] == [True] * warns
+    assert all(one.filename == __file__ for one in told)
 
 
 # ---- vertices begin anywhere -------------------------------------------------------------------------------------
