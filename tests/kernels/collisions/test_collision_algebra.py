@@ -82,10 +82,12 @@ def test_a_sum_with_and_without_flip_draws_both_in_proportion():
     law = 0.3 * TEETH + 0.7 * (TEETH @ TEETH)
     n = 20_000
     before = np.tile(-DISK.from_angles(1.1, 0.8), (n, 1))
-    _, psi = angles_of(law.sample(before, rng=RNG))
+    theta, psi = angles_of(law.sample(before, rng=RNG))
     kept = np.abs(psi - 0.8) < 1e-9
     assert np.all(kept | (np.abs(psi - (np.pi - 0.8)) < 1e-9))
     assert abs(kept.mean() - 0.7) < 4.5 * np.sqrt(0.21 / n)
+    found, mean = np.cos(theta) * psi, float(law.apply(lambda t, p: np.cos(t) * p, 1.1, 0.8))
+    assert abs(found.mean() - mean) < 4.5 * found.std() / np.sqrt(n)
     assert sum(float(p) for p, _ in law.branches(1.1)) == pytest.approx(1.0, abs=1e-13)
     assert float(law.apply(lambda _, p: p, 1.1, 0.8)) == pytest.approx(0.3 * (np.pi - 0.8) + 0.7 * 0.8, abs=1e-13)
 
