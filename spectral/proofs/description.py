@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.checks import instance
 from ...core.errors import InputError
 from ...geometry import Arc, dispersing_arcs
 from ...kernels import Law, WallLaw, lambertian, specular
@@ -40,6 +41,7 @@ class Description:
     @classmethod
     def of(cls, law: Law) -> Description:
         """The description of a law; raises InputError if there is no theorem on it."""
+        instance("law", law, Law, "ker.henyey_greenstein(0.5)")
         frame, base, weights = law.frame, None, dict.fromkeys(("law", "specular", "retroreflection", "lambertian"), 0.0)
         for word, weight in (words_of(law) or {}).items():
             name, one, mirrored = _kind(word)
