@@ -37,7 +37,7 @@ LEVELS, FIRST_SIZE, FULL_PANELS, MOST_UNKNOWNS = ((8, 4), (16, 6), (32, 8), (64,
 # Larger systems are solved by GMRES, to this relative residual.
 MOST_DIRECT, GMRES_TOLERANCE = 1000, 1e-11
 # The factor by which a doubling of the polynomials is trusted to reduce their error.
-GAIN = 8.0
+GAIN, FEWEST_LEVELS = 8.0, 3
 # Largest norm of a law between polynomials of degrees 16 to 31. For laws that smooth it is below 0.3; isometries, as of
 # straight pieces, keep functions of all degrees, and the errors of their projections follow no rule.
 MOST_KEPT = 0.5
@@ -221,7 +221,7 @@ def _by_polynomials(law: Law, length: float, tolerance: float, rng: np.random.Ge
     levels = [
         one for one in LEVELS if (len(_panels(length, FULL_PANELS / one[0])) - 1) * math.prod(one) <= MOST_UNKNOWNS
     ]
-    value, truncation, error, size = math.nan, 0.0, math.inf, 0
+    value, changes, error, size = math.nan, list[float](), math.inf, 0
     for accuracy in (MATRIX_TOLERANCE, 0.1 * tolerance):
         matrix = discretise(law, Legendre(FIRST_SIZE), tolerance=accuracy, rng=rng)
         kept = np.asarray(matrix.symmetric)[FIRST_SIZE // 2 :, FIRST_SIZE // 2 :]
@@ -236,9 +236,10 @@ def _by_polynomials(law: Law, length: float, tolerance: float, rng: np.random.Ge
         value, noise = _in_polynomials(matrix, length, size, nodes)
         if noise > tolerance:
             break
-        if not math.isnan(before):
-            truncation = max(abs(value - before), truncation / GAIN)
-            error = truncation + noise
+        changes = [abs(value - before), *(change / GAIN for change in changes)]
+        # one small change may be chance
+        if len(changes) >= FEWEST_LEVELS:
+            error = max(changes[:-1]) + noise
         if error <= tolerance:
             break
     method = f"integral equation in {size} polynomials of the cosine, by {matrix.method}; error from {size // 2}"

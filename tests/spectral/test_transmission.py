@@ -274,6 +274,13 @@ def test_the_error_by_the_rays_of_the_matrix_is_their_spread():
     assert 0.3 < 2.0 * value.std(ddof=1) / np.median(noise) < 1.5
 
 
+def test_one_small_change_is_not_taken_for_convergence():
+    """From 8 to 16 polynomials this law changes by less than half of the error of 16."""
+    law, length = ker.CircularArcLaw(1.4471656964570416), 10.880220834204371
+    rough, fine = (spec.transmission(law, length, tolerance=tolerance, rng=0) for tolerance in (5e-3, 2e-4))
+    assert abs(float(rough) - float(fine)) + fine.error < rough.error
+
+
 def test_iterations_give_what_elimination_gives(monkeypatch):
     matrix, flights = np.diag(0.8 ** np.arange(24.0)), clausing._planar_flights(24, 5.0)
     found = clausing._solved(flights, matrix, 5.0, 8)[0]
