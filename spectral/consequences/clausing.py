@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from ...core.checks import Floats, Rng, choice, generator, number_between, positive_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, RULE_OF_THREE, Estimate
+from ...core.estimates import NORMAL_95, RULE_OF_THREE, Estimate, student_95
 from ...core.rounding import EPS
-from ...kernels import Law, lambertian, specular
+from ...kernels import KernelMatrix, Law, Legendre, discretise, lambertian, specular
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.structure import words_of
 from .channel import LARGEST, in_paper_frame, reflected
@@ -23,12 +24,25 @@ Function: TypeAlias = Callable[[Floats], Floats]
 # Directions of flight, and the displacements along the axis and directions that follow after a reflection.
 Reflections: TypeAlias = Callable[[Floats], tuple[Floats, Floats]]
 
-# Gauss nodes of a panel in two resolutions, whose difference is the error; longest panel in units of the half width of
-# the strip in which the kernel is analytic; limit on the panels.
-NODES, PANEL_LENGTH, MOST_PANELS = (8, 10), 1.0, 300
+# Gauss nodes of a panel in two resolutions, whose difference is the error of diffuse walls.
+NODES = (8, 10)
+# Longest diffuse channel, in the unit in which the kernel begins to fall; rounding of a diffuse reflection.
+LONGEST, ROUNDING = 1e5, 64.0 * EPS
 # Least diffuse fraction of the integral equation, and the terms of its kernel in units of the inverse fraction: the
-# terms beyond sum to less than rounding.
-LEAST_DIFFUSE, TERMS = 0.01, 50.0
+# terms beyond sum to less than rounding. Knots of their spline for each factor of e in length.
+LEAST_DIFFUSE, TERMS, KNOTS = 0.01, 50.0, 50
+# Other laws: polynomials of the cosine, with the nodes of a panel; those of the first matrix; the largest number of
+# both that does not shorten the panels at the ends; limit on the unknowns, a few seconds.
+LEVELS, FIRST_SIZE, FULL_PANELS, MOST_UNKNOWNS = ((8, 4), (16, 6), (32, 8), (64, 6)), 32, 16, 4000
+# Larger systems are solved by GMRES, to this relative residual.
+MOST_DIRECT, GMRES_TOLERANCE = 1000, 1e-11
+# The factor by which a doubling of the polynomials is trusted to reduce their error.
+GAIN, FEWEST_LEVELS = 8.0, 3
+# Largest norm of a law between polynomials of degrees 16 to 31. For laws that smooth it is below 0.3; isometries, as of
+# straight pieces, keep functions of all degrees, and the errors of their projections follow no rule.
+MOST_KEPT = 0.5
+# Tolerance of the matrix, in the Frobenius norm, of which the transmission shows little.
+MATRIX_TOLERANCE = 0.1
 # Particles at a time, the limit on their reflections, about ten seconds of a law with a closed form, and the particles
 # of which one reflection takes as long as the calls that it needs.
 TOGETHER, MOST_REFLECTIONS, LEAST_TOGETHER = 2**16, 5 * 10**7, 500
@@ -59,6 +73,11 @@ def _beyond_in_tube(z: Floats) -> Floats:
     return np.asarray(4.0 / (root * (root + z) ** 2))
 
 
+def _kernel_in_tube(z: Floats) -> Floats:
+    root = np.sqrt(z * z + 4.0)
+    return np.asarray(4.0 * (z + 2.0 * root) / (root**3 * (root + z) ** 2))
+
+
 # In the channel of width 1 the fractions are those of the plane: the cosine law in space projects to that in the plane.
 GEOMETRIES: dict[Section, _Geometry] = {
     "channel": _Geometry(
@@ -69,7 +88,7 @@ GEOMETRIES: dict[Section, _Geometry] = {
     ),
     # radius 1
     "tube": _Geometry(
-        lambda z: 0.5 * (1.0 - z * (z * z + 6.0) * (z * z + 4.0) ** -1.5),
+        _kernel_in_tube,
         _beyond_in_tube,
         lambda z: 4.0 / (np.sqrt(z * z + 4.0) + z) ** 2,
         2.0,
@@ -98,20 +117,20 @@ def transmission(
     tolerance : float
         The wanted error. Diffuse walls and mixtures with specular ones reach 1e-8.
     rng : None, int or numpy.random.Generator
-        The source of the flights of other laws.
+        The source of the rays of other laws.
 
     Returns
     -------
     Estimate
-        The error is that reached. For flights it exceeds the tolerance where 5 x 10^7 reflections do not reach it (ten
-        seconds to a minute): an error of 1e-4 takes up to 10^8 particles, each with about as many reflections as the
-        length has widths.
+        The error is that reached. Laws that smooth, such as those of arcs, meet 1e-4 in seconds. For flights the error
+        exceeds the tolerance where 5 x 10^7 reflections do not reach it (ten seconds to a minute): an error of 1e-4
+        takes up to 10^8 particles, each with about as many reflections as the length has widths.
 
     Raises
     ------
     InputError
         If an argument is not as described, the tube has another planar law, a tube with these is longer than
-        600 radii or has a diffuse fraction between 0 and 0.01.
+        2 x 10^5 radii or has a diffuse fraction between 0 and 0.01.
 
     Notes
     -----
@@ -121,8 +140,12 @@ def transmission(
     At walls that reflect diffusely with probability a, else specularly, the places x of diffuse reflections form a
     Markov chain. With the fraction S of particles that go from a place of the wall beyond a distance, S_a(z) = a sum_k
     (1 - a)^(k-1) S(z/k) is the fraction without a diffuse reflection before. The probability u of leaving at the far
-    end solves u(x) = S_a(L - x) - int S_a'(d) u(y) dy with the distance d of x and y, by Gauss quadrature on panels.
-    For other laws particles are simulated from their first collision on; the fraction that has none is exact.
+    end solves u(x) = S_a(L - x) - int S_a'(d) u(y) dy with the distance d of x and y, by Gauss quadrature on panels
+    whose lengths double from both ends to the middle. For other laws in a channel u depends on the angle too. In N
+    polynomials of its cosine, 8 to 64, it solves N such equations, coupled by the matrix of the law; the error is the
+    largest change from N to 2 N polynomials, with a discount for earlier ones, plus that by the error of the matrix.
+    Where it misses the tolerance, for laws near isometries, such as those of straight pieces, and in tubes, particles
+    are simulated from their first collision on; the fraction that has none is exact.
 
     Source: P. Clausing, Ann. Phys. 404 (1932) 961.
 
@@ -155,18 +178,22 @@ def transmission(
     diffuse = _diffuse_fraction(paper)
     if diffuse == 0.0:
         return Estimate(1.0, 0.0, "bound", "specular reflection keeps the direction along the axis")
-    in_reach = far <= MOST_PANELS * PANEL_LENGTH * geometry.width
+    in_reach = far <= LONGEST * geometry.width
     if diffuse is not None and diffuse >= LEAST_DIFFUSE and in_reach:
         return _by_integral_equation(geometry, diffuse, far)
     if section == "channel":
-        return _by_flights("channel", far, wanted, source, _entered_in_plane, lambda angle: _turn(paper, angle, source))
+        smooth = _by_polynomials(paper, far, wanted, source)
+        if smooth.error <= wanted:
+            return smooth
+        flown = _by_flights(section, far, wanted, source, _entered_in_plane, lambda angle: _turn(paper, angle, source))
+        return min(smooth, flown, key=lambda found: found.error)
     if diffuse is None:
         raise InputError(
             "law: in a tube expected lambertian(), maxwell(a) or HemisphereLaw(law, orientation), because a planar law "
             f"does not tell the direction of its grooves, got {law!r}"
         )
     raise InputError(
-        f"length: in a tube expected at most {MOST_PANELS * PANEL_LENGTH * geometry.width:g} radii and a diffuse "
+        f"length: in a tube expected at most {LONGEST * geometry.width:g} radii and a diffuse "
         f"fraction of at least {LEAST_DIFFUSE:g}, got {far:g} and {diffuse:g}"
     )
 
@@ -183,61 +210,194 @@ def _diffuse_fraction(law: Law) -> float | None:
 
 # ---- the integral equation -----------------------------------------------------------------------------------------
 def _by_integral_equation(geometry: _Geometry, diffuse: float, length: float) -> Estimate:
-    coarse, fine = (_solved(geometry, diffuse, length, nodes) for nodes in NODES)
-    panels = _panels(geometry, length)
-    # the matrix is 1 minus one of nonnegative entries with row sums below 1; its condition grows like length squared
-    rounding = 4.0 * EPS * panels * NODES[1]
-    method = f"integral equation, {panels} panels of {NODES[1]} nodes; error from {NODES[0]}"
-    return Estimate(fine, abs(fine - coarse) + rounding, "estimate", method)
+    flights, one = _diffuse_flights(geometry, diffuse, length), np.ones((1, 1))
+    (coarse, _), (fine, slope) = (_solved(flights, one, length, nodes) for nodes in NODES)
+    error = abs(fine - coarse) + ROUNDING * (1.0 + float(slope[0, 0]))
+    return Estimate(fine, error, "estimate", f"integral equation, {NODES[1]} nodes a panel; error from {NODES[0]}")
 
 
-def _panels(geometry: _Geometry, length: float) -> int:
-    return math.ceil(length / (PANEL_LENGTH * geometry.width))
+def _by_polynomials(law: Law, length: float, tolerance: float, rng: np.random.Generator) -> Estimate:
+    """In polynomials of the cosine, of degrees that double until the tolerance is met or the work exceeds its limit."""
+    levels = [
+        one for one in LEVELS if (len(_panels(length, FULL_PANELS / one[0])) - 1) * math.prod(one) <= MOST_UNKNOWNS
+    ]
+    value, changes, error, size = math.nan, list[float](), math.inf, 0
+    for accuracy in (MATRIX_TOLERANCE, 0.1 * tolerance):
+        matrix = discretise(law, Legendre(FIRST_SIZE), tolerance=accuracy, rng=rng)
+        kept = np.asarray(matrix.symmetric)[FIRST_SIZE // 2 :, FIRST_SIZE // 2 :]
+        if float(np.linalg.norm(kept, 2)) > MOST_KEPT:
+            levels = []
+        if not levels or _in_polynomials(matrix, length, *levels[0])[1] <= 0.5 * tolerance:
+            break
+    for size, nodes in levels:
+        if size > FIRST_SIZE:
+            matrix = discretise(law, Legendre(size), tolerance=accuracy, rng=rng)
+        before = value
+        value, noise = _in_polynomials(matrix, length, size, nodes)
+        if noise > tolerance:
+            break
+        changes = [abs(value - before), *(change / GAIN for change in changes)]
+        # one small change may be chance
+        if len(changes) >= FEWEST_LEVELS:
+            error = max(changes[:-1]) + noise
+        if error <= tolerance:
+            break
+    method = f"integral equation in {size} polynomials of the cosine, by {matrix.method}; error from {size // 2}"
+    return Estimate(value, error, "estimate", method)
 
 
-def _solved(geometry: _Geometry, diffuse: float, length: float, nodes: int) -> float:
-    """The transmission, with so many Gauss nodes on each panel."""
-    panels = _panels(geometry, length)
-    size = length / panels
-    unit, weight = np.polynomial.legendre.leggauss(nodes)
-    node, weight = 0.5 * size * (unit + 1.0), 0.5 * size * weight
+def _in_polynomials(matrix: KernelMatrix, length: float, size: int, nodes: int) -> tuple[float, float]:
+    """The transmission in so many polynomials, with its error by that of the matrix."""
+    value, slope = _solved(_planar_flights(size, length), matrix.symmetric[:size, :size].T, length, nodes)
+    # of a sum of matrices the spread shows only the error of rays
+    if matrix.replicates and "+" not in matrix.method:
+        parts = [float(np.sum(slope.T * np.asarray(part)[:size, :size])) for part in matrix.replicates]
+        return value, student_95(len(parts)) * float(np.std(parts, ddof=1)) / math.sqrt(len(parts))
+    return value, float(matrix.error) * float(np.linalg.norm(slope))
+
+
+@dataclass(frozen=True)
+class _Flights:
+    """Flights between reflections, with the directions expanded in N functions.
+
+    Attributes
+    ----------
+    arriving, leaving : callable
+        From displacements along the axis to the functions of the directions, shape (..., N). Those of arriving
+        particles are times the density of the displacement.
+    beyond : callable
+        From distances to the integrals of the leaving functions over larger displacements, shape (..., N).
+    signs : array, shape (N,)
+        1 for functions that are even along the axis, -1 for odd ones.
+    entering, direct : float
+        Particles that enter in units of those that a wall sends to the end; the fraction that is never reflected.
+    width, resolved : float
+        The distance at which the density begins to fall; the length of the panels at the ends.
+    """
+
+    arriving: Function
+    leaving: Function
+    beyond: Function
+    signs: Floats
+    entering: float
+    direct: float
+    width: float
+    resolved: float
+
+
+def _diffuse_flights(geometry: _Geometry, diffuse: float, length: float) -> _Flights:
+    """Flights from one diffuse reflection to the next."""
     terms = np.arange(1, math.ceil(TERMS / diffuse) + 1 if diffuse < 1.0 else 2)
     chance = np.asarray(diffuse * (1.0 - diffuse) ** (terms - 1), dtype=np.float64)
 
     def averaged(function: Function, z: Floats, factor: Floats) -> Floats:
         return np.asarray(sum(one * function(z / k) for k, one in zip(terms, factor, strict=True)))
 
-    # blocks of all pairs of panels depend on the distance of the panels alone
-    far = size * np.arange(1, panels)[:, None, None] + node - node[:, None]
-    block = averaged(geometry.kernel, far, chance / terms) * weight
-    own = _own_block(lambda z: averaged(geometry.kernel, z, chance / terms), unit, size)
-    # to the panel before, at the same distance: by symmetry of the nodes about the middle of the panel
-    every = np.concatenate((block[::-1, ::-1, ::-1], own[None], block))
-    step = np.arange(panels)[None, :] - np.arange(panels)[:, None] + panels - 1
-    matrix = every[step].transpose(0, 2, 1, 3).reshape(panels * nodes, panels * nodes)
-    place = (size * np.arange(panels)[:, None] + node).ravel()
-    leaving = averaged(geometry.beyond, length - place, chance)
-    reaching = np.linalg.solve(np.eye(place.size) - matrix, leaving)
+    def kernel(z: Floats) -> Floats:
+        return averaged(geometry.kernel, z, chance / terms)
+
+    if terms.size > 1:
+        from scipy.interpolate import make_interp_spline
+
+        # analytic in log(z) for large z: a spline of degree 7 is right to rounding
+        grid = np.linspace(0.0, math.asinh(length / geometry.width), KNOTS * (1 + math.ceil(math.asinh(length))))
+        spline = make_interp_spline(grid, kernel(geometry.width * np.sinh(grid)), k=7)
+
+    def arriving(z: Floats) -> Floats:
+        distance = np.abs(z)
+        return (spline(np.arcsinh(distance / geometry.width)) if terms.size > 1 else kernel(distance))[..., None]
+
     direct = float(averaged(geometry.passing, np.array(length), diffuse * terms * chance))
-    # by reversal of the paths, a place of the wall has its first diffuse particles from the end as it sends them there
-    first = 2.0 * diffuse * averaged(geometry.beyond, place, chance)
-    return direct + float(np.sum(first * reaching * np.tile(weight, panels)))
+    return _Flights(
+        arriving, lambda z: np.ones((*z.shape, 1)), lambda z: averaged(geometry.beyond, z, chance)[..., None],
+        np.ones(1), 2.0 * diffuse, direct, geometry.width, geometry.width,
+    )  # fmt: skip
 
 
-def _own_block(kernel: Function, unit: Floats, size: float) -> Floats:
-    """Integrals of kernel(|x - y|) over a panel times the Lagrange polynomials of its nodes, for x at each node.
+def _planar_flights(size: int, length: float) -> _Flights:
+    """Flights across the channel between reflections of any law, in polynomials of the cosine of the angle."""
+    basis, signs = Legendre(size), np.asarray((-1.0) ** np.arange(size), dtype=np.float64)
+    unit, weight = np.polynomial.legendre.leggauss(size // 2 + 1)
 
-    On both sides of the kink y = x by Gauss quadrature.
-    """
-    weight = np.polynomial.legendre.leggauss(unit.size)[1]
-    # nodes between -1 and x, and between x and 1
-    half = 0.5 * np.stack((1.0 + unit, 1.0 - unit), axis=-1)[..., None]
-    y = np.stack((unit, unit), axis=-1)[..., None] + half * (unit + np.array([[-1.0], [1.0]]))
-    lagrange = np.polynomial.legendre.legvander(y, unit.size - 1) @ np.linalg.inv(
-        np.polynomial.legendre.legvander(unit, unit.size - 1)
-    )
-    value = kernel(0.5 * size * np.abs(y - unit[:, None, None])) * half * weight * 0.5 * size
-    return np.asarray(np.einsum("isq,isqj->ij", value, lagrange))
+    def leaving(z: Floats) -> Floats:
+        return basis.evaluate(np.arctan2(1.0, z))
+
+    def beyond(z: Floats) -> Floats:
+        # half of the integral over the cosine, from z/sqrt(1 + z^2) to 1
+        part = GEOMETRIES["channel"].beyond(z)[..., None]
+        inner = basis.evaluate(np.arccos(1.0 - part * (1.0 + unit)))
+        return np.asarray(np.einsum("...qi,q->...i", inner, 0.5 * weight) * part)
+
+    def arriving(z: Floats) -> Floats:
+        return leaving(z) * (signs * GEOMETRIES["channel"].kernel(z)[..., None])
+
+    direct = float(GEOMETRIES["channel"].passing(np.array(length)))
+    return _Flights(arriving, leaving, beyond, signs, 2.0, direct, 1.0, min(FULL_PANELS / size, 1.0))
+
+
+def _panels(length: float, width: float) -> Floats:
+    """Edges of panels whose lengths double from both ends to the middle, since the solution is the smoother there."""
+    half = 0.5 * length / width
+    count = max(math.ceil(math.log2(half + 1.0)), 1)
+    left = 0.5 * length * (2.0 ** np.arange(count + 1) - 1.0) / (2.0**count - 1.0)
+    return np.concatenate((left, length - left[-2::-1]))
+
+
+def _solved(flights: _Flights, matrix: Floats, length: float, nodes: int) -> tuple[float, Floats]:
+    """The transmission with so many Gauss nodes on each panel, and its derivative by the matrix of reflection."""
+    edges = _panels(length, flights.resolved)
+    unit, weight = np.polynomial.legendre.leggauss(nodes)
+    half = 0.5 * np.diff(edges)
+    place = (edges[:-1] + half)[:, None] + half[:, None] * unit
+    weight = (half[:, None] * weight).ravel()
+    size, signs = flights.signs.size, flights.signs
+    rows = np.stack([_row(flights, edges, unit, x, nodes) for x in place[: len(half) // 2].ravel()])
+    # the second half of the channel is the mirror image
+    turned = (signs[:, None, None] * signs * rows)[::-1, :, ::-1]
+    flown = np.concatenate((rows, turned)).reshape(place.size * size, -1)
+    place = place.ravel()
+
+    first = flights.entering * signs * flights.beyond(place)
+    sent = _reflected(matrix, first, flown)
+    through = np.sum(weight[:, None] * flights.beyond(length - place) * sent.reshape(first.shape))
+    arriving = first + (flown @ sent).reshape(first.shape)
+    # the chances of particles that a wall sends, from the transposed equation: that of the flights is itself
+    last = flights.beyond(length - place)
+    chances = last + (flown @ _reflected(matrix.T, last, flown)).reshape(first.shape)
+    return flights.direct + float(through), np.einsum("x,xi,xj->ij", weight, chances, arriving)
+
+
+def _reflected(matrix: Floats, first: Floats, flown: Floats) -> Floats:
+    """Particles that all places send, which the matrix gives of the first and of those flown there from all places."""
+    if len(flown) > MOST_DIRECT:
+        operator = LinearOperator(
+            flown.shape, lambda some: some - ((flown @ some).reshape(first.shape) @ matrix.T).ravel(), dtype=np.float64
+        )
+        sent, failed = gmres(operator, (first @ matrix.T).ravel(), rtol=GMRES_TOLERANCE, restart=200, maxiter=1)
+        if not failed:
+            return np.asarray(sent)
+    equation = np.eye(len(flown)) - (matrix @ flown.reshape(*first.shape, -1)).reshape(flown.shape)
+    return np.asarray(np.linalg.solve(equation, (first @ matrix.T).ravel()))
+
+
+def _row(flights: _Flights, edges: Floats, unit: Floats, x: float, nodes: int) -> Floats:
+    """Moments of particles arriving at x from the Lagrange polynomials of all nodes, shape (N, nodes in all, N)."""
+    size, length = flights.signs.size, edges[-1]
+    # intervals that double from x on, in both directions
+    steps = 0.5 * flights.width * (2.0 ** np.arange(math.log2(2.0 * length / flights.width + 1.0) + 1.0) - 1.0)
+    cuts = np.unique(np.clip(np.concatenate((x - edges, steps, -steps)), x - length, x))
+    inner, weight = np.polynomial.legendre.leggauss(NODES[1] + 4 + size // 4)
+    half, middle = 0.5 * np.diff(cuts)[:, None], 0.5 * (cuts[1:] + cuts[:-1])[:, None]
+    # displacements from the places y = x - z; y alone is not accurate enough in long channels
+    z, panel = middle + half * inner, np.searchsorted(edges[1:-1], x - middle.ravel())
+    local = 2.0 * (x - z - edges[panel, None]) / np.diff(edges)[panel, None] - 1.0
+    vandermonde = np.polynomial.legendre.legvander
+    lagrange = vandermonde(local, nodes - 1) @ np.linalg.inv(vandermonde(unit, nodes - 1))
+    leaving = (lagrange[..., None] * flights.leaving(z)[:, :, None, :]).reshape(*z.shape, -1)
+    part = np.swapaxes(flights.arriving(z) * (half * weight)[..., None], 1, 2) @ leaving
+    row = np.zeros((len(edges) - 1, size, nodes * size))
+    np.add.at(row, panel, part)
+    return row.reshape(-1, size, nodes, size).swapaxes(0, 1).reshape(size, -1, size)
 
 
 # ---- flights -------------------------------------------------------------------------------------------------------
