@@ -217,7 +217,8 @@ def channel_diffusivity(
     Raises
     ------
     InputError
-        If an argument is not as described, or a particle has not left after 10^6 flights.
+        If an argument is not as described, a particle has not left after 10^6 flights, or every ray keeps its angle to
+        the wall, so that the mean exit time is infinite.
 
     Examples
     --------
@@ -229,6 +230,7 @@ def channel_diffusivity(
     >>> spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
     ChannelDiffusivity(L^2/(2 tau): 3.63(9) at L = 20; logarithmic in L well above 36)
     """
+    _refuse_kept_sines(law)
     found = simulated_times(law, lengths, particles, rng, radius, speed, arrangement, {}, least=1)
     errors = NORMAL_95 * found.times.std(axis=0, ddof=1) / np.sqrt(len(found.times))
     try:
@@ -256,12 +258,7 @@ def logarithmic_slope(law: Law, radius: float, speed: float, arrangement: Arrang
             f"law: {law!r} keeps the direction of grazing flights (zeta = {zeta:.6g}), so the diffusivity is infinite; "
             "expected a law that turns them round at times, as a mixture with lambertian() does"
         )
-    if holds_of_all(law, _keeps_sines):
-        raise InputError(
-            "law: every ray keeps its angle to the wall, so all flights of a particle are equally long and the "
-            f"particles have no common diffusivity; got {law!r}, expected a law that changes angles, as a mixture with "
-            "lambertian() does"
-        )
+    _refuse_kept_sines(law)
     # the limit follows from the structure of the law, or from the shape of the wall at y = 0
     exact = symbol.entry_error == 0.0
     if not exact and zeta + uncertainty >= 1.0 - BALLISTIC:
@@ -294,6 +291,15 @@ def _onset(law: Law, zeta: float) -> float:
     far = np.abs(means + zeta) > NEAR_LIMIT
     first = int(np.flatnonzero(far)[-1]) + 1 if far.any() else 0
     return float(1.0 / np.tan(ONSET_ANGLES[first])) if first < ONSET_ANGLES.size else np.inf
+
+
+def _refuse_kept_sines(law: Law) -> None:
+    if isinstance(law, Law) and holds_of_all(law, _keeps_sines):
+        raise InputError(
+            "law: every ray keeps its angle to the wall, so all flights of a particle are equally long and the "
+            f"particles have no common diffusivity; got {law!r}, expected a law that changes angles, as a mixture with "
+            "lambertian() does"
+        )
 
 
 def _keeps_sines(law: Law) -> bool:

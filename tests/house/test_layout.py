@@ -35,6 +35,7 @@ FLOORS = [
     *("kernels.discretisation", "kernels.distances", "kernels.positions", "kernels.thermal", "kernels.collisions"),
     *("kernels.hemisphere", "kernels.billiards", "kernels.inverse", "kernels.aerodynamics", "kernels"),
     *("spectral.eigenvalues", "spectral.essential", "spectral.bounds", "spectral.gap", "spectral.consequences"),
+    "spectral.proofs",
     *("spectral.sweeps", "spectral.work_diagrams", "spectral"),
     # the ledger's index finds the files of its folders without naming them
     *("ledger", "ledger.plane", "ledger.disk", "ledger.proof"),

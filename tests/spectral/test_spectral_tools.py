@@ -230,9 +230,8 @@ def test_the_diffusivity_of_one_length_scales_with_radius_and_speed():
     assert second.values == pytest.approx(8.0 * first.values) and second.onset == pytest.approx(2.0 * first.onset)
 
 
-def test_a_channel_whose_slope_is_refused_has_times_all_the_same():
-    """Every particle keeps its angle to the wall until it leaves."""
-    law = 0.5 * ker.specular() + 0.5 * ker.retroreflection()
+def test_a_channel_whose_slope_is_unknown_has_times_all_the_same():
+    law = ker.WallLaw(geo.rectangular_teeth()) @ ker.henyey_greenstein(0.5)
     found = spec.channel_diffusivity(law, [1.0, 2.0], 200, 3)
     assert found.onset == np.inf and np.all(found.times > 0.0) and "well above inf" not in repr(found)
 
@@ -241,6 +240,12 @@ def test_a_channel_whose_slope_is_refused_has_times_all_the_same():
 def test_lengths_of_channels_that_do_not_increase_from_above_zero_are_refused(lengths):
     with pytest.raises(InputError, match=r"^lengths: expected "):
         spec.channel_diffusivity(ker.lambertian(), lengths)
+
+
+def test_a_channel_whose_particles_keep_their_angles_has_no_mean_exit_time():
+    for law in (ker.RectangularTeethLaw(1.0), 0.5 * ker.specular() + 0.5 * ker.retroreflection()):
+        with pytest.raises(InputError, match="every ray keeps its angle"):
+            spec.channel_diffusivity(law, [5.0])
 
 
 # without a closed form
