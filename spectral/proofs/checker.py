@@ -33,8 +33,9 @@ def up_to(most):
 
 
 def spread(values):
-    """From the least to the greatest number of some balls."""
-    return ball(min(x.lower() for x in values), max(x.upper() for x in values))
+    """From the least to the greatest number of some balls; of what is not finite nothing is known."""
+    finite = all(x.is_finite() for x in values)
+    return ball(min(x.lower() for x in values), max(x.upper() for x in values)) if finite else ZERO / 0
 
 
 def increasing(numbers):
@@ -102,9 +103,8 @@ class Bumps:
     """
 
     def __init__(self, curvature, effort):
-        self.K, self.R, self.effort = curvature, 1 / curvature, effort
+        self.K, self.R, self.steepest, self.effort = curvature, 1 / curvature, (curvature / 2).asin(), effort
         demand(self.K > 0 and self.K * self.K < 2, "a curvature between 0 and sqrt(2)")
-        self.steepest = (self.K / 2).asin()
 
     def hits(self, s, a):
         """Whether a ray that leaves an arc hits the next one on the right (lemma 2); None: undecided."""
@@ -302,7 +302,7 @@ def of_bumps(curvature, certificate, signs):
     v, guess = Trial(certificate["trial"], odd), arb(certificate["guess"])
     form, square = law.form_and_residual(v, signs[odd], guess)
     ends, square = [arb(x) for x in ((form / v.norm).lower(), (form / v.norm).upper())], arb((square / v.norm).upper())
-    demand(above > ends[1], "a quotient below the next eigenvalue")
+    demand(above > ends[1] and square.is_finite(), "a quotient below the next eigenvalue, and a finite residual")
     # concave in the quotient, so least at an end
     least = min((x - square / (above - x)).lower() for x in ends)
     return {odd: (least, ends[1]), not odd: (other, arb(2))}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from ...core.errors import InputError
 from ...geometry import Arc, dispersing_arcs
 from ...kernels import Law, WallLaw, lambertian, specular
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
-from ...kernels.laws.structure import Word, words_of
+from ...kernels.laws.structure import words_of
 
 # The weights and the curvature of a theorem have this relative radius, so that it holds of 1/3 as of the double beside.
 RADIUS = 2.0**-52
@@ -20,73 +19,51 @@ RADIUS = 2.0**-52
 ROUNDED = 1e-14
 
 
-@dataclass(frozen=True)
-class Description:
-    """A mixture of one law with specular reflection, retroreflection and Lambert's law.
-
-    Attributes
-    ----------
-    law : Law
-        In the paper's convention.
-    content : dict
-        What a certificate says of it.
-    text : str
-        In words.
-    """
-
-    law: Law
-    content: dict[str, Any]
-    text: str
-
-    @classmethod
-    def of(cls, law: Law) -> Description:
-        """The description of a law; raises InputError if there is no theorem on it."""
-        instance("law", law, Law, "ker.henyey_greenstein(0.5)")
-        frame, base, weights = law.frame, None, dict.fromkeys(("law", "specular", "retroreflection", "lambertian"), 0.0)
-        for word, weight in (words_of(law) or {}).items():
-            name, one, mirrored = _kind(word)
-            if name is None or (one is not None and base not in (None, one)):
-                raise InputError(_expected(law))
-            weights[
-                name
-                if frame == "paper"
-                else {"specular": "retroreflection", "retroreflection": "specular"}.get(name, name)
-            ] += weight
-            base = one or base
-            if one is not None and mirrored != (frame == "specular"):
-                raise InputError(_expected(law))
-        base = lambertian() if base is None else base
-        family, text = _family(base, law)
-        ends = {name: _with_radius(weight) for name, weight in weights.items()}
-        mixture = " + ".join(
-            f"{weight:g} {text if name == 'law' else name}" for name, weight in weights.items() if weight > 0.0
-        )
-        return cls(base, {"law": family, "weights": ends, "frame": frame}, mixture)
+def described(law: Law) -> tuple[Law, dict[str, Any]]:
+    """The law without ideal ones beside it, and what a certificate says; InputError if there is no theorem."""
+    instance("law", law, Law, "ker.henyey_greenstein(0.5)")
+    specular_frame = law.frame == "specular"
+    # the kernel that keeps angles, and the one that turns them
+    ideal = ("specular", "retroreflection") if specular_frame else ("retroreflection", "specular")
+    weights, base = dict.fromkeys(("law", "specular", "retroreflection", "lambertian"), 0.0), None
+    for word, weight in (words_of(law) or {(law, law, law): 1.0}).items():
+        if not word or word == (specular(),):
+            weights[ideal[len(word)]] += weight
+        elif word[0] == lambertian():
+            weights["lambertian"] += weight
+        elif word[1:] == ((specular(),) if specular_frame else ()) and base in (None, word[0]):
+            weights["law"], base = weights["law"] + weight, word[0]
+        else:
+            raise InputError(_expected(law))
+    base = lambertian() if base is None else base
+    texts = {name: _with_radius(weight) for name, weight in weights.items()}
+    return base, {"law": _family(base, law), "weights": texts, "frame": law.frame}
 
 
-def _kind(word: Word) -> tuple[str | None, Law | None, bool]:
-    """The name of a word's weight, in the paper's convention, the law, and whether specular reflection follows."""
-    if not word or word == (specular(),):
-        return ("specular" if word else "retroreflection"), None, False
-    if word[0] == lambertian():
-        return "lambertian", None, False
-    mirrored = len(word) == 2 and word[1] == specular()
-    return ("law", word[0], mirrored) if mirrored or len(word) == 1 else (None, None, False)
+def in_words(content: dict[str, Any]) -> str:
+    """The law of a certificate."""
+
+    def number(pair: list[str]) -> str:
+        return f"{pair[0]} +/- {float(pair[1]):.1e}"
+
+    family = dict(content["law"])
+    name = {"dispersing arcs": "dispersing arcs of curvature {}", "powers": "Henyey-Greenstein of mean cosine {}"}
+    text = name[family.pop("family")].format(*map(number, family.values()))
+    terms = [
+        f"({number(pair)}) {text if key == 'law' else key}"
+        for key, pair in content["weights"].items()
+        if float(pair[0])
+    ]
+    return " + ".join(terms)
 
 
-def _family(law: Law, whole: Law) -> tuple[dict[str, Any], str]:
+def _family(law: Law, whole: Law) -> dict[str, Any]:
     if law == lambertian():
-        return {"family": "powers", "mean_cosine": "0"}, "the Lambertian law"
+        return {"family": "powers", "mean_cosine": _with_radius(0.0)}
     if isinstance(law, HenyeyGreensteinLaw):
-        return {
-            "family": "powers",
-            "mean_cosine": _with_radius(law.g),
-        }, f"the Henyey-Greenstein law of mean cosine {law.g!r}"
+        return {"family": "powers", "mean_cosine": _with_radius(law.g)}
     if isinstance(law, WallLaw) and (curvature := _curvature(law)) is not None:
-        return {
-            "family": "dispersing arcs",
-            "curvature": _with_radius(curvature),
-        }, f"dispersing arcs of curvature {curvature!r}"
+        return {"family": "dispersing arcs", "curvature": _with_radius(curvature)}
     raise InputError(_expected(whole))
 
 

@@ -14,7 +14,7 @@ from ...core.files import write_whole
 from ...core.version import __version__
 from ...kernels import Law
 from .checker import Refused, check, enclose
-from .description import Description
+from .description import described, in_words
 from .search import certificates
 
 FORMAT = "asperity proved gap 1"
@@ -108,19 +108,19 @@ def prove_gap(law: Law, width: float = 1e-4) -> Proof:
     >>> [round(float(end), 14) for end in proof.interval]
     [0.75, 0.75]
     """
-    described, wanted = Description.of(law), number_between("width", width, 0.0, 1.0)
+    (base, content), wanted = described(law), number_between("width", width, 0.0, 1.0)
     try:
-        for certificate in certificates(described, wanted):
+        for certificate in certificates(base, content, wanted):
             certificate["format"] = FORMAT
             low, high = enclose(certificate)
             ends = _decimal(low, down=True), _decimal(high, down=False)
             certificate["interval"] = [str(end) for end in ends]
             if ends[1] - ends[0] <= Decimal(wanted) * ends[1]:
-                return _proof(certificate, described.text)
+                return _proof(certificate)
             reason = f"the interval [{ends[0]}, {ends[1]}] is wider than asked; ask for a greater width"
     except Refused as refusal:
         reason = f"expected {refusal}"
-    raise ProofError(f"the gap of {described.text} is not proved: {reason}")
+    raise ProofError(f"the gap of {in_words(content)} is not proved: {reason}")
 
 
 def check_proof(path: str | Path) -> Proof:
@@ -142,16 +142,16 @@ def check_proof(path: str | Path) -> Proof:
         raise InputError(f"path: cannot read a certificate from {path}: {reason}") from reason
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, ZeroDivisionError) as reason:
         raise InputError(f"path: expected a certificate that Proof.save wrote, got {path} ({reason!r})") from reason
-    return _proof(certificate, certificate.get("text", "the law"))
+    return _proof(certificate)
 
 
-def _proof(certificate: dict[str, Any], text: str) -> Proof:
+def _proof(certificate: dict[str, Any]) -> Proof:
     low, high = (Decimal(end) for end in certificate["interval"])
-    certificate |= {"text": text, "written by": certificate.get("written by", f"asperity {__version__}")}
+    certificate.setdefault("written by", f"asperity {__version__}")
     convention = "specular" if certificate["frame"] == "specular" else "paper's"
     statement = (
-        f"In the {convention} convention, for all parameters within 2^-52 of themselves, the law P of {text} has a "
-        f"spectral gap, inf spec(1 - P) on functions of mean 0, between {low} and {high}."
+        f"In the {convention} convention every law P = {in_words(certificate)} has a spectral gap, "
+        f"inf spec(1 - P) on functions of mean 0, between {low} and {high}."
     )
     used = tuple((name, LEMMAS[name]) for name in USED[certificate["law"]["family"]])
     return Proof((low, high), statement, used, certificate)

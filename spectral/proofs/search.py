@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...core.checks import Floats
-from ...kernels import Law, WallLaw
+from ...kernels import Law
 from .checker import Bumps, Refused, Trial, arb, ctx, exact
-from .description import Description
 
 BITS = 64
 # Powers of sin(theta) in trial functions, at first and at most, and Gauss nodes of a quarter turn.
@@ -52,14 +51,12 @@ class _Class:
     residual: float
 
 
-def certificates(described: Description, width: float) -> Iterator[dict[str, Any]]:
-    """Certificates without their intervals, better and better ones."""
-    content = described.content
+def certificates(law: Law, content: dict[str, Any], width: float) -> Iterator[dict[str, Any]]:
+    """Certificates without their intervals, better and better ones, of what `described` gives."""
     if content["law"]["family"] == "powers":
         yield {**content, "precision": BITS}
         return
-    assert isinstance(described.law, WallLaw)
-    law = described.law.in_specular_frame()
+    law = law.in_specular_frame()
     signs = {True: 1 if content["frame"] == "specular" else -1, False: 1}
     precision, ctx.prec = ctx.prec, BITS
     try:

@@ -157,6 +157,8 @@ def changed(certificate, path, value):
         pytest.param(*(("odd",), lambda odd: False), marks=pytest.mark.slow),
         pytest.param(*(("trial", 0), lambda text: str(float(text) * 1.01)), marks=pytest.mark.slow),
         pytest.param(*(("trial", 3), lambda text: str(float(text) * 1.05)), marks=pytest.mark.slow),
+        pytest.param(*(("guess",), lambda text: "nan"), marks=pytest.mark.slow),
+        pytest.param(*(("trial", 1), lambda text: "nan"), marks=pytest.mark.slow),
         pytest.param(*(("guess",), lambda text: str(float(text) * 1.05)), marks=pytest.mark.slow),
         (("threshold",), lambda text: "0.95"),
         (("other",), lambda text: "0.95"),
