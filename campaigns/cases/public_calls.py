@@ -246,10 +246,11 @@ FIRST = {
 # How Python and numpy refuse what has no such method, no length, no truth, or is no path; its message and the lines
 # of the call say the rest.
 PLAIN = (TypeError, ValueError, AttributeError, IndexError)
-# They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz.
+# They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz, and
+# `check_proof` its own damaged certificates.
 LEFT_OUT = {
-    "Basis", "Container", "DiskStatus", "double_parabola", "flat", "invisible_body", "lambertian", "Law",
-    "LeastResistanceLaw", "retroreflection", "SpectralGap", "Spectrum", "specular", "Status",
+    "Basis", "check_proof", "Container", "DiskStatus", "double_parabola", "flat", "invisible_body", "lambertian", "Law",
+    "LeastResistanceLaw", "Proof", "retroreflection", "SpectralGap", "Spectrum", "specular", "Status",
     "SweepTable", "verify", "WorkReport", "zero_resistance_body",
 }  # fmt: skip
 

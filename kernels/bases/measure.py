@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, check_memory, choice, finite_array, generator, shaped, whole_number
+from ...core.errors import InputError
 
 WeightName = Literal["sin", "sin2"]
 
@@ -63,6 +64,9 @@ class AngularMeasure:
     def quantile(self, probability: ArrayLike) -> Floats:
         """The angle below which a fraction ``probability`` in [0, 1] of the measure lies."""
         fraction = finite_array("probability", probability)
+        if np.any((fraction < 0.0) | (fraction > 1.0)):
+            worst = fraction.flat[np.argmax(np.abs(fraction - 0.5))]
+            raise InputError(f"probability: expected numbers in [0, 1], got {float(worst)!r}")
         if self.name == "sin":
             # arcsin of the smaller of p and 1 - p gives full relative accuracy at both ends of (0, pi)
             lower = 2.0 * np.arcsin(np.sqrt(np.minimum(fraction, 0.5)))

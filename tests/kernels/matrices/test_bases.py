@@ -83,6 +83,8 @@ def test_quantiles_are_accurate_at_both_ends(measure) -> None:
     upper = 1.0 - np.array([2.0**-50, 2.0**-40, 2.0**-20, 0.125, 0.25, 0.4375])
     assert np.abs(np.pi - measure.quantile(upper) - measure.quantile(1.0 - upper)).max() < 9e-16
     assert measure.quantile([0.0, 1.0]).tolist() == [0.0, np.pi]
+    with pytest.raises(InputError, match=r"probability: expected numbers in \[0, 1\], got -0.5"):
+        measure.quantile([0.2, -0.5])
 
 
 def exact_mass_fine(name: str, angle: float) -> mpmath.mpf:
