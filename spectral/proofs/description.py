@@ -43,16 +43,16 @@ def described(law: Law) -> tuple[Law, dict[str, Any]]:
 def in_words(content: dict[str, Any]) -> str:
     """The law of a certificate."""
 
-    def number(pair: list[str]) -> str:
-        return f"{pair[0]} +/- {float(pair[1]):.1e}"
+    def number(given: str | list[str]) -> str:
+        return given if isinstance(given, str) else " +/- ".join(given)
 
     family = dict(content["law"])
     name = {"dispersing arcs": "dispersing arcs of curvature {}", "powers": "Henyey-Greenstein of mean cosine {}"}
     text = name[family.pop("family")].format(*map(number, family.values()))
     terms = [
-        f"({number(pair)}) {text if key == 'law' else key}"
-        for key, pair in content["weights"].items()
-        if float(pair[0])
+        f"({number(given)}) {text if key == 'law' else key}"
+        for key, given in content["weights"].items()
+        if given not in (_with_radius(0.0), "0")
     ]
     return " + ".join(terms)
 

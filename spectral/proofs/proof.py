@@ -13,9 +13,9 @@ from ...core.errors import InputError, ProofError
 from ...core.files import write_whole
 from ...core.version import __version__
 from ...kernels import Law
-from .checker import Refused, check, enclose
+from .checker import Refused, check, ctx, enclose
 from .description import described, in_words
-from .search import certificates
+from .search import BITS, certificates
 
 FORMAT = "asperity proved gap 1"
 # Digits of the ends of an interval.
@@ -110,14 +110,16 @@ def prove_gap(law: Law, width: float = 1e-4) -> Proof:
     """
     (base, content), wanted = described(law), number_between("width", width, 0.0, 1.0)
     try:
-        for certificate in certificates(base, content, wanted):
-            certificate["format"] = FORMAT
-            low, high = enclose(certificate)
-            ends = _decimal(low, down=True), _decimal(high, down=False)
-            certificate["interval"] = [str(end) for end in ends]
-            if ends[1] - ends[0] <= Decimal(wanted) * ends[1]:
-                return _proof(certificate)
-            reason = f"the interval [{ends[0]}, {ends[1]}] is wider than asked; ask for a greater width"
+        # the checker sets the precision of the library of balls
+        with ctx.workprec(BITS):
+            for certificate in certificates(base, content, wanted):
+                certificate["format"] = FORMAT
+                low, high = enclose(certificate)
+                ends = _decimal(low, down=True), _decimal(high, down=False)
+                certificate["interval"] = [str(end) for end in ends]
+                if ends[1] - ends[0] <= Decimal(wanted) * ends[1]:
+                    return _proof(certificate)
+                reason = f"the interval [{ends[0]}, {ends[1]}] is wider than asked; ask for a greater width"
     except Refused as refusal:
         reason = f"expected {refusal}"
     raise ProofError(f"the gap of {in_words(content)} is not proved: {reason}")
@@ -135,7 +137,8 @@ def check_proof(path: str | Path) -> Proof:
     """
     try:
         certificate = json.loads(Path(path).read_text(encoding="utf-8"))
-        check(certificate)
+        with ctx.workprec(BITS):
+            check(certificate)
     except Refused as refusal:
         raise ProofError(f"{path}: the certificate is refused, expected {refusal}") from refusal
     except OSError as reason:
@@ -159,6 +162,8 @@ def _proof(certificate: dict[str, Any]) -> Proof:
 
 def _decimal(end: Any, down: bool) -> Decimal:
     """An end of an interval, rounded outwards to a decimal number."""
-    scaled = end * 10**DIGITS
-    whole = int((scaled.floor() if down else scaled.ceil()).unique_fmpz())
+    # exact, so that it has one integer part
+    with ctx.workprec(8 * BITS):
+        scaled = end * 10**DIGITS
+        whole = int((scaled.floor() if down else scaled.ceil()).unique_fmpz())
     return Decimal(whole).scaleb(-DIGITS)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...kernels import Law
-from .checker import Bumps, Refused, Trial, arb, ctx, exact
+from .checker import Bumps, Refused, Trial, arb, exact
 
 BITS = 64
 # Powers of sin(theta) in trial functions, at first and at most, and Gauss nodes of a quarter turn.
@@ -58,13 +58,9 @@ def certificates(law: Law, content: dict[str, Any], width: float) -> Iterator[di
         return
     law = law.in_specular_frame()
     signs = {True: 1 if content["frame"] == "specular" else -1, False: 1}
-    precision, ctx.prec = ctx.prec, BITS
-    try:
-        for powers in POWERS:
-            classes = {odd: _galerkin(law, odd, sign, powers) for odd, sign in signs.items()}
-            yield from _of_bumps(content, classes, width, powers == POWERS[-1])
-    finally:
-        ctx.prec = precision
+    for powers in POWERS:
+        classes = {odd: _galerkin(law, odd, sign, powers) for odd, sign in signs.items()}
+        yield from _of_bumps(content, classes, width, powers == POWERS[-1])
 
 
 def _galerkin(law: Law, odd: bool, sign: int, powers: int) -> _Class:
@@ -118,7 +114,7 @@ def _of_bumps(
     trial = Trial([repr(float(c)) for c in mine.coefficients], mine.odd)
     size = float(trial.norm.mid())
     spare = wanted * (threshold - mine.value) * size
-    first = math.sqrt(FIRST * 4.0 * spare) / (float(trial.largest) * (2.0 + mine.value))
+    first = math.sqrt(FIRST * 2.0 * spare) / (float(trial.largest) * (2.0 + mine.value))
     certificate = {
         **content, "precision": BITS, "odd": mine.odd, "trial": [repr(float(c)) for c in mine.coefficients],
         "guess": repr(mine.value), "threshold": above, "other": beyond, "bins": bins,

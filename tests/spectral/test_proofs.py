@@ -55,6 +55,8 @@ def test_gaps_of_powers_are_proved_to_rounding(law):
     low, high = spec.prove_gap(law, width=1e-9).interval
     gap = spec.spectral_gap(law)
     assert high - low < Decimal("1e-14")
+    # of the whole program, not of the proof
+    assert checker.ctx.prec == 53
     assert float(low) - gap.error <= gap.value <= float(high) + gap.error
 
 
