@@ -227,8 +227,8 @@ def test_options_that_numba_does_not_have_are_left_out(monkeypatch, tmp_path):
     assert found == 6.0 and not compilation.UNDOCUMENTED & set(options)
 
 
-# The modules and names of numba's manual: its interface, its extension interface with its data models, and the events of
-# its compiler.
+# The modules and names of numba's manual: its interface, its extension interface with its data models, and the events
+# of its compiler.
 DOCUMENTED = {
     "numba", "numba.extending", "numba.typed", "numba.experimental", "numba.core.types", "numba.core.errors",
     "numba.core.cgutils", "numba.core.event", "numba.core.datamodel.models",
