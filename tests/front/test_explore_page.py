@@ -422,9 +422,9 @@ if __name__ == "__main__":
     tracemalloc.start()
     server.io_loop.run_sync(lambda: open_and_close(server, 2))
     before = tracemalloc.get_traced_memory()[0]
-    server.io_loop.run_sync(lambda: open_and_close(server, 5))
+    server.io_loop.run_sync(lambda: open_and_close(server, 2))
     left = tracemalloc.get_traced_memory()[0] - before
-    print(left // 5, sum(type(thing) is Page for thing in gc.get_objects()))
+    print(left // 2, sum(type(thing) is Page for thing in gc.get_objects()))
 """
 
 
