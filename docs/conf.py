@@ -50,7 +50,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = [
-    *("_build", "_templates", "how-to", "examples"),
+    *("_build", "_templates", "tutorials", "how-to", "examples"),
     *("generated/*.md", "generated/backreferences", "**/sg_execution_times*", "**/*.ipynb"),
 ]
 templates_path = ["_templates"]
@@ -76,11 +76,11 @@ addresses = {
 }
 intersphinx_mapping = {name: (address, inventories[name]) for name, address in addresses.items()}
 
-# The short examples are executed; the studies take minutes, so that their source is shown only.
+# Tutorials and short examples are executed; the studies take minutes, so that their source is shown only.
 sphinx_gallery_conf = {
-    "examples_dirs": ["how-to", "examples"],
-    "gallery_dirs": ["generated/how-to", "generated/examples"],
-    "filename_pattern": r"/how-to/",
+    "examples_dirs": ["tutorials", "how-to", "examples"],
+    "gallery_dirs": ["generated/tutorials", "generated/how-to", "generated/examples"],
+    "filename_pattern": r"/(tutorials|how-to)/",
     "ignore_pattern": r"(gallery|paper_figures|true_disk_pictures)\.py$",
     "within_subsection_order": "reference.StoryOrder",
     "backreferences_dir": "generated/backreferences",

@@ -19,6 +19,7 @@ from asperity import spectral as spec
 
 DOCS = Path(__file__).parents[2] / "docs"
 HOW_TO = sorted(path.stem for path in (DOCS / "how-to").glob("*.py"))
+TUTORIALS = sorted((DOCS / "tutorials").glob("*.py"))
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def run(monkeypatch):
     from matplotlib import pyplot
 
     monkeypatch.setattr(pyplot, "show", lambda: None)
-    yield lambda name: runpy.run_path(str(DOCS / "how-to" / f"{name}.py"))
+    yield lambda name, folder="how-to": runpy.run_path(str(DOCS / folder / f"{name}.py"))
     pyplot.close("all")
 
 
@@ -151,6 +152,16 @@ def test_the_slower_examples_agree_with_what_is_known(run, name):
     else:
         assert names["table"].rows[-1].verdict == "essential edge"
         assert names["table"].rows[-1].value == pytest.approx(1 - 3 / 8 * math.log(9), abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
+def test_a_tutorial_says_what_it_computes(path, run):
+    """Its assertions hold, and its pages are linked where readers begin."""
+    source = path.read_text(encoding="utf-8")
+    run(path.stem, "tutorials")
+    assert source.count("\n# %%\n") >= 12 and source.count("\nassert ") >= 8
+    assert f"docs/tutorials/{path.name}" in (DOCS.parent / "README.md").read_text(encoding="utf-8")
 
 
 def test_no_line_of_a_page_is_lost_as_a_comment():
