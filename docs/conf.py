@@ -81,7 +81,7 @@ sphinx_gallery_conf = {
     "examples_dirs": ["tutorials", "how-to", "examples"],
     "gallery_dirs": ["generated/tutorials", "generated/how-to", "generated/examples"],
     "filename_pattern": r"/(tutorials|how-to)/",
-    "ignore_pattern": r"(gallery|paper_figures|true_disk_pictures)\.py$",
+    "ignore_pattern": r"(gallery|front_picture|paper_figures|true_disk_pictures)\.py$",
     "within_subsection_order": "reference.StoryOrder",
     "backreferences_dir": "generated/backreferences",
     "doc_module": ("asperity",),
