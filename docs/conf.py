@@ -31,6 +31,8 @@ sys.path.insert(0, str(HERE / "examples"))
 paper_figures = import_module("paper_figures")
 paper_figures.main(generated / "figures")
 (generated / "figures.md").write_text(paper_figures.page(), encoding="utf-8")
+# pages of the gallery show them
+import_module("thumbnails").write_thumbnails(generated / "thumbnails")
 # docs/api/index.md lists the pages of the tasks
 reference.write_pages(HERE / "api" / "generated")
 

@@ -6,6 +6,8 @@ A wall of round bumps reflects particles at random. We take a family of such wal
 its spectrum, compare the gap with the literature, prove it, and end with a wall for which no formula is known.
 """
 
+# sphinx_gallery_thumbnail_number = 2
+
 import tempfile
 from pathlib import Path
 

@@ -7,6 +7,8 @@ From the file we get the accommodation of momentum by angle, the flow through a 
 a simulation code.
 """
 
+# sphinx_gallery_thumbnail_number = 3
+
 import tempfile
 from pathlib import Path
 

@@ -7,6 +7,8 @@ a rim with real teeth do? Disks hit a plate, disks hit each other, and a box of 
 translation and spin.
 """
 
+# sphinx_gallery_thumbnail_number = 3
+
 import matplotlib.pyplot as plt
 import numpy as np
 

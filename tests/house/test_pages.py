@@ -195,6 +195,19 @@ def test_every_short_example_is_in_the_story(reference):
     assert sorted(reference.STORY) == HOW_TO
 
 
+def test_small_pictures_of_pages_are_drawn_and_exist(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(DOCS)
+    thumbnails = importlib.import_module("thumbnails")
+    thumbnails.write_thumbnails(tmp_path / "generated" / "thumbnails")
+    asked = [
+        re.findall(r'^# sphinx_gallery_thumbnail_path = "(.*)"$', path.read_text(encoding="utf-8"), re.M)
+        for folder in ("how-to", "examples") for path in (DOCS / folder).glob("*.py")
+    ]  # fmt: skip
+    names = {name for found in asked for name in found}
+    assert {f"generated/thumbnails/{name}.png" for name in thumbnails.PICTURES} <= names
+    assert all((DOCS / name).exists() or (tmp_path / name).stat().st_size > 2000 for name in names)
+
+
 def test_the_reference_lists_every_public_name_once(reference, tmp_path):
     reference.write_pages(tmp_path)
     listed = [
