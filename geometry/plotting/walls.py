@@ -63,7 +63,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     >>> draw_wall(geo.triangular_teeth(1.5), 0.25, np.pi / 2).get_ylabel()
     'y'
     >>> draw_wall(geo.triangular_teeth(3.1)).get_ylabel()
-    'y (stretched 29.1 times against x)'
+    'y, stretched 29.1 times'
     """
     entries, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
     if ax is None:
@@ -89,9 +89,8 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     ax.set_xlabel(f"x ({unit or 'length units of the wall'})")
     factor = vertical_stretch(wall)
     words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"
-    remarks = [unit] if unit else []
-    remarks += [] if factor == 1.0 else [f"{words} against x"]
-    ax.set_ylabel(f"y ({', '.join(remarks)})" if remarks else "y")
+    label = f"y ({unit})" if unit else "y"
+    ax.set_ylabel(label if factor == 1.0 else f"{label}, {words}")
     ax.set_aspect(factor)
     ax.locator_params(axis="both", nbins=6)
     return ax

@@ -148,7 +148,9 @@ def sweep(
     study = _Study(family, listed, wanted)
     run = _Run(study, points, found[0].names[0])
     rows = run.all_rows(checkpoint, key, client, progress)
-    return SweepTable(points.names, rows, not points.is_product, study.rows)
+    # walls of the command line have a text, functions a name
+    name = str(getattr(family, "text", getattr(family, "__name__", "")))
+    return SweepTable(points.names, rows, not points.is_product, study.rows, "" if "<" in name else name)
 
 
 class _Run:
