@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from ...core.checks import Floats
+from ...core.summaries import Summary
 from ..curves.curve import Curve
 from ..curves.segment import Segment
 
 
-@dataclass(frozen=True)
-class Hollow:
+@dataclass(frozen=True, repr=False)
+class Hollow(Summary):
     """One opening of a wall with the pieces below it.
 
     Parameters
@@ -28,6 +29,7 @@ class Hollow:
     right: float
     first: int
     last: int
+    _in_one_line = True
 
     @property
     def width(self) -> float:

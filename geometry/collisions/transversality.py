@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, instance, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, fraction_estimate
+from ...core.summaries import Summary
 from ..curves.curvature import largest_curvature
 from ..curves.segment import Segment
 from ..disk import rolling
@@ -40,8 +41,8 @@ FAR = 1e9
 REACH_STEPS, ROOM = 60, 1.0 + 1e-6
 
 
-@dataclass(frozen=True)
-class CollisionConstants:
+@dataclass(frozen=True, repr=False)
+class CollisionConstants(Summary):
     """The constants of the paper's estimates of one reflection, for a disk and a wall of bounded curvature.
 
     Let two states, of the disk and of the cylinder, meet the wall at points that are at most ``s`` apart, at a piece
@@ -78,8 +79,8 @@ class CollisionConstants:
         return cls(velocity, 1.0 + 2.4 + velocity)
 
 
-@dataclass(frozen=True)
-class Shadow:
+@dataclass(frozen=True, repr=False)
+class Shadow(Summary):
     """One collision on the cylinder with k contacts, and how far the collision of the true disk stays from it.
 
     Lengths are in units of the wall, velocities of the disk's speed (the kinetic norm). The flights are those of the

@@ -18,7 +18,7 @@ from .tracing import MAX_COLLISIONS, Status, StatusCounts
 ANGLES = (TINIEST, float(np.nextafter(np.pi, 0.0)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BoundaryStates(StatusCounts):
     """States of particles on the boundary of a container.
 

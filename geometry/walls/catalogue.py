@@ -13,6 +13,7 @@ from typing import Any
 
 from ...core.checks import instance
 from ...core.errors import InputError
+from ...core.summaries import Summary
 from ..cells.profile import SEPARATORS, read_profile
 from ..disk.disk import Disk
 from .mushroom import mushrooms
@@ -29,14 +30,21 @@ from .named import (
 from .wall import Wall, load_wall
 
 
-@dataclass(frozen=True)
-class NamedWall:
+@dataclass(frozen=True, repr=False)
+class NamedWall(Summary):
     """A wall's constructor with its name, a one-line summary, and the defaults of its parameters as numbers."""
 
     name: str
     constructor: Callable[..., Wall]
     defaults: Mapping[str, float | int]
     summary: str
+    _more, _in_one_line = ".build()", True
+
+    def _headline(self) -> str:
+        return self.name
+
+    def _facts(self) -> dict[str, object]:
+        return {"is": self.summary, **self.defaults}
 
     def build(self, **parameters: float | int) -> Wall:
         """Return the wall with the given parameters and the defaults for the others."""

@@ -23,6 +23,7 @@ from ...core.checks import (
 )
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, mean_of_strata
+from ...core.summaries import Summary
 from ...geometry import Arc, Container
 from ..bases.measure import SINE
 from .drag import scaled
@@ -36,8 +37,8 @@ UNCHANGED = 1e-9
 BOUNDARY_POINTS = 4096
 
 
-@dataclass(frozen=True)
-class Scattering:
+@dataclass(frozen=True, repr=False)
+class Scattering(Summary):
     """Particles after their reflections from a body; arrays with one entry per particle.
 
     Attributes
@@ -54,8 +55,8 @@ class Scattering:
     reflections: NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
-class PolygonalBody:
+@dataclass(frozen=True, eq=False, repr=False)
+class PolygonalBody(Summary):
     """A body that consists of simple polygons with disjoint interiors, and reflects particles specularly.
 
     Parameters
@@ -82,6 +83,7 @@ class PolygonalBody:
     polygons: tuple[Floats, ...]
     _starts: Floats = field(init=False, repr=False)
     _sides: Floats = field(init=False, repr=False)
+    _in_one_line = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.polygons, Sequence) or not len(self.polygons):
@@ -308,8 +310,8 @@ def _convex(region: Container) -> Container:
     return around
 
 
-@dataclass(frozen=True)
-class BodyForce:
+@dataclass(frozen=True, repr=False)
+class BodyForce(Summary):
     """The force of a parallel stream on a body, in units of the momentum flux.
 
     Attributes

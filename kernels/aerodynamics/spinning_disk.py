@@ -10,6 +10,7 @@ import numpy as np
 from ...core.checks import Floats, finite_number, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
+from ...core.summaries import Summary
 from ..bases.measure import gauss_rule
 from ..laws.law import Law, is_atomic
 
@@ -25,8 +26,8 @@ SAFETY = 2.0
 TRACED = 1e-8
 
 
-@dataclass(frozen=True)
-class SpinForce:
+@dataclass(frozen=True, repr=False)
+class SpinForce(Summary):
     """Force and torque on a rotating disk, in units of the momentum flux of the stream.
 
     Attributes
@@ -43,6 +44,7 @@ class SpinForce:
     along: Estimate
     across: Estimate
     torque: Estimate
+    _more = ".along.method"
 
 
 def spin_force(law: Law, spin: float, radius: float = 1.0) -> SpinForce:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, choice, number_between, shaped, whole_number
+from ...core.summaries import Summary
 from ...geometry.tables.boundary import FlightStatus
 from ...geometry.tracing.tracing import numbers_of
 
@@ -29,8 +30,8 @@ DRAWN_RADIUS, TRACE = 0.02, 5.0
 LONGEST = 86_400.0
 
 
-@dataclass(frozen=True)
-class BilliardRecord:
+@dataclass(frozen=True, repr=False)
+class BilliardRecord(Summary):
     """States of n disks after each of their collisions; the first entry of every array is the initial state.
 
     A disk that meets no further wall, or whose next collision is not resolved, has fewer ``collisions`` than
@@ -64,6 +65,13 @@ class BilliardRecord:
     wall: NDArray[np.int64]
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
+    _more = ".position, .velocity, .energy, .counts(), .phase_portrait(), .animate()"
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "container": self.container, "disk": self.disk, "time": self.time, "collisions": self.collisions,
+            "status": {name: number for name, number in self.counts().items() if number},
+        }  # fmt: skip
 
     def counts(self) -> dict[str, int]:
         """Return the number of disks with every ``FlightStatus``, by name in lower case.

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.checks import Floats, Rng, check_memory, choice, generator, number_between, whole_number
 from ...core.errors import InputError
+from ...core.summaries import Summary
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
 from .resampling import (
@@ -24,8 +25,8 @@ from .resampling import (
 from .transport import wasserstein_order
 
 
-@dataclass(frozen=True)
-class DifferenceTest:
+@dataclass(frozen=True, repr=False)
+class DifferenceTest(Summary):
     """The outcome of `difference_test`.
 
     Attributes
@@ -41,6 +42,10 @@ class DifferenceTest:
     statistic: float
     p_value: float
     null: Floats
+    _more = ".null, .differs(level)"
+
+    def _facts(self) -> dict[str, object]:
+        return {"statistic": self.statistic, "noise floor": self.noise_floor, "p value": self.p_value}
 
     @property
     def noise_floor(self) -> float:

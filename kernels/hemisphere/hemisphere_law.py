@@ -16,6 +16,7 @@ from ...core.checks import Floats, Rng, finite_number, foreign, frozen, generato
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.rounding import EPS
+from ...core.summaries import Summary
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.given import seed_by_name
@@ -35,8 +36,8 @@ BETWEEN_FACTORS, CHANGE = 2, 3.0
 Term: TypeAlias = "tuple[float, tuple[HemisphereLaw, ...]]"
 
 
-@dataclass(frozen=True)
-class AzimuthalBlock:
+@dataclass(frozen=True, repr=False)
+class AzimuthalBlock(Summary):
     """The matrix of a rotation-invariant law on the Zernike functions of one azimuthal order.
 
     Attributes
@@ -55,6 +56,9 @@ class AzimuthalBlock:
     degrees: NDArray[np.int64]
     order: int
     error: Estimate
+
+    def _facts(self) -> dict[str, object]:
+        return {**super()._facts(), "error": f"{float(self.error):.2g} ({self.error.kind})"}
 
 
 class DirectionLaw(SpatialLaw):

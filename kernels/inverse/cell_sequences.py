@@ -11,6 +11,7 @@ import numpy as np
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number, sequence
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95
+from ...core.summaries import Summary
 from ..collisions.small_scale_limit import limit_study
 from ..distances.distances import distance
 from ..walls.wall_law import WallLaw
@@ -26,8 +27,8 @@ SCALES, SAMPLES = (1e-3, 1e-4, 1e-5), (12, 16, 16)
 FALLEN, STANDING = 0.25, 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Dichotomy:
+@dataclass(frozen=True, eq=False, repr=False)
+class Dichotomy(Summary):
     """The outcome of `dichotomy`.
 
     Attributes
@@ -50,6 +51,13 @@ class Dichotomy:
     distances: Floats
     errors: Floats
     diameters: Floats
+    _more = ".distances, .errors"
+
+    def _headline(self) -> str:
+        return self.verdict
+
+    def _facts(self) -> dict[str, object]:
+        return {"scales": self.scales, "diameters": self.diameters}
 
 
 def dichotomy(

@@ -12,6 +12,7 @@ import numpy as np
 from ...core.checks import Floats, finite_array, finite_number, frozen, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
+from ...core.summaries import Summary
 from ..laws.law import Law
 from ..walls.wall_law import WallLaw
 
@@ -32,8 +33,8 @@ RADIUS_POINTS = 129
 CORNER = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class WallDesign:
+@dataclass(frozen=True, eq=False, repr=False)
+class WallDesign(Summary):
     """The outcome of `design_wall`.
 
     Attributes
@@ -52,6 +53,13 @@ class WallDesign:
     member: Wall | Law
     value: Estimate
     tried: Floats
+    _more = ".member, .tried, .value.method"
+
+    def _headline(self) -> str:
+        return str(self.value)
+
+    def _facts(self) -> dict[str, object]:
+        return {"parameters": self.parameters, "member": self.member, "tried": f"{len(self.tried)} members"}
 
 
 def design_wall(

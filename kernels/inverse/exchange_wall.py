@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import LEVEL, NORMAL_95, Estimate
+from ...core.summaries import Summary
 from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.interval_exchange import IntervalExchangeLaw
@@ -41,8 +42,8 @@ PIECE_NODES = 32, 128
 NECK = 0.01
 
 
-@dataclass(frozen=True)
-class Generations:
+@dataclass(frozen=True, repr=False)
+class Generations(Summary):
     """The law of a wall of chambers of several generations; made by `ExchangeHollow.generations`.
 
     Attributes
@@ -65,10 +66,11 @@ class Generations:
     limit: float
     law: Law
     distance: Estimate
+    _more = ".distance.method"
 
 
-@dataclass(frozen=True, eq=False)
-class ExchangeHollow:
+@dataclass(frozen=True, eq=False, repr=False)
+class ExchangeHollow(Summary):
     """A wall with a small opening behind which mirrors perform an exchange of intervals; made by `exchange_hollow`.
 
     Attributes
@@ -88,6 +90,7 @@ class ExchangeHollow:
     wall: Wall
     opening: tuple[float, float]
     mirrors: int
+    _more = ".loss(), .displacement(), .mean(function), .generations(number)"
 
     def loss(self, samples: int = SAMPLES, rng: Rng = None) -> Estimate:
         """The fraction of the flux through the opening that does not leave where the exchange sends it.

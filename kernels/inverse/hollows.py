@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import AsperityError, InputError
+from ...core.summaries import Summary
 from ..bases.legendre import Legendre
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
@@ -34,8 +35,8 @@ DEEPEST, SHALLOWEST, DEPTH_POWER = 2.0, 0.02, 1.5
 ORDERED = 0.7
 
 
-@dataclass(frozen=True, eq=False)
-class UnitHollow:
+@dataclass(frozen=True, eq=False, repr=False)
+class UnitHollow(Summary):
     """A wall of period 1 that is one hollow, or flat.
 
     Parameters
@@ -50,6 +51,7 @@ class UnitHollow:
     wall: Wall
     label: str
     traced: bool = False
+    _in_one_line = True
 
     @classmethod
     def polygon(cls, vertices: ArrayLike) -> UnitHollow | None:

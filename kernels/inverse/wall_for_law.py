@@ -23,6 +23,8 @@ from ...core.checks import (
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.rounding import EPS
+from ...core.summaries import Summary
+from ...geometry.cells.miniature import wall_miniature
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE
@@ -64,8 +66,8 @@ DISTANCE_TOLERANCE = 1e-2
 ROUNDED = 64.0 * EPS
 
 
-@dataclass(frozen=True, eq=False)
-class WallForLaw:
+@dataclass(frozen=True, eq=False, repr=False)
+class WallForLaw(Summary):
     """A wall whose law has the moments of a wanted law; made by `wall_for`.
 
     Attributes
@@ -102,6 +104,7 @@ class WallForLaw:
     law: Law | None
     moments: int
     disk: Disk | None = None
+    _more = ".wall, .weights, .distance, .history, .plot()"
 
     @property
     def wall_law(self) -> WallLaw:
@@ -129,11 +132,16 @@ class WallForLaw:
         axes.set_title(f"{len(self.hollows)} hollows, defect {float(self.defect):.2g} in {self.moments} moments")
         return axes
 
-    def __repr__(self) -> str:
-        return (
-            f"WallForLaw({self.law!r}, {len(self.hollows)} hollows, defect {float(self.defect):.3g} in {self.moments} "
-            f"moments, at most {float(self.bound):.3g} too much)"
-        )
+    def _facts(self) -> dict[str, object]:
+        return {
+            "law": self.law, "wall": f"{len(self.hollows)} hollows, {len(self.wall.pieces)} pieces, period "
+            f"{self.wall.period:g}, depth {self.wall.depth:.6g}",
+            "defect": f"{self.defect} in {self.moments} moments; at most {float(self.bound):.2g} too much",
+            "disk": self.disk,
+        }  # fmt: skip
+
+    def _picture(self) -> str:
+        return wall_miniature(self.wall)
 
 
 def wall_for(

@@ -15,6 +15,7 @@ from ...core.checks import Floats, Rng, angles, check_memory, frozen, generator,
 from ...core.errors import InputError
 from ...core.files import write_whole
 from ...core.frames import needed
+from ...core.summaries import Summary
 from ...core.tables import numbers_as_csv
 from ..bases.basis import Frame
 from ..bases.given import seed_by_name
@@ -41,8 +42,8 @@ WithAtoms: TypeAlias = Callable[[Floats, Floats], tuple[Conditionals, NDArray[np
 Parts: TypeAlias = Sequence[tuple[float, WithAtoms]]
 
 
-@dataclass(frozen=True, eq=False)
-class Table:
+@dataclass(frozen=True, eq=False, repr=False)
+class Table(Summary):
     """The inverse distribution functions of a law on a grid, for other codes to interpolate.
 
     Attributes

@@ -9,6 +9,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.estimates import ErrorKind
 from ...core.rounding import EPS
+from ...core.summaries import Summary
 from ...kernels import DensityLaw, Law, MatrixLaw
 from ...kernels.bases.measure import SINE, gauss_rule
 from ...kernels.laws.ideal import LambertianLaw
@@ -24,8 +25,8 @@ POWER_TARGET = 0.6
 TRACE_PANELS, TRACE_NODES = 24, (12, 16)
 
 
-@dataclass(frozen=True)
-class Separation:
+@dataclass(frozen=True, repr=False)
+class Separation(Summary):
     """A bound ``radius`` of the modulus of the spectrum without m listed eigenvalues.
 
     Attributes
@@ -39,6 +40,7 @@ class Separation:
     radius: float
     kind: ErrorKind
     reason: str
+    _in_one_line = True
 
 
 def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) -> Separation:

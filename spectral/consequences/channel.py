@@ -22,8 +22,9 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate
+from ...core.estimates import NORMAL_95, Estimate, with_errors
 from ...core.long_runs import Engine, all_parts
+from ...core.summaries import Summary
 from ...core.version import __version__
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
@@ -41,8 +42,8 @@ LARGEST = 1e150
 TOGETHER = 4096
 
 
-@dataclass(frozen=True)
-class ExitTimes:
+@dataclass(frozen=True, repr=False)
+class ExitTimes(Summary):
     """Times to leave -L < x < L, for particles that start at x = 0 with the invariant distribution of angles.
 
     Attributes
@@ -59,6 +60,14 @@ class ExitTimes:
     times: Floats
     radius: float
     speed: float
+    _more = ".means, .eta(), .scaled, .times"
+
+    def _facts(self) -> dict[str, object]:
+        half = NORMAL_95 * self.times.std(axis=0, ddof=1) / np.sqrt(len(self.times))
+        return {
+            "lengths": self.lengths, "means": with_errors(self.means, half), "particles": len(self.times), "radius": self.radius,
+            "speed": self.speed,
+        }  # fmt: skip
 
     @property
     def means(self) -> Floats:

@@ -9,14 +9,16 @@ import numpy as np
 
 from ...core.checks import Floats, frozen
 from ...core.errors import InputError
+from ...core.estimates import with_error
+from ...core.summaries import Summary
 from ..eigenvalues.spectra import matrix_spectrum
 
 if TYPE_CHECKING:
     from ...kernels import KernelMatrix
 
 
-@dataclass(frozen=True)
-class Conductance:
+@dataclass(frozen=True, repr=False)
+class Conductance(Summary):
     """The best cut by a level of the second eigenfunction, and its bounds for the gap.
 
     Attributes
@@ -39,6 +41,13 @@ class Conductance:
     gap_above: float
     gap_below: float
     error: float
+    _more = ".cells"
+
+    def _headline(self) -> str:
+        return with_error(self.value, self.error)
+
+    def _facts(self) -> dict[str, object]:
+        return {"gap": f"at most {with_error(self.gap_above, self.error)}, of the matrix at least {self.gap_below:.6g}"}
 
 
 def conductance(matrix: KernelMatrix) -> Conductance:

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, choice, frozen, positive_number
 from ...core.errors import AccuracyError, AsperityError, InputError
-from ...core.estimates import NORMAL_95, ErrorKind, Estimate
+from ...core.estimates import NORMAL_95, ErrorKind, Estimate, with_error, with_errors
 from ...core.rounding import EPS
+from ...core.summaries import Summary
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.structure import holds_of_all
@@ -66,13 +67,15 @@ class Diffusivity(Estimate):
     onset: float
 
     def __str__(self) -> str:
-        digits = f"{self.value:.4g}" if self.error <= 1e-4 * abs(self.value) else super().__str__()
         far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "beyond 2000 r at least"
-        return f"{digits}, the slope of L^2/tau against ln(L/r) for L {far}"
+        return f"{super().__str__()}, the slope of L^2/tau against ln(L/r) for L {far}"
 
-    def __repr__(self) -> str:
-        same = ", the same for all walls that turn grazing flights" if abs(self.eta - 1.0) <= self.eta_error else ""
-        return f"Diffusivity({self}{same}; eta={self.eta:.6g}, zeta={self.zeta:.6g}, kind={self.kind!r})"
+    _in_one_line = False
+
+    def _facts(self) -> dict[str, object]:
+        same = "the same for all walls that turn grazing flights" if abs(self.eta - 1.0) <= self.eta_error else None
+        eta, zeta = with_error(self.eta, self.eta_error), with_error(self.zeta, self.zeta_error)
+        return {"is": same, "eta": eta, "zeta": zeta, "unit": "radius x speed", **super()._facts()}
 
 
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
@@ -137,7 +140,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
 
 
 @dataclass(frozen=True, repr=False)
-class ChannelDiffusivity:
+class ChannelDiffusivity(Summary):
     r"""Mean exit times tau(L) from channels -L < x < L, and the diffusivity L^2/(2 tau) at each length.
 
     Particles that diffuse by Fick's law, with the variance 2 D_F t, leave in the mean time L^2/(2 D_F). So L^2/(2 tau)
@@ -177,11 +180,12 @@ class ChannelDiffusivity:
         """Half widths of the 95 % intervals of ``values``, to first order."""
         return np.asarray(self.values * self.time_errors / self.times)
 
-    def __repr__(self) -> str:
-        numbers = (Estimate(*pair, "estimate", "") for pair in zip(self.values, self.errors, strict=True))
-        text = ", ".join(f"{number} at L = {length:g}" for length, number in zip(self.lengths, numbers, strict=True))
-        far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "from an unknown length on"
-        return f"ChannelDiffusivity(L^2/(2 tau): {text}; logarithmic in L {far})"
+    def _facts(self) -> dict[str, object]:
+        far = f"L well above {self.onset:.2g}" if np.isfinite(self.onset) else "an unknown length on"
+        return {
+            "lengths": self.lengths, "L^2/(2 tau)": with_errors(self.values, self.errors), "unit": "radius x speed",
+            "grows like ln(L)": f"from {far}",
+        }  # fmt: skip
 
 
 def channel_diffusivity(

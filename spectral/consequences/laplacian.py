@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.checks import Floats, frozen, whole_number
+from ...core.estimates import with_error
+from ...core.summaries import Summary
 from ...kernels import Law, Legendre, discretise
 from ...kernels.laws.matrix_law import not_a_law
 
@@ -21,8 +23,8 @@ CHORDS = 4096
 STEEPENING = 1.2
 
 
-@dataclass(frozen=True)
-class LaplacianComparison:
+@dataclass(frozen=True, repr=False)
+class LaplacianComparison(Summary):
     r"""Comparison of a law in Feres' convention with 1 + 2 h d/dz (1 - z^2) d/dz, z = cos(theta).
 
     Attributes
@@ -47,6 +49,10 @@ class LaplacianComparison:
     ratios: Floats
     leaks: Floats
     error: float
+
+    def _facts(self) -> dict[str, object]:
+        flatness = with_error(self.flatness, 0.25 * self.error)
+        return {"flatness": flatness, "ratios": self.ratios, "degrees": self.degrees, "convention": "specular"}
 
 
 def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) -> LaplacianComparison:

@@ -12,6 +12,7 @@ from ...core.checks import Floats, choice, number_between
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.rounding import EPS
+from ...core.summaries import Summary
 from ...kernels import DensityLaw, KernelMatrix, Law
 from ...kernels.bases.measure import SINE
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
@@ -25,8 +26,8 @@ SOUGHT, TOLERANCE = 6, 1e-4
 PANELS, NODES = 48, 16
 
 
-@dataclass(frozen=True)
-class MixingTime:
+@dataclass(frozen=True, repr=False)
+class MixingTime(Summary):
     """The number of steps after which a chain is near its invariant distribution.
 
     Attributes
@@ -54,9 +55,20 @@ class MixingTime:
     distance: Distance
     initial: float
     kind: ErrorKind
+    _more = ".relaxation_time, .slem, .earliest"
 
     def __float__(self) -> float:
         return float(self.steps)
+
+    def _headline(self) -> str:
+        return f"{self.steps} steps"
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "distance": f"{self.distance}, from a density at L2 distance {self.initial:.6g}",
+            "at least": f"{self.earliest} steps" if self.earliest else None,
+            "relaxation": f"{self.relaxation_time} steps", "slem": self.slem, "kind": self.kind,
+        }  # fmt: skip
 
 
 def mixing_time(

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
+from ...core.summaries import Summary
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from .channel import MOST_FLIGHTS, SMALLEST, Arrangement, checked, passed, reflected
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 GROUPS = 32
 
 
-@dataclass(frozen=True)
-class ChannelPaths:
+@dataclass(frozen=True, repr=False)
+class ChannelPaths(Summary):
     """Positions along a channel of particles that start at 0 on a wall, with the invariant distribution of angles.
 
     Attributes
@@ -44,6 +45,7 @@ class ChannelPaths:
     radius: float
     speed: float
     bend: float
+    _more = ".mean_squares, .variance_rate(), .limit_variance()"
 
     @property
     def mean_squares(self) -> Floats:

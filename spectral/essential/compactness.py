@@ -22,7 +22,7 @@ UNSEEN = 1e-3
 FALLING = 0.7
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class HilbertSchmidtNorm(Estimate):
     r"""The Hilbert-Schmidt norm of a law in L^2(sin theta d theta): of a reversible law (sum_l lambda_l^2)^(1/2).
 
@@ -40,6 +40,10 @@ class HilbertSchmidtNorm(Estimate):
 
     compact: bool | None
     reasons: tuple[str, ...]
+    _more = ".method, .reasons"
+
+    def _facts(self) -> dict[str, object]:
+        return {"compact": {True: "yes", False: "no", None: "not known"}[self.compact], **super()._facts()}
 
 
 def hilbert_schmidt_norm(law: Law, tolerance: float = 1e-6) -> HilbertSchmidtNorm:

@@ -9,7 +9,8 @@ from functools import reduce
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.estimates import ErrorKind
+from ...core.estimates import ErrorKind, with_error
+from ...core.summaries import Summary
 from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import IsometryLaw
@@ -22,8 +23,8 @@ from .straight_pieces import straight_part
 ROUNDING = 1e-15
 
 
-@dataclass(frozen=True)
-class EssentialEdge:
+@dataclass(frozen=True, repr=False)
+class EssentialEdge(Summary):
     """An interval that contains the supremum of the essential spectrum.
 
     Attributes
@@ -38,6 +39,7 @@ class EssentialEdge:
     high: float
     kind: ErrorKind
     reasons: tuple[str, ...]
+    _more, _in_one_line = ".reasons", True
 
     @property
     def value(self) -> float:
@@ -48,6 +50,12 @@ class EssentialEdge:
     def error(self) -> float:
         """Half of the width of the interval."""
         return 0.5 * (self.high - self.low)
+
+    def _headline(self) -> str:
+        return with_error(self.value, self.error)
+
+    def _facts(self) -> dict[str, object]:
+        return {"kind": self.kind}
 
 
 @dataclass(frozen=True)
@@ -123,7 +131,7 @@ def _leaf(law: Law) -> _Part:
         return replace(_isometric(law), grazing=limit.matrix, error=limit.error, entry_error=limit.entry_error)
     limit = grazing_limit(law)
     errors = (limit.error, limit.entry_error)
-    how = f"-> {limit.root:.8f} +- {limit.error:.1g} as theta -> 0 or pi"
+    how = f"-> {with_error(limit.root, limit.error)} as theta -> 0 or pi"
     if not limit.resolved:
         how = "has no limit that can be told in double precision, so the essential spectrum may reach 1"
     elif limit.error == 0.0:

@@ -11,6 +11,7 @@ from typing import Any
 from ...core.checks import number_between
 from ...core.errors import InputError, ProofError
 from ...core.files import write_whole
+from ...core.summaries import Summary
 from ...core.version import __version__
 from ...kernels import Law
 from .checker import Refused, check, ctx, enclose
@@ -34,8 +35,8 @@ LEMMAS = {
 USED = {"powers": ("mixtures", "powers"), "dispersing arcs": tuple(name for name in LEMMAS if name != "powers")}
 
 
-@dataclass(frozen=True)
-class Proof:
+@dataclass(frozen=True, repr=False)
+class Proof(Summary):
     """A theorem on the spectral gap of a law: what `prove_gap` returns.
 
     Attributes
@@ -54,6 +55,7 @@ class Proof:
     statement: str
     lemmas: tuple[tuple[str, str], ...]
     certificate: dict[str, Any]
+    _more, _in_one_line = ".statement, .lemmas, .save(path)", True
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write the certificate as JSON; an existing file is replaced only with ``overwrite``."""
@@ -64,9 +66,12 @@ class Proof:
         write_whole(target, text, overwrite=overwrite)
         return target
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         low, high = self.interval
-        return f"Proof: the gap lies in [{low}, {high}]"
+        return f"of a gap in [{low}, {high}]"
+
+    def _facts(self) -> dict[str, object]:
+        return {}
 
 
 def prove_gap(law: Law, width: float = 1e-4) -> Proof:

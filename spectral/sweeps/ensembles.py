@@ -17,6 +17,7 @@ from ...core.checks import Floats, Rng, check_memory, generator, instance, posit
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate
 from ...core.frames import data_frame
+from ...core.summaries import Summary
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...kernels import Basis, KernelMatrix, discretise
@@ -36,8 +37,8 @@ SEED_WITHOUT_RNG = 0
 SEED = "rng"
 
 
-@dataclass(frozen=True)
-class EnsembleRow:
+@dataclass(frozen=True, repr=False)
+class EnsembleRow(Summary):
     """One quantity over all realisations.
 
     Attributes
@@ -56,6 +57,16 @@ class EnsembleRow:
     spread: Estimate
     realisations: int
     refused: int
+    _more, _in_one_line = ".mean.method, .spread.method", True
+
+    def _headline(self) -> str:
+        return f"{self.quantity} {self._words()}"
+
+    def _facts(self) -> dict[str, object]:
+        return {"realisations": self.realisations, "refused": self.refused or None}
+
+    def _words(self) -> str:
+        return f"mean {self.mean}, spread {self.spread}"
 
 
 MEANS = ("quantity", "mean", "mean_error", "spread", "spread_error", "realisations", "refused")
@@ -66,8 +77,8 @@ def _cells(row: EnsembleRow) -> list[str | float | int]:
     return [row.quantity, mean.value, mean.error, spread.value, spread.error, row.realisations, row.refused]
 
 
-@dataclass(frozen=True)
-class Ensemble:
+@dataclass(frozen=True, repr=False)
+class Ensemble(Summary):
     """Quantities over random walls; made by `ensemble`.
 
     Attributes
@@ -80,6 +91,12 @@ class Ensemble:
 
     table: SweepTable
     rows: tuple[EnsembleRow, ...]
+    _more = ".of(quantity), .rows, .table, .to_frame(), .to_csv()"
+
+    def _facts(self) -> dict[str, object]:
+        """A line for each quantity, and why realisations were refused."""
+        means = {row.quantity: row._words() for row in self.rows}
+        return {"walls": len(self.table.of(self.table.quantities[0])), **means, "refused": self.table._refusals()}
 
     def of(self, quantity: str) -> EnsembleRow:
         """Mean and spread of one quantity.

@@ -10,6 +10,7 @@ from ...core.checks import whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.rounding import EPS
+from ...core.summaries import Summary
 
 if TYPE_CHECKING:
     from .points import Point
@@ -23,8 +24,8 @@ SHARP = 0.1
 SAFETY = 2.0
 
 
-@dataclass(frozen=True)
-class Extremum:
+@dataclass(frozen=True, repr=False)
+class Extremum(Summary):
     """The largest or smallest value of a quantity in the interval that a sweep covers.
 
     Attributes
@@ -53,6 +54,16 @@ class Extremum:
     largest: bool
     at_end: bool
     evaluations: int
+    _more = ".value.method"
+
+    def _headline(self) -> str:
+        return f"{self.value} at {self.parameter}"
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "is": ("the smallest", "the largest")[self.largest] + ", at an end of the sweep" * self.at_end,
+            "evaluations": self.evaluations, "kind": self.value.kind,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.checks import finite_number, number_between
-from ...core.estimates import Estimate, finite
+from ...core.estimates import Estimate, finite, with_error
+from ...core.summaries import Summary
 from .points import Point, Value
 
 COLUMNS = ("quantity", "value", "error", "kind", "verdict", "method", "seconds", "version", "message")
 
 
-@dataclass(frozen=True)
-class SweepRow:
+@dataclass(frozen=True, repr=False)
+class SweepRow(Summary):
     """One quantity at one point.
 
     Attributes
@@ -47,6 +48,16 @@ class SweepRow:
     seconds: float
     version: str
     message: str
+    _more, _in_one_line = ".method, .seconds", True
+
+    def __str__(self) -> str:
+        return with_error(self.value, self.error) if self.value is not None and self.error is not None else "refused"
+
+    def _headline(self) -> str:
+        return f"{self.quantity} {self}"
+
+    def _facts(self) -> dict[str, object]:
+        return {**self.point, "verdict": self.verdict, "kind": self.kind, "message": self.message}
 
     @staticmethod
     def of(point: Point, quantity: str, found: Estimate, verdict: str, seconds: float, version: str) -> SweepRow:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.errors import FileExistsRefusal, InputError
 from ...core.files import write_whole
 from ...core.frames import data_frame, needed
+from ...core.summaries import Summary, shown
 from .extremum import Extremum, refined_extremum
 from .picture import draw_curves
 from .points import Point, key_of
@@ -30,8 +31,8 @@ UNITS = {"relaxation_time": "collisions"}
 FILES = ("table.csv", "table.json")
 
 
-@dataclass(frozen=True)
-class SweepTable:
+@dataclass(frozen=True, repr=False)
+class SweepTable(Summary):
     """What a sweep found.
 
     Attributes
@@ -56,6 +57,26 @@ class SweepTable:
     rows: tuple[SweepRow, ...]
     zipped: bool = False
     solve: Callable[[Point], Sequence[SweepRow]] | None = field(default=None, repr=False, compare=False)
+    _more = ".rows, .of(quantity), .to_frame(), .plot(), .extremum()"
+
+    def _headline(self) -> str:
+        return f"over {', '.join(self.parameters)}"
+
+    def _facts(self) -> dict[str, object]:
+        """The points, least and greatest value of each quantity, and why rows were refused."""
+        facts: dict[str, object] = {"points": len(self.rows) // max(len(self.quantities), 1)}
+        for name in self.quantities:
+            known = sorted((row for row in self.of(name) if row.value is not None), key=lambda row: row.value or 0.0)
+            ends = dict.fromkeys(
+                f"{row} at {', '.join(map(shown, row.point.values()))}" for row in known[:: len(known) - 1 or 1]
+            )
+            facts[name] = " to ".join(ends) or "refused"
+        return {**facts, "refused": self._refusals()}
+
+    def _refusals(self) -> str | None:
+        """How many rows have no value, and why the first of them."""
+        refused = [row.message for row in self.rows if row.value is None]
+        return f"{len(refused)}: {refused[0]}" if refused else None
 
     @property
     def quantities(self) -> tuple[str, ...]:

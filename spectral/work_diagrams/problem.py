@@ -13,14 +13,15 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, finite_array, finite_number, frozen, sequence
 from ...core.errors import InputError
 from ...core.rounding import EPS
+from ...core.summaries import Summary
 
 # Relative error of a value that counts as exact: rounding of a few thousand operations.
 ROUNDED = 4096.0 * EPS
 ErrorNorm = Callable[[Floats], float]
 
 
-@dataclass(frozen=True, eq=False)
-class ReferenceValue:
+@dataclass(frozen=True, eq=False, repr=False)
+class ReferenceValue(Summary):
     """A reference value of a quantity.
 
     Parameters
@@ -49,6 +50,7 @@ class ReferenceValue:
     error: float
     source: str
     made_by: tuple[str, ...] = ()
+    _in_one_line = True
 
     def __init__(self, value: ArrayLike, error: float, source: str, made_by: tuple[str, ...] = ()) -> None:
         object.__setattr__(self, "value", frozen(finite_array("value", value)))
@@ -86,8 +88,8 @@ ARRAY_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({"Frobenius": frobenius,
 MATRIX_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({**ARRAY_NORMS, "operator": operator_norm})
 
 
-@dataclass(frozen=True, eq=False)
-class WorkProblem:
+@dataclass(frozen=True, eq=False, repr=False)
+class WorkProblem(Summary):
     """A quantity with its reference values and error norms.
 
     Parameters
@@ -117,6 +119,7 @@ class WorkProblem:
     references: tuple[ReferenceValue, ...]
     norms: Mapping[str, ErrorNorm] = field(default_factory=dict)
     auto: str = "auto"
+    _in_one_line = True
 
     def __post_init__(self) -> None:
         given = (self.references,) if isinstance(self.references, ReferenceValue) else self.references
@@ -147,8 +150,8 @@ class WorkProblem:
         return {name: norm(found - reference) for name, norm in self.norms.items()}
 
 
-@dataclass(frozen=True, eq=False)
-class WorkMethod:
+@dataclass(frozen=True, eq=False, repr=False)
+class WorkMethod(Summary):
     """A method that computes the quantity of a problem.
 
     Parameters
@@ -172,3 +175,4 @@ class WorkMethod:
     solve: Callable[..., Any]
     is_random: bool = False
     order: float | None = None
+    _in_one_line = True

@@ -14,6 +14,7 @@ import numpy as np
 from ...core.checks import choice
 from ...core.errors import InputError
 from ...core.frames import data_frame
+from ...core.summaries import Summary
 from ...core.tables import table, verbatim
 from .machine import Machine
 from .order import FittedOrder, fit_order
@@ -31,8 +32,8 @@ MARKERS = "osv^D<>Ph*X"
 DECADE = 10.0
 
 
-@dataclass(frozen=True)
-class WorkRow:
+@dataclass(frozen=True, repr=False)
+class WorkRow(Summary):
     """One row of a report on error against run time.
 
     Attributes
@@ -64,6 +65,7 @@ class WorkRow:
     seconds: tuple[float, ...] = ()
     reported: float | None = None
     note: str = ""
+    _in_one_line = True
 
     def __post_init__(self) -> None:
         choice("status", self.status, get_args(RowStatus))
@@ -130,8 +132,8 @@ def _cells(report: WorkReport, row: WorkRow, in_front: bool) -> list[str]:
     return [name, f"{row.budget:g}", *errors, reported, f"{row.least:.2g}", f"{row.spread:.0%}", ", ".join(marks)]
 
 
-@dataclass(frozen=True)
-class MethodFacts:
+@dataclass(frozen=True, repr=False)
+class MethodFacts(Summary):
     """Properties of a method in a report.
 
     Attributes
@@ -148,10 +150,11 @@ class MethodFacts:
     is_random: bool
     reference: str
     floor: float
+    _in_one_line = True
 
 
-@dataclass(frozen=True)
-class WorkReport:
+@dataclass(frozen=True, repr=False)
+class WorkReport(Summary):
     """Errors and run times measured by `work_precision`.
 
     Attributes
@@ -181,6 +184,19 @@ class WorkReport:
     methods: Mapping[str, MethodFacts]
     machine: Machine
     rows: tuple[WorkRow, ...] = ()
+    _more = ".table(), .rows, .front(), .choice(), .order(method), .plot(), .machine"
+
+    def _headline(self) -> str:
+        return self.problem
+
+    def _facts(self) -> dict[str, object]:
+        """Of each method the least error, with the time that it took."""
+        found = {}
+        for name in self.methods:
+            done = [row for row in self.rows if row.method == name and row.is_done]
+            best = min(done, key=self.error, default=None)
+            found[name] = "not done" if best is None else f"error {self.error(best):.1e} in {best.least:.2g} s"
+        return found
 
     @classmethod
     def of(cls, problem: WorkProblem, methods: Sequence[WorkMethod], machine: Machine) -> WorkReport:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Literal
 
 from .checks import choice, numbers, one_number
 from .errors import InputError
-from .tables import html_table
+from .summaries import Summary, shown
 
 ErrorKind = Literal["bound", "estimate"]
 
@@ -26,8 +27,8 @@ DECIMALS = 12
 TWO_DIGITS, SIGNIFICANT, PLAIN = 3, 17, (-4, 8)
 
 
-@dataclass(frozen=True)
-class Estimate:
+@dataclass(frozen=True, repr=False)
+class Estimate(Summary):
     """A quantity that carries its error.
 
     Parameters
@@ -52,8 +53,8 @@ class Estimate:
     Examples
     --------
     >>> gap = Estimate(0.25, 0.0, "bound", "closed form")
-    >>> float(gap)
-    0.25
+    >>> gap, float(gap)
+    (Estimate 0.25 (kind bound; more .method), 0.25)
     >>> print(gap, Estimate(0.0373214, 0.00004, "estimate", "two resolutions"))
     0.25 0.03732(5)
     >>> f"{gap:.3f}"
@@ -70,6 +71,7 @@ class Estimate:
     error: float
     kind: ErrorKind
     method: str
+    _more, _in_one_line = ".method", True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "value", one_number("value", numbers("value", self.value)))
@@ -84,27 +86,26 @@ class Estimate:
         return float(self.value)
 
     def __str__(self) -> str:
-        return compact(self)
+        return with_error(self.value, self.error)
 
     def __format__(self, spec: str) -> str:
         return format(self.value, spec) if spec else str(self)
 
-    def _repr_html_(self) -> str:
-        lines = {"error": f"{self.error:.2g} ({self.kind})", "method": self.method}
-        return html_table(f"{type(self).__name__} {self}", lines)
+    def _headline(self) -> str:
+        return str(self)
+
+    def _facts(self) -> dict[str, object]:
+        return {"kind": self.kind}
 
 
-def compact(number: Estimate) -> str:
-    """The value with the error in units of its last digit; both roundings are inside the error that is printed.
+def with_error(value: float, error: float) -> str:
+    """A value with its error in units of the last digit; both roundings are inside the error that is printed.
 
     Examples
     --------
-    >>> compact(Estimate(0.63297743, 0.00022, "estimate", "")), compact(Estimate(1.5e-9, 4e-11, "bound", ""))
-    ('0.63298(23)', '1.50(4)e-09')
-    >>> compact(Estimate(123456, 400.0, "bound", "")), compact(Estimate(0.5, math.inf, "bound", ""))
-    ('123500(500)', '0.5(inf)')
+    >>> with_error(0.63297743, 0.00022), with_error(1.5e-9, 4e-11), with_error(123456, 400.0), with_error(0.5, math.inf)
+    ('0.63298(23)', '1.50(4)e-09', '123500(500)', '0.5(inf)')
     """
-    value, error = number.value, number.error
     if error == 0.0 or not (math.isfinite(value) and math.isfinite(error)):
         return f"{value:.{DECIMALS}g}" + (f"({error:g})" if error else "")
     size = math.floor(math.log10(max(abs(value), error)))
@@ -114,39 +115,22 @@ def compact(number: Estimate) -> str:
     decimals = min(decimals, SIGNIFICANT - 1 - size)
     # the shortest decimals that are these doubles
     exact, width = Decimal(repr(value)), Decimal(repr(error))
-    shown = round(exact, decimals) + 0
-    units = math.ceil((width + abs(exact - shown)).scaleb(decimals)) * 10 ** max(-decimals, 0)
+    rounded = round(exact, decimals) + 0
+    units = math.ceil((width + abs(exact - rounded)).scaleb(decimals)) * 10 ** max(-decimals, 0)
     if PLAIN[0] <= size <= PLAIN[1]:
-        return f"{shown:f}({units})"
-    return f"{shown.scaleb(-size):f}({units})e{size:+03d}"
+        return f"{rounded:f}({units})"
+    return f"{rounded.scaleb(-size):f}({units})e{size:+03d}"
 
 
-def described(number: Estimate) -> str:
-    """Value, error, kind and method in one line.
-
-    Examples
-    --------
-    >>> described(Estimate(0.25, 0.0, "bound", "closed form"))
-    '0.25 +- 0 (bound: closed form)'
-    """
-    return f"{number.value:.10g} +- {number.error:.2g} ({number.kind}: {number.method})"
-
-
-def rounded(number: Estimate) -> str:
-    """Value and error to the digits that the error leaves.
+def with_errors(values: Iterable[float], errors: Iterable[float]) -> str:
+    """Up to six values with their errors.
 
     Examples
     --------
-    >>> from asperity.estimates import Estimate
-    >>> rounded(Estimate(0.63297743, 0.00022, "estimate", "")), rounded(Estimate(0.25, 0.0, "bound", ""))
-    ('0.63298 +- 0.00022', '0.25 +- 0')
+    >>> with_errors([1.0, 2.0], [0.25, 0.5]), with_errors([0.0] * 8, [0.0] * 8)
+    ('1.00(25), 2.0(5)', '0, 0, 0, 0, 0, 0, ... (8)')
     """
-    if number.error == 0.0 or not math.isfinite(number.error):
-        return f"{number.value:.{DECIMALS}g} +- {number.error:g}"
-    decimals = min(max(1 - math.floor(math.log10(number.error)), 0), DECIMALS)
-    if decimals >= DECIMALS:
-        return f"{number.value:.{DECIMALS}f} +- {number.error:.2g}"
-    return f"{number.value:.{decimals}f} +- {number.error:.{decimals}f}"
+    return shown([with_error(float(value), float(error)) for value, error in zip(values, errors, strict=True)])
 
 
 def student_95(parts: int) -> float:
@@ -187,7 +171,7 @@ def mean_of_strata(values: Any, largest: float, method: str) -> Estimate:
     Examples
     --------
     >>> mean_of_strata([1.0, 1.0, 1.0], 2.0, "3 points")
-    Estimate(value=1.0, error=2.0, kind='estimate', method='3 points')
+    Estimate 1.0(20) (kind estimate; more .method)
     """
     import numpy as np
 

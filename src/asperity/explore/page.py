@@ -13,7 +13,6 @@ import panel as pn
 from bokeh.events import PanEnd, PanStart
 
 from ..core.errors import AsperityError
-from ..core.estimates import compact
 from ..geometry import WALLS, Disk, Wall, wall_from_text
 from . import drawing
 from .answers import Answer
@@ -380,7 +379,7 @@ def answer_as_html(answer: Answer) -> str:
         line = f"<b>0</b>, no gap ({html.escape(gap.evidence[0])})"
     else:
         name = "" if gap.self_adjoint else "1 - norm on functions of mean 0: "
-        line = f"{name}<b>{html.escape(compact(gap))}</b>, {gap.verdict}, error {gap.error:.1e} ({gap.kind})"
+        line = f"{name}<b>{html.escape(str(gap))}</b>, {gap.verdict}, error {gap.error:.1e} ({gap.kind})"
     rows = {"gap": f"{line}; {gap.convention} convention" if gap else line}
     if gap is not None and gap.verdict != "no gap":
         rows["by"] = html.escape(gap.method)
@@ -390,7 +389,7 @@ def answer_as_html(answer: Answer) -> str:
         rows["kernel"] = html.escape(kernel)
     if answer.collision is not None:
         mean = answer.collision.mean
-        value = f"<b>{html.escape(compact(mean))}</b>"
+        value = f"<b>{html.escape(str(mean))}</b>"
         rows["collision"] = f"mean outgoing v1 {value}, error {mean.error:.1e}, {mean.method}"
     rows |= {quantity: f"refused: {html.escape(reason)}" for quantity, reason in answer.refusals}
     cells = "".join(f"<tr><td>{title}</td><td>{text}</td></tr>" for title, text in rows.items())

@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.errors import InputError
+from ..core.summaries import Summary
 
 Answer = Literal["proved", "agrees", "refuted", "undecided"]
 # from the answer that decides a conjunction first to the answer that decides it last
 _WEIGHT: dict[Answer, int] = {"refuted": 0, "undecided": 1, "agrees": 2, "proved": 3}
 
 
-@dataclass(frozen=True)
-class Verdict:
+@dataclass(frozen=True, repr=False)
+class Verdict(Summary):
     """The answer of a check, with its evidence.
 
     Parameters
@@ -50,6 +51,7 @@ class Verdict:
     evidence: str
     counterexample: Mapping[str, Any] = field(default_factory=dict)
     values: tuple[str, str] | None = None
+    _more, _in_one_line = ".evidence", True
 
     def __post_init__(self) -> None:
         if self.answer not in _WEIGHT:
@@ -64,10 +66,12 @@ class Verdict:
         """Whether the formula was proved or agrees with the numbers."""
         return self.answer in ("proved", "agrees")
 
-    def __str__(self) -> str:
+    def _headline(self) -> str:
+        return self.answer
+
+    def _facts(self) -> dict[str, object]:
         where = ", ".join(f"{name} = {value}" for name, value in self.counterexample.items())
-        sides = f": {self.values[0]} against {self.values[1]}" if self.values else ""
-        return f"{self.answer} ({self.evidence})" + (f" at {where}{sides}" if where else sides)
+        return {"at": where, "sides": self.values and " against ".join(self.values)}
 
 
 def every(*verdicts: Verdict) -> Verdict:
