@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from ...core.checks import Floats
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ..curves.curve import Curve
 from ..curves.segment import Segment
 
@@ -29,7 +29,6 @@ class Hollow(Summary):
     right: float
     first: int
     last: int
-    _in_one_line = True
 
     @property
     def width(self) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, finite_number, frozen, instance, whole_number
 from ...core.errors import InputError
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ..curves.curve import LARGEST_COORDINATE
 
 # Metres of the units that headers of profiles have; micro is written in three ways.
@@ -52,7 +52,6 @@ class Profile(Summary):
     x: Floats
     height: Floats
     unit: str = ""
-    _in_one_line = True
 
     def __post_init__(self) -> None:
         x, height = finite_array("x", self.x), heights_of("height", self.height)

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, instance, whole_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate, fraction_estimate
-from ...core.summaries import Summary
+from ...core.estimates import Estimate, Summary, fraction_estimate
 from ..curves.curvature import largest_curvature
 from ..curves.segment import Segment
 from ..disk import rolling

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ..cells.cell import Cell
 from ..cells.hollow_shape import distinct_hollows
 from . import columns as c

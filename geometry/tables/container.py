@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, frozen, indices, number_between, positive_number, sequence, shaped
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ..curves.arc import Arc
 from ..curves.curve import Curve
 from ..curves.segment import Segment
@@ -75,7 +75,6 @@ class Container(Summary):
     points: Floats
     normals: Floats
     curves: tuple[boundary.Piece, ...] = ()
-    _in_one_line = True
 
     def __post_init__(self) -> None:
         points, normals = finite_array("points", self.points), finite_array("normals", self.normals)

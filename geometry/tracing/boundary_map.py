@@ -43,6 +43,7 @@ class BoundaryStates(StatusCounts):
     time: Floats
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
+    _unit = "radians, and the container's unit of length"
 
 
 def billiard_map(container: Container, s: ArrayLike, theta: ArrayLike, iterations: int = 1) -> BoundaryStates:

@@ -23,7 +23,7 @@ from ...core.checks import (
     numbers,
     whole_number,
 )
-from ...core.summaries import Summary, shown
+from ...core.estimates import Summary
 from ..scene import columns as c
 from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
@@ -122,10 +122,7 @@ class Trace(StatusCounts):
     theta: Floats
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
-    _more = ".escaped, .flagged, .counts()"
-
-    def _facts(self) -> dict[str, object]:
-        return {**super()._facts(), "theta": f"{shown(self.theta)} radians"}
+    _unit = "radians, and the wall's unit of length"
 
     @property
     def flagged(self) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from typing import Any
 
 from ...core.checks import instance
 from ...core.errors import InputError
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ..cells.profile import SEPARATORS, read_profile
 from ..disk.disk import Disk
 from .mushroom import mushrooms
@@ -38,13 +38,6 @@ class NamedWall(Summary):
     constructor: Callable[..., Wall]
     defaults: Mapping[str, float | int]
     summary: str
-    _more, _in_one_line = ".build()", True
-
-    def _headline(self) -> str:
-        return self.name
-
-    def _facts(self) -> dict[str, object]:
-        return {"is": self.summary, **self.defaults}
 
     def build(self, **parameters: float | int) -> Wall:
         """Return the wall with the given parameters and the defaults for the others."""

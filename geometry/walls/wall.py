@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, instance, numbers, positive_number, sequence
 from ...core.errors import InputError, WallError
-from ...core.summaries import html_table
+from ...core.estimates import html_table
 from ..cells.cell import Cell
 from ..cells.measured import Profile
 from ..cells.miniature import wall_miniature

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...core.checks import Floats, choice, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate
-from ...core.summaries import Summary
+from ...core.estimates import Estimate, Summary
 from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
 from ..laws.interval_exchange import IntervalExchangeLaw
@@ -47,13 +46,6 @@ class ExtremalResistance(Summary):
     upper: float
     plan: KernelMatrix
     law: Law
-    _more = ".plan, .law, .involution()"
-
-    def _headline(self) -> str:
-        return str(self.value)
-
-    def _facts(self) -> dict[str, object]:
-        return {"lower": self.lower, "upper": self.upper, "kind": "bound"}
 
     @property
     def value(self) -> Estimate:

@@ -22,8 +22,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import AccuracyError, InputError
-from ...core.estimates import Estimate, mean_of_strata
-from ...core.summaries import Summary
+from ...core.estimates import Estimate, Summary, mean_of_strata
 from ...geometry import Arc, Container
 from ..bases.measure import SINE
 from .drag import scaled
@@ -83,7 +82,6 @@ class PolygonalBody(Summary):
     polygons: tuple[Floats, ...]
     _starts: Floats = field(init=False, repr=False)
     _sides: Floats = field(init=False, repr=False)
-    _in_one_line = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.polygons, Sequence) or not len(self.polygons):

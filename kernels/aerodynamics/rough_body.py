@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
-from ...core.summaries import Summary
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ..bases.basis import AngleFunction
 from ..bases.measure import SINE
 from ..laws.law import Law
@@ -79,7 +78,6 @@ class RoughBody(Summary):
     law: Laws
     # every law with the numbers of its elements
     _groups: tuple[tuple[Law, NDArray[np.intp]], ...] = field(init=False, repr=False)
-    _in_one_line = True
 
     def __post_init__(self) -> None:
         normals = np.atleast_1d(finite_array("normals", self.normals))

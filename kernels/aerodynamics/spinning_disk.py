@@ -9,8 +9,7 @@ import numpy as np
 
 from ...core.checks import Floats, finite_number, positive_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate
-from ...core.summaries import Summary
+from ...core.estimates import Estimate, Summary
 from ..bases.measure import gauss_rule
 from ..laws.law import Law, is_atomic
 
@@ -44,7 +43,6 @@ class SpinForce(Summary):
     along: Estimate
     across: Estimate
     torque: Estimate
-    _more = ".along.method"
 
 
 def spin_force(law: Law, spin: float, radius: float = 1.0) -> SpinForce:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, choice, number_between, shaped, whole_number
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ...geometry.tables.boundary import FlightStatus
 from ...geometry.tracing.tracing import numbers_of
 
@@ -65,13 +65,7 @@ class BilliardRecord(Summary):
     wall: NDArray[np.int64]
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
-    _more = ".position, .velocity, .energy, .counts(), .phase_portrait(), .animate()"
-
-    def _facts(self) -> dict[str, object]:
-        return {
-            "container": self.container, "disk": self.disk, "time": self.time, "collisions": self.collisions,
-            "status": {name: number for name, number in self.counts().items() if number},
-        }  # fmt: skip
+    _show = "container disk time collisions"
 
     def counts(self) -> dict[str, int]:
         """Return the number of disks with every ``FlightStatus``, by name in lower case.

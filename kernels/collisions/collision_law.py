@@ -27,7 +27,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.summaries import html_table
+from ...core.estimates import html_table
 from ...geometry import Disk, Wall
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis

@@ -25,11 +25,10 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate, student_95, with_errors
+from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_errors
 from ...core.frames import data_frame
 from ...core.long_runs import Engine, all_parts
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ...core.version import __version__
 
 if TYPE_CHECKING:

@@ -23,10 +23,9 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import Estimate, student_95, with_errors
+from ...core.estimates import Estimate, Summary, student_95
 from ...core.frames import data_frame
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ..bases.measure import SINE, SINE_SQUARED
 from .collision_law import StateFunction
 
@@ -75,17 +74,6 @@ class WeakLimit(Summary):
     limit_error: Floats
     unresolved: Floats
     collisions: int
-    _more = ".estimate(scale, pair), .limit, .cylinder, .to_frame()"
-
-    def _facts(self) -> dict[str, object]:
-        limit, cylinder = (
-            with_errors(value[-1], error[-1])
-            for value, error in ((self.limit, self.limit_error), (self.cylinder, self.cylinder_error))
-        )
-        least = f"at scale {self.scales[-1]:g}"
-        return {
-            "scales": self.scales, "pairs": self.names, f"limit {least}": limit, f"cylinder {least}": cylinder,
-        }  # fmt: skip
 
     def estimate(self, scale: int, pair: int, of: str = "cylinder") -> Estimate:
         """One entry of ``cylinder`` or ``limit`` with its error.

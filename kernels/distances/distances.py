@@ -45,9 +45,6 @@ class Distance(Estimate):
 
     noise_floor: float | None = None
 
-    def _facts(self) -> dict[str, object]:
-        return {"noise floor": self.noise_floor, **super()._facts()}
-
 
 def distance(
     first: Law | KernelMatrix | TensorLaw,

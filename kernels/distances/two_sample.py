@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.checks import Floats, Rng, check_memory, choice, generator, number_between, whole_number
 from ...core.errors import InputError
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
 from .resampling import (
@@ -42,10 +42,7 @@ class DifferenceTest(Summary):
     statistic: float
     p_value: float
     null: Floats
-    _more = ".null, .differs(level)"
-
-    def _facts(self) -> dict[str, object]:
-        return {"statistic": self.statistic, "noise floor": self.noise_floor, "p value": self.p_value}
+    _show = "statistic noise_floor p_value"
 
     @property
     def noise_floor(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ...core.summaries import shown, text_of
+from ...core.estimates import shown, text_of
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction, Basis
 from ..bases.given import Vectorised

@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, finite_number, foreign, frozen, generator, instance, shaped, whole_number
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.given import seed_by_name
@@ -56,9 +55,6 @@ class AzimuthalBlock(Summary):
     degrees: NDArray[np.int64]
     order: int
     error: Estimate
-
-    def _facts(self) -> dict[str, object]:
-        return {**super()._facts(), "error": f"{float(self.error):.2g} ({self.error.kind})"}
 
 
 class DirectionLaw(SpatialLaw):

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number, sequence
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95
-from ...core.summaries import Summary
+from ...core.estimates import NORMAL_95, Summary
 from ..collisions.small_scale_limit import limit_study
 from ..distances.distances import distance
 from ..walls.wall_law import WallLaw
@@ -51,13 +50,6 @@ class Dichotomy(Summary):
     distances: Floats
     errors: Floats
     diameters: Floats
-    _more = ".distances, .errors"
-
-    def _headline(self) -> str:
-        return self.verdict
-
-    def _facts(self) -> dict[str, object]:
-        return {"scales": self.scales, "diameters": self.diameters}
 
 
 def dichotomy(

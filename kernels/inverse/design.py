@@ -11,8 +11,7 @@ import numpy as np
 
 from ...core.checks import Floats, finite_array, finite_number, frozen, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate
-from ...core.summaries import Summary
+from ...core.estimates import Estimate, Summary
 from ..laws.law import Law
 from ..walls.wall_law import WallLaw
 
@@ -53,13 +52,6 @@ class WallDesign(Summary):
     member: Wall | Law
     value: Estimate
     tried: Floats
-    _more = ".member, .tried, .value.method"
-
-    def _headline(self) -> str:
-        return str(self.value)
-
-    def _facts(self) -> dict[str, object]:
-        return {"parameters": self.parameters, "member": self.member, "tried": f"{len(self.tried)} members"}
 
 
 def design_wall(

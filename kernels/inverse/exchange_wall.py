@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import LEVEL, NORMAL_95, Estimate
-from ...core.summaries import Summary
+from ...core.estimates import LEVEL, NORMAL_95, Estimate, Summary
 from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.interval_exchange import IntervalExchangeLaw
@@ -66,7 +65,6 @@ class Generations(Summary):
     limit: float
     law: Law
     distance: Estimate
-    _more = ".distance.method"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,7 +88,6 @@ class ExchangeHollow(Summary):
     wall: Wall
     opening: tuple[float, float]
     mirrors: int
-    _more = ".loss(), .displacement(), .mean(function), .generations(number)"
 
     def loss(self, samples: int = SAMPLES, rng: Rng = None) -> Estimate:
         """The fraction of the flux through the opening that does not leave where the exchange sends it.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import AsperityError, InputError
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ..bases.legendre import Legendre
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
@@ -51,7 +51,6 @@ class UnitHollow(Summary):
     wall: Wall
     label: str
     traced: bool = False
-    _in_one_line = True
 
     @classmethod
     def polygon(cls, vertices: ArrayLike) -> UnitHollow | None:

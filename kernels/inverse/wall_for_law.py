@@ -21,9 +21,8 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ...geometry.cells.miniature import wall_miniature
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre

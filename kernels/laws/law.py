@@ -29,8 +29,8 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
+from ...core.estimates import html_table
 from ...core.rounding import EPS
-from ...core.summaries import html_table
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Frame
 from ..bases.given import Vectorised, seed_by_name

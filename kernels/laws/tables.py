@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, angles, check_memory, frozen, generator, shortened, whole_number
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...core.files import write_whole
 from ...core.frames import needed
-from ...core.summaries import Summary
 from ...core.tables import numbers_as_csv
 from ..bases.basis import Frame
 from ..bases.given import seed_by_name

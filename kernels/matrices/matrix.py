@@ -30,10 +30,9 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, html_table
 from ...core.frames import data_array, data_frame
 from ...core.rounding import EPS
-from ...core.summaries import html_table
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...core.checks import Floats, Rng, frozen, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate, fraction_estimate
-from ...core.summaries import Summary
+from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate
 from ...geometry import Wall
 from ..bases.measure import SINE
 
@@ -35,7 +34,6 @@ class Displacements(Summary):
     values: Floats
     unresolved: float
     longest_possible: float
-    _more = ".exceeds(distance), .quantile(probability), .tail_exponent(), .values"
 
     @property
     def rays(self) -> int:

@@ -22,7 +22,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ...geometry import Wall
 from ..bases.given import Vectorised, seed_by_name
 from ..laws.law import Combination, Law
@@ -66,7 +66,6 @@ class PositionLaw(Summary):
 
     edges: Floats
     laws: tuple[Law, ...]
-    _in_one_line = True
 
     def __post_init__(self) -> None:
         edges = np.atleast_1d(finite_array("edges", self.edges))

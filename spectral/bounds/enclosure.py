@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats, positive_number, whole_number
-from ...core.estimates import ErrorKind, with_error
+from ...core.estimates import ErrorKind, Summary, with_error
 from ...core.frames import data_frame
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ...kernels import Basis, CollisionLaw, DensityLaw, Law, Legendre, discretise
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.ideal import LambertianLaw
@@ -78,7 +77,7 @@ class Enclosure(Summary):
     kind: ErrorKind
     reason: str
     parity: Parity = "none"
-    _more, _in_one_line = ".residual, .reason", True
+    _more = ".residual, .reason"
 
     @property
     def width(self) -> float:

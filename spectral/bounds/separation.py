@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.estimates import ErrorKind
+from ...core.estimates import ErrorKind, Summary
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ...kernels import DensityLaw, Law, MatrixLaw
 from ...kernels.bases.measure import SINE, gauss_rule
 from ...kernels.laws.ideal import LambertianLaw
@@ -40,7 +39,6 @@ class Separation(Summary):
     radius: float
     kind: ErrorKind
     reason: str
-    _in_one_line = True
 
 
 def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) -> Separation:

@@ -22,9 +22,8 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate, with_errors
+from ...core.estimates import NORMAL_95, Estimate, Summary, with_errors
 from ...core.long_runs import Engine, all_parts
-from ...core.summaries import Summary
 from ...core.version import __version__
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
@@ -60,14 +59,11 @@ class ExitTimes(Summary):
     times: Floats
     radius: float
     speed: float
-    _more = ".means, .eta(), .scaled, .times"
+    _unit = "length / speed"
 
     def _facts(self) -> dict[str, object]:
         half = NORMAL_95 * self.times.std(axis=0, ddof=1) / np.sqrt(len(self.times))
-        return {
-            "lengths": self.lengths, "means": with_errors(self.means, half), "particles": len(self.times), "radius": self.radius,
-            "speed": self.speed,
-        }  # fmt: skip
+        return {"lengths": self.lengths, "means": with_errors(self.means, half), "particles": len(self.times)}
 
     @property
     def means(self) -> Floats:

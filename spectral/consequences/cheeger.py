@@ -9,8 +9,7 @@ import numpy as np
 
 from ...core.checks import Floats, frozen
 from ...core.errors import InputError
-from ...core.estimates import with_error
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ..eigenvalues.spectra import matrix_spectrum
 
 if TYPE_CHECKING:
@@ -41,13 +40,6 @@ class Conductance(Summary):
     gap_above: float
     gap_below: float
     error: float
-    _more = ".cells"
-
-    def _headline(self) -> str:
-        return with_error(self.value, self.error)
-
-    def _facts(self) -> dict[str, object]:
-        return {"gap": f"at most {with_error(self.gap_above, self.error)}, of the matrix at least {self.gap_below:.6g}"}
 
 
 def conductance(matrix: KernelMatrix) -> Conductance:

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, choice, frozen, positive_number
 from ...core.errors import AccuracyError, AsperityError, InputError
-from ...core.estimates import NORMAL_95, ErrorKind, Estimate, with_error, with_errors
+from ...core.estimates import NORMAL_95, ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.structure import holds_of_all
@@ -65,17 +64,15 @@ class Diffusivity(Estimate):
     zeta_error: float
     arrangement: Arrangement
     onset: float
+    _unit = "radius x speed"
 
     def __str__(self) -> str:
         far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "beyond 2000 r at least"
         return f"{super().__str__()}, the slope of L^2/tau against ln(L/r) for L {far}"
 
-    _in_one_line = False
-
-    def _facts(self) -> dict[str, object]:
-        same = "the same for all walls that turn grazing flights" if abs(self.eta - 1.0) <= self.eta_error else None
-        eta, zeta = with_error(self.eta, self.eta_error), with_error(self.zeta, self.zeta_error)
-        return {"is": same, "eta": eta, "zeta": zeta, "unit": "radius x speed", **super()._facts()}
+    def _headline(self) -> str:
+        same = ", the same for all walls that turn grazing flights" if abs(self.eta - 1.0) <= self.eta_error else ""
+        return f"{self}{same}"
 
 
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
@@ -169,6 +166,8 @@ class ChannelDiffusivity(Summary):
     particles: int
     radius: float
     speed: float
+    _show = "lengths values times onset particles radius speed"
+    _unit = "of the values radius x speed"
 
     @property
     def values(self) -> Floats:
@@ -179,13 +178,6 @@ class ChannelDiffusivity(Summary):
     def errors(self) -> Floats:
         """Half widths of the 95 % intervals of ``values``, to first order."""
         return np.asarray(self.values * self.time_errors / self.times)
-
-    def _facts(self) -> dict[str, object]:
-        far = f"L well above {self.onset:.2g}" if np.isfinite(self.onset) else "an unknown length on"
-        return {
-            "lengths": self.lengths, "L^2/(2 tau)": with_errors(self.values, self.errors), "unit": "radius x speed",
-            "grows like ln(L)": f"from {far}",
-        }  # fmt: skip
 
 
 def channel_diffusivity(

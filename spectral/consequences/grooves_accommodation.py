@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
-from ...core.summaries import Summary
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ...kernels import Law
 from ...kernels.bases.directions import SINE_NORM
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
@@ -40,7 +39,6 @@ class SpaceAccommodation(Summary):
     tangential: Estimate
     normal: Estimate
     maxwell_fraction: Estimate
-    _more = ".tangential.method"
 
 
 def in_space(law: DirectionLaw, planar: Callable[[Law], tuple[Estimate, ...]]) -> SpaceAccommodation:

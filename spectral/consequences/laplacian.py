@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.checks import Floats, frozen, whole_number
-from ...core.estimates import with_error
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 from ...kernels import Law, Legendre, discretise
 from ...kernels.laws.matrix_law import not_a_law
 
@@ -49,10 +48,6 @@ class LaplacianComparison(Summary):
     ratios: Floats
     leaks: Floats
     error: float
-
-    def _facts(self) -> dict[str, object]:
-        flatness = with_error(self.flatness, 0.25 * self.error)
-        return {"flatness": flatness, "ratios": self.ratios, "degrees": self.degrees, "convention": "specular"}
 
 
 def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) -> LaplacianComparison:

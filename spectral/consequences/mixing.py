@@ -10,9 +10,8 @@ import numpy as np
 
 from ...core.checks import Floats, choice, number_between
 from ...core.errors import AccuracyError, InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ...kernels import DensityLaw, KernelMatrix, Law
 from ...kernels.bases.measure import SINE
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
@@ -55,20 +54,15 @@ class MixingTime(Summary):
     distance: Distance
     initial: float
     kind: ErrorKind
-    _more = ".relaxation_time, .slem, .earliest"
+    _show = "distance initial earliest relaxation_time slem kind"
+    _unit = "steps"
+    _more = ".slem.method"
 
     def __float__(self) -> float:
         return float(self.steps)
 
     def _headline(self) -> str:
         return f"{self.steps} steps"
-
-    def _facts(self) -> dict[str, object]:
-        return {
-            "distance": f"{self.distance}, from a density at L2 distance {self.initial:.6g}",
-            "at least": f"{self.earliest} steps" if self.earliest else None,
-            "relaxation": f"{self.relaxation_time} steps", "slem": self.slem, "kind": self.kind,
-        }  # fmt: skip
 
 
 def mixing_time(

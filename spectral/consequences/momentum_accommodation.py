@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, angles, finite_array, frozen, generator, positive_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, ErrorKind, Estimate, with_error
+from ...core.estimates import FEW, NORMAL_95, ErrorKind, Estimate, Summary, shown, with_error
 from ...core.rounding import EPS
-from ...core.summaries import FEW, Summary, shown
 from ...kernels import SINE, Law, Panels, discretise
 from ...kernels.bases.basis import Basis
 from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, frozen, generator, positive_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate, student_95
-from ...core.summaries import Summary
+from ...core.estimates import NORMAL_95, Estimate, Summary, student_95
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from .channel import MOST_FLIGHTS, SMALLEST, Arrangement, checked, passed, reflected
@@ -45,7 +44,6 @@ class ChannelPaths(Summary):
     radius: float
     speed: float
     bend: float
-    _more = ".mean_squares, .variance_rate(), .limit_variance()"
 
     @property
     def mean_squares(self) -> Floats:

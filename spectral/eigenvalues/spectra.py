@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, frozen
 from ...core.errors import AccuracyError
-from ...core.estimates import NORMAL_95, Estimate, with_error
+from ...core.estimates import NORMAL_95, Estimate, Summary, with_error
 from ...core.frames import data_frame
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 from ...kernels import Basis, Bins, KernelMatrix
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
 from .dense import ExtremalEigenvalues, compressed, end_values

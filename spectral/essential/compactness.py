@@ -40,10 +40,6 @@ class HilbertSchmidtNorm(Estimate):
 
     compact: bool | None
     reasons: tuple[str, ...]
-    _more = ".method, .reasons"
-
-    def _facts(self) -> dict[str, object]:
-        return {"compact": {True: "yes", False: "no", None: "not known"}[self.compact], **super()._facts()}
 
 
 def hilbert_schmidt_norm(law: Law, tolerance: float = 1e-6) -> HilbertSchmidtNorm:

@@ -9,8 +9,7 @@ from functools import reduce
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.estimates import ErrorKind, with_error
-from ...core.summaries import Summary
+from ...core.estimates import ErrorKind, Summary, with_error
 from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import IsometryLaw
@@ -39,7 +38,6 @@ class EssentialEdge(Summary):
     high: float
     kind: ErrorKind
     reasons: tuple[str, ...]
-    _more, _in_one_line = ".reasons", True
 
     @property
     def value(self) -> float:
@@ -50,12 +48,6 @@ class EssentialEdge(Summary):
     def error(self) -> float:
         """Half of the width of the interval."""
         return 0.5 * (self.high - self.low)
-
-    def _headline(self) -> str:
-        return with_error(self.value, self.error)
-
-    def _facts(self) -> dict[str, object]:
-        return {"kind": self.kind}
 
 
 @dataclass(frozen=True)

@@ -51,10 +51,6 @@ class SpectralGap(Estimate):
         cut = f"a gap is never negative: the interval {with_error(self.value, self.error)} is cut at 0"
         return replace(self, value=0.5 * high, error=0.5 * high, evidence=(*self.evidence, cut))
 
-    def _facts(self) -> dict[str, object]:
-        what = None if self.self_adjoint else "1 - norm on functions of mean 0"
-        return {"is": what, "verdict": self.verdict, "convention": self.convention, **super()._facts()}
-
 
 def made_from(found: Spectrum, how: str) -> str:
     """The method, in words, of a gap computed from a matrix."""

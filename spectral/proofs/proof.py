@@ -10,8 +10,8 @@ from typing import Any
 
 from ...core.checks import number_between
 from ...core.errors import InputError, ProofError
+from ...core.estimates import Summary
 from ...core.files import write_whole
-from ...core.summaries import Summary
 from ...core.version import __version__
 from ...kernels import Law
 from .checker import Refused, check, ctx, enclose
@@ -55,7 +55,6 @@ class Proof(Summary):
     statement: str
     lemmas: tuple[tuple[str, str], ...]
     certificate: dict[str, Any]
-    _more, _in_one_line = ".statement, .lemmas, .save(path)", True
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write the certificate as JSON; an existing file is replaced only with ``overwrite``."""
@@ -65,13 +64,6 @@ class Proof(Summary):
         text = json.dumps(self.certificate, indent=1) + "\n"
         write_whole(target, text, overwrite=overwrite)
         return target
-
-    def _headline(self) -> str:
-        low, high = self.interval
-        return f"of a gap in [{low}, {high}]"
-
-    def _facts(self) -> dict[str, object]:
-        return {}
 
 
 def prove_gap(law: Law, width: float = 1e-4) -> Proof:

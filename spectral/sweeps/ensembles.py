@@ -15,9 +15,8 @@ import numpy as np
 from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
 from ...core.checks import Floats, Rng, check_memory, generator, instance, positive_number, whole_number
 from ...core.errors import AsperityError, InputError
-from ...core.estimates import Estimate
+from ...core.estimates import Estimate, Summary
 from ...core.frames import data_frame
-from ...core.summaries import Summary
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...kernels import Basis, KernelMatrix, discretise
@@ -57,16 +56,6 @@ class EnsembleRow(Summary):
     spread: Estimate
     realisations: int
     refused: int
-    _more, _in_one_line = ".mean.method, .spread.method", True
-
-    def _headline(self) -> str:
-        return f"{self.quantity} {self._words()}"
-
-    def _facts(self) -> dict[str, object]:
-        return {"realisations": self.realisations, "refused": self.refused or None}
-
-    def _words(self) -> str:
-        return f"mean {self.mean}, spread {self.spread}"
 
 
 MEANS = ("quantity", "mean", "mean_error", "spread", "spread_error", "realisations", "refused")
@@ -91,12 +80,10 @@ class Ensemble(Summary):
 
     table: SweepTable
     rows: tuple[EnsembleRow, ...]
-    _more = ".of(quantity), .rows, .table, .to_frame(), .to_csv()"
 
     def _facts(self) -> dict[str, object]:
-        """A line for each quantity, and why realisations were refused."""
-        means = {row.quantity: row._words() for row in self.rows}
-        return {"walls": len(self.table.of(self.table.quantities[0])), **means, "refused": self.table._refusals()}
+        means = {row.quantity: f"mean {row.mean}, spread {row.spread}" for row in self.rows}
+        return {"walls": self.rows[0].realisations, **means, "refused": self.table.refusals()}
 
     def of(self, quantity: str) -> EnsembleRow:
         """Mean and spread of one quantity.

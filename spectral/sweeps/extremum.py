@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 from ...core.checks import whole_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate
+from ...core.estimates import Estimate, Summary
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 
 if TYPE_CHECKING:
     from .points import Point
@@ -54,16 +53,6 @@ class Extremum(Summary):
     largest: bool
     at_end: bool
     evaluations: int
-    _more = ".value.method"
-
-    def _headline(self) -> str:
-        return f"{self.value} at {self.parameter}"
-
-    def _facts(self) -> dict[str, object]:
-        return {
-            "is": ("the smallest", "the largest")[self.largest] + ", at an end of the sweep" * self.at_end,
-            "evaluations": self.evaluations, "kind": self.value.kind,
-        }  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.checks import finite_number, number_between
-from ...core.estimates import Estimate, finite, with_error
-from ...core.summaries import Summary
+from ...core.estimates import Estimate, Summary, finite, shown
 from .points import Point, Value
 
 COLUMNS = ("quantity", "value", "error", "kind", "verdict", "method", "seconds", "version", "message")
@@ -48,16 +47,15 @@ class SweepRow(Summary):
     seconds: float
     version: str
     message: str
-    _more, _in_one_line = ".method, .seconds", True
-
-    def __str__(self) -> str:
-        return with_error(self.value, self.error) if self.value is not None and self.error is not None else "refused"
+    _show = "kind verdict message"
 
     def _headline(self) -> str:
-        return f"{self.quantity} {self}"
+        return f"{self.quantity} {self.in_words()}"
 
-    def _facts(self) -> dict[str, object]:
-        return {**self.point, "verdict": self.verdict, "kind": self.kind, "message": self.message}
+    def in_words(self) -> str:
+        """The value with its error, and the point."""
+        number = "refused" if self.value is None else self._fact("value")
+        return f"{number} at {', '.join(map(shown, self.point.values()))}"
 
     @staticmethod
     def of(point: Point, quantity: str, found: Estimate, verdict: str, seconds: float, version: str) -> SweepRow:

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import FileExistsRefusal, InputError
+from ...core.estimates import Summary
 from ...core.files import write_whole
 from ...core.frames import data_frame, needed
-from ...core.summaries import Summary, shown
 from .extremum import Extremum, refined_extremum
 from .picture import draw_curves
 from .points import Point, key_of
@@ -64,19 +64,16 @@ class SweepTable(Summary):
 
     def _facts(self) -> dict[str, object]:
         """The points, least and greatest value of each quantity, and why rows were refused."""
-        facts: dict[str, object] = {"points": len(self.rows) // max(len(self.quantities), 1)}
+        facts: dict[str, object] = {"points": len(self.of(self.quantities[0])) if self.rows else 0}
         for name in self.quantities:
             known = sorted((row for row in self.of(name) if row.value is not None), key=lambda row: row.value or 0.0)
-            ends = dict.fromkeys(
-                f"{row} at {', '.join(map(shown, row.point.values()))}" for row in known[:: len(known) - 1 or 1]
-            )
-            facts[name] = " to ".join(ends) or "refused"
-        return {**facts, "refused": self._refusals()}
+            facts[name] = " to ".join(dict.fromkeys(row.in_words() for row in (known[:1] + known[-1:])))
+        return {**facts, "refused": self.refusals()}
 
-    def _refusals(self) -> str | None:
-        """How many rows have no value, and why the first of them."""
+    def refusals(self) -> str | None:
+        """How many rows have no value, and why the first of them, or None."""
         refused = [row.message for row in self.rows if row.value is None]
-        return f"{len(refused)}: {refused[0]}" if refused else None
+        return f"{len(refused)} of {len(self.rows)}: {refused[0]}" if refused else None
 
     @property
     def quantities(self) -> tuple[str, ...]:

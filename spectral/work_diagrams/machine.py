@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ...core.summaries import Summary
+from ...core.estimates import Summary
 
 PACKAGES = ("asperity", "numpy", "scipy", "numba")
 

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
-from ...core.estimates import with_error
-from ...core.summaries import Summary
+from ...core.estimates import Summary, with_error
 
 # Least number of points of a fit with a confidence interval.
 FEWEST_POINTS = 3
@@ -39,7 +38,7 @@ class FittedOrder(Summary):
     low: float
     high: float
     points: int
-    _in_one_line = True
+    _show = "points"
 
     def agrees_with(self, declared: float) -> bool:
         """Whether the declared order is within 0.15 of the fitted one."""
@@ -62,9 +61,6 @@ class FittedOrder(Summary):
 
     def _headline(self) -> str:
         return str(self)
-
-    def _facts(self) -> dict[str, object]:
-        return {"points": self.points, "kind": "estimate"}
 
 
 def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = None) -> FittedOrder | None:

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, finite_number, frozen, sequence
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...core.rounding import EPS
-from ...core.summaries import Summary
 
 # Relative error of a value that counts as exact: rounding of a few thousand operations.
 ROUNDED = 4096.0 * EPS
@@ -50,7 +50,6 @@ class ReferenceValue(Summary):
     error: float
     source: str
     made_by: tuple[str, ...] = ()
-    _in_one_line = True
 
     def __init__(self, value: ArrayLike, error: float, source: str, made_by: tuple[str, ...] = ()) -> None:
         object.__setattr__(self, "value", frozen(finite_array("value", value)))
@@ -119,7 +118,6 @@ class WorkProblem(Summary):
     references: tuple[ReferenceValue, ...]
     norms: Mapping[str, ErrorNorm] = field(default_factory=dict)
     auto: str = "auto"
-    _in_one_line = True
 
     def __post_init__(self) -> None:
         given = (self.references,) if isinstance(self.references, ReferenceValue) else self.references
@@ -175,4 +173,3 @@ class WorkMethod(Summary):
     solve: Callable[..., Any]
     is_random: bool = False
     order: float | None = None
-    _in_one_line = True

@@ -13,8 +13,8 @@ import numpy as np
 
 from ...core.checks import choice
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...core.frames import data_frame
-from ...core.summaries import Summary
 from ...core.tables import table, verbatim
 from .machine import Machine
 from .order import FittedOrder, fit_order
@@ -65,7 +65,6 @@ class WorkRow(Summary):
     seconds: tuple[float, ...] = ()
     reported: float | None = None
     note: str = ""
-    _in_one_line = True
 
     def __post_init__(self) -> None:
         choice("status", self.status, get_args(RowStatus))
@@ -150,7 +149,6 @@ class MethodFacts(Summary):
     is_random: bool
     reference: str
     floor: float
-    _in_one_line = True
 
 
 @dataclass(frozen=True, repr=False)
@@ -189,7 +187,7 @@ class WorkReport(Summary):
     def _headline(self) -> str:
         return self.problem
 
-    def _facts(self) -> dict[str, object]:
+    def _facts(self) -> dict[str, str]:
         """Of each method the least error, with the time that it took."""
         found = {}
         for name in self.methods:

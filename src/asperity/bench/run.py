@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.errors import FileExistsRefusal, InputError
+from ..core.estimates import Summary
 from ..core.files import moved_when_complete
-from ..core.summaries import Summary
 from ..core.tables import table
 from ..spectral import WorkReport
 from ..spectral.work_diagrams.report import WorkRow

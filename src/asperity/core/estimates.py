@@ -1,16 +1,21 @@
-"""A number together with its error: where the error comes from and how big it is."""
+"""Numbers with their errors, and results as summaries: what they are, their numbers, and where there is more."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from decimal import Decimal
-from typing import Any, Literal
+from html import escape
+from inspect import getattr_static
+from textwrap import shorten
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from .checks import choice, numbers, one_number
 from .errors import InputError
-from .summaries import Summary, shown
 
 ErrorKind = Literal["bound", "estimate"]
 
@@ -25,6 +30,73 @@ DECIMALS = 12
 # A printed error has two digits if the first is smaller than this, of a double's significant digits at most so many;
 # powers of ten between these are written without exponent.
 TWO_DIGITS, SIGNIFICANT, PLAIN = 3, 17, (-4, 8)
+# Entries of a sequence and facts that a summary shows; characters of a fact or a line; attributes that its hint names.
+FEW, MOST_FACTS, LONGEST, HINTS = 6, 12, 120, 6
+# Methods and evidence are shown to those who ask for them.
+ON_REQUEST = {
+    "method", "evidence", "reasons", "reason", "completeness", "statement", "lemmas", "certificate", "spectrum",
+}  # fmt: skip
+
+
+class Summary:
+    """A result that is shown as its class, its value with its error, and one fact a line, as text and as HTML.
+
+    Facts are the fields of a dataclass, which has ``repr=False``, but those that say why, and those at their defaults.
+    """
+
+    # names of other facts, fields or properties; the unit of the numbers; what to call for more, in place of the rest
+    _show: ClassVar[str] = ""
+    _unit: ClassVar[str] = ""
+    _more: ClassVar[str] = ""
+
+    def _headline(self) -> str:
+        """What follows the name of the class."""
+        return self._fact("value") if hasattr(self, "value") else ""
+
+    def _fact(self, name: str) -> str:
+        """A field or property in a few words, with the error that stands beside it."""
+        value, beside = getattr(self, name), {"value": "error", "values": "errors"}.get(name, f"{name}_error")
+        return shown(value) if value is None or not hasattr(self, beside) else with_errors(value, getattr(self, beside))
+
+    def _fields(self) -> list[str]:
+        found: Any = self
+        kept = [one.name for one in fields(found) if one.repr and getattr(self, one.name) is not one.default]
+        number = {"value", "error"} if hasattr(self, "value") else set()
+        return [name for name in kept if name not in number and not name.endswith("_error")]
+
+    def _facts(self) -> Mapping[str, object]:
+        """The facts by name; None and empty texts are left out."""
+        names = self._show.split() or [name for name in self._fields() if name not in ON_REQUEST]
+        return {name: self._fact(name) for name in names}
+
+    def _picture(self) -> str:
+        """HTML between title and facts."""
+        return ""
+
+    def _shown(self) -> tuple[str, dict[str, str]]:
+        found = {name: value for name, value in self._facts().items() if value is not None}
+        facts = {name: shown(found[name]) for name in list(found)[:MOST_FACTS]}
+        rest = f"{len(found) - len(facts)} more" if len(found) > len(facts) else ""
+        last = {"...": rest, "unit": self._unit or facts.get("unit", ""), "more": self._hint(found)}
+        return f"{type(self).__name__} {self._headline()}".strip(), {**facts, **last}
+
+    def _hint(self, facts: Mapping[str, object]) -> str:
+        """What else there is: fields, methods and properties, those of the class itself first."""
+        kind = type(self)
+        names = [name for name in dict.fromkeys([*vars(kind), *dir(kind)]) if name[0] != "_"]
+        members = {name: getattr_static(kind, name, None) for name in [*self._fields(), *names] if name not in facts}
+        calls = [
+            f".{name}{'()' * callable(one)}"
+            for name, one in members.items()
+            if not isinstance(one, classmethod | staticmethod)
+        ]
+        return self._more or ", ".join(calls[:HINTS])
+
+    def __repr__(self) -> str:
+        return text_of(*self._shown())
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._shown(), self._picture())
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,7 +143,6 @@ class Estimate(Summary):
     error: float
     kind: ErrorKind
     method: str
-    _more, _in_one_line = ".method", True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "value", one_number("value", numbers("value", self.value)))
@@ -90,12 +161,6 @@ class Estimate(Summary):
 
     def __format__(self, spec: str) -> str:
         return format(self.value, spec) if spec else str(self)
-
-    def _headline(self) -> str:
-        return str(self)
-
-    def _facts(self) -> dict[str, object]:
-        return {"kind": self.kind}
 
 
 def with_error(value: float, error: float) -> str:
@@ -122,15 +187,85 @@ def with_error(value: float, error: float) -> str:
     return f"{rounded.scaleb(-size):f}({units})e{size:+03d}"
 
 
-def with_errors(values: Iterable[float], errors: Iterable[float]) -> str:
-    """Up to six values with their errors.
+def with_errors(values: ArrayLike, errors: ArrayLike) -> str:
+    """Values with their errors, up to six of them.
 
     Examples
     --------
-    >>> with_errors([1.0, 2.0], [0.25, 0.5]), with_errors([0.0] * 8, [0.0] * 8)
-    ('1.00(25), 2.0(5)', '0, 0, 0, 0, 0, 0, ... (8)')
+    >>> with_errors([1.0, 2.0], [0.25, 0.5]), with_errors(0.5, 0.0)
+    ('1.00(25), 2.0(5)', '0.5')
     """
-    return shown([with_error(float(value), float(error)) for value, error in zip(values, errors, strict=True)])
+    return shown([with_error(float(value), float(error)) for value, error in np.broadcast(values, errors)])
+
+
+def shown(value: Any) -> str:
+    """A value in a few words; of arrays of more than six numbers the size and the range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> shown(0.1 + 0.2), shown((1.5, 2.5)), shown(np.arange(10.0).reshape(2, 5)), shown(np.arange(9) > 3)
+    ('0.3', '1.5, 2.5', '2 x 5 numbers from 0 to 9', '5 of 9')
+    """
+    if isinstance(value, Summary):
+        return value._headline() or type(value).__name__
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {shown(one)}" for name, one in value.items())
+    if isinstance(value, tuple | list):
+        rest = f", ... ({len(value)})" if len(value) > FEW else ""
+        return ", ".join(map(shown, value[:FEW])) + rest
+    if getattr(value, "shape", ()):
+        return _array(value)
+    if isinstance(value, str):
+        return " ".join(value.split())
+    return shorten(getattr(value, "__name__", str(value)), LONGEST, placeholder=" ...")
+
+
+def _array(value: Any) -> str:
+    size = " x ".join(map(str, value.shape))
+    if value.dtype == bool:
+        return f"{int(value.sum())} of {size}"
+    if value.size <= FEW:
+        return shown(value.ravel().tolist())
+    # entries that are not known are nan
+    known = value[value == value]
+    return f"{size} numbers" + (f" from {known.min():.6g} to {known.max():.6g}" if known.size else ", none known")
+
+
+def text_of(title: str, facts: Mapping[str, str]) -> str:
+    """A title with its facts in brackets, if that is no long line, else below it.
+
+    Examples
+    --------
+    >>> text_of("Gap 0.5", {"kind": "bound", "more": ".method"}), text_of("Gap 0.5", {"kind": 80 * "*"})[:21]
+    ('Gap 0.5 (kind bound; more .method)', 'Gap 0.5\\nkind      ****')
+    """
+    known = {name: value for name, value in facts.items() if value}
+    line = f"{title} ({'; '.join(f'{name} {value}' for name, value in known.items())})"
+    if len(line) <= LONGEST:
+        return line
+    width = max(9, *map(len, known)) + 1
+    return "\n".join([title, *(f"{name:{width}s}{value}" for name, value in known.items())])
+
+
+def html_table(title: str, facts: Mapping[str, object], picture: str = "") -> str:
+    """A title, a picture and one row a fact; facts that are None or empty are left out.
+
+    Parameters
+    ----------
+    picture : str
+        HTML, as it stands; all other text is escaped.
+
+    Examples
+    --------
+    >>> html_table("a < b", {"error": 0.5, "method": None})
+    '<div><b>a &lt; b</b><table><tr><th>error</th><td>0.5</td></tr></table></div>'
+    """
+    known = {name: str(value) for name, value in facts.items() if value is not None}
+    rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(one)}</td></tr>" for name, one in known.items() if one)
+    return f"<div><b>{escape(title)}</b>{picture}<table>{rows}</table></div>"
 
 
 def student_95(parts: int) -> float:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..core.errors import AsperityError
-from ..core.estimates import Estimate, estimate_as_dict, finite, with_error
-from ..core.summaries import Summary
+from ..core.estimates import Estimate, Summary, estimate_as_dict, finite, with_error
 from ..geometry import Wall
 from ..kernels import Law
 from ..spectral import SpectralGap, Spectrum, mean_squared_slope

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..core.estimates import NORMAL_95, Estimate
+from ..core.estimates import NORMAL_95, Estimate, Summary
 from ..core.rounding import EPS
-from ..core.summaries import Summary
 from ..geometry import Disk, Wall
 from ..kernels import CollisionLaw, KernelMatrix
 from ..spectral import SpectralGap, Spectrum

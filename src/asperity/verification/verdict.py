@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.errors import InputError
-from ..core.summaries import Summary
+from ..core.estimates import Summary
 
 Answer = Literal["proved", "agrees", "refuted", "undecided"]
 # from the answer that decides a conjunction first to the answer that decides it last
@@ -51,7 +51,6 @@ class Verdict(Summary):
     evidence: str
     counterexample: Mapping[str, Any] = field(default_factory=dict)
     values: tuple[str, str] | None = None
-    _more, _in_one_line = ".evidence", True
 
     def __post_init__(self) -> None:
         if self.answer not in _WEIGHT:
@@ -65,13 +64,6 @@ class Verdict(Summary):
     def stands(self) -> bool:
         """Whether the formula was proved or agrees with the numbers."""
         return self.answer in ("proved", "agrees")
-
-    def _headline(self) -> str:
-        return self.answer
-
-    def _facts(self) -> dict[str, object]:
-        where = ", ".join(f"{name} = {value}" for name, value in self.counterexample.items())
-        return {"at": where, "sides": self.values and " against ".join(self.values)}
 
 
 def every(*verdicts: Verdict) -> Verdict:
