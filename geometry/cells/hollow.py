@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from ...core.checks import Floats
-from ...core.estimates import Summary
 from ..curves.curve import Curve
 from ..curves.segment import Segment
 
 
-@dataclass(frozen=True, repr=False)
-class Hollow(Summary):
+@dataclass(frozen=True)
+class Hollow:
     """One opening of a wall with the pieces below it.
 
     Parameters

@@ -40,8 +40,8 @@ FAR = 1e9
 REACH_STEPS, ROOM = 60, 1.0 + 1e-6
 
 
-@dataclass(frozen=True, repr=False)
-class CollisionConstants(Summary):
+@dataclass(frozen=True)
+class CollisionConstants:
     """The constants of the paper's estimates of one reflection, for a disk and a wall of bounded curvature.
 
     Let two states, of the disk and of the cylinder, meet the wall at points that are at most ``s`` apart, at a piece

@@ -204,7 +204,11 @@ class Wall(Cell):
         Examples
         --------
         >>> Wall.from_vertices([(0, 0), (0.5, 0), (0.5, -1), (1, -1), (1, 0)]).plan()  # doctest: +ELLIPSIS
-        TracePlan(primitives=('lines',), hollows=1, pieces_traced=3, pieces_left_out=1, flat_fraction=0.5, ...)
+        TracePlan
+        primitives        lines
+        hollows           1
+        pieces_traced     3
+        ...
         """
         return plan_of(self.cell, self.cell.scene, self.is_mirror_symmetric)
 

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import AsperityError, InputError
-from ...core.estimates import Summary
 from ..bases.legendre import Legendre
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
@@ -35,8 +34,8 @@ DEEPEST, SHALLOWEST, DEPTH_POWER = 2.0, 0.02, 1.5
 ORDERED = 0.7
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class UnitHollow(Summary):
+@dataclass(frozen=True, eq=False)
+class UnitHollow:
     """A wall of period 1 that is one hollow, or flat.
 
     Parameters

@@ -135,8 +135,8 @@ class Enclosures(Summary):
         return data_frame({name: [getattr(item, name) for item in self.items] for name in names})
 
     def _facts(self) -> dict[str, object]:
-        numbers = {str(k) if item.index is None else f"{k} {item.parity}": item for k, item in enumerate(self.items)}
-        return {"convention": self.convention, **numbers}
+        names = ("point {}" if item.index is None else f"{{}} {item.parity}" for item in self.items)
+        return {"convention": self.convention, **{name.format(k): self.items[k] for k, name in enumerate(names)}}
 
 
 def enclosures(
@@ -419,7 +419,7 @@ def _enclosed(
         reason = f"{apart.reason}: the rest is within {apart.radius:.6g}"
         return Enclosure(value, low, high, "indexed", rank, norm, kind, reason, own)
     radius = norm + float(found.quotient_errors[position]) + QUOTIENT_ROUNDING
-    reason = f"its number is not known: the rest may reach {apart.radius:.6g} ({apart.reason})"
+    reason = f"its number is not known: the rest reaches {apart.radius:.6g} for all that is known ({apart.reason})"
     kind = "bound" if exact else "estimate"
     return Enclosure(
         value, value - radius, min(value + radius, 1.0), "contains-spectrum", None, norm, kind, reason, own

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.estimates import ErrorKind, Summary
+from ...core.estimates import ErrorKind
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, MatrixLaw
 from ...kernels.bases.measure import SINE, gauss_rule
@@ -24,8 +24,8 @@ POWER_TARGET = 0.6
 TRACE_PANELS, TRACE_NODES = 24, (12, 16)
 
 
-@dataclass(frozen=True, repr=False)
-class Separation(Summary):
+@dataclass(frozen=True)
+class Separation:
     """A bound ``radius`` of the modulus of the spectrum without m listed eigenvalues.
 
     Attributes

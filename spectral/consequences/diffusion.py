@@ -166,7 +166,7 @@ class ChannelDiffusivity(Summary):
     particles: int
     radius: float
     speed: float
-    _show = "lengths values times onset particles radius speed"
+    _show = "lengths values onset particles"
     _unit = "of the values radius x speed"
 
     @property
@@ -222,9 +222,16 @@ def channel_diffusivity(
 
     >>> from asperity import kernels as ker, spectral as spec
     >>> spec.channel_diffusivity(ker.lambertian(), [20.0], rng=1)
-    ChannelDiffusivity(L^2/(2 tau): 1.26(4) at L = 20; logarithmic in L well above 3.2)
-    >>> spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
-    ChannelDiffusivity(L^2/(2 tau): 3.63(9) at L = 20; logarithmic in L well above 36)
+    ChannelDiffusivity
+    lengths   20
+    values    1.26(4)
+    onset     3.17352
+    particles 4096
+    unit      of the values radius x speed
+    more      .times, .time_errors, .radius, .speed, .errors
+    >>> shallow = spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
+    >>> print(*shallow.values.round(2), round(shallow.onset))
+    3.63 36
     """
     _refuse_kept_sines(law)
     found = simulated_times(law, lengths, particles, rng, radius, speed, arrangement, {}, least=1)

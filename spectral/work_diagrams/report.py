@@ -131,8 +131,8 @@ def _cells(report: WorkReport, row: WorkRow, in_front: bool) -> list[str]:
     return [name, f"{row.budget:g}", *errors, reported, f"{row.least:.2g}", f"{row.spread:.0%}", ", ".join(marks)]
 
 
-@dataclass(frozen=True, repr=False)
-class MethodFacts(Summary):
+@dataclass(frozen=True)
+class MethodFacts:
     """Properties of a method in a report.
 
     Attributes

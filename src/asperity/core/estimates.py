@@ -31,7 +31,7 @@ DECIMALS = 12
 # powers of ten between these are written without exponent.
 TWO_DIGITS, SIGNIFICANT, PLAIN = 3, 17, (-4, 8)
 # Entries of a sequence and facts that a summary shows; characters of a fact or a line; attributes that its hint names.
-FEW, MOST_FACTS, LONGEST, HINTS = 6, 12, 120, 6
+FEW, MOST_FACTS, LONGEST, HINTS = 6, 14, 120, 6
 # Methods and evidence are shown to those who ask for them.
 ON_REQUEST = {
     "method", "evidence", "reasons", "reason", "completeness", "statement", "lemmas", "certificate", "spectrum",
@@ -171,6 +171,8 @@ def with_error(value: float, error: float) -> str:
     >>> with_error(0.63297743, 0.00022), with_error(1.5e-9, 4e-11), with_error(123456, 400.0), with_error(0.5, math.inf)
     ('0.63298(23)', '1.50(4)e-09', '123500(500)', '0.5(inf)')
     """
+    # numpy's numbers have another repr
+    value, error = float(value), float(error)
     if error == 0.0 or not (math.isfinite(value) and math.isfinite(error)):
         return f"{value:.{DECIMALS}g}" + (f"({error:g})" if error else "")
     size = math.floor(math.log10(max(abs(value), error)))
@@ -195,7 +197,7 @@ def with_errors(values: ArrayLike, errors: ArrayLike) -> str:
     >>> with_errors([1.0, 2.0], [0.25, 0.5]), with_errors(0.5, 0.0)
     ('1.00(25), 2.0(5)', '0.5')
     """
-    return shown([with_error(float(value), float(error)) for value, error in np.broadcast(values, errors)])
+    return shown([with_error(value, error) for value, error in np.broadcast(values, errors)])
 
 
 def shown(value: Any) -> str:
@@ -239,7 +241,7 @@ def text_of(title: str, facts: Mapping[str, str]) -> str:
 
     Examples
     --------
-    >>> text_of("Gap 0.5", {"kind": "bound", "more": ".method"}), text_of("Gap 0.5", {"kind": 80 * "*"})[:21]
+    >>> text_of("Gap 0.5", {"kind": "bound", "more": ".method"}), text_of("Gap 0.5", {"kind": 120 * "*"})[:21]
     ('Gap 0.5 (kind bound; more .method)', 'Gap 0.5\\nkind      ****')
     """
     known = {name: value for name, value in facts.items() if value}

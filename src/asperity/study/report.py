@@ -57,7 +57,7 @@ def summary_of(study: StudyResult, by_angle: bool) -> str:
         "relaxation": _relaxation(found.relaxation_time, found.without_gap),
         "diffusion": _refused(found.refusal)
         if found.diffusion is None
-        else f"D = {found.diffusion}; half-width 1, speed 1, tau the exit time",
+        else f"D = {found.diffusion}; r = 1, speed 1, tau the exit time",
     }
     lines |= {} if study.disk_given or of_profile else of_disk
     titled = {title: [line] for title, line in lines.items()}
@@ -221,7 +221,10 @@ def _gap_line(study: StudyResult, which: str) -> str:
     if gap.verdict == "no gap":
         return words + "0 (no gap): " + gap.evidence[0].split(":")[0]
     met = _met(gap.error <= study.tolerance, study.tolerance)
-    return f"{words}{gap}, {gap.verdict} ({gap.kind}: {gap.method}), {met}"
+    # rounding to its error would leave nothing of some numbers
+    unknown = gap.verdict == "undecided" and gap.error >= abs(gap.value)
+    number = f"not decided; {gap.value:.4g} at the finest basis, error up to {gap.error:.2g}"
+    return f"{words}{number if unknown else f'{gap}, {gap.verdict}'} ({gap.kind}: {gap.method}), {met}"
 
 
 def _contraction(gap: SpectralGap, tolerance: float) -> str:
