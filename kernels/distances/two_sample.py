@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, check_memory, choice, generator, number_between, whole_number
+from ...core.checks import Floats, Rng, check_memory, choice, generator, instance, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Summary
 from ..matrices.matrix import KernelMatrix
@@ -102,6 +102,8 @@ def difference_test(
     >>> difference_test(rough, smooth).differs(), difference_test(rough, rough).p_value
     (True, 1.0)
     """
+    instance("first", first, KernelMatrix, "ker.discretise(law, ker.Bins(64))")
+    instance("second", second, KernelMatrix, "ker.discretise(law, ker.Bins(64))")
     check_comparable(first, second)
     choice("kind", kind, ("rows", "sup"))
     number = whole_number("permutations", permutations, 19)

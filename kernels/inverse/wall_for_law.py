@@ -31,7 +31,7 @@ from ..collisions.collision_law import CollisionLaw
 from ..discretisation.discretisation import discretise
 from ..distances.distances import Distance, distance
 from ..laws.law import Law
-from ..laws.matrix_law import MatrixLaw
+from ..laws.matrix_law import MatrixLaw, not_a_law
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
 from .hollows import UnitHollow, flat, random_polygons, retroreflector, simple_hollows
@@ -332,7 +332,7 @@ def _wanted_law(law: Law | KernelMatrix) -> Law:
             )
         law = MatrixLaw(law)
     if not isinstance(law, Law):
-        raise InputError(f"law: expected a Law such as ker.lambertian() or a KernelMatrix, got {law!r}")
+        raise not_a_law("law", "a Law such as ker.lambertian() or a KernelMatrix", law)
     if law.reversible is False:
         raise InputError(f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}")
     # the change is its own inverse

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, positive_number, whole_number
+from ...core.checks import Floats, instance, positive_number, whole_number
 from ...core.estimates import ErrorKind, Summary, with_error
 from ...core.frames import data_frame
 from ...core.rounding import EPS
@@ -17,7 +17,7 @@ from ...kernels import Basis, CollisionLaw, DensityLaw, Law, Legendre, discretis
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, Power
-from ...kernels.laws.matrix_law import finite_matrix, not_a_law
+from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.walls.wall_law import made_of_isometries
 from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
@@ -194,8 +194,7 @@ def enclosures(
     positive_number("tolerance", tolerance)
     if isinstance(law, CollisionLaw):
         law = law.law
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    instance("law", law, Law, "ker.WallLaw(wall)")
     refuse_unless_self_adjoint(law)
     own = finite_matrix(law)
     matrix = finite_matrix(law, k + 1) if own is not None and own.size > 1 else None

@@ -17,6 +17,7 @@ from ...core.checks import (
     finite_array,
     frozen,
     generator,
+    instance,
     number_between,
     shortened,
     whole_number,
@@ -27,7 +28,6 @@ from ...core.long_runs import Engine, all_parts
 from ...core.version import __version__
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
-from ...kernels.laws.matrix_law import not_a_law
 
 Arrangement = Literal["mirror", "half-turn"]
 
@@ -173,8 +173,7 @@ def simulated_times(
 
 def in_paper_frame(law: Law) -> Law:
     """The law in the paper's convention; an InputError if it is no law."""
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    instance("law", law, Law, "ker.WallLaw(wall)")
     return law.in_specular_frame() if law.frame == "specular" else law
 
 

@@ -14,6 +14,7 @@ from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, KernelMatrix, Law
 from ...kernels.bases.measure import SINE
+from ...kernels.laws.matrix_law import not_a_law
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..gap.gap import modulus_gap
 
@@ -116,6 +117,8 @@ def mixing_time(
     """
     within = number_between("within", within, 0.0, np.inf)
     choice("distance", distance, get_args(Distance))
+    if not isinstance(kernel, Law | KernelMatrix | Spectrum):
+        raise not_a_law("kernel", "a Law, a KernelMatrix or a Spectrum", kernel)
     steps_before, size = 0, number_between("initial", initial, 0.0, np.inf, closed="low")
     if density is not None:
         size = _distance_of(density)

@@ -8,7 +8,7 @@ from functools import reduce
 
 import numpy as np
 
-from ...core.checks import Floats
+from ...core.checks import Floats, instance
 from ...core.estimates import ErrorKind, Summary, with_error
 from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ...kernels.laws.ideal import LambertianLaw
@@ -90,6 +90,7 @@ def essential_edge(law: Law) -> EssentialEdge:
     >>> essential_edge(0.25 * ker.lambertian() + 0.75 * ker.TriangularTeethLaw(0.7)).value
     0.75
     """
+    instance("law", law, Law, "ker.WallLaw(wall)")
     part = fold(law, ISOMETRIES) if made_of_isometries(law) else _taken_apart(law)
     matrix = part.grazing
     root = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
