@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, choice, number_between, shaped, whole_number
+from ...core.estimates import Summary
 from ...geometry.tables.boundary import FlightStatus
 from ...geometry.tracing.tracing import numbers_of
 
@@ -29,8 +30,8 @@ DRAWN_RADIUS, TRACE = 0.02, 5.0
 LONGEST = 86_400.0
 
 
-@dataclass(frozen=True)
-class BilliardRecord:
+@dataclass(frozen=True, repr=False)
+class BilliardRecord(Summary):
     """States of n disks after each of their collisions; the first entry of every array is the initial state.
 
     A disk that meets no further wall, or whose next collision is not resolved, has fewer ``collisions`` than
@@ -64,6 +65,7 @@ class BilliardRecord:
     wall: NDArray[np.int64]
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
+    _show = "container disk time collisions"
 
     def counts(self) -> dict[str, int]:
         """Return the number of disks with every ``FlightStatus``, by name in lower case.

@@ -19,6 +19,7 @@ from ...core.version import __version__
 from ...core.workers import connected, results
 from ...geometry import Wall
 from ...kernels import CollisionLaw, Law, WallLaw
+from ...kernels.laws.matrix_law import not_a_law
 from .points import Grid, Point, key_of
 from .quantities import Quantity, UserQuantity, listed_quantities, name_of, quantities_from
 from .row import SweepRow
@@ -255,7 +256,7 @@ def law_of(made: object) -> Law:
     if isinstance(made, CollisionLaw):
         return made.law
     if not isinstance(made, Law):
-        raise InputError(f"family: expected a function that returns a wall or a law, got {made!r} from it")
+        raise not_a_law("family", "a function that returns a wall or a law", made)
     return made
 
 

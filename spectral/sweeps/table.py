@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import FileExistsRefusal, InputError
+from ...core.estimates import Summary
 from ...core.files import write_whole
 from ...core.frames import data_frame, needed
 from .extremum import Extremum, refined_extremum
@@ -28,8 +29,8 @@ FORMAT = 1
 FILES = ("table.csv", "table.json")
 
 
-@dataclass(frozen=True)
-class SweepTable:
+@dataclass(frozen=True, repr=False)
+class SweepTable(Summary):
     """What a sweep found.
 
     Attributes
@@ -57,6 +58,23 @@ class SweepTable:
     zipped: bool = False
     solve: Callable[[Point], Sequence[SweepRow]] | None = field(default=None, repr=False, compare=False)
     family: str = field(default="", repr=False)
+    _more = ".rows, .of(quantity), .to_frame(), .plot(), .extremum()"
+
+    def _headline(self) -> str:
+        return f"over {', '.join(self.parameters)}"
+
+    def _facts(self) -> dict[str, object]:
+        """The points, least and greatest value of each quantity, and why rows were refused."""
+        facts: dict[str, object] = {"points": len(self.of(self.quantities[0])) if self.rows else 0}
+        for name in self.quantities:
+            known = sorted((row for row in self.of(name) if row.value is not None), key=lambda row: row.value or 0.0)
+            facts[name] = " to ".join(dict.fromkeys(row.in_words() for row in (known[:1] + known[-1:])))
+        return {**facts, "refused": self.refusals()}
+
+    def refusals(self) -> str | None:
+        """How many rows have no value, and why the first of them, or None."""
+        refused = [row.message for row in self.rows if row.value is None]
+        return f"{len(refused)} of {len(self.rows)}: {refused[0]}" if refused else None
 
     @property
     def quantities(self) -> tuple[str, ...]:

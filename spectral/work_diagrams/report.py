@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.checks import choice
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...core.frames import data_frame
 from ...core.tables import table, verbatim
 from .machine import Machine
@@ -31,8 +32,8 @@ MARKERS = "osv^D<>Ph*X"
 DECADE = 10.0
 
 
-@dataclass(frozen=True)
-class WorkRow:
+@dataclass(frozen=True, repr=False)
+class WorkRow(Summary):
     """One row of a report on error against run time.
 
     Attributes
@@ -150,8 +151,8 @@ class MethodFacts:
     floor: float
 
 
-@dataclass(frozen=True)
-class WorkReport:
+@dataclass(frozen=True, repr=False)
+class WorkReport(Summary):
     """Errors and run times measured by `work_precision`.
 
     Attributes
@@ -181,6 +182,19 @@ class WorkReport:
     methods: Mapping[str, MethodFacts]
     machine: Machine
     rows: tuple[WorkRow, ...] = ()
+    _more = ".table(), .rows, .front(), .choice(), .order(method), .plot(), .machine"
+
+    def _headline(self) -> str:
+        return self.problem
+
+    def _facts(self) -> dict[str, str]:
+        """Of each method the least error, with the time that it took."""
+        found = {}
+        for name in self.methods:
+            done = [row for row in self.rows if row.method == name and row.is_done]
+            best = min(done, key=self.error, default=None)
+            found[name] = "not done" if best is None else f"error {self.error(best):.1e} in {best.least:.2g} s"
+        return found
 
     @classmethod
     def of(cls, problem: WorkProblem, methods: Sequence[WorkMethod], machine: Machine) -> WorkReport:

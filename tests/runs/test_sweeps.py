@@ -299,7 +299,7 @@ def test_the_command_writes_its_folder_and_goes_on_there(tmp_path):
     asked = ["sweep", "focusing-arcs", "--over", "half_angle=0.2:1.7:3", "--quantity", "resistance,eta", "--out"]
     first = run(*asked, tmp_path / "arcs")
     assert first.exit_code == 0, first.output
-    assert "6 rows, 2 of them refused" in first.stdout and "expected a number in (0, 1.5708], got 1.7" in first.stdout
+    assert "2 of 6: half_angle" in first.stdout and "expected a number in (0, 1.5708], got 1.7" in first.stdout
     names = {"sweep.checkpoint", "table.csv", "table.json", "table.parquet", "table.png"}
     assert {path.name for path in (tmp_path / "arcs").iterdir()} == names
     before = (tmp_path / "arcs" / "table.csv").read_bytes()
