@@ -86,6 +86,20 @@ def grains(ax: Axes) -> None:
     ax.set(xlim=(-2.8, 4.6), ylim=(-1.7, 3.4), aspect="equal")
 
 
+def rough_disks(ax: Axes) -> None:
+    """Two disks with bumps on their rims."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 1441)
+    rim = 0.84 + 0.16 * np.abs(np.sin(10.0 * turn))
+    for x, y, colour in ((0.0, 0.0, "0.75"), (1.55, 1.2, BLUE)):
+        ax.fill(x + rim * np.cos(turn), y + rim * np.sin(turn), facecolor=colour, edgecolor="black", alpha=0.7)
+    ax.set(xlim=(-1.9, 3.4), ylim=(-1.2, 2.4), aspect="equal")
+
+
+def for_lambert(ax: Axes) -> None:
+    """Some hollows of a wall for Lambert's law."""
+    wall_with(ker.wall_for(ker.lambertian(), 6).wall, 0.4, 1.2, -0.25, 0.25)(ax)
+
+
 def true_disk(ax: Axes) -> None:
     """A collision of a true disk, near the wall."""
     geo.ConfigurationSpace(geo.triangular_teeth(1.2), geo.Disk(), 0.01).draw_collision(
@@ -125,6 +139,8 @@ def exchange(ax: Axes) -> None:
 PICTURES: dict[str, Callable[[Axes], None]] = {
     "a_granular_collision": grains,
     "a_wall_for_a_law": hollows,
+    "rough_disks": rough_disks,
+    "walls_converge": for_lambert,
     "no_slip_billiards": plates(ker.retroreflection(), 40),
     "retroreflectors": wall_with(geo.notched_angle(0.6, 12), 0.53, 1.1, -1.7, 0.3),
     "billiards": stadium,

@@ -7,7 +7,7 @@ a rim with real teeth do? Disks hit a plate, disks hit each other, and a box of 
 translation and spin.
 """
 
-# sphinx_gallery_thumbnail_number = 3
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/rough_disks.png"
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -210,7 +210,7 @@ def test_small_pictures_of_pages_are_drawn_and_exist(tmp_path, monkeypatch):
     thumbnails.write_thumbnails(tmp_path / "generated" / "thumbnails")
     asked = [
         re.findall(r'^# sphinx_gallery_thumbnail_path = "(.*)"$', path.read_text(encoding="utf-8"), re.M)
-        for folder in ("how-to", "examples") for path in (DOCS / folder).glob("*.py")
+        for folder in ("tutorials", "how-to", "examples") for path in (DOCS / folder).glob("*.py")
     ]  # fmt: skip
     names = {name for found in asked for name in found}
     assert {f"generated/thumbnails/{name}.png" for name in thumbnails.PICTURES} <= names
