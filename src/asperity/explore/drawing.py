@@ -101,7 +101,7 @@ def _figure(title: str, **options: Any) -> Any:
                   frame_align=False, **options)  # fmt: skip
     plot.toolbar.logo = None
     # a finger that is moved over the figure scrolls the page
-    plot.toolbar.active_drag = None
+    plot.toolbar.active_drag = plot.toolbar.active_tap = None
     plot.title.text_font_size = "11pt"
     plot.grid.grid_line_alpha = 0.4
     return plot
@@ -131,9 +131,8 @@ class WallFigure:
                                nonselection_fill_alpha=1.0, nonselection_line_alpha=1.0)  # fmt: skip
         view = plot.scatter("x", "y", source=self._view, alpha=0.0)
         plot.x_range.renderers = plot.y_range.renderers = [view]
-        self._tool = draw = PointDrawTool(renderers=[handles], drag=True, add=True, description=HOW_TO_DRAW)
-        plot.add_tools(draw, PanTool(), WheelZoomTool(), ResetTool())
-        plot.toolbar.active_tap = draw
+        self._tool = PointDrawTool(renderers=[handles], drag=True, add=True, description=HOW_TO_DRAW)
+        plot.add_tools(self._tool, PanTool(), WheelZoomTool(), ResetTool())
         send = CustomJS(args={"vertices": self.vertices, "interval": DRAG_INTERVAL}, code=SEND_WHILE_DRAGGING)
         plot.js_on_event("pan", send)
 
@@ -175,7 +174,7 @@ class WallFigure:
         for source, data in (self.vertices, vertices), (self._view, {"x": [left, right], "y": list(heights(wall))}):
             if data != {name: list(source.data[name]) for name in data}:
                 source.data = data
-        self.plot.toolbar.active_drag = self._tool if handles else None
+        self.plot.toolbar.active_multi = self._tool if handles else None
         # the width over the height of a square
         self.plot.aspect_scale = 1.0 / vertical_stretch(wall)
 
