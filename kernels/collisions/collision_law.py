@@ -339,12 +339,9 @@ class VelocityLaw(TensorLaw):
         return _law_of([*self.parts(), *other.parts()], self.disk)
 
     def _repr_html_(self) -> str:
-        terms = {
-            f"term {k}": f"{w:g} x {law!r}{', psi -> pi - psi' * flip}" for k, (w, law, flip) in enumerate(self.parts())
-        }
-        facts = {"disk": self.disk, **terms, "foreshortening": f"{self.disk.foreshortening:.6g}", "convention": "paper"}
+        facts = {"convention": "paper", "foreshortening": f"{self.disk.foreshortening:.6g}"}
         more = ".sample(velocity), .apply(function, theta, psi), .branches(theta), .operator(theta_basis, psi_basis)"
-        return html_table(type(self).__name__, {**facts, "more": more})
+        return html_table(repr(self), {**facts, "more": more})
 
     def _check_disk(self, other: VelocityLaw, verb: str) -> None:
         if self.disk != other.disk:

@@ -98,11 +98,9 @@ class LimitStudy(Summary):
     _more = ".errors, .order(column), .by_psi, .to_frame()"
 
     def _facts(self) -> dict[str, object]:
-        """The columns of distances with their half widths of 95 %."""
-        columns = ("distance", "floor", "psi_defect", "two_satellites", "outliers")
-        half = {name: NORMAL_95 * self.errors[name] for name in columns}
-        measured = {name: with_errors(getattr(self, name), half[name]) for name in columns}
-        return {"scales": self.scales, "collisions": f"{self.collisions} at each scale", **measured}
+        """The columns with their half widths of 95 %."""
+        measured = {name: with_errors(getattr(self, name), NORMAL_95 * self.errors[name]) for name in COLUMNS}
+        return {"scales": self.scales, **measured}
 
     def to_frame(self) -> Any:
         """One row a scale; every measured column is followed by its standard error (extra ``studies``)."""

@@ -103,7 +103,8 @@ class WallForLaw(Summary):
     law: Law | None
     moments: int
     disk: Disk | None = None
-    _more = ".wall, .weights, .distance, .history, .plot()"
+    _show = "law disk wall weights moments defect bound"
+    _more = ".wall, .hollows, .distance, .history, .plot()"
 
     @property
     def wall_law(self) -> WallLaw:
@@ -130,14 +131,6 @@ class WallForLaw(Summary):
         axes = draw_wall(self.wall, ax=ax)
         axes.set_title(f"{len(self.hollows)} hollows, defect {float(self.defect):.2g} in {self.moments} moments")
         return axes
-
-    def _facts(self) -> dict[str, object]:
-        return {
-            "law": self.law, "wall": f"{len(self.hollows)} hollows, {len(self.wall.pieces)} pieces, period "
-            f"{self.wall.period:g}, depth {self.wall.depth:.6g}",
-            "defect": f"{self.defect} in {self.moments} moments; at most {float(self.bound):.2g} too much",
-            "disk": self.disk,
-        }  # fmt: skip
 
     def _picture(self) -> str:
         return wall_miniature(self.wall)

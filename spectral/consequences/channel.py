@@ -61,7 +61,7 @@ class ExitTimes(Summary):
     times: Floats
     radius: float
     speed: float
-    _unit = "length / speed"
+    _unit = "times in length / speed"
 
     def _facts(self) -> dict[str, object]:
         half = NORMAL_95 * self.times.std(axis=0, ddof=1) / np.sqrt(len(self.times))

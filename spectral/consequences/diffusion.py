@@ -165,7 +165,7 @@ class ChannelDiffusivity(Summary):
     radius: float
     speed: float
     _show = "lengths values onset particles"
-    _unit = "of the values radius x speed"
+    _unit = "values in radius x speed"
 
     @property
     def values(self) -> Floats:
@@ -225,7 +225,7 @@ def channel_diffusivity(
     values    1.26(4)
     onset     3.17352
     particles 4096
-    unit      of the values radius x speed
+    unit      values in radius x speed
     more      .times, .time_errors, .radius, .speed, .errors
     >>> shallow = spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
     >>> print(*shallow.values.round(2), round(shallow.onset))

@@ -56,8 +56,8 @@ class MixingTime(Summary):
     initial: float
     kind: ErrorKind
     _show = "distance initial earliest relaxation_time slem kind"
-    _unit = "steps"
-    _more = ".slem.method"
+    _unit = "times in steps"
+    _more = ".relaxation_time.method, .slem.method"
 
     def __float__(self) -> float:
         return float(self.steps)

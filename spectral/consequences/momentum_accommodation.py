@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, angles, finite_array, frozen, generator, positive_number
 from ...core.errors import InputError
-from ...core.estimates import FEW, NORMAL_95, ErrorKind, Estimate, Summary, shown, with_error
+from ...core.estimates import FEW, NORMAL_95, ErrorKind, Estimate, Summary, with_error
 from ...core.rounding import EPS
 from ...kernels import SINE, Law, Panels, discretise
 from ...kernels.bases.basis import Basis
@@ -93,14 +93,12 @@ class Accommodation(Summary):
     misfit_at: Floats
     misfit_errors: Floats
     kind_at: ErrorKind
-    _more = ".tangential_at, .tangential_errors, .normal_at, .normal_errors, .incidence_deg, .tangential.method"
+    _show = "tangential normal maxwell_fraction misfit incidence_deg"
+    _unit = "degrees; the misfit in units of the speed"
+    _more = ".tangential_at, .tangential_errors, .normal_at, .normal_errors, .by_angle(), .tangential.method"
 
     def _facts(self) -> dict[str, object]:
-        return {
-            "tangential": self.tangential, "normal": self.normal, "Maxwell": f"fraction {self.maxwell_fraction}",
-            "misfit": f"{self.misfit} of the speed",
-            **(self.by_angle() if self.theta.size <= FEW else {"angles": f"{shown(self.incidence_deg)} degrees"}),
-        }  # fmt: skip
+        return {**super()._facts(), **(self.by_angle() if self.theta.size <= FEW else {})}
 
     def by_angle(self) -> dict[str, str]:
         """The coefficients in words, by the angle from the normal."""

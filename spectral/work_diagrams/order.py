@@ -38,7 +38,6 @@ class FittedOrder(Summary):
     low: float
     high: float
     points: int
-    _show = "points"
 
     def agrees_with(self, declared: float) -> bool:
         """Whether the declared order is within 0.15 of the fitted one."""

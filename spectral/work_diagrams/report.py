@@ -188,13 +188,8 @@ class WorkReport(Summary):
         return self.problem
 
     def _facts(self) -> dict[str, str]:
-        """Of each method the least error, with the time that it took."""
-        found = {}
-        for name in self.methods:
-            done = [row for row in self.rows if row.method == name and row.is_done]
-            best = min(done, key=self.error, default=None)
-            found[name] = "not done" if best is None else f"error {self.error(best):.1e} in {best.least:.2g} s"
-        return found
+        """Of each method on the front the least error there, with the time that it took."""
+        return {row.method: f"error {self.error(row):.1e} in {row.least:.2g} s" for row in self.front()}
 
     @classmethod
     def of(cls, problem: WorkProblem, methods: Sequence[WorkMethod], machine: Machine) -> WorkReport:

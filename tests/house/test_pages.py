@@ -1,5 +1,6 @@
 """Examples and scripts of pages run and are right, and the reference lists all public names."""
 
+import importlib
 import importlib.util
 import inspect
 import math
@@ -292,3 +293,15 @@ def test_the_scripts_on_a_page_run_in_small(page, blocks, tmp_path, monkeypatch)
         for full, small in SMALLER.items():
             block = block.replace(full, small)
         exec(compile(block, page, "exec"), names)
+
+
+@pytest.mark.parametrize("room", ["geometry", "kernels", "spectral"])
+def test_the_help_of_a_room_lists_each_public_name_once_below_what_people_do(reference, room):
+    module = importlib.import_module(f"asperity.{room}")
+    lines = [line.partition(": ") for line in module.__doc__.split("\n- ")[1:]]
+    listed = [name for _, _, names in lines for name in re.findall(r"\w+", names)]
+    assert sorted(listed) == sorted(module.__all__)
+    titles, heads = [title for _, title, _ in reference.sections()], [head for head, _, _ in lines]
+    assert [*(title for title in titles if title in heads), *(set(heads) - set(titles))] == heads
+    assert set(heads) - set(titles) <= {"Verify a formula, and the formulas of a disk"}
+    assert set(dir(module)) == set(module.__all__) and set(dir(asperity)) == set(asperity.__all__)

@@ -208,11 +208,11 @@ def test_the_names_that_are_advised_for_files_are_written(tmp_path):
 
 def test_a_refusal_of_another_kind_names_the_constructor_that_makes_the_wanted_one():
     wall, array, matrix, law = geo.koch(1), np.eye(2), P, LAW
+    points, profile = [(0.0, 0.0), (0.5, -1.0), (1.0, 0.0)], geo.Profile([0, 1], [0, 1])
     given = {
-        "wall": wall, "array": array, "matrix": matrix, "law": law, "text": "koch",
-        "profile": geo.Profile([0, 1], [0, 1]), "points": [(0.0, 0.0), (0.5, -1.0), (1.0, 0.0)],
-        "density": lambda a, b: 0.5 * np.sin(b) + 0.0 * a,
-        "map": lambda theta: np.pi - theta, "ker": ker, "geo": geo,
+        "wall": wall, "array": array, "matrix": matrix, "law": law, "text": "koch", "profile": profile, "ker": ker,
+        "points": points, "density": lambda a, b: 0.5 * np.sin(b) + 0.0 * a, "map": lambda theta: np.pi - theta,
+        "geo": geo,
     }  # fmt: skip
     kinds = {"Law": ker.Law, "Wall": geo.Wall, "KernelMatrix": ker.KernelMatrix}
     generations = geo.MushroomGenerations(0.25, 0.5, 2)

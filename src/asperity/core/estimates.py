@@ -209,6 +209,8 @@ def shown(value: Any) -> str:
     >>> shown(0.1 + 0.2), shown((1.5, 2.5)), shown(np.arange(10.0).reshape(2, 5)), shown(np.arange(9) > 3)
     ('0.3', '1.5, 2.5', '2 x 5 numbers from 0 to 9', '5 of 9')
     """
+    if value is None:
+        return ""
     if isinstance(value, Summary):
         return value._headline() or type(value).__name__
     if isinstance(value, float):
