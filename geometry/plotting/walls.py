@@ -63,7 +63,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     >>> draw_wall(geo.triangular_teeth(1.5), 0.25, np.pi / 2).get_ylabel()
     'y'
     >>> draw_wall(geo.triangular_teeth(3.1)).get_ylabel()
-    'y (stretched 29.1 times against x)'
+    'y, stretched 29.1 times'
     """
     entries, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
     if ax is None:
@@ -113,9 +113,9 @@ def axis_labels(wall: Wall) -> tuple[str, str]:
     """Return the labels of x and y: the unit of the wall, and the factor by which y is stretched."""
     factor = vertical_stretch(wall)
     words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"
-    remarks = [wall.unit] if wall.unit else []
-    remarks += [] if factor == 1.0 else [f"{words} against x"]
-    return f"x ({wall.unit or 'length units of the wall'})", f"y ({', '.join(remarks)})" if remarks else "y"
+    upwards = f"y ({wall.unit})" if wall.unit else "y"
+    upwards += "" if factor == 1.0 else f", {words}"
+    return f"x ({wall.unit or 'length units of the wall'})", upwards
 
 
 def heights(wall: Wall) -> tuple[float, float]:

@@ -272,7 +272,7 @@ def test_a_profile_is_stretched_and_has_its_answers(page, tmp_path, number):
     assert stretch > 5.0
     assert found["stretch"] == pytest.approx(stretch, rel=1e-6)
     assert found["words"].startswith("rough, depth")
-    assert f"angles not to scale | y (um, stretched {stretch:.3g} times against x)" in found["words"]
+    assert f"angles not to scale | y (um), stretched {stretch:.3g} times" in found["words"]
     assert found["x"] == []
     assert re.search(r"tangential 0\.\d+\(\d+\), normal 0\.\d+\(\d+\); resistance of a tumbling body 1\.\d+\(\d+\)",
                      found["answers"])  # fmt: skip

@@ -389,9 +389,8 @@ def answer_as_html(answer: Answer) -> str:
         rows["gap"] = f"<b>0</b>, no gap ({html.escape(gap.evidence[0])}); {gap.convention} convention"
     elif gap is not None:
         name = "" if gap.self_adjoint else "1 - norm on functions of mean 0: "
-        rows["gap"] = (
-            f"{name}<b>{gap}</b>, {gap.verdict}, error {gap.error:.1e} ({gap.kind}); {gap.convention} convention"
-        )
+        value = f"{name}<b>{html.escape(str(gap))}</b>"
+        rows["gap"] = f"{value}, {gap.verdict}, error {gap.error:.1e} ({gap.kind}); {gap.convention} convention"
         rows["by"] = html.escape(gap.method)
     if momentum is not None:
         resistance = resistance_from(momentum)
@@ -404,7 +403,7 @@ def answer_as_html(answer: Answer) -> str:
         rows["kernel"] = html.escape(kernel)
     if answer.collision is not None:
         mean = answer.collision.mean
-        rows["collision"] = f"mean outgoing v1 <b>{mean}</b>, error {mean.error:.1e}, {mean.method}"
+        rows["collision"] = f"mean outgoing v1 <b>{html.escape(str(mean))}</b>, error {mean.error:.1e}, {mean.method}"
     rows |= {quantity: f"refused: {html.escape(reason)}" for quantity, reason in answer.refusals}
     cells = "".join(f"<tr><td>{title}</td><td>{text}</td></tr>" for title, text in rows.items())
     return f"<table class='asperity-answers'>{cells}</table>"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..core.estimates import NORMAL_95, Estimate
+from ..core.estimates import NORMAL_95, Estimate, Summary
 from ..core.rounding import EPS
 from ..geometry import Disk, Wall
 from ..kernels import CollisionLaw, KernelMatrix
@@ -15,8 +15,8 @@ from ..spectral.consequences.momentum_accommodation import WEIGHTS, Accommodatio
 from .consequences import Consequences
 
 
-@dataclass(frozen=True)
-class TracerCheck:
+@dataclass(frozen=True, repr=False)
+class TracerCheck(Summary):
     """What a sample of rays says of the tracer on this wall.
 
     Attributes
@@ -41,8 +41,8 @@ class TracerCheck:
         return deviation / self.mean_collisions.error * NORMAL_95 if self.mean_collisions.error > 0.0 else 0.0
 
 
-@dataclass(frozen=True)
-class StudyResult:
+@dataclass(frozen=True, repr=False)
+class StudyResult(Summary):
     """Everything that `study_wall` found: the fields of a `Study`.
 
     Attributes
