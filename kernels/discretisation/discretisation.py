@@ -29,6 +29,9 @@ from ..sampling.sobol import PARTS
 from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SAMPLING, SEED_WITHOUT_RNG, SEGMENTS_A_RAY, Budget, MethodName
 from .methods import recipe
 
+# Memory in which a matrix is computed, in matrices.
+MATRICES = 6
+
 
 def discretise(
     law: Law | SpatialLaw,
@@ -167,7 +170,7 @@ def discretise(
         raise InputError(f"basis: expected a basis of one angle for {law!r}, got {basis!r}; use P.tensor(Q)")
     if basis.measure != SINE:
         return _on_roll_angles(law, basis)
-    check_memory("basis", f"the matrix in {basis!r}", basis.size**2)
+    check_memory("basis", f"computing the matrix in {basis!r}", MATRICES * basis.size**2)
     choice("method", method, get_args(MethodName))
     choice("symmetrise", symmetrise, (True, False))
     if finite_number("tolerance", tolerance) < 0.0:
