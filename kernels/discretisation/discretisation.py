@@ -10,10 +10,10 @@ from typing import Unpack, get_args
 
 import numpy as np
 
-from ...core.checks import Rng, check_memory, choice, finite_number, generator, instance, whole_number
+from ...core.checks import DOUBLE, Rng, check_memory, choice, finite_number, generator, instance, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
-from ...core.long_runs import Engine
+from ...core.long_runs import Engine, reported
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
@@ -29,8 +29,8 @@ from ..sampling.sobol import PARTS
 from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SAMPLING, SEED_WITHOUT_RNG, SEGMENTS_A_RAY, Budget, MethodName
 from .methods import recipe
 
-# Memory in which a matrix is computed, in matrices.
-MATRICES = 6
+# Memory in which a matrix is computed, in matrices, and least time of an entry.
+MATRICES, SECONDS = 6, 4e-7
 
 
 def discretise(
@@ -185,7 +185,9 @@ def discretise(
     budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)
     exact = finite_matrix(law, edges=basis.edges) if isinstance(basis, Bins) else None
     has_bins = method == "auto" and not holds_of_all(law, lambda part: not isinstance(part, MatrixLaw))
-    found = replace(exact, basis=basis) if exact is not None and has_bins else recipe(law, method)(basis, budget)
+    entries = basis.size**2
+    with reported(f"matrix in {basis!r}", SECONDS * entries, DOUBLE * MATRICES * entries):
+        found = replace(exact, basis=basis) if exact is not None and has_bins else recipe(law, method)(basis, budget)
     return replace(
         found,
         beyond=None if exact is None or found.samples else exact.beyond,

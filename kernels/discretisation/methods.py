@@ -11,7 +11,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.errors import InputError
 from ..bases.basis import Basis
-from ..bases.mirror import is_mirror_symmetric, mirror_image, mirror_refinement, reflection_matrix
+from ..bases.mirror import is_mirror_symmetric, mirror_image, mirror_refinement
 from ..laws.law import Law, retroreflection, specular
 from ..laws.structure import LONGEST_WORD, Rules, fold, has_chain, law_of, words_of
 from ..matrices.defects import SymmetryDefect
@@ -183,15 +183,14 @@ class _Mirrored:
         return self.inner.without_rays(basis)
 
     def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        symmetric = is_mirror_symmetric(basis)
-        finer, restriction = (basis, np.empty(0)) if symmetric else mirror_refinement(basis)
+        finer, restriction = (basis, None) if is_mirror_symmetric(basis) else mirror_refinement(basis)
         if wanted == "auto" and not self._has_choice(finer):
             wanted = "quadrature"
         inner = self.inner.matrix(wanted, finer, budget)
-        flipped = np.empty(0) if symmetric else reflection_matrix(finer) @ restriction.T
 
         def mirrored(part: Any) -> Floats:
-            return mirror_image(part, basis, rows=False) if symmetric else restriction @ part @ flipped
+            image = mirror_image(part, finer, rows=False)
+            return image if restriction is None else restriction @ image @ restriction.T
 
         return KernelMatrix(
             mirrored(inner.symmetric),

@@ -90,7 +90,7 @@ def scaled(matrix: KernelMatrix, factor: float) -> KernelMatrix:
     error = frobenius_error(abs(factor) * float(matrix.error), matrix.error.kind, matrix.error.method)
     return _derived(
         matrix, factor * matrix.symmetric, error, f"{factor:g}*{_name(matrix)}",
-        replicates=_Mapped(matrix.replicates, lambda part: factor * part), reversible=matrix.reversible,
+        replicates=Mapped(matrix.replicates, lambda part: factor * part), reversible=matrix.reversible,
         mirror_symmetric=matrix.mirror_symmetric, norm_bound=abs(factor) * matrix.norm_bound,
         beyond=_beyond(lambda number: factor * number, matrix),
     )  # fmt: skip
@@ -102,9 +102,9 @@ def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     replicates: Sequence[Any] = ()
     # parts of different samples cannot be paired; those of one term are shifted by the other where it has none
     if first.replicates and not second.replicates:
-        replicates = _Mapped(first.replicates, lambda part: part + second.symmetric)
+        replicates = Mapped(first.replicates, lambda part: part + second.symmetric)
     elif second.replicates and not first.replicates:
-        replicates = _Mapped(second.replicates, lambda part: part + first.symmetric)
+        replicates = Mapped(second.replicates, lambda part: part + first.symmetric)
     how = f"sum of ({first.error.method}) and ({second.error.method})"
     error = frobenius_error(float(first.error) + float(second.error), joint_kind(first, second), how)
     return _derived(
@@ -177,7 +177,7 @@ def in_other_frame(matrix: KernelMatrix) -> KernelMatrix:
         matrix,
         symmetric=mirror_image(matrix.symmetric, matrix.basis, rows=False),
         counts=None,
-        replicates=_Mapped(matrix.replicates, lambda part: mirror_image(part, matrix.basis, rows=False)),
+        replicates=Mapped(matrix.replicates, lambda part: mirror_image(part, matrix.basis, rows=False)),
         symmetrised=False,
         law=f"({_name(matrix)}).in_specular_frame()",
         # P J is self-adjoint exactly if P commutes with J
@@ -205,7 +205,7 @@ def _derived(
 
 
 @dataclass(frozen=True)
-class _Mapped(Sequence[Any]):
+class Mapped(Sequence[Any]):
     """A function of each replicate, computed when it is asked for."""
 
     parts: Sequence[Any]
@@ -467,7 +467,7 @@ class KernelMatrix:
             self,
             symmetric=self.symmetric.T,
             counts=None if self.counts is None else self.counts.T,
-            replicates=_Mapped(self.replicates, lambda part: part.T),
+            replicates=Mapped(self.replicates, lambda part: part.T),
             law=self.law if self.reversible else f"adjoint of {self.law or self.method}",
         )
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from ..matrices.defects import (
     reversibility_z_score,
     row_blocks,
 )
+from ..matrices.matrix import Mapped
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -138,83 +139,48 @@ def array_from_counts(parts: Sequence[Any], basis: Basis, *, symmetrise: bool, i
     counts = _summed(parts)
     number, rows = float(counts.sum()), counts.sum(axis=1)
     _check_occupied(rows + counts.sum(axis=0) if symmetrise else rows, basis)
-    estimate = _Estimate(counts, rows, number, basis, symmetrise)
+    fractions = (basis.weights / np.where(rows > 0, rows, 1))[:, None]
+
+    def normalised(flux: Floats, some: slice) -> Floats:
+        flux *= basis.normalisation[some, None]  # from fluxes to the orthonormal basis
+        flux *= basis.normalisation
+        return flux
+
+    def numerators(part: Any, some: slice) -> Floats:
+        return normalised(
+            (part[some] + part[:, some].T) / (2.0 * number) if symmetrise else part[some] * fractions[some], some
+        )
+
+    def influence(part: Any, some: slice) -> Floats:
+        """Of a part on the estimate: its numerators minus its denominators times the estimate."""
+        if symmetrise:
+            excess = numerators(part, some) - float(part.sum()) / number * symmetric[some]
+        else:
+            excess = part[some] - (part[some].sum(axis=1) / rows[some])[:, None] * counts[some]
+            excess = normalised(excess * fractions[some], some)
+        excess *= len(parts)
+        return excess
+
     symmetric = np.empty(counts.shape)
     for some in row_blocks(len(counts)):
-        symmetric[some] = estimate.of(counts, some)
+        symmetric[some] = numerators(counts, some)
     replicates: Sequence[Replicate] = ()
     if independent:
         error = _quantile(*_moments_of_counts(counts, basis, symmetrise))
         z_score = reversibility_z_score(np.asarray(counts, dtype=np.int64))
     else:
-        found = _Replicates(symmetric, tuple(parts), estimate)
-        error = _half_width(found.differences, symmetric, len(parts))
+        error = _half_width(lambda some: np.array([influence(part, some) for part in parts]), symmetric, len(parts))
         z_score = replicate_z_score(
             [(part[pairs] - part[pairs[::-1]]) / np.sqrt(counts[pairs] + counts.T[pairs]) for part in parts]
             for pairs in occupied_pairs(counts)
         )
-        replicates = found if _may_be_stored(symmetric, len(parts)) else ()
+        if _may_be_stored(symmetric, len(parts)):  # as counts, which take less memory
+            replicates = Mapped(parts, lambda part: _compact(symmetric + influence(part, slice(None))))
     raw = relative_asymmetry(counts, basis.normalisation)
     for array in (counts, symmetric):
         array.setflags(write=False)
     whole = cast(Counts, counts) if counts.dtype == np.int64 else None
     return SampledArray(symmetric, error, replicates, SymmetryDefect(raw, z_score=z_score), whole)
-
-
-class _Estimate(NamedTuple):
-    """The estimate from counts, computed some rows at a time."""
-
-    counts: Counts | Floats
-    rows: Counts | Floats
-    number: float
-    basis: Basis
-    symmetrise: bool
-
-    def of(self, part: Any, some: slice) -> Floats:
-        """The numerators of a part over the denominators of all counts."""
-        if self.symmetrise:
-            return self._normalised((part[some] + part[:, some].T) / (2.0 * self.number), some)
-        return self._normalised(part[some] * self._fractions(some), some)
-
-    def influence(self, part: Any, symmetric: Floats, some: slice) -> Floats:
-        """The influence of a part on the estimate: its numerators minus its denominators times the estimate."""
-        if self.symmetrise:
-            return self.of(part, some) - float(part.sum()) / self.number * symmetric[some]
-        excess = (part[some].sum(axis=1) / self.rows[some])[:, None] * self.counts[some]
-        np.subtract(part[some], excess, out=excess)
-        excess *= self._fractions(some)
-        return self._normalised(excess, some)
-
-    def _fractions(self, some: slice) -> Floats:
-        rows = self.rows[some]
-        return np.asarray((self.basis.weights[some] / np.where(rows > 0, rows, 1))[:, None])
-
-    def _normalised(self, flux: Floats, some: slice) -> Floats:
-        flux *= self.basis.normalisation[some, None]  # from fluxes to the orthonormal basis
-        flux *= self.basis.normalisation
-        return flux
-
-
-@dataclass(frozen=True, eq=False)
-class _Replicates(Sequence[Any]):
-    """The matrices of the parts of the counts, each computed when it is asked for: counts take less memory."""
-
-    symmetric: Floats
-    parts: tuple[Any, ...]
-    estimate: _Estimate
-
-    def __len__(self) -> int:
-        return len(self.parts)
-
-    def __getitem__(self, number: Any) -> Any:
-        return _compact(self.symmetric + self._difference(self.parts[number], slice(None)))
-
-    def differences(self, some: slice) -> Floats:
-        """Some rows of the differences of all parts from the estimate, shape (parts, rows, n)."""
-        return np.array([self._difference(part, some) for part in self.parts])
-
-    def _difference(self, part: Any, some: slice) -> Floats:
-        return len(self) * self.estimate.influence(part, self.symmetric, some)
 
 
 def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
@@ -329,53 +295,48 @@ def _moments_of_counts(counts: Counts | Floats, basis: Basis, symmetrise: bool) 
     if not symmetrise:
         # Entry (i, j) of the array is C_ij w_i h_i h_j / N_i, and each row is an independent multinomial.
         rows = counts.sum(axis=1)
-        found = [_squared_norms(counts[some], normalisation**2, rows[some]) for some in row_blocks(len(rows))]
+        found = [_squared_norms([(counts[some], normalisation**2)], rows[some]) for some in row_blocks(len(rows))]
         mean, variance = (np.concatenate(part) for part in zip(*found, strict=True))
         scale = (weights * normalisation / rows) ** 2
         return float(scale @ mean), float(scale**2 @ variance)
     # A pair counts one half at each of its two entries, or fully on the diagonal.
     number = float(counts.sum())
-    total = np.zeros((6, 1))
-    for some in row_blocks(len(weights)):
-        squares = np.outer(normalisation[some], normalisation) ** 2 / number**2
-        upper, first = np.triu(np.ones(squares.shape, dtype=np.bool_), some.start + 1), some.start
-        pairs = [np.diagonal(counts[some], first), (counts[some] + counts[:, some].T)[upper]]
-        weight = [np.diagonal(squares, first), 0.5 * squares[upper]]
-        total = total + _sums_of_rows(np.concatenate(pairs)[None], np.concatenate(weight), np.array([number]))
-    mean, variance = _moments(total, np.array([number]))
+
+    def blocks() -> Iterator[tuple[Counts | Floats, Floats]]:
+        for some in row_blocks(len(weights)):
+            squares = np.outer(normalisation[some], normalisation) ** 2 / number**2
+            first, upper = some.start, np.triu(np.ones(squares.shape, dtype=np.bool_), some.start + 1)
+            pairs = [np.diagonal(counts[some], first), (counts[some] + counts[:, some].T)[upper]]
+            weight = [np.diagonal(squares, first), 0.5 * squares[upper]]
+            yield np.concatenate(pairs)[None], np.concatenate(weight)
+
+    mean, variance = _squared_norms(blocks(), np.array([number]))
     return float(mean[0]), float(variance[0])
 
 
-def _squared_norms(counts: Counts | Floats, weight: Floats, number: Counts | Floats) -> tuple[Floats, Floats]:
+def _squared_norms(blocks: Iterable[tuple[Counts | Floats, Floats]], number: Counts | Floats) -> tuple[Floats, Floats]:
     """Mean and variance of sum_j w_j (C_j - N p_j)^2 for multinomial rows C of N pairs, both estimated from C.
 
-    It equals the sum of k(x, y) = sum_j w_j (1[x = j] - p_j) (1[y = j] - p_j) over all pairs (x, y) of the N draws, so
+    The cells j come block by block, each as C and w. The number equals the sum of
+    k(x, y) = sum_j w_j (1[x = j] - p_j) (1[y = j] - p_j) over all pairs (x, y) of the N draws, so
     its variance is N Var k(x, x) + 2 N (N - 1) E k(x, y)^2. The first term dominates if most counts are 0 or 1; without
     it the counts would be treated as normal.
     """
-    return _moments(_sums_of_rows(counts, weight, number), number)
-
-
-def _sums_of_rows(counts: Counts | Floats, weight: Floats, number: Counts | Floats) -> Floats:
-    """The sums over the cells of which the moments are functions, shape (6, rows); those of parts of a row add up."""
     number = np.asarray(number, dtype=np.float64)  # the square of a number of pairs can exceed int64
-    fraction = counts / number[:, None]
-    # An unbiased estimate of p^2, because the bias matters for small counts.
-    square = np.maximum(fraction * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
-    tilted = weight * (1.0 - 2.0 * fraction)
-    return np.array([
-        np.einsum("ij,j->i", fraction * (1.0 - fraction), weight), fraction @ weight,
-        np.einsum("ij,ij->i", fraction, tilted**2), np.einsum("ij,ij->i", fraction, tilted),
-        np.einsum("ij,j->i", square * (1.0 - 2.0 * fraction), weight**2), square @ weight,
-    ])  # fmt: skip
-
-
-def _moments(sums: Floats, number: Counts | Floats) -> tuple[Floats, Floats]:
-    number = np.asarray(number, dtype=np.float64)
-    spread, weighted, tilted_squares, tilted, cubes, squares = sums
+    sums = np.zeros((6, number.size))
+    for counts, weight in blocks:
+        fraction = counts / number[:, None]
+        # An unbiased estimate of p^2, because the bias matters for small counts.
+        square = np.maximum(fraction * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
+        tilted = weight * (1.0 - 2.0 * fraction)
+        sums += [
+            np.einsum("ij,j->i", fraction * (1.0 - fraction), weight), fraction @ weight,
+            np.einsum("ij,ij->i", fraction, tilted**2), np.einsum("ij,ij->i", fraction, tilted),
+            np.einsum("ij,j->i", square * (1.0 - 2.0 * fraction), weight**2), square @ weight,
+        ]  # fmt: skip
     # A single pair does not determine its spread, which is then overestimated.
-    mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * spread, weighted)
-    own, other = tilted_squares - tilted**2, cubes + squares**2
+    mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * sums[0], sums[1])
+    own, other = sums[2] - sums[3] ** 2, sums[4] + sums[5] ** 2
     return mean, number * np.maximum(own, 0.0) + 2.0 * number * (number - 1.0) * np.maximum(other, 0.0)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from ...core.checks import number_between
 from ...core.errors import InputError, ProofError
 from ...core.files import write_whole
+from ...core.long_runs import reported
 from ...core.version import __version__
 from ...kernels import Law
 from .checker import Refused, check, ctx, enclose
@@ -69,6 +70,7 @@ class Proof:
         return f"Proof: the gap lies in [{low}, {high}]"
 
 
+@reported("proof of the gap")
 def prove_gap(law: Law, width: float = 1e-4) -> Proof:
     """Prove that the spectral gap of a law lies in an interval.
 

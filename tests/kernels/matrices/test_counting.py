@@ -158,20 +158,20 @@ def test_the_mean_of_the_squared_error_is_estimated_without_bias(number: int) ->
     mean = 0.0
     for draws in itertools.product(range(3), repeat=number):
         counts = np.bincount(draws, minlength=3)
-        estimate, _ = counting._squared_norms(counts[None], weight, np.array([number]))
+        estimate, _ = counting._squared_norms([(counts[None], weight)], np.array([number]))
         mean += np.prod(fraction[list(draws)]) * float(estimate[0])
     assert mean == pytest.approx(number * float(weight @ (fraction * (1.0 - fraction))), rel=1e-12)
 
 
 def test_a_single_pair_has_a_large_spread() -> None:
-    mean, variance = counting._squared_norms(np.array([[0, 1, 0]]), np.array([2.0, 5.0, 1.0]), np.array([1]))
+    mean, variance = counting._squared_norms([(np.array([[0, 1, 0]]), np.array([2.0, 5.0, 1.0]))], np.array([1]))
     assert mean[0] == 5.0 and variance[0] == 0.0
 
 
 def test_the_variance_of_the_squared_error_is_that_of_poisson_counts_in_small_cells() -> None:
     # (C - m)^2 of a Poisson C has variance m + 2 m^2; c + 2 c (c - 1) estimates it without bias
     counts, weight = np.array([[10**12, 1, 3, 7]]), np.array([0.0, 1.0, 2.0, 0.5])
-    mean, variance = counting._squared_norms(counts, weight, counts.sum(axis=1))
+    mean, variance = counting._squared_norms([(counts, weight)], counts.sum(axis=1))
     assert mean[0] == pytest.approx(1.0 + 6.0 + 3.5, rel=1e-9)
     assert variance[0] == pytest.approx(1.0 + 4.0 * (3 + 12) + 0.25 * (7 + 84), rel=1e-9)
 
@@ -179,7 +179,7 @@ def test_the_variance_of_the_squared_error_is_that_of_poisson_counts_in_small_ce
 def test_the_variance_of_four_draws_is_counted_by_hand() -> None:
     # two and two: squares of fractions are estimated as 1/6 each, so E k^2 = (1/3)^2, for 12 ordered pairs of draws,
     # twice
-    mean, variance = counting._squared_norms(np.array([[2, 2]]), np.ones(2), np.array([4]))
+    mean, variance = counting._squared_norms([(np.array([[2]]), np.ones(1))] * 2, np.array([4]))
     assert mean[0] == pytest.approx(16 / 3 * 0.5) and variance[0] == pytest.approx(24 / 9)
 
 
@@ -188,7 +188,7 @@ def test_the_variance_of_the_squared_error_is_that_of_binomials(number: int, fra
     first = np.arange(number + 1)
     with np.errstate(all="raise", under="ignore"):
         counts = np.stack([first, number - first], axis=1)
-        _, found = counting._squared_norms(counts, np.array([1.0, 2.0]), np.full(number + 1, number))
+        _, found = counting._squared_norms([(counts, np.array([1.0, 2.0]))], np.full(number + 1, number))
     likely = binom.pmf(first, number, fraction)
     square = 3.0 * (first - number * fraction) ** 2
     exact = likely @ square**2 - (likely @ square) ** 2

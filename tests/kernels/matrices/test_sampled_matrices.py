@@ -165,7 +165,7 @@ def test_squared_errors_vary_as_multinomial_counts_do_also_where_most_are_none()
     fraction, weight = np.full(200, 1 / 200), np.where(np.arange(200) % 2, 1.0, 10.0)
     counts = np.random.default_rng(1).multinomial(40, fraction, size=20_000)
     squares = (counts - 0.2) ** 2 @ weight
-    mean, variance = _squared_norms(counts, weight, counts.sum(axis=1))
+    mean, variance = _squared_norms([(counts, weight)], counts.sum(axis=1))
     assert np.mean(mean) == pytest.approx(np.mean(squares), rel=0.01)
     # fractions from so few draws are uneven, which takes 11 % away
     assert np.mean(variance) == pytest.approx(np.var(squares), rel=0.2)
