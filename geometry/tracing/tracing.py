@@ -24,6 +24,7 @@ from ...core.checks import (
     numbers,
     whole_number,
 )
+from ...core.estimates import Summary
 from ...core.long_runs import reported
 from ..scene import columns as c
 from ..walls.wall import Wall
@@ -71,10 +72,13 @@ class Status(IntEnum):
     BOUNCE_LIMIT = 3
 
 
-class StatusCounts:
+class StatusCounts(Summary):
     """Mask and counts of a result's array ``status``, of rays or of disks."""
 
     status: NDArray[np.uint8]
+
+    def _facts(self) -> dict[str, object]:
+        return {**super()._facts(), "status": {name: number for name, number in self.counts().items() if number}}
 
     @property
     def escaped(self) -> NDArray[np.bool_]:
@@ -99,7 +103,7 @@ def numbers_of(status: NDArray[np.uint8], outcomes: type[IntEnum]) -> dict[str, 
     return {outcome.name.lower(): int(numbers[outcome]) for outcome in outcomes}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trace(StatusCounts):
     """The outgoing rays, each array in the broadcast shape of ``x`` and ``theta``.
 
@@ -120,6 +124,7 @@ class Trace(StatusCounts):
     theta: Floats
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
+    _unit = "radians, and the wall's unit of length"
 
     @property
     def flagged(self) -> NDArray[np.bool_]:

@@ -20,7 +20,7 @@ from ..bases.measure import SINE
 from ..bases.mirror import reflection_matrix
 from ..bases.tensor import TensorBasis
 from ..laws.law import IsometryLaw, Law
-from ..laws.matrix_law import MatrixLaw, finite_matrix, not_a_law
+from ..laws.matrix_law import MatrixLaw, finite_matrix
 from ..laws.structure import Rules, fold, holds_of_all
 from ..laws.tensor_law import SpatialLaw
 from ..matrices.matrix import KernelMatrix
@@ -163,8 +163,7 @@ def discretise(
             ),
         )
     source = generator(rng, SEED_WITHOUT_RNG)
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    instance("law", law, Law, "ker.WallLaw(wall)")
     instance("basis", basis, Basis, "ker.Bins(64)")
     if isinstance(basis, TensorBasis):
         raise InputError(f"basis: expected a basis of one angle for {law!r}, got {basis!r}; use P.tensor(Q)")

@@ -30,10 +30,9 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, html_table
 from ...core.frames import data_array, data_frame
 from ...core.rounding import EPS
-from ...core.tables import html_table
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, mirror_image
@@ -565,7 +564,7 @@ class KernelMatrix:
         lines = {
             "law": self.law, "method": self.method, "Frobenius error": f"{float(self.error):.2g} ({self.error.kind})",
             "tolerance": self.requested_tolerance and f"{self.requested_tolerance:g}", "samples": self.samples or "",
-            "convention": self.frame,
+            "convention": self.frame, "more": ".array, .error.method, .plot(), .symmetry_defect(), .to_frame()",
         }  # fmt: skip
         return html_table(f"KernelMatrix in {self.basis!r}", lines)
 

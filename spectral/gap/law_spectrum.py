@@ -84,8 +84,8 @@ def spectrum(
     >>> from asperity import kernels as ker, spectral as spec
     >>> spec.spectrum(ker.henyey_greenstein(0.5), k=4).values.round(12).tolist()
     [1.0, 0.5, 0.25, 0.125]
-    >>> spec.spectrum(ker.TriangularTeethLaw(0.7))
-    Spectrum(k=10, gap=0, slem=1, verdict='no gap', convention='paper')
+    >>> spec.spectrum(ker.TriangularTeethLaw(0.7)).verdict
+    'no gap'
     """
     whole_number("k", k, 1)
     seconds = positive_number("time_limit", time_limit)

@@ -10,6 +10,7 @@ from typing import Any
 
 from ...core.checks import number_between
 from ...core.errors import InputError, ProofError
+from ...core.estimates import Summary
 from ...core.files import write_whole
 from ...core.long_runs import reported
 from ...core.version import __version__
@@ -35,8 +36,8 @@ LEMMAS = {
 USED = {"powers": ("mixtures", "powers"), "dispersing arcs": tuple(name for name in LEMMAS if name != "powers")}
 
 
-@dataclass(frozen=True)
-class Proof:
+@dataclass(frozen=True, repr=False)
+class Proof(Summary):
     """A theorem on the spectral gap of a law: what `prove_gap` returns.
 
     Attributes
@@ -64,10 +65,6 @@ class Proof:
         text = json.dumps(self.certificate, indent=1) + "\n"
         write_whole(target, text, overwrite=overwrite)
         return target
-
-    def __repr__(self) -> str:
-        low, high = self.interval
-        return f"Proof: the gap lies in [{low}, {high}]"
 
 
 @reported("proof of the gap")

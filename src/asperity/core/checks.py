@@ -19,12 +19,30 @@ Floats = NDArray[np.float64]
 T = TypeVar("T")
 # What `generator` takes.
 Rng: TypeAlias = np.random.Generator | np.random.BitGenerator | np.random.SeedSequence | int | None
-# Characters of a value that a message repeats.
-SHOWN = 80
+# Characters of a value that a message repeats, in one line.
+SHOWN, LINE_ENDS = 80, re.compile(r"\s*\n\s*")
 # Bytes of a double, and the number of doubles for which no machine is asked.
 DOUBLE, ALWAYS_THERE = 8, 2**24
 # Whole numbers beyond do not fit into arrays.
 LARGEST = 2**63 - 1
+# By the wanted class and that of what was given instead: what makes the one from the other.
+MAKES = {
+    "Law": {
+        "Wall": "ker.WallLaw(wall)", "MushroomGenerations": "ker.MushroomLaw(wall)",
+        "str": "ker.WallLaw(geo.wall_from_text(text))", "ndarray": "ker.MatrixLaw(array)",
+        "list": "ker.MatrixLaw(array)", "KernelMatrix": "ker.MatrixLaw(matrix)",
+        "function": "ker.DensityLaw(density) or ker.InvolutionLaw(map)", "CollisionLaw": "its .law",
+    },
+    "Wall": {
+        "str": "geo.wall_from_text(text)", "ndarray": "geo.Wall.from_vertices(points)",
+        "list": "geo.Wall.from_vertices(points)", "Profile": "geo.Wall.from_profile(*profile)",
+        "NamedWall": "its .build()", "WallLaw": "its .wall",
+    },
+    "KernelMatrix": {
+        "Law": "ker.discretise(law, ker.Bins(64))", "Wall": "ker.discretise(ker.WallLaw(wall), ker.Bins(64))",
+        "ndarray": "ker.discretise(ker.MatrixLaw(array), ker.Bins(len(array)))",
+    },
+}  # fmt: skip
 # Seeds are below this number, the size of numpy's own.
 SEEDS = 2**128
 
@@ -133,7 +151,20 @@ def instance(name: str, value: object, kind: type, example: str) -> None:
     """
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
-        raise InputError(f"{name}: expected {article} {kind.__name__} such as {example}, got {shortened(value)}")
+        raise InputError(f"{name}: expected {article} {kind.__name__} such as {example}, got {given(value, kind)}")
+
+
+def given(value: object, kind: type) -> str:
+    """What was given for an object of a kind, and what makes one of it.
+
+    Examples
+    --------
+    >>> given("koch", type("Wall", (), {}))
+    "'koch'; take geo.wall_from_text(text)"
+    """
+    makes = MAKES.get(kind.__name__, {})
+    found = next((makes[one.__name__] for one in type(value).__mro__ if one.__name__ in makes), None)
+    return shortened(value) + (f"; take {found}" if found else "")
 
 
 def sequence(name: str, value: Iterable[T], kind: type[T] | None = None, example: str = "") -> tuple[T, ...]:
@@ -216,7 +247,7 @@ def shortened(value: object) -> str:
     ('[1.0, 2.0]', 83, 'a value of type int')
     """
     try:
-        text = repr(value)
+        text = LINE_ENDS.sub(" ", repr(value))
     except Exception:  # of foreign objects, and of integers with thousands of digits
         return f"a value of type {type(value).__name__}"
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
