@@ -17,18 +17,18 @@ from ...core.checks import (
     finite_array,
     frozen,
     generator,
+    instance,
     number_between,
     shortened,
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate
+from ...core.estimates import NORMAL_95, Estimate, Summary, with_errors
 from ...core.long_runs import Engine, all_parts
 from ...core.version import __version__
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.law import IsometryLaw
-from ...kernels.laws.matrix_law import not_a_law
 from ...kernels.laws.structure import holds_of_all
 
 Arrangement = Literal["mirror", "half-turn"]
@@ -43,8 +43,8 @@ LARGEST = 1e150
 TOGETHER = 4096
 
 
-@dataclass(frozen=True)
-class ExitTimes:
+@dataclass(frozen=True, repr=False)
+class ExitTimes(Summary):
     """Times to leave -L < x < L, for particles that start at x = 0 with the invariant distribution of angles.
 
     Attributes
@@ -61,6 +61,11 @@ class ExitTimes:
     times: Floats
     radius: float
     speed: float
+    _unit = "times in length / speed"
+
+    def _facts(self) -> dict[str, object]:
+        half = NORMAL_95 * self.times.std(axis=0, ddof=1) / np.sqrt(len(self.times))
+        return {"lengths": self.lengths, "means": with_errors(self.means, half), "particles": len(self.times)}
 
     @property
     def means(self) -> Floats:
@@ -171,8 +176,7 @@ def simulated_times(
 
 def in_paper_frame(law: Law) -> Law:
     """The law in the paper's convention; an InputError if it is no law."""
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    instance("law", law, Law, "ker.WallLaw(wall)")
     return law.in_specular_frame() if law.frame == "specular" else law
 
 

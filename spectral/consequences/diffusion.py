@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, choice, frozen, positive_number
 from ...core.errors import AccuracyError, AsperityError, InputError
-from ...core.estimates import NORMAL_95, ErrorKind, Estimate
+from ...core.estimates import NORMAL_95, ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
 from ...kernels import Law
 from ..essential.edge import grazing_symbol
@@ -62,15 +62,15 @@ class Diffusivity(Estimate):
     zeta_error: float
     arrangement: Arrangement
     onset: float
+    _unit = "radius x speed"
 
     def __str__(self) -> str:
-        digits = f"{self.value:.4g}" if self.error <= 1e-4 * abs(self.value) else super().__str__()
         far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "beyond 2000 r at least"
-        return f"{digits}, the slope of L^2/tau against ln(L/r) for L {far}"
+        return f"{super().__str__()}, the slope of L^2/tau against ln(L/r) for L {far}"
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         same = ", the same for all walls that turn grazing flights" if abs(self.eta - 1.0) <= self.eta_error else ""
-        return f"Diffusivity({self}{same}; eta={self.eta:.6g}, zeta={self.zeta:.6g}, kind={self.kind!r})"
+        return f"{self}{same}"
 
 
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
@@ -135,7 +135,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
 
 
 @dataclass(frozen=True, repr=False)
-class ChannelDiffusivity:
+class ChannelDiffusivity(Summary):
     r"""Mean exit times tau(L) from channels -L < x < L, and the diffusivity L^2/(2 tau) at each length.
 
     Particles that diffuse by Fick's law, with the variance 2 D_F t, leave in the mean time L^2/(2 D_F). So L^2/(2 tau)
@@ -164,6 +164,8 @@ class ChannelDiffusivity:
     particles: int
     radius: float
     speed: float
+    _show = "lengths values onset particles"
+    _unit = "values in radius x speed"
 
     @property
     def values(self) -> Floats:
@@ -174,12 +176,6 @@ class ChannelDiffusivity:
     def errors(self) -> Floats:
         """Half widths of the 95 % intervals of ``values``, to first order."""
         return np.asarray(self.values * self.time_errors / self.times)
-
-    def __repr__(self) -> str:
-        numbers = (Estimate(*pair, "estimate", "") for pair in zip(self.values, self.errors, strict=True))
-        text = ", ".join(f"{number} at L = {length:g}" for length, number in zip(self.lengths, numbers, strict=True))
-        far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "from an unknown length on"
-        return f"ChannelDiffusivity(L^2/(2 tau): {text}; logarithmic in L {far})"
 
 
 def channel_diffusivity(
@@ -224,9 +220,16 @@ def channel_diffusivity(
 
     >>> from asperity import kernels as ker, spectral as spec
     >>> spec.channel_diffusivity(ker.lambertian(), [20.0], rng=1)
-    ChannelDiffusivity(L^2/(2 tau): 1.26(4) at L = 20; logarithmic in L well above 3.2)
-    >>> spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
-    ChannelDiffusivity(L^2/(2 tau): 3.63(9) at L = 20; logarithmic in L well above 36)
+    ChannelDiffusivity
+    lengths   20
+    values    1.26(4)
+    onset     3.17352
+    particles 4096
+    unit      values in radius x speed
+    more      .times, .time_errors, .radius, .speed, .errors
+    >>> shallow = spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
+    >>> print(*shallow.values.round(2), round(shallow.onset))
+    3.63 36
     """
     found = simulated_times(law, lengths, particles, rng, radius, speed, arrangement, {}, least=1)
     errors = NORMAL_95 * found.times.std(axis=0, ddof=1) / np.sqrt(len(found.times))

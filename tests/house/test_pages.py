@@ -1,5 +1,6 @@
 """Examples and scripts of pages run and are right, and the reference lists all public names."""
 
+import importlib
 import importlib.util
 import inspect
 import math
@@ -19,6 +20,7 @@ from asperity import spectral as spec
 
 DOCS = Path(__file__).parents[2] / "docs"
 HOW_TO = sorted(path.stem for path in (DOCS / "how-to").glob("*.py"))
+TUTORIALS = sorted((DOCS / "tutorials").glob("*.py"))
 
 
 @pytest.fixture
@@ -27,7 +29,7 @@ def run(monkeypatch):
     from matplotlib import pyplot
 
     monkeypatch.setattr(pyplot, "show", lambda: None)
-    yield lambda name: runpy.run_path(str(DOCS / "how-to" / f"{name}.py"))
+    yield lambda name, folder="how-to": runpy.run_path(str(DOCS / folder / f"{name}.py"))
     pyplot.close("all")
 
 
@@ -159,6 +161,16 @@ def test_the_slower_examples_agree_with_what_is_known(run, name):
         assert names["table"].rows[-1].value == pytest.approx(1 - 3 / 8 * math.log(9), abs=1e-6)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
+def test_a_tutorial_says_what_it_computes(path, run):
+    """Its assertions hold, and its pages are linked where readers begin."""
+    source = path.read_text(encoding="utf-8")
+    run(path.stem, "tutorials")
+    assert source.count("\n# %%\n") >= 12 and source.count("\nassert ") >= 8
+    assert f"docs/tutorials/{path.name}" in (DOCS.parent / "README.md").read_text(encoding="utf-8")
+
+
 def test_no_line_of_a_page_is_lost_as_a_comment():
     """A line that begins with a percent sign is a comment in Markdown of MyST: "95 %" may not be broken before it."""
     pages = [page for page in DOCS.rglob("*.md") if not {"_build", "generated"} & set(page.parts)]
@@ -191,6 +203,19 @@ def test_every_short_example_is_in_the_story_and_runs_here(reference):
     # `make check` builds the documentation without running them
     text = Path(__file__).read_text(encoding="utf-8")
     assert [name for name in HOW_TO if f'"{name}"' not in text] == []
+
+
+def test_small_pictures_of_pages_are_drawn_and_exist(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(DOCS)
+    thumbnails = importlib.import_module("thumbnails")
+    thumbnails.write_thumbnails(tmp_path / "generated" / "thumbnails")
+    asked = [
+        re.findall(r'^# sphinx_gallery_thumbnail_path = "(.*)"$', path.read_text(encoding="utf-8"), re.M)
+        for folder in ("tutorials", "how-to", "examples") for path in (DOCS / folder).glob("*.py")
+    ]  # fmt: skip
+    names = {name for found in asked for name in found}
+    assert {f"generated/thumbnails/{name}.png" for name in thumbnails.PICTURES} <= names
+    assert all((DOCS / name).exists() or (tmp_path / name).stat().st_size > 2000 for name in names)
 
 
 def test_the_reference_lists_every_public_name_once(reference, tmp_path):
@@ -268,3 +293,15 @@ def test_the_scripts_on_a_page_run_in_small(page, blocks, tmp_path, monkeypatch)
         for full, small in SMALLER.items():
             block = block.replace(full, small)
         exec(compile(block, page, "exec"), names)
+
+
+@pytest.mark.parametrize("room", ["geometry", "kernels", "spectral"])
+def test_the_help_of_a_room_lists_each_public_name_once_below_what_people_do(reference, room):
+    module = importlib.import_module(f"asperity.{room}")
+    lines = [line.partition(": ") for line in module.__doc__.split("\n- ")[1:]]
+    listed = [name for _, _, names in lines for name in re.findall(r"\w+", names)]
+    assert sorted(listed) == sorted(module.__all__)
+    titles, heads = [title for _, title, _ in reference.sections()], [head for head, _, _ in lines]
+    assert [*(title for title in titles if title in heads), *(set(heads) - set(titles))] == heads
+    assert set(heads) - set(titles) <= {"Verify a formula, and the formulas of a disk"}
+    assert set(dir(module)) == set(module.__all__) and set(dir(asperity)) == set(asperity.__all__)

@@ -204,7 +204,8 @@ def test_the_command_writes_means_and_all_walls_and_goes_on(tmp_path):
     assert [row["quantity"] for row in means] == ["resistance", "gap"]
     assert float(means[0]["mean"]) == found.of("resistance").mean.value
     assert float(means[0]["spread_error"]) == found.of("resistance").spread.error
-    assert "6 walls, 0 of them refused" in first.stdout and found.to_csv() == (tmp_path / "means.csv").read_text()
+    assert repr(found) in first.stdout and "walls" in first.stdout and "refused" not in first.stdout
+    assert found.to_csv() == (tmp_path / "means.csv").read_text()
     walls = list(csv.DictReader(io.StringIO((tmp_path / "table.csv").read_text())))
     # the columns of a sweep, with the seed that makes the wall again
     assert list(walls[0]) == ["rng", *COLUMNS]
