@@ -111,7 +111,7 @@ STORY = (
 
 
 class StoryOrder:
-    """Sorts the short examples as STORY, others after them by name; sphinx-gallery takes it by its name."""
+    """Sorts short examples as STORY, tutorials and studies by name; sphinx-gallery takes it by its name."""
 
     def __init__(self, folder: object) -> None:
         self.folder = folder

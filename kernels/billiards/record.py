@@ -201,10 +201,11 @@ class BilliardRecord(Summary):
         from matplotlib import pyplot
 
         axes = pyplot.subplots()[1] if ax is None else ax
+        # a few points are to be seen too
+        size = float(np.clip(300.0 / len(first), 1.2, 5.0))
         for k in range(first.shape[1]):
-            axes.plot(
-                first[:, k], second[:, k], ".", markersize=1.2, markeredgewidth=0, color=COLOURS[k % len(COLOURS)]
-            )
+            colour = COLOURS[k % len(COLOURS)]
+            axes.plot(first[:, k], second[:, k], ".", markersize=size, markeredgewidth=0, color=colour)
         if coordinates == "boundary":
             axes.set(xlim=(0.0, self.container.perimeter), ylim=(-1.0, 1.0), xlabel="arc length $s$")
             axes.set_ylabel("tangential velocity $v_1/|v|$")

@@ -13,11 +13,9 @@ from ...core.checks import Floats, Rng, choice, frozen, positive_number
 from ...core.errors import AccuracyError, AsperityError, InputError
 from ...core.estimates import NORMAL_95, ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
-from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
-from ...kernels.laws.law import IsometryLaw
-from ...kernels.laws.structure import holds_of_all
+from ...kernels import Law
 from ..essential.edge import grazing_symbol
-from .channel import Arrangement, in_paper_frame, simulated_times
+from .channel import Arrangement, in_paper_frame, refuse_kept_sines, simulated_times
 
 # Sign of the displacement of rays that leave near theta = 0 and near theta = pi.
 DIRECTION = np.array([1.0, -1.0])
@@ -233,7 +231,6 @@ def channel_diffusivity(
     >>> print(*shallow.values.round(2), round(shallow.onset))
     3.63 36
     """
-    _refuse_kept_sines(law)
     found = simulated_times(law, lengths, particles, rng, radius, speed, arrangement, {}, least=1)
     errors = NORMAL_95 * found.times.std(axis=0, ddof=1) / np.sqrt(len(found.times))
     try:
@@ -261,7 +258,7 @@ def logarithmic_slope(law: Law, radius: float, speed: float, arrangement: Arrang
             f"law: {law!r} keeps the direction of grazing flights (zeta = {zeta:.6g}), so the diffusivity is infinite; "
             "expected a law that turns them round at times, as a mixture with lambertian() does"
         )
-    _refuse_kept_sines(law)
+    refuse_kept_sines(law)
     # the limit follows from the structure of the law, or from the shape of the wall at y = 0
     exact = symbol.entry_error == 0.0
     if not exact and zeta + uncertainty >= 1.0 - BALLISTIC:
@@ -294,21 +291,3 @@ def _onset(law: Law, zeta: float) -> float:
     far = np.abs(means + zeta) > NEAR_LIMIT
     first = int(np.flatnonzero(far)[-1]) + 1 if far.any() else 0
     return float(1.0 / np.tan(ONSET_ANGLES[first])) if first < ONSET_ANGLES.size else np.inf
-
-
-def _refuse_kept_sines(law: Law) -> None:
-    if isinstance(law, Law) and holds_of_all(law, _keeps_sines):
-        raise InputError(
-            "law: every ray keeps its angle to the wall, so all flights of a particle are equally long and the "
-            f"particles have no common diffusivity; got {law!r}, expected a law that changes angles, as a mixture with "
-            "lambertian() does"
-        )
-
-
-def _keeps_sines(law: Law) -> bool:
-    """Whether a law is known to consist of theta' = theta and theta' = pi - theta."""
-    if isinstance(law, (WallLaw, PolygonLaw)):
-        wall = law.wall
-        steps = [np.subtract(piece.end, piece.start) for loop in (wall.pieces, *wall.islands) for piece in loop]
-        return wall.is_polygonal and all(np.count_nonzero(step) == 1 for step in steps)
-    return isinstance(law, (IsometryLaw, RectangularTeethLaw))

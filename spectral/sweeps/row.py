@@ -12,6 +12,8 @@ from ...core.estimates import Estimate, Summary, finite, shown
 from .points import Point, Value
 
 COLUMNS = ("quantity", "value", "error", "kind", "verdict", "method", "seconds", "version", "message")
+# What the quantities are measured in; all others are pure numbers.
+UNITS = {"relaxation_time": "collisions"}
 
 
 @dataclass(frozen=True, repr=False)

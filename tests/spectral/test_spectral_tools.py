@@ -246,6 +246,8 @@ def test_a_channel_whose_particles_keep_their_angles_has_no_mean_exit_time():
     for law in (ker.RectangularTeethLaw(1.0), 0.5 * ker.specular() + 0.5 * ker.retroreflection()):
         with pytest.raises(InputError, match="every ray keeps its angle"):
             spec.channel_diffusivity(law, [5.0])
+        with pytest.raises(InputError, match="every ray keeps its angle"):
+            spec.exit_times(law, [1.0, 2.0, 4.0], 10)
 
 
 # without a closed form

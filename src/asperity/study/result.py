@@ -102,13 +102,16 @@ class StudyResult(Summary):
 
     @property
     def resistance(self) -> Estimate | None:
-        """That of a tumbling body with this wall, where a smooth one has 1; None where accommodation is.
+        """That of a tumbling body with this wall, where a smooth one has 1; None where accommodation is."""
+        return None if self.accommodation is None else resistance_from(self.accommodation)
 
-        With c = cos(theta) and s = sin(theta), R = (3/4)(1 + <c, P c> + <s, P s>), and accommodation has both entries.
-        """
-        if (found := self.accommodation) is None:
-            return None
-        across, along = found.normal, found.tangential
-        value = 1.0 + 0.75 * (WEIGHTS[0] * along.value - WEIGHTS[1] * across.value)
-        error = 0.75 * (WEIGHTS[0] * along.error + WEIGHTS[1] * across.error) + EPS
-        return Estimate(value, error, along.kind, along.method)
+
+def resistance_from(found: Accommodation) -> Estimate:
+    """The resistance of a tumbling body, where a smooth one has 1.
+
+    With c = cos(theta) and s = sin(theta), R = (3/4)(1 + <c, P c> + <s, P s>), and accommodation has both entries.
+    """
+    across, along = found.normal, found.tangential
+    value = 1.0 + 0.75 * (WEIGHTS[0] * along.value - WEIGHTS[1] * across.value)
+    error = 0.75 * (WEIGHTS[0] * along.error + WEIGHTS[1] * across.error) + EPS
+    return Estimate(value, error, along.kind, along.method)
