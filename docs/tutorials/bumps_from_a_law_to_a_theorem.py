@@ -16,10 +16,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import sympy
 
+from asperity import Estimate, verify
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity import verify
 from asperity.errors import InputError
 from asperity.ledger import selected
 
@@ -47,7 +47,8 @@ law = ker.WallLaw(geo.dispersing_arcs(curvature=1.0))
 outgoing = law.sample(np.full(100_000, 1.0), rng=0)
 spread = 1.96 * np.cos(outgoing).std() / np.sqrt(outgoing.size)
 exact = float(law.apply(np.cos, 1.0))
-print(f"by sampling {np.cos(outgoing).mean():.4f} +- {spread:.4f}, by quadrature {exact:.6f}")
+sampled = Estimate(np.cos(outgoing).mean(), spread, "estimate", "100,000 draws")
+print(f"by sampling {sampled}, by quadrature {exact:.6f}")
 assert abs(np.cos(outgoing).mean() - exact) < 2 * spread
 
 # %%
