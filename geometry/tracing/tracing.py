@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
 from fractions import Fraction
@@ -24,6 +25,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.estimates import Summary
+from ...core.long_runs import reported
 from ..scene import columns as c
 from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
@@ -219,8 +221,10 @@ def trace(
         trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], found)
         unresolved.append(found.any() and np.any((found == Status.CORNER) | (found == Status.GRAZING)))
 
+    interrupt = None if len(starts) * _work(scene) <= LITTLE_WORK else stop
     try:
-        in_blocks(run, len(starts), threads, stop=None if len(starts) * _work(scene) <= LITTLE_WORK else stop)
+        with reported("trace") if len(starts) >= MANY_RAYS else nullcontext():
+            in_blocks(run, len(starts), threads, stop=interrupt)
     except InvalidRays:
         # the message names the place among all rays
         finite_array("x", x)

@@ -99,7 +99,7 @@ def _adapted(law: Law, k: int, tolerance: float, most_levels: int, bar: Any) -> 
         goal = float(np.sqrt(tolerance * _room(values, k)))
         joint = float(np.sqrt(squares[:, :k].sum()))
         history.append((level.panels.size, joint))
-        bar.set_postfix_str(f"residual {joint:.1g}, asked for {goal:.1g}", refresh=False)
+        bar.describe(f"residual {joint:.1g}, asked for {goal:.1g}")
         bar.update()
         if joint <= goal or len(history) == most_levels or len(edges) > most_panels:
             break

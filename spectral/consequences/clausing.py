@@ -13,6 +13,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ...core.checks import Floats, Rng, choice, generator, number_between, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, RULE_OF_THREE, Estimate, student_95
+from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...kernels import KernelMatrix, Law, Legendre, discretise, lambertian, specular
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
@@ -96,6 +97,7 @@ GEOMETRIES: dict[Section, _Geometry] = {
 }
 
 
+@reported("transmission")
 def transmission(
     law: Law | DirectionLaw, length: float, section: Section = "channel", tolerance: float = 1e-4, rng: Rng = None
 ) -> Estimate:

@@ -10,7 +10,7 @@ import numpy as np
 from ...core.checks import Rng, generator, positive_number
 from ...core.errors import AccuracyError
 from ...core.estimates import with_error
-from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
+from ...core.long_runs import TIME_LIMIT, OutOfTime, reported, time_limited
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
@@ -83,6 +83,7 @@ def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
     return int(found[0]) + 2 if found.size else None
 
 
+@reported("spectral gap")
 def spectral_gap(
     law: Law | KernelMatrix | CollisionLaw | DirectionLaw,
     tolerance: float = 1e-6,

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.checks import Rng, frozen, generator, number_between, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.long_runs import TIME_LIMIT
+from ...core.long_runs import TIME_LIMIT, reported
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import not_a_law
@@ -25,6 +25,7 @@ from .verdict import SpectralGap
 TOLERANCE = 1e-4
 
 
+@reported("spectrum")
 def spectrum(
     kernel: KernelMatrix | Law | CollisionLaw,
     k: int = 10,

@@ -125,7 +125,7 @@ def _refined(
         levels.append(found)
         evidence.append(f"{basis!r}: gap {with_error(found.gap, found.gap_error)} ({matrix.method})")
         steps = Refinement(tuple(levels), _converges(levels, tolerance), tuple(evidence))
-        bar.set_postfix_str(f"error {steps.error:.1g}, asked for {tolerance:.1g}", refresh=False)
+        bar.describe(f"error {steps.error:.1g}, asked for {tolerance:.1g}")
         bar.update()
         near_edge = near_edge and 1.0 - found.gap - found.gap_error < edge.high
         if len(levels) >= FEWEST_LEVELS and steps.converges and steps.error <= tolerance:

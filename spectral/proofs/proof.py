@@ -12,6 +12,7 @@ from ...core.checks import number_between
 from ...core.errors import InputError, ProofError
 from ...core.estimates import Summary
 from ...core.files import write_whole
+from ...core.long_runs import reported
 from ...core.version import __version__
 from ...kernels import Law
 from .checker import Refused, check, ctx, enclose
@@ -66,6 +67,7 @@ class Proof(Summary):
         return target
 
 
+@reported("proof of the gap")
 def prove_gap(law: Law, width: float = 1e-4) -> Proof:
     """Prove that the spectral gap of a law lies in an interval.
 

@@ -17,6 +17,7 @@ from ...core.checks import Floats, Rng, check_memory, generator, instance, posit
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate, Summary
 from ...core.frames import data_frame
+from ...core.long_runs import reported
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...kernels import Basis, KernelMatrix, discretise
@@ -249,6 +250,7 @@ class _Matrices:
         return content
 
 
+@reported("mean law")
 def mean_law(
     family: Family,
     realisations: int,

@@ -180,7 +180,7 @@ class _Run:
                 store = stack.enter_context(Checkpoint(checkpoint, self.identity(key is not None), key=key))
             known = {} if store is None else dict(store.parts(self._read))
             workers = stack.enter_context(connected(client))
-            bar = stack.enter_context(progress_bar(self.grid.size, "point", shown=progress))
+            bar = stack.enter_context(progress_bar(self.grid.size, "point", "sweep", shown=progress))
             plan = self.grid.plan()
             portion = next(plan, [])
             while portion:

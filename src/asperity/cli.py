@@ -120,12 +120,15 @@ def study(
       asperity study triangular-teeth --incidence 0,30,60 --table law.csv
     """
     from .core.files import removed_on_failure
+    from .core.long_runs import QUIET
     from .geometry import Disk, wall_from_text
     from .kernels import WallLaw
     from .study import prepare_folder, study_wall
 
     if quiet and (as_json or verbose):
         raise click.UsageError("--quiet prints nothing; leave --json and --verbose out")
+    if quiet:
+        os.environ[QUIET] = "1"
     given = {name: value for name, value in (("mass", mass), ("inertia", inertia)) if value is not None}
     disk = Disk(**given) if given else None
     found_wall = wall_from_text(wall)

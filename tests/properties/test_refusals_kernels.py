@@ -194,7 +194,7 @@ REFUSED = {
             ((1.0, 0.1, "guess", ""), "kind"), (("many", 0.1, "bound", ""), "value"),
             ((10**400, 0.1, "bound", ""), "value"), ((1.0, 0.1, "bound", 3), "method"),
         )),
-        *((call, r"1000000\) takes 8e\+03 GB of memory") for basis in (ker.Bins(10**6), ker.Legendre(10**6))
+        *((call, r"1000000\) takes (8e\+03|4\.8e\+04) GB of memory") for basis in (ker.Bins(10**6), ker.Legendre(10**6))
           for call in (lambda basis=basis: ker.discretise(DIFFUSE, basis), estimate([1.0] * 100, [1.0] * 100, basis))),
         (lambda: matrix(np.eye(2), ker.Bins(2)) @ np.ones(3), "expected 2 entries"),
         (lambda: matrix(np.eye(2), ker.Bins(2)) ** -1, "exponent"),
