@@ -135,8 +135,8 @@ plt.show()
 (entry,) = selected(["S1.09"])
 finding = entry.run()
 print(textwrap.fill(f"{entry.statement} {entry.reason}", 88))
-print(textwrap.fill(f"as printed: {finding.wrong}", 88))
-print(textwrap.fill(f"corrected: {finding.right}", 88))
+print(textwrap.fill(f"as printed: {finding.wrong.answer}, {finding.wrong.evidence}", 88))
+print(textwrap.fill(f"corrected: {finding.right.answer}, {finding.right.evidence}", 88))
 assert finding.as_stated
 
 # %%
@@ -158,7 +158,7 @@ s, k = sympy.symbols("s k", real=True)
 integral = sympy.atanh(sympy.sin(s)) - sympy.sin(s)
 integrand = sympy.tan(s) ** 2 * sympy.cos(s)
 verdict = verify(sympy.diff(integral, s), integrand, [s > 0, s < sympy.pi / 2])
-print(verdict)
+print(f"{verdict.answer} by {verdict.evidence}")
 h = sympy.atanh(k / 2) / (k / 2) - 1
 print("2 h =", sympy.series(2 * h, k, 0, 5))
 assert verdict.answer == "proved"
@@ -181,7 +181,7 @@ assert float(low) < float(gap) < float(high) < 1.01 * float(low)
 # The page on :doc:`proved gaps </theory/proved-gaps>` has the lemmas with their proofs.
 
 path = proof.save(Path(tempfile.mkdtemp()) / "gap.json")
-print(f"{path.stat().st_size} bytes; {spec.check_proof(path)}")
+print(f"{path.stat().st_size} bytes; checked:", *spec.check_proof(path).interval)
 print("lemmas:", ", ".join(name for name, _ in proof.lemmas))
 
 # %%
