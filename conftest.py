@@ -10,6 +10,9 @@ collect_ignore = ["kernels", "geometry", "spectral"]
 # Pictures are drawn to files; no test may open a window.
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+# Reports of long calls would be found among the errors of commands; their own tests ask for them.
+os.environ.setdefault("ASPERITY_QUIET", "1")
+
 # The tests share out the cores themselves; a linear algebra with threads of its own would only get in their way.
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")

@@ -13,7 +13,7 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
-from ..bases.mirror import is_mirror_symmetric, reflection_matrix
+from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..expectations.angle_panels import NODES, NORMAL, NULL_RULES, AnglePanels
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
@@ -267,10 +267,9 @@ class _Integrator:
         panels = self.panels.total_error(self.basis)
         conditionals = self.panels.total_mean_error(self.basis)
         if self.halved:
-            flip = reflection_matrix(self.basis)
             # the halves share no row of the matrix if each basis function lives on one side
             both = math.sqrt(2.0) if self.sided else 2.0
-            matrix, panels, conditionals = matrix + flip @ matrix @ flip.T, both * panels, both * conditionals
+            matrix, panels, conditionals = matrix + mirror_image(matrix, self.basis), both * panels, both * conditionals
         return matrix, panels, conditionals, self._asymmetry_factor * float(np.linalg.norm(matrix - matrix.T))
 
     def _worth_dividing(self, goal: float) -> NDArray[np.bool_]:

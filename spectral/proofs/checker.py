@@ -71,6 +71,21 @@ def at(waves, u):
     return total
 
 
+def negative_pivots(matrix):
+    """How many eigenvalues of a symmetric matrix are negative, by LDL^T; its lower half is overwritten (lemma 1)."""
+    negative, n = 0, len(matrix)
+    for k in range(n):
+        pivot = matrix[k][k]
+        demand(pivot > 0 or pivot < 0, "pivots of known sign")
+        negative += pivot < 0
+        # a ball that contains 0 and more is neither 0 nor not 0
+        column = [(i, matrix[i][k], matrix[i][k] / pivot) for i in range(k + 1, n) if not matrix[i][k].is_zero()]
+        for number, (i, _, factor) in enumerate(column):
+            for j, x, _ in column[: number + 1]:
+                matrix[i][j] -= factor * x
+    return negative
+
+
 class Trial:
     """v = c0 cos(m theta) + c1 sin((m + 1) theta) + c2 cos((m + 2) theta) + ..., m = 1 if odd, or 0, less its mean."""
 
@@ -155,9 +170,8 @@ class Bumps:
 
         if bits:
             return length * integral(integrand, 0, 1, bits)
-        return (
-            length * sum((integrand(acb(ball(ONE * i / 16, ONE * (i + 1) / 16)), True) for i in range(16)), ZERO) / 16
-        )
+        parts = [acb(ball(ONE * i / 16, ONE * (i + 1) / 16)) for i in range(16)]
+        return length * sum((integrand(part, True) for part in parts), ZERO) / 16
 
     def reflected(self, v, theta, sides, analytic, bits):
         """P v (lemma 5); the sides of the kinks say which of its formulas holds."""
@@ -177,7 +191,7 @@ class Bumps:
         return (total + v.swept(last * last / unit(theta), last) - v.swept(first * first / unit(theta), first)) / size
 
     def form_and_residual(self, v, sign, guess, first, bits):
-        """<v, (1 - sign P) v> and a bound of |(1 - sign P - guess) v|^2, both times 2 (lemma 6)."""
+        """<v, (1 - sign P) v> and a bound of |(1 - sign P - guess) v|^2 (lemma 6)."""
         demand(first > 0 and first < self.steepest, "a first angle below the steepest slope")
         kinks, off = (self.steepest, 3 * self.steepest, PI - 3 * self.steepest), ONE / 2**46
         cuts = sorted((x for x in (first, *kinks, PI / 2) if not x > PI / 2), key=lambda x: float(x.mid()))
@@ -195,9 +209,8 @@ class Bumps:
             total, missed = total + integral(integrand, low, high, bits), missed - (high - low)
         # where nothing is known but the size of v
         most = (first * first / 2 + missed) * (2 + abs(guess)) * v.largest * v.largest
-        return guess * v.norm + total.imag + ball(-most.upper(), most.upper()), total.real + up_to(
-            most * (2 + abs(guess))
-        )
+        form = guess * v.norm + total.imag + ball(-most.upper(), most.upper())
+        return form, total.real + up_to(most * (2 + abs(guess)))
 
     def count(self, angles, odd, sign, threshold):
         """At most how many eigenvalues of 1 - sign P lie below which number (lemmas 1 and 4)."""
@@ -215,19 +228,10 @@ class Bumps:
             folded = [near[i][j] + fold * far[i][j] for j in range(i + 1)]
             matrix.append([-sign * (weight[i] * weight[j]).sqrt() * x for j, x in enumerate(folded)])
             matrix[i][i] += row - threshold
-        negative = 0
-        for k in range(n):
-            pivot = matrix[k][k]
-            demand(pivot > 0 or pivot < 0, "pivots of known sign")
-            negative += pivot < 0
-            column = [(i, matrix[i][k], matrix[i][k] / pivot) for i in range(k + 1, n) if matrix[i][k] != 0]
-            for number, (i, _, factor) in enumerate(column):
-                for j, x, _ in column[: number + 1]:
-                    matrix[i][j] -= factor * x
         once, block, entering = self.grazing(half[0])
         share = once - block - threshold
-        demand(share > 0, "a threshold below the chance to leave grazing angles")
-        return negative, threshold - (1 / share - 1) * entering
+        demand(share > 0 and share <= 1, "a positive threshold below the chance to leave grazing angles")
+        return negative_pivots(matrix), threshold - (1 / share - 1) * entering
 
     def least(self, theta, eta):
         """The least density, from bin to bin, of rays that are certainly reflected once."""
@@ -239,7 +243,8 @@ class Bumps:
     def grazing(self, eps):
         """The least chance of one reflection, the norm of the grazing block, the chance to enter it (lemma 4)."""
         ratio, width, reach = eps.sin() / eps, 8 * self.K / (eps / 2).sinc() ** 2, 2 * self.steepest + eps
-        small = eps.tan() < self.K and (width * eps).sqrt() < PI / 2 and reach + eps < PI
+        small = eps < self.steepest and (self.steepest + eps).sin() < self.K * eps.cos()
+        small = small and self.K * eps.sin() < 1 - (PI / 4).cos()
         demand(small, "a first bin nearer to 0")
         block = self.R * eps / (2 * ratio) * ((width / eps).log() + ONE / 2).sqrt()
         return 1 - self.R * (eps / 2).tan(), block, self.R * eps / 2 * (1 if reach < PI / 2 else 2 / reach.sin())
@@ -266,20 +271,26 @@ def enclose(certificate):
     ctx.prec, frame, law = certificate["precision"], certificate["frame"], certificate["law"]
     demand(ctx.prec >= 53 and frame in ("specular", "paper"), "53 bits or more, and a known convention")
     weights = {name: exact(number) for name, number in certificate["weights"].items()}
-    demand(all(w >= 0 for w in weights.values()) and sum(weights.values()).contains(1), "weights that sum to 1")
+    names = ["lambertian", "law", "retroreflection", "specular"]
+    demand(
+        sorted(weights) == names and all(w >= 0 for w in weights.values()) and sum(weights.values()).contains(1),
+        "weights that sum to 1",
+    )
+    number = {"powers": "mean_cosine", "dispersing arcs": "curvature"}.get(law["family"])
+    demand(sorted(law) == sorted(["family", str(number)]), "a known family and its number")
     signs = {True: 1 if frame == "specular" else -1, False: 1}
     if law["family"] == "powers":
         # the eigenvalue g^l on the Legendre polynomial of degree l in the paper's convention (lemma 8)
-        g = exact(law["mean_cosine"])
+        g = exact(law[number])
         demand(abs(g) < 1, "a mean cosine between -1 and 1")
         tops = {odd: -signs[odd] * g if odd else g * g for odd in signs}
         values = {odd: [1 - max(x, ZERO) for x in (top.upper(), top.lower())] for odd, top in tops.items()}
     else:
-        demand(law["family"] == "dispersing arcs", "a known family")
-        values = of_bumps(law["curvature"], certificate, signs)
+        values = of_bumps(law[number], certificate, signs)
     # a mixture (lemma 7)
     plane = {odd: weights["specular"] + (-1 if odd else 1) * weights["retroreflection"] for odd in signs}
     mixed = [[1 - signs[odd] * plane[odd] - weights["law"] * (1 - x) for x in values[odd]] for odd in signs]
+    demand(all(x.is_finite() for ends in mixed for x in ends), "finite bounds")
     return min(arb(low.lower()) for low, _ in mixed), min(arb(high.upper()) for _, high in mixed)
 
 
@@ -291,5 +302,6 @@ def check(certificate):
 
 
 if __name__ == "__main__":
-    check(json.load(sys.stdin))
-    print("The certificate proves its interval.")
+    given = json.load(sys.stdin)
+    check(given)
+    print("Proved:", {name: given[name] for name in ("law", "weights", "frame", "interval")})

@@ -46,9 +46,11 @@ def in_words(content: dict[str, Any]) -> str:
     def number(given: str | list[str]) -> str:
         return given if isinstance(given, str) else " +/- ".join(given)
 
-    family = dict(content["law"])
-    name = {"dispersing arcs": "dispersing arcs of curvature {}", "powers": "Henyey-Greenstein of mean cosine {}"}
-    text = name[family.pop("family")].format(*map(number, family.values()))
+    name = {
+        "dispersing arcs": "dispersing arcs of curvature {curvature}",
+        "powers": "Henyey-Greenstein of mean cosine {mean_cosine}",
+    }
+    text = name[content["law"]["family"]].format_map({key: number(given) for key, given in content["law"].items()})
     terms = [
         f"({number(given)}) {text if key == 'law' else key}"
         for key, given in content["weights"].items()

@@ -10,7 +10,9 @@ from typing import Any
 
 from ...core.checks import number_between
 from ...core.errors import InputError, ProofError
+from ...core.estimates import Summary
 from ...core.files import write_whole
+from ...core.long_runs import reported
 from ...core.version import __version__
 from ...kernels import Law
 from .checker import Refused, check, ctx, enclose
@@ -34,8 +36,8 @@ LEMMAS = {
 USED = {"powers": ("mixtures", "powers"), "dispersing arcs": tuple(name for name in LEMMAS if name != "powers")}
 
 
-@dataclass(frozen=True)
-class Proof:
+@dataclass(frozen=True, repr=False)
+class Proof(Summary):
     """A theorem on the spectral gap of a law: what `prove_gap` returns.
 
     Attributes
@@ -64,11 +66,8 @@ class Proof:
         write_whole(target, text, overwrite=overwrite)
         return target
 
-    def __repr__(self) -> str:
-        low, high = self.interval
-        return f"Proof: the gap lies in [{low}, {high}]"
 
-
+@reported("proof of the gap")
 def prove_gap(law: Law, width: float = 1e-4) -> Proof:
     """Prove that the spectral gap of a law lies in an interval.
 

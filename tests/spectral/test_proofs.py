@@ -151,7 +151,8 @@ def changed(certificate, path, value):
         pytest.param(
             *(("law", "curvature"), lambda pair: [str(float(pair[0]) * 1.001), pair[1]]), marks=pytest.mark.slow
         ),
-        (("law", "family"), lambda text: "focusing arcs"),
+        (("law",), lambda law: {**law, "note": "0.5"}),
+        (("weights",), lambda weights: {**weights, "specular reflection": "0"}),
         (("weights", "law"), lambda pair: ["0.9", "0"]),
         pytest.param(*(("weights", "specular"), lambda pair: ["1e-6", "0"]), marks=pytest.mark.slow),
         (("weights", "lambertian"), lambda pair: ["-1e-6", "0"]),
@@ -169,6 +170,7 @@ def changed(certificate, path, value):
         (("effort", "angles", 0), lambda text: "-0.1"),
         pytest.param(*(("effort", "angles", -1), lambda text: "1.5"), marks=pytest.mark.slow),
         pytest.param(*(("effort", "halvings"), lambda number: 10), marks=pytest.mark.slow),
+        pytest.param(*(("effort", "halvings"), lambda number: 0), marks=pytest.mark.slow),
         pytest.param(*(("effort", "tolerance"), lambda text: "0.1"), marks=pytest.mark.slow),
         (("precision",), lambda bits: 20),
         (("format",), lambda text: "asperity proved gap 2"),
@@ -180,6 +182,30 @@ def test_a_certificate_that_was_tampered_with_is_refused(proof, path, change):
         old = old[key]
     with pytest.raises(Refused):
         checker.check(changed(proof.certificate, path, change(old)))
+
+
+def test_angles_beyond_half_a_turn_are_refused():
+    """There sin(theta) < 0, and a squared residual would be negative."""
+    law = Bumps(exact("1"), {"angles": ["4", "4.5", "5"], "tolerance": "1", "halvings": 1})
+    with pytest.raises(Refused, match="up to pi/2"):
+        law.form_and_residual(Trial(TRIAL, True), 1, arb("0.34"))
+
+
+def test_an_entry_of_unknown_sign_is_not_left_out_of_a_factorisation():
+    rng = np.random.default_rng(2)
+    full = rng.normal(size=(9, 9))
+    full += full.T
+    known = int((np.linalg.eigvalsh(full) < 0).sum())
+    assert checker.negative_pivots([[arb(x) for x in row] for row in full.tolist()]) == known
+    with pytest.raises(Refused, match="known sign"):
+        checker.negative_pivots([[arb(1), None], [arb(0, 3), arb(1)]])
+
+
+def test_a_bound_that_is_not_a_number_is_not_left_out(proof, monkeypatch):
+    monkeypatch.setattr(checker, "of_bumps", lambda *_: {True: (arb("0.3"), arb("0.4")), False: (-1 / arb(0), arb(2))})
+    weights = {"law": "0", "specular": "0.3", "retroreflection": "0.6", "lambertian": "0.1"}
+    with pytest.raises(Refused, match="finite"):
+        checker.enclose({**proof.certificate, "weights": weights})
 
 
 def test_a_saved_certificate_is_checked_without_asperity(tmp_path):
@@ -203,6 +229,8 @@ def test_a_saved_certificate_is_checked_without_asperity(tmp_path):
             [sys.executable, "-I", str(CHECKER)], input=json.dumps(content), text=True, capture_output=True, check=False
         )
         assert done.returncode == code, done.stderr
+        # it says what it has proved
+        assert (done.stdout.startswith("Proved:") and "0.5" in done.stdout) == (code == 0)
     path.write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(ProofError, match="the interval from"):
         spec.check_proof(path)
