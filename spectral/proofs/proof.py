@@ -27,11 +27,17 @@ LEMMAS = {
     "grazing": "Angles below eps change the number of eigenvalues below a threshold only if it is moved by a bound.",
     "form": "<v, (1 - P) v> is the sum of integrals over rays that are reflected once, and several times.",
     "residual": "|(1 - P - r) v|^2 is the integral of a sum over boxes of rays.",
+    "chords": "A ray keeps its angle s with a focusing arc, and leaves it in the direction 2 k s - theta.",
+    "intervals": "<v, P v> and |(1 - P - r) v|^2 are sums over intervals: values in the middle and slopes in balls.",
     "mixtures": "Mixtures with specular reflection, retroreflection and Lambert's law keep the eigenfunctions.",
     "powers": "The Henyey-Greenstein law has the eigenvalue g^l on the Legendre polynomial of degree l.",
     "Temple": "With one eigenvalue below nu, it is at least q - r^2/(nu - q) for the quotient q and the residual r.",
 }
-USED = {"powers": ("mixtures", "powers"), "dispersing arcs": tuple(name for name in LEMMAS if name != "powers")}
+USED = {
+    "powers": ("mixtures", "powers"),
+    "dispersing arcs": ("bins", "next arc", "alternation", "grazing", "form", "residual", "mixtures", "Temple"),
+    "focusing arcs": ("bins", "grazing", "mixtures", "Temple", "chords", "intervals"),
+}
 
 
 @dataclass(frozen=True)

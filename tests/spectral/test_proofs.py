@@ -125,11 +125,8 @@ def test_the_residual_is_that_of_quadrature():
 def test_eigenvalues_are_counted(proof):
     """Odd ones of curvature 1: 0.3425 and 0.871; even ones: 0 and 0.716."""
     law, bins = Bumps(exact("1"), {}), proof.certificate["bins"]
-    assert [law.count(bins, True, 1, exact(text))[0] for text in ("0.2", "0.55")] == [0, 1]
-    assert [law.count(bins, False, 1, exact(text))[0] for text in ("0.2", "0.55")] == [1, 1]
-    found, moved = law.count(bins, True, 1, exact("0.55"))
-    assert found == 1
-    assert 0.54 < float(moved) < 0.55
+    assert [law.count(bins, True, 1, exact(text)) for text in ("0.2", "0.55")] == [0, 1]
+    assert [law.count(bins, False, 1, exact(text)) for text in ("0.2", "0.55")] == [1, 1]
     with pytest.raises(Refused):
         law.count(bins, True, 1, exact("0.99"))
 
@@ -244,7 +241,7 @@ def test_a_saved_certificate_is_checked_without_asperity(tmp_path):
 @pytest.mark.parametrize(
     "law",
     [
-        ker.WallLaw(geo.focusing_arcs(0.5)), ker.WallLaw(geo.triangular_teeth(0.5)),
+        ker.WallLaw(geo.focusing_arcs(0.5)) ** 2, ker.WallLaw(geo.triangular_teeth(0.5)),
         HG(0.5) @ ker.WallLaw(geo.dispersing_arcs(1.0)),
         0.5 * HG(0.5) + 0.5 * HG(0.2), 0.5 * bumps(1.0) + 0.5 * HG(0.2).in_specular_frame(),
     ],
