@@ -84,9 +84,10 @@ def prove_gap(law: Law, width: float = 1e-4) -> Proof:
     Parameters
     ----------
     law : Law
-        The law of ``dispersing_arcs`` of a curvature below sqrt(2) or the Henyey-Greenstein law, in either convention,
-        or a mixture with specular reflection, retroreflection and Lambert's law. Weights, curvatures and mean cosines
-        are known to 2^-52 of themselves: the theorem holds of 1/3 as of the double beside it.
+        The law of ``dispersing_arcs`` of a curvature below sqrt(2), of ``focusing_arcs`` of a half angle below pi/2 or
+        the Henyey-Greenstein law, in either convention, or a mixture with specular reflection, retroreflection and
+        Lambert's law. Weights, curvatures, half angles and mean cosines are known to 2^-52 of themselves: the theorem
+        holds of 1/3 as of the double beside it.
     width : float
         The width of the interval relative to the gap, at most. One core takes about a minute for
         1e-4 and several for 1e-5.
