@@ -50,6 +50,7 @@ def proof():
     [
         HG(0.5), HG(-0.5), HG(0.5).in_specular_frame(), DIFFUSE, ker.maxwell(0.3),
         0.3 * MIRROR + 0.7 * HG(0.5), 0.2 * RETRO + 0.8 * HG(-0.5), (0.2 * RETRO + 0.8 * HG(-0.5)).in_specular_frame(),
+        (0.3 * MIRROR + 0.7 * HG(0.5)).in_specular_frame(),
         0.1 * RETRO + 0.2 * MIRROR + 0.3 * DIFFUSE + 0.4 * HG(0.9),
     ],
     ids=repr,
