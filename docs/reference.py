@@ -93,6 +93,7 @@ FOLDERS = {"asperity.geometry.WALLS": "geometry.walls"}
 STORY = (
     "a_wall_and_its_law",
     "a_gap_with_its_error",
+    "a_proved_gap",
     "a_measured_profile",
     "a_disk",
     "a_granular_collision",

@@ -27,8 +27,8 @@ def described(law: Law) -> tuple[Law, dict[str, Any]]:
     ideal = ("specular", "retroreflection") if specular_frame else ("retroreflection", "specular")
     weights, base = dict.fromkeys(("law", "specular", "retroreflection", "lambertian"), 0.0), None
     for word, weight in (words_of(law) or {(law, law, law): 1.0}).items():
-        if not word or word == (specular(),):
-            weights[ideal[len(word)]] += weight
+        if all(one == specular() for one in word):
+            weights[ideal[len(word) % 2]] += weight
         elif word[0] == lambertian():
             weights["lambertian"] += weight
         elif word[1:] == ((specular(),) if specular_frame else ()) and base in (None, word[0]):

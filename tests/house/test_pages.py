@@ -60,6 +60,14 @@ def test_the_profile_keeps_its_units(run):
     assert float(names["found"].tangential) == pytest.approx(1 + entry(names["law"], np.cos), abs=0.02)
 
 
+def test_the_proved_interval_contains_the_estimate(run):
+    names = run("a_proved_gap")
+    low, high = map(float, names["proof"].interval)
+    gap = spec.spectral_gap(names["law"], tolerance=1e-6)
+    assert low - gap.error < gap.value < high + gap.error
+    assert high - low < 1e-4 * high
+
+
 def entry(law, function):
     """3 <cos, P cos>, by sampling."""
     theta = ker.SINE.sample(200_000, np.random.default_rng(3))

@@ -15,6 +15,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError, ProofError
+from asperity.estimates import Estimate
 from asperity.spectral.proofs import checker, search
 from asperity.spectral.proofs.checker import Bumps, Refused, Trial, acb, arb, exact
 
@@ -51,6 +52,7 @@ def proof():
     [
         HG(0.5), HG(-0.5), HG(0.5).in_specular_frame(), DIFFUSE, ker.maxwell(0.3),
         0.3 * MIRROR + 0.7 * HG(0.5), 0.2 * RETRO + 0.8 * HG(-0.5), (0.2 * RETRO + 0.8 * HG(-0.5)).in_specular_frame(),
+        (0.3 * MIRROR + 0.7 * HG(0.5)).in_specular_frame(),
         0.1 * RETRO + 0.2 * MIRROR + 0.3 * DIFFUSE + 0.4 * HG(0.9),
     ],
     ids=repr,
@@ -277,3 +279,18 @@ def test_what_is_not_proved_says_so(monkeypatch):
     monkeypatch.setattr("asperity.spectral.proofs.proof.enclose", refuse)
     with pytest.raises(ProofError, match="not proved: expected a step"):
         spec.prove_gap(HG(0.5))
+
+
+def proved_gap(law):
+    """As on the page of sweeps."""
+    low, high = map(float, spec.prove_gap(law, width=1e-9).interval)
+    return Estimate((low + high) / 2, (high - low) / 2 + 2e-16, "bound", "Temple's inequality in balls")
+
+
+def test_a_sweep_proves_the_gap_at_each_point_and_goes_on(tmp_path):
+    grid, path = {"g": [0.2, 0.5, 1.0]}, tmp_path / "proofs.sweep"
+    table = spec.sweep(HG, grid, proved_gap, checkpoint=path)
+    assert [row.value for row in table.rows] == [pytest.approx(0.8), pytest.approx(0.5), None]
+    assert [row.kind for row in table.rows] == ["bound", "bound", ""]
+    assert table.rows[0].error < 1e-14
+    assert spec.sweep(HG, grid, proved_gap, checkpoint=path).rows[:2] == table.rows[:2]
