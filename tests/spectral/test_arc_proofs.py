@@ -110,7 +110,7 @@ def test_gaps_of_both_conventions_are_proved(half_angle, frame):
         (("parities", 1, "guess"), lambda text: "nan"),
         (("parities", 0, "guess"), lambda text: str(float(text) * 1.2)),
         (("parities", 0, "threshold"), lambda text: "0.95"),
-        (("parities", 1, "threshold"), lambda text: "0.5"),
+        (("parities", 1, "threshold"), lambda text: "0.45"),
         (("bins", 5), lambda text: "1.0"),
         (("bins", 0), lambda text: "0.6"),
         (("edges", 2), lambda text: "1.6"),
