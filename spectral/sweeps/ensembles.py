@@ -250,7 +250,6 @@ class _Matrices:
         return content
 
 
-@reported("mean law")
 def mean_law(
     family: Family,
     realisations: int,
@@ -312,6 +311,7 @@ def mean_law(
     seeds = _seeds(rng, number)
     try:
         with ExitStack() as stack:
+            stack.enter_context(reported("mean law"))
             store = None
             if checkpoint is not None:
                 store = stack.enter_context(Checkpoint(checkpoint, _identity(job, seeds), key=key))

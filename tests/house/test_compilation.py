@@ -117,7 +117,8 @@ def test_a_terminal_shows_that_functions_are_compiled(tmp_path, module):
     command = f"import sys; sys.path[:0] = {[str(SOURCE.parent), str(tmp_path)]}; import doubling; doubling.twice(1.0)"
     shown = []
     for _ in range(2):
-        done = subprocess.run([sys.executable, "-c", command], stderr=writer, timeout=300)
+        heard = os.environ | {"ASPERITY_QUIET": ""}
+        done = subprocess.run([sys.executable, "-c", command], stderr=writer, timeout=300, env=heard)
         assert done.returncode == 0
         os.write(writer, b"end\n")
         text = ""
