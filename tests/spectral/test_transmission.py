@@ -320,7 +320,7 @@ def test_laws_that_keep_functions_of_all_degrees_are_left_to_flights():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"law": "diffuse"}, "law: expected a law"),
+        ({"law": "diffuse"}, "law: expected a Law"),
         ({"length": 0.0}, r"length: expected a number in \(0, "),
         ({"length": -1.0}, r"length: expected a number in \(0, "),
         ({"length": math.inf}, "length: expected finite"),
@@ -332,7 +332,7 @@ def test_laws_that_keep_functions_of_all_degrees_are_left_to_flights():
         ({"section": "tube", "law": ker.maxwell(0.001)}, "diffuse fraction of at least 0.01"),
         ({"law": 2.0 * ker.lambertian()}, "weights"),
         ({"law": 0.5 * ker.HemisphereLaw(ARCS), "section": "tube"}, "weights"),
-        ({"law": ker.CollisionLaw(ARCS, geo.Disk())}, "law: expected a law"),
+        ({"law": ker.CollisionLaw(ARCS, geo.Disk())}, "law: expected a Law"),
         ({"rng": -1}, "rng: expected"),
     ],
     ids=str,
