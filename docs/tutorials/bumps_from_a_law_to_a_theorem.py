@@ -16,10 +16,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import sympy
 
+from asperity import Estimate, verify
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity import verify
 from asperity.errors import InputError
 from asperity.ledger import selected
 
@@ -47,7 +47,8 @@ law = ker.WallLaw(geo.dispersing_arcs(curvature=1.0))
 outgoing = law.sample(np.full(100_000, 1.0), rng=0)
 spread = 1.96 * np.cos(outgoing).std() / np.sqrt(outgoing.size)
 exact = float(law.apply(np.cos, 1.0))
-print(f"by sampling {np.cos(outgoing).mean():.4f} +- {spread:.4f}, by quadrature {exact:.6f}")
+sampled = Estimate(np.cos(outgoing).mean(), spread, "estimate", "100,000 draws")
+print(f"by sampling {sampled}, by quadrature {exact:.6f}")
 assert abs(np.cos(outgoing).mean() - exact) < 2 * spread
 
 # %%
@@ -134,8 +135,8 @@ plt.show()
 (entry,) = selected(["S1.09"])
 finding = entry.run()
 print(textwrap.fill(f"{entry.statement} {entry.reason}", 88))
-print(textwrap.fill(f"as printed: {finding.wrong}", 88))
-print(textwrap.fill(f"corrected: {finding.right}", 88))
+print(textwrap.fill(f"as printed: {finding.wrong.answer}, {finding.wrong.evidence}", 88))
+print(textwrap.fill(f"corrected: {finding.right.answer}, {finding.right.evidence}", 88))
 assert finding.as_stated
 
 # %%
@@ -157,7 +158,7 @@ s, k = sympy.symbols("s k", real=True)
 integral = sympy.atanh(sympy.sin(s)) - sympy.sin(s)
 integrand = sympy.tan(s) ** 2 * sympy.cos(s)
 verdict = verify(sympy.diff(integral, s), integrand, [s > 0, s < sympy.pi / 2])
-print(verdict)
+print(f"{verdict.answer} by {verdict.evidence}")
 h = sympy.atanh(k / 2) / (k / 2) - 1
 print("2 h =", sympy.series(2 * h, k, 0, 5))
 assert verdict.answer == "proved"
@@ -176,11 +177,11 @@ low, high = proof.interval
 assert float(low) < float(gap) < float(high) < 1.01 * float(low)
 
 # %%
-# The proof is a file. It can be checked by anyone with python-flint and the 210 lines of the checker, without asperity.
+# The proof is a file. It can be checked by anyone with python-flint and the 330 lines of the checker, without asperity.
 # The page on :doc:`proved gaps </theory/proved-gaps>` has the lemmas with their proofs.
 
 path = proof.save(Path(tempfile.mkdtemp()) / "gap.json")
-print(f"{path.stat().st_size} bytes; {spec.check_proof(path)}")
+print(f"{path.stat().st_size} bytes; checked:", *spec.check_proof(path).interval)
 print("lemmas:", ", ".join(name for name, _ in proof.lemmas))
 
 # %%

@@ -12,6 +12,7 @@ translation and spin.
 import matplotlib.pyplot as plt
 import numpy as np
 
+from asperity import Estimate
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
@@ -103,7 +104,8 @@ true = ker.SatelliteLaw(plate, disk, 1e-3)
 found = true.sample(np.tile(before, (4000, 1)), rng=2)
 limit = K.sample(np.tile(before, (200_000, 1)), rng=3)
 spread = 1.96 * found.std(axis=0) / np.sqrt(len(found))
-print("true disk", found.mean(axis=0).round(3), "+-", spread.round(3))
+sampled = zip(found.mean(axis=0), spread, strict=True)
+print("true disk", *(Estimate(*pair, "estimate", "4000 collisions") for pair in sampled))
 print("law      ", limit.mean(axis=0).round(3))
 assert np.all(abs(found.mean(axis=0) - limit.mean(axis=0)) < 2 * spread)
 

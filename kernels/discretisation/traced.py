@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats
+from ...core.checks import Floats, check_memory
 from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
@@ -160,6 +160,9 @@ class _Integrator:
 
         The matrix with the least error is returned, because an interrupted stage may increase the error.
         """
+        # expectations at the nodes of the first panels, and a copy when panels are added
+        values = 2 * (len(self.edges) - 1) * (len(NODES) + 1) * self.basis.size
+        check_memory("basis", f"quadrature of rays in {self.basis!r}", values)
         self._add_panels(self.edges[:-1], self.edges[1:])
         stage = FIRST_STAGE
         while True:

@@ -8,9 +8,11 @@ import json
 import sys
 from itertools import pairwise
 
-from flint import acb, arb, ctx
+from flint import acb, acb_poly, arb, arb_poly, ctx
 
-PI, UNIT, ZERO, ONE = arb.pi(), acb(0, 1), arb(0), arb(1)
+UNIT, ZERO, ONE = acb(0, 1), arb(0), arb(1)
+with ctx.workprec(512):
+    PI = arb.pi()
 
 
 class Refused(Exception):
@@ -35,6 +37,19 @@ def spread(values):
     """From the least to the greatest number of some balls; of what is not finite nothing is known."""
     finite = all(x.is_finite() for x in values)
     return ball(min(x.lower() for x in values), max(x.upper() for x in values)) if finite else ZERO / 0
+
+
+def clipped(t, a, b):
+    """The point of [a, b] that is nearest to t."""
+    ends = zip((t.lower(), t.upper()), (a.lower(), a.upper()), (b.lower(), b.upper()), strict=True)
+    return ball(*(min(max(x, low), high) for x, low, high in ends))
+
+
+def top(lines, t):
+    """The greatest of some linear functions at t, and the slopes that it may have."""
+    values = [slope * t + offset for slope, offset in lines]
+    most = ball(max(x.lower() for x in values), max(x.upper() for x in values))
+    return most, spread([slope for (slope, _), x in zip(lines, values, strict=True) if not x < most])
 
 
 def increasing(numbers):
@@ -86,6 +101,11 @@ def negative_pivots(matrix):
     return negative
 
 
+def primitive(p, n):
+    """The polynomial q for which q(t) e^(i t/n) has the derivative p(t) e^(i t/n)."""
+    return UNIT * n * (primitive(p.derivative(), n) - p) if len(p) else acb_poly()
+
+
 class Trial:
     """v = c0 cos(m theta) + c1 sin((m + 1) theta) + c2 cos((m + 2) theta) + ..., m = 1 if odd, or 0, less its mean."""
 
@@ -111,15 +131,87 @@ class Trial:
         return (at(down, u) / glance - at(up, u) * glance) / 2
 
 
-class Bumps:
+class Pieces:
+    """v, a polynomial of t - c between edges up to pi/2, c their middle, less its mean; even or odd about pi/2."""
+
+    def __init__(self, edges, coefficients, odd):
+        ends, self.odd, self.waves = [ZERO, *map(arb, edges), PI / 2], odd, {}
+        demand(increasing(ends) and len(coefficients) == len(ends) - 1, "increasing edges with a polynomial between")
+        pieces = zip(pairwise(ends), coefficients, strict=True)
+        self.half = [(a, b, arb(((a + b) / 2).mid()), arb_poly([arb(x) for x in p])) for (a, b), p in pieces]
+        if not odd:
+            mean = self.integral(lambda p: p)
+            self.half = [(a, b, c, p - mean) for a, b, c, p in self.half]
+        self.norm = self.integral(lambda p: p * p)
+        mirror = arb_poly([0, -1])
+        self.all = self.half + [(PI - b, PI - a, PI - c, (-1 if odd else 1) * p(mirror)) for a, b, c, p in self.half]
+        self.largest = max(abs(self(ball(a, b))).upper() for a, b, *_ in self.half)
+
+    def integral(self, function):
+        """Integral of a function of v times sin(theta) up to pi/2."""
+        waves = [(a, b, c, primitive(function(p), 1)) for a, b, c, p in self.half]
+        return sum(((UNIT * b).exp() * q(b - c) - (UNIT * a).exp() * q(a - c) for a, b, c, q in waves), acb(0)).imag
+
+    def wave(self, n, low, high):
+        """Integral of v(x) e^(i x/n) from low to high, nothing if these are in the wrong order."""
+        if n not in self.waves:
+            self.waves[n] = [primitive(p, n) for *_, p in self.all]
+        # between the middles of the ends, because errors would grow with the powers of n
+        first, last = arb(low.mid()), arb(high.mid())
+        rest = (low - first + high - last) * self.largest
+        total, last = acb(rest, rest), max(first, last)
+        for (a, b, c, _), q in zip(self.all, self.waves[n], strict=True):
+            if not (b < first or a > last):
+                x, y = clipped(first, a, b), clipped(last, a, b)
+                total += (UNIT * y / n).exp() * q(y - c) - (UNIT * x / n).exp() * q(x - c)
+        return total
+
+    def __call__(self, t):
+        """Value by the mean value theorem."""
+        found = []
+        for a, b, c, p in self.all:
+            if not (t < a or t > b):
+                x = clipped(t, a, b)
+                middle = arb(x.mid())
+                found.append(p(middle - c) + p.derivative()(x - c) * (x - middle))
+        return spread(found)
+
+
+class Wall:
+    """A law whose eigenvalues are counted by the least density and the grazing angles that subclasses give."""
+
+    def count(self, angles, odd, sign, threshold):
+        """At most how many eigenvalues of 1 - sign P lie below the threshold (lemmas 1 and 4)."""
+        half = [arb(t) for t in angles]
+        demand(increasing([ZERO, *half, PI / 2]), "increasing angles of bins")
+        edges, n, fold = [*half, PI / 2, *(PI - t for t in reversed(half))], len(half), -1 if odd else 1
+        bins = [ball(x, y) for x, y in pairwise(edges)]
+        weight = [(x.cos() - y.cos()) / 2 for x, y in pairwise(edges)]
+        # densities between bins on one side and on both sides, symmetric; exact, as the factorisation needs
+        sides = (bins, bins[::-1])
+        near, far = ([[arb(self.least(bins[i], b).lower()) for b in side[: i + 1]] for i in range(n)] for side in sides)
+        once, block, entering = self.grazing(half[0])
+        share, matrix = once - block - threshold, []
+        demand(share > 0 and share <= 1, "a positive threshold below the chance to leave grazing angles")
+        for i in range(n):
+            row = sum((weight[j] * (near[max(i, j)][min(i, j)] + far[max(i, j)][min(i, j)]) for j in range(n)), ZERO)
+            row -= arb(((1 / share - 1) * entering(bins[i])).upper()) + threshold
+            demand(row > 0, "a threshold below the chance to leave each bin")
+            folded = [near[i][j] + fold * far[i][j] for j in range(i + 1)]
+            matrix.append([-sign * (weight[i] * weight[j]).sqrt() * x for j, x in enumerate(folded)])
+            matrix[i][i] += row
+        return negative_pivots(matrix)
+
+
+class Bumps(Wall):
     """Dispersing arcs of curvature K and period 1, in the specular frame.
 
     A ray of direction theta that meets the point of slope -psi leaves in the direction a = theta - 2 psi, at the angle
     s = theta - psi with the arc.
     """
 
-    def __init__(self, curvature):
-        self.K, self.R, self.steepest = curvature, 1 / curvature, (curvature / 2).asin()
+    def __init__(self, curvature, effort):
+        self.K, self.R, self.steepest, self.effort = curvature, 1 / curvature, (curvature / 2).asin(), effort
         demand(self.K > 0 and self.K * self.K < 2, "a curvature between 0 and sqrt(2)")
 
     def hits(self, s, a):
@@ -190,8 +282,9 @@ class Bumps:
             last = unit((PI + theta - a) / 2)
         return (total + v.swept(last * last / unit(theta), last) - v.swept(first * first / unit(theta), first)) / size
 
-    def form_and_residual(self, v, sign, guess, first, bits):
+    def form_and_residual(self, v, sign, guess):
         """<v, (1 - sign P) v> and a bound of |(1 - sign P - guess) v|^2 (lemma 6)."""
+        first, bits = arb(self.effort["first"]), self.effort["bits"]
         demand(first > 0 and first < self.steepest, "a first angle below the steepest slope")
         kinks, off = (self.steepest, 3 * self.steepest, PI - 3 * self.steepest), ONE / 2**46
         cuts = sorted((x for x in (first, *kinks, PI / 2) if not x > PI / 2), key=lambda x: float(x.mid()))
@@ -212,27 +305,6 @@ class Bumps:
         form = guess * v.norm + total.imag + ball(-most.upper(), most.upper())
         return form, total.real + up_to(most * (2 + abs(guess)))
 
-    def count(self, angles, odd, sign, threshold):
-        """At most how many eigenvalues of 1 - sign P lie below which number (lemmas 1 and 4)."""
-        half = [arb(t) for t in angles]
-        demand(increasing([ZERO, *half, PI / 2]), "increasing angles of bins")
-        edges, n, fold = [*half, PI / 2, *(PI - t for t in reversed(half))], len(half), -1 if odd else 1
-        bins = [ball(x, y) for x, y in pairwise(edges)]
-        weight = [(x.cos() - y.cos()) / 2 for x, y in pairwise(edges)]
-        # densities between bins on one side and on both sides, both symmetric
-        near, far = ([[self.least(bins[i], b) for b in side[: i + 1]] for i in range(n)] for side in (bins, bins[::-1]))
-        matrix = []
-        for i in range(n):
-            row = sum((weight[j] * (near[max(i, j)][min(i, j)] + far[max(i, j)][min(i, j)]) for j in range(n)), ZERO)
-            demand(row > threshold, "a threshold below the chance to leave each bin")
-            folded = [near[i][j] + fold * far[i][j] for j in range(i + 1)]
-            matrix.append([-sign * (weight[i] * weight[j]).sqrt() * x for j, x in enumerate(folded)])
-            matrix[i][i] += row - threshold
-        once, block, entering = self.grazing(half[0])
-        share = once - block - threshold
-        demand(share > 0 and share <= 1, "a positive threshold below the chance to leave grazing angles")
-        return negative_pivots(matrix), threshold - (1 / share - 1) * entering
-
     def least(self, theta, eta):
         """The least density, from bin to bin, of rays that are certainly reflected once."""
         s, psi = (theta + eta) / 2, (theta - eta) / 2
@@ -247,23 +319,122 @@ class Bumps:
         small = small and self.K * eps.sin() < 1 - (PI / 4).cos()
         demand(small, "a first bin nearer to 0")
         block = self.R * eps / (2 * ratio) * ((width / eps).log() + ONE / 2).sqrt()
-        return 1 - self.R * (eps / 2).tan(), block, self.R * eps / 2 * (1 if reach < PI / 2 else 2 / reach.sin())
+        entering = self.R * eps / 2 * (1 if reach < PI / 2 else 2 / reach.sin())
+        return 1 - self.R * (eps / 2).tan(), block, lambda _: entering
+
+
+class FocusingArcs(Wall):
+    """Arcs of half angle alpha and period 1, in the specular frame.
+
+    A ray of direction theta makes the same angle s with the arc at each reflection, and after k of them it leaves in
+    the direction 2 k s - theta (lemma 10).
+    """
+
+    def __init__(self, half_angle, effort):
+        self.alpha, self.R, self.effort = half_angle, 1 / (2 * half_angle.sin()), effort
+        demand(half_angle > 0 and half_angle < PI / 2, "a half angle between 0 and pi/2")
+
+    def form_and_residual(self, v, sign, guess):
+        """<v, (1 - sign P) v>, and a bound of |(1 - sign P - guess) v|^2, by intervals of theta (lemma 11)."""
+        parts, most, alpha = self.effort["parts"], self.effort["reflections"], self.alpha
+        demand(parts > 0 and most > 0, "at least one interval and one reflection")
+        self.strips = []
+        for n in (arb(2 * k) for k in range(1, most + 1)):
+            lower = (n - 1, -n * alpha), (-n - 1, n * alpha), (-1 / (n + 1), n * alpha / (n + 1))
+            self.strips.append((n, lower, ((-1 / (n - 1), -n * alpha / (n - 1)), (ONE, -n * PI / 2))))
+        scale, fold, paired, square = sign * self.R, -1 if v.odd else 1, ZERO, ZERO
+        for a, b, c, p in v.half:
+            h, derivative = (b - a) / parts, p.derivative()
+            for low, high in ((a + i * h, a + (i + 1) * h) for i in range(parts)):
+                theta, t = ball(low, high), (low + high) / 2
+                one, two = self.one_side(v, theta, t), self.one_side(v, PI - theta, PI - t)
+                after, by_theta, rest = (x + y * fold for x, y in zip(one, (two[0], -two[1], two[2]), strict=True))
+                off, own, slope = theta - t, p(t - c), derivative(theta - c)
+                wide = own + slope * off
+                bend = slope * (after + by_theta * off) + wide * by_theta
+                # to the second order, because the interval is symmetric about its middle
+                paired += h * (own * after + wide * rest) + (bend - arb(bend.mid())) * h * h / 4
+                missed = (1 - guess) * own * t.sin() - scale * (after + rest)
+                change = (1 - guess) * (slope * theta.sin() + wide * theta.cos()) - scale * by_theta
+                demand(low > 0 or rest == 0, "a first interval out of reach of rays with many reflections")
+                missed = (missed + change * off) / theta.sin() if low > 0 else change / theta.sinc()
+                square += missed * missed * (low.cos() - high.cos())
+        return v.norm - scale * paired, square
+
+    def one_side(self, v, theta, t):
+        """Integral of v(x) sin(s) ds over the rays with s < pi/2: at t, its slope, and that of many reflections."""
+        value, slope, off = ZERO, ZERO, theta - t
+        for n, lower, upper in self.strips:
+            # the ends of the outgoing angles x = n s - theta
+            (low, falls), (high, rises) = top(lower, theta), (-x for x in top(upper, theta))
+            if high < low:
+                break
+            if not high > low:
+                high, rises = spread([high, low]), spread([rises, falls])
+            wave = (UNIT * t / n).exp() / n * v.wave(n, top(lower, t)[0], -top(upper, t)[0])
+            value += wave.imag
+            slope += wave.real / n + off * v.largest * (abs(rises) + abs(falls) + (high - low) / n) / (n * n)
+            slope += sum(rate * v(x) * ((x + theta) / n).sin() / n for x, rate in ((high, rises), (low, -falls)))
+        s = (self.alpha + theta) / (2 * len(self.strips) + 1)
+        mass = clipped((theta - self.alpha).cos() - s.cos(), ZERO, ONE)
+        return value, slope, v(self.alpha + ball(-s.upper(), s.upper())) * mass
+
+    def least(self, theta, eta):
+        """The least density from bin to bin (lemma 10)."""
+        views, density = ((theta, eta), (PI - theta, PI - eta)), ZERO
+        for side, view in enumerate(views):
+            for k in range(1 + side, 99):
+                # the rays of one reflection are those of both sides
+                if not all(
+                    self.returns(k, *one) and self.returns(k, *one[::-1]) for one in (views if k == 1 else (view,))
+                ):
+                    break
+                density += arb((sum(view) / (2 * k)).sin().lower()) / k
+        return self.R * density / (arb(theta.sin().upper()) * arb(eta.sin().upper()))
+
+    def returns(self, k, x, y):
+        """Whether surely |x - alpha| < s = (x + y)/(2 k)."""
+        return y - (2 * k - 1) * x + 2 * k * self.alpha > 0 and y + (2 * k + 1) * x - 2 * k * self.alpha > 0
+
+    def grazing(self, eps):
+        """As of bumps: all rays count, and none leads from grazing angles to grazing angles (lemma 4)."""
+        demand(2 * eps < self.alpha and 2 * eps < PI - 2 * self.alpha, "a first bin nearer to 0")
+
+        def entering(theta):
+            seen = [x for x in (theta, PI - theta) if not (x > 2 * self.alpha + eps or x < 2 * self.alpha - 3 * eps)]
+            return len(seen) * self.R * eps / (2 * arb(theta.sin().lower()))
+
+        return ONE, ZERO, entering
 
 
 def of_bumps(curvature, certificate, signs):
     """Bounds of the least eigenvalues of 1 - sign P on odd functions, and on even ones of mean 0 (lemma 9)."""
-    law, odd = Bumps(exact(curvature)), certificate["odd"]
-    found, above = law.count(certificate["bins"], odd, signs[odd], exact(certificate["threshold"]))
-    demand(found <= (1 if odd else 2), "one eigenvalue of the trial function's parity below the threshold")
-    found, other = law.count(certificate["bins"], not odd, signs[not odd], exact(certificate["other"]))
+    law, odd = Bumps(exact(curvature), certificate["effort"]), certificate["odd"]
+    above, other = exact(certificate["threshold"]), exact(certificate["other"])
+    found = law.count(certificate["bins"], not odd, signs[not odd], other)
     demand(found <= (1 if odd else 0), "no eigenvalue of the other parity below its threshold")
     v, guess = Trial(certificate["trial"], odd), arb(certificate["guess"])
-    form, square = law.form_and_residual(v, signs[odd], guess, arb(certificate["first"]), certificate["bits"])
+    return {odd: temple(law, v, signs[odd], guess, certificate["bins"], above), not odd: (other, arb(2))}
+
+
+def of_focusing_arcs(half_angle, certificate, signs):
+    """As of bumps, with a trial function of each parity."""
+    law, values = FocusingArcs(exact(half_angle), certificate["effort"]), {}
+    for odd, one in zip((False, True), certificate["parities"], strict=True):
+        v, above = Pieces(certificate["edges"], one["trial"], odd), exact(one["threshold"])
+        values[odd] = temple(law, v, signs[odd], arb(one["guess"]), certificate["bins"], above)
+    return values
+
+
+def temple(law, v, sign, guess, bins, above):
+    """Bounds of the least eigenvalue of 1 - sign P on functions of the parity of v, of mean 0 (lemma 9)."""
+    found = law.count(bins, v.odd, sign, above)
+    demand(found <= (1 if v.odd else 2), "one eigenvalue of the trial function's parity below the threshold")
+    form, square = law.form_and_residual(v, sign, guess)
     ends, square = [arb(x) for x in ((form / v.norm).lower(), (form / v.norm).upper())], arb((square / v.norm).upper())
     demand(above > ends[1] and square.is_finite(), "a quotient below the next eigenvalue, and a finite residual")
     # concave in the quotient, so least at an end
-    least = min((x - square / (above - x)).lower() for x in ends)
-    return {odd: (least, ends[1]), not odd: (other, arb(2))}
+    return min((x - square / (above - x)).lower() for x in ends), ends[1]
 
 
 def enclose(certificate):
@@ -276,7 +447,8 @@ def enclose(certificate):
         sorted(weights) == names and all(w >= 0 for w in weights.values()) and sum(weights.values()).contains(1),
         "weights that sum to 1",
     )
-    number = {"powers": "mean_cosine", "dispersing arcs": "curvature"}.get(law["family"])
+    numbers = {"powers": "mean_cosine", "dispersing arcs": "curvature", "focusing arcs": "half_angle"}
+    number = numbers.get(law["family"])
     demand(sorted(law) == sorted(["family", str(number)]), "a known family and its number")
     signs = {True: 1 if frame == "specular" else -1, False: 1}
     if law["family"] == "powers":
@@ -286,7 +458,8 @@ def enclose(certificate):
         tops = {odd: -signs[odd] * g if odd else g * g for odd in signs}
         values = {odd: [1 - max(x, ZERO) for x in (top.upper(), top.lower())] for odd, top in tops.items()}
     else:
-        values = of_bumps(law[number], certificate, signs)
+        bounds = of_bumps if number == "curvature" else of_focusing_arcs
+        values = bounds(law[number], certificate, signs)
     # a mixture (lemma 7)
     plane = {odd: weights["specular"] + (-1 if odd else 1) * weights["retroreflection"] for odd in signs}
     mixed = [[1 - signs[odd] * plane[odd] - weights["law"] * (1 - x) for x in values[odd]] for odd in signs]

@@ -9,7 +9,7 @@ import numpy as np
 from ...core.checks import instance
 from ...core.errors import InputError
 from ...geometry import Arc, dispersing_arcs
-from ...kernels import Law, WallLaw, lambertian, specular
+from ...kernels import CircularArcLaw, Law, WallLaw, lambertian, specular
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import words_of
 
@@ -48,6 +48,7 @@ def in_words(content: dict[str, Any]) -> str:
 
     name = {
         "dispersing arcs": "dispersing arcs of curvature {curvature}",
+        "focusing arcs": "focusing arcs of half angle {half_angle}",
         "powers": "Henyey-Greenstein of mean cosine {mean_cosine}",
     }
     text = name[content["law"]["family"]].format_map({key: number(given) for key, given in content["law"].items()})
@@ -64,6 +65,8 @@ def _family(law: Law, whole: Law) -> dict[str, Any]:
         return {"family": "powers", "mean_cosine": _with_radius(0.0)}
     if isinstance(law, HenyeyGreensteinLaw):
         return {"family": "powers", "mean_cosine": _with_radius(law.g)}
+    if isinstance(law, CircularArcLaw):
+        return {"family": "focusing arcs", "half_angle": _with_radius(law.half_angle)}
     if isinstance(law, WallLaw) and (curvature := _curvature(law)) is not None:
         return {"family": "dispersing arcs", "curvature": _with_radius(curvature)}
     raise InputError(_expected(whole))
@@ -93,6 +96,7 @@ def _with_radius(number: float) -> list[str]:
 
 def _expected(law: Law) -> str:
     return (
-        "law: expected the law of ker.WallLaw(geo.dispersing_arcs(K)) or ker.henyey_greenstein(g), in either "
-        f"convention, or its mixture with specular(), retroreflection() and lambertian(), got {law!r}"
+        "law: expected the law of ker.WallLaw(wall) of geo.dispersing_arcs(K) or geo.focusing_arcs(xi), or "
+        "ker.henyey_greenstein(g), in either convention, or its mixture with specular(), retroreflection() and "
+        f"lambertian(), got {law!r}"
     )

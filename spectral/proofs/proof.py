@@ -29,11 +29,26 @@ LEMMAS = {
     "grazing": "Angles below eps change the number of eigenvalues below a threshold only if it is moved by a bound.",
     "law applied": "P v is an elementary term and an integral of an analytic function over rays reflected twice.",
     "form and residual": "<v, (1 - P) v> and |(1 - P - g) v|^2 are integrals of P v, analytic between known angles.",
+    "chords": "A ray keeps its angle s with a focusing arc, and leaves it in the direction 2 k s - theta.",
+    "intervals": "<v, P v> and |(1 - P - r) v|^2 are sums over intervals: values in the middle and slopes in balls.",
     "mixtures": "Mixtures with specular reflection, retroreflection and Lambert's law keep the eigenfunctions.",
     "powers": "The Henyey-Greenstein law has the eigenvalue g^l on the Legendre polynomial of degree l.",
     "Temple": "With one eigenvalue below nu, it is at least q - r^2/(nu - q) for the quotient q and the residual r.",
 }
-USED = {"powers": ("mixtures", "powers"), "dispersing arcs": tuple(name for name in LEMMAS if name != "powers")}
+USED = {
+    "powers": ("mixtures", "powers"),
+    "dispersing arcs": (
+        "bins",
+        "next arc",
+        "two reflections",
+        "grazing",
+        "law applied",
+        "form and residual",
+        "mixtures",
+        "Temple",
+    ),
+    "focusing arcs": ("bins", "grazing", "mixtures", "Temple", "chords", "intervals"),
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -77,9 +92,10 @@ def prove_gap(law: Law, width: float = 1e-4) -> Proof:
     Parameters
     ----------
     law : Law
-        The law of ``dispersing_arcs`` of a curvature below sqrt(2) or the Henyey-Greenstein law, in either convention,
-        or a mixture with specular reflection, retroreflection and Lambert's law. Weights, curvatures and mean cosines
-        are known to 2^-52 of themselves: the theorem holds of 1/3 as of the double beside it.
+        The law of ``dispersing_arcs`` of a curvature below sqrt(2), of ``focusing_arcs`` of a half angle below pi/2 or
+        the Henyey-Greenstein law, in either convention, or a mixture with specular reflection, retroreflection and
+        Lambert's law. Weights, curvatures, half angles and mean cosines are known to 2^-52 of themselves: the theorem
+        holds of 1/3 as of the double beside it.
     width : float
         The width of the interval relative to the gap, at most. One core takes ten to thirty
         seconds for 1e-5.

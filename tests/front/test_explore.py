@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.core.estimates import compact
 from asperity.errors import InputError
 from asperity.explore.answers import Answer, answers_to, first_answer, histogram, largest_gap
 from asperity.explore.background import GONE, Background
@@ -405,7 +404,7 @@ def test_accommodation_and_resistance_stand_beside_the_gap_with_their_errors():
         (resistance_from(momentum), ker.resistance(law, 1e-4)),
     ):  # fmt: skip
         assert abs(mine.value - yours.value) <= mine.error + yours.error
-        assert f"<b>{compact(mine)}</b>" in text
+        assert f"<b>{mine}</b>" in text
     assert text.index("<td>gap") < text.index("<td>accommodation") < text.index("<td>kernel")
 
 

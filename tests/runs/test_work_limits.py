@@ -116,6 +116,9 @@ def test_what_exceeds_the_memory_is_refused_with_its_size(monkeypatch: pytest.Mo
         )
         with pytest.raises(InputError, match=words):
             ker.discretise(WALL, ker.Bins(size))
+    # rules of fifteen nodes on each bin, twice; the wall is mirror-symmetric
+    with pytest.raises(InputError, match=r"quadrature of rays in Bins\(5000\) takes 3\.2 GB"):
+        ker.discretise(WALL, ker.Bins(5000), "quadrature")
 
 
 def test_a_limit_of_the_process_counts_as_its_memory() -> None:

@@ -244,7 +244,7 @@ def text_of(title: str, facts: Mapping[str, str]) -> str:
     Examples
     --------
     >>> text_of("Gap 0.5", {"kind": "bound", "more": ".method"}), text_of("Gap 0.5", {"kind": 120 * "*"})[:21]
-    ('Gap 0.5 (kind bound; more .method)', 'Gap 0.5\\nkind      ****')
+    ('Gap 0.5 (kind bound; more .method)', 'Gap 0.5\\nkind      ***')
     """
     known = {name: value for name, value in facts.items() if value}
     line = f"{title} ({'; '.join(f'{name} {value}' for name, value in known.items())})"

@@ -253,13 +253,12 @@ class Page:
         """Show the last valid wall, with its vertices unless others are awaited, and an answer or "computing"."""
         self._due = None
         answer = answer or Answer("computing")
-        # all at once, and the wall last, so that no old answer is under a new wall even for a moment
-        with pn.io.hold():
-            self.table.object = answer_as_html(answer)
-            for figure in (self.kernel, self.spectrum, self.collision):
-                figure.show(answer)
-            if self._picture is not None:
-                self.wall_figure.show(self._picture, dragged=self._dragging or self._awaited)
+        self.table.object = answer_as_html(answer)
+        for figure in (self.kernel, self.spectrum, self.collision):
+            figure.show(answer)
+        # last, so that no old answer is under a new wall even for a moment: messages arrive one by one
+        if self._picture is not None:
+            self.wall_figure.show(self._picture, dragged=self._dragging or self._awaited)
 
     def collect(self) -> None:
         """Show the results that have come."""
