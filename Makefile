@@ -37,6 +37,8 @@ test-newest: ## run the tests with the newest versions of all dependencies, in .
 	.venv-newest/bin/python -m pip install --quiet --upgrade --upgrade-strategy eager --editable '.[dev]'
 	.venv-newest/bin/python -m pytest --numprocesses auto --dist worksteal
 
+# the tests run the examples
+check: GALLERY := -D plot_gallery=0
 check: format-check lint types docs test-all ## everything a change must pass
 
 format-check: $(DEV)
@@ -49,7 +51,7 @@ types: $(DEV)
 	$(PY) -m mypy
 
 docs: $(DEV) ## build the documentation into docs/_build/html, warnings are errors
-	$(PY) -m sphinx -b html -W --keep-going -q -d docs/_build/doctrees docs docs/_build/html
+	$(PY) -m sphinx -b html -W --keep-going -q $(GALLERY) -d docs/_build/doctrees docs docs/_build/html
 	@echo "documentation: docs/_build/html/index.html"
 
 bench: $(RUN) ## measure everything that is timed, tables and pictures into bench-results/, up to 50 minutes

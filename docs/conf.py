@@ -31,6 +31,8 @@ sys.path.insert(0, str(HERE / "examples"))
 paper_figures = import_module("paper_figures")
 paper_figures.main(generated / "figures")
 (generated / "figures.md").write_text(paper_figures.page(), encoding="utf-8")
+# pages of the gallery show them
+import_module("thumbnails").write_thumbnails(generated / "thumbnails")
 # docs/api/index.md lists the pages of the tasks
 reference.write_pages(HERE / "api" / "generated")
 
@@ -50,7 +52,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = [
-    *("_build", "_templates", "how-to", "examples"),
+    *("_build", "_templates", "tutorials", "how-to", "examples"),
     *("generated/*.md", "generated/backreferences", "**/sg_execution_times*", "**/*.ipynb"),
 ]
 templates_path = ["_templates"]
@@ -76,12 +78,12 @@ addresses = {
 }
 intersphinx_mapping = {name: (address, inventories[name]) for name, address in addresses.items()}
 
-# The short examples are executed; the studies take minutes, so that their source is shown only.
+# Tutorials and short examples are executed; the studies take minutes, so that their source is shown only.
 sphinx_gallery_conf = {
-    "examples_dirs": ["how-to", "examples"],
-    "gallery_dirs": ["generated/how-to", "generated/examples"],
-    "filename_pattern": r"/how-to/",
-    "ignore_pattern": r"(gallery|paper_figures|true_disk_pictures)\.py$",
+    "examples_dirs": ["tutorials", "how-to", "examples"],
+    "gallery_dirs": ["generated/tutorials", "generated/how-to", "generated/examples"],
+    "filename_pattern": r"/(tutorials|how-to)/",
+    "ignore_pattern": r"(gallery|front_picture|paper_figures|true_disk_pictures)\.py$",
     "within_subsection_order": "reference.StoryOrder",
     "backreferences_dir": "generated/backreferences",
     "doc_module": ("asperity",),

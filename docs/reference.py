@@ -32,6 +32,10 @@ TASKS = (
     ("disks", "Collide disks", ("geometry.disk", "kernels.collisions", "geometry.collisions", "geometry.tables")),
     ("resistance", "Find the least and greatest resistance", ("kernels.aerodynamics",)),
     ("inverse", "Find a wall for a law", ("kernels.inverse",)),
+    ("proofs", "Prove a gap", ("spectral.proofs",)),
+    ("billiards", "Play billiards and gases", ("kernels.billiards",)),
+    ("positions", "Let the law depend on the position", ("kernels.positions",)),
+    ("moving-walls", "Reflect from walls that move", ("kernels.thermal",)),
     ("work-diagrams", "Measure error against time", ("spectral.work_diagrams",)),
 )
 # Classes that only other objects return or are built upon, by the public name on whose page they are documented: their
@@ -107,7 +111,7 @@ STORY = (
 
 
 class StoryOrder:
-    """Sorts the short examples as STORY, others after them by name; sphinx-gallery takes it by its name."""
+    """Sorts short examples as STORY, tutorials and studies by name; sphinx-gallery takes it by its name."""
 
     def __init__(self, folder: object) -> None:
         self.folder = folder

@@ -1,4 +1,14 @@
-"""Walls and disks, the tracing of rays, and the collision of a disk with a rough wall."""
+"""Walls and disks, the tracing of rays, and the collision of a disk with a rough wall.
+
+- Make a wall: WALLS, HeightCorrelation, SelfAffine, Wall, dispersing_arcs, double_parabola, elliptical_arcs, flat,
+  focusing_arcs, join_walls, koch, load_wall, mushrooms, notched_angle, random_wall, rectangular_teeth,
+  triangular_teeth, tube, wall_from_text, Profile, read_profile, Arc, Bezier, Segment.
+- Trace rays: MushroomGenerations, Status, billiard_map, nested_reflection, trace, trajectory.
+- Draw walls: draw_wall.
+- Collide disks: Disk, InnerDisk, RollingCharts, SatelliteDisk, ConfigurationSpace, DiskStatus, collide,
+  collide_cylinder, collide_modified, collide_pair, collide_rim, collision_path, good_fraction, shadow, Container.
+- Verify a formula, and the formulas of a disk: verify, symbolic.
+"""
 
 from __future__ import annotations
 

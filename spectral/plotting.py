@@ -77,7 +77,7 @@ def draw_eigenfunctions(
         # the sign is chosen positive at small angles
         ax.plot(theta, np.sign(values[0] or 1.0) * values, label=label)
     ax.axhline(0.0, color="0.6", linewidth=0.8, zorder=1)
-    ax.set_xlabel("incoming angle θ")
+    ax.set_xlabel("incoming angle θ (rad)")
     ax.set_ylabel("eigenfunction")
     ax.set_title(f"Eigenfunctions, {convention} convention", fontsize=11)
     ax.legend(frameon=False, title="eigenvalue")

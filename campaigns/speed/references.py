@@ -1,9 +1,10 @@
 """Make src/asperity/bench/standard_references.json: ``python -m campaigns.speed.references [PROBLEM...]``.
 
 The benchmark's references come from this script, not from the benchmark's own runs. Polygons that resolve into beams
-are exact and confirmed by a second method. Arcs use `exact_rows`, and grazing limits use closed forms. All other walls
-are sampled by 16 independent scrambled Sobol sequences, whose spread is the error. A scene takes about a minute of one
-core. Problems are patterns as for ``asperity bench``; other problems in the file are unchanged.
+are exact and confirmed by a second method. Arcs use `exact_rows`, and grazing limits use closed forms. Transmissions
+use Clausing's equation by another rule, or particles. All other walls are sampled by 16 independent scrambled Sobol
+sequences, whose spread is the error. A scene takes about a minute of one core. Problems are patterns as for ``asperity
+bench``; other problems in the file are unchanged.
 """
 
 from __future__ import annotations
@@ -22,19 +23,24 @@ from asperity import kernels as ker
 from asperity.bench.problems import problem_names
 from asperity.bench.quantities.collision import DISK, correlation_of
 from asperity.bench.quantities.matrix import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
+from asperity.bench.quantities.transmission import DIFFUSE, LENGTH
 from asperity.bench.quantities.walls import wall_of
 from asperity.bench.references import FILE
 from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import traced_matrix
 from asperity.kernels.laws.law import sum_of
+from campaigns.errors.transmission import TOGETHER, Case, in_arcs, passed
+from campaigns.judges.clausing_equation import by_trapezoids
 
 from .exact_rows import ArcRow, Atoms, crevice_row, mean_over_angles, tooth_row
 from .reference_eigenvalues import reference_eigenvalue
-from .reference_rays import NETS, Found, mean_and_error, sampled_sums
+from .reference_rays import NETS, SEED, Found, mean_and_error, sampled_sums
 
 # Rays of the sampled references of scenes, and of random walls, for which only a moment is sampled.
 RAYS, RANDOM_RAYS = 2**25, 2**23
+# Particles of the reference of a transmission, two minutes.
+PARTICLES = 2**26
 BASES = {"law": LAW_BASIS, "moment": MOMENT_BASIS, "resistance": RESISTANCE_BASIS}
 # Beams with a larger unresolved part give no reference.
 RESOLVED = 1e-10
@@ -207,6 +213,19 @@ def eta_found(scene: str) -> Found:
     return Found(np.asarray((1.0 + zeta) / (1.0 - zeta)), 0.0, words)
 
 
+def transmission_found(scene: str) -> Found:
+    """The integral equation of diffuse reflection by another rule, or flights with formulas of their own."""
+    if scene in DIFFUSE:
+        value, error = by_trapezoids(DIFFUSE[scene], LENGTH)
+        return Found(np.asarray(value), error, "integral equation by the trapezoidal rule, extrapolated")
+    case = Case(0, scene, ker.WallLaw(wall_of(scene)), in_arcs(1.2), LENGTH)
+    rng = np.random.default_rng([SEED, PARTICLES])
+    value = sum(passed(case, rng) for _ in range(PARTICLES // TOGETHER)) / PARTICLES
+    return Found(
+        np.asarray(value), (value * (1.0 - value) / PARTICLES) ** 0.5, f"{PARTICLES} particles, by their spread"
+    )
+
+
 MAKERS = {
     "law": lambda scene: matrices_of(scene)["law"],
     "moment": entry_of,
@@ -216,6 +235,7 @@ MAKERS = {
     "resistance": resistance_found,
     "distance": distance_found,
     "eta": eta_found,
+    "transmission": transmission_found,
 }
 
 

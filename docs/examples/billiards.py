@@ -8,6 +8,8 @@ a momentum at every flat piece; the exponents are smaller, but not 0. In a circl
 a gas of no-slip disks translation and spin come to equipartition: a third of the energy is in the spins.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/billiards.png"
+
 from __future__ import annotations
 
 import sys

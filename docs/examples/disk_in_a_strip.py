@@ -9,6 +9,8 @@ fits, every orbit that does not leave is periodic. Plates with a real roughness 
 gone.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/disk_in_a_strip.png"
+
 from __future__ import annotations
 
 import math

@@ -7,7 +7,7 @@ A symmetric matrix is that of an exchange of intervals, and pairs of mirrors per
 theorem that every symmetric law is a limit of laws of walls.
 """
 
-# sphinx_gallery_thumbnail_path = "gallery/exchange-hollow.png"
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/exchange_hollow.png"
 from __future__ import annotations
 
 import sys

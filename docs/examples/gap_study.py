@@ -8,6 +8,8 @@ Rayleigh quotient of cos theta. The gaps are those of the specular convention, w
 ``python docs/examples/gap_study.py FOLDER`` prints both tables and draws gaps against h.
 """
 
+# sphinx_gallery_thumbnail_path = "gap-study.png"
+
 from __future__ import annotations
 
 import sys

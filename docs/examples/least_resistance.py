@@ -8,7 +8,7 @@ Plakhov's problem: a convex body tumbles through a thin medium. Roughness change
 right side shows what simple hollows do. Among isosceles triangles the best are a little sharper than a right angle.
 """
 
-# sphinx_gallery_thumbnail_path = "gallery/least-resistance.png"
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/least_resistance.png"
 from __future__ import annotations
 
 import sys

@@ -10,6 +10,8 @@ Maxwell's law, and reflected twice, the wall's gap obeys what theory says of mix
 mean of the two gaps, and 1 - (1 - gap)^2 after two reflections where no eigenvalue has a larger modulus.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/maxwell_or_rough.png"
+
 from __future__ import annotations
 
 from asperity import geometry as geo

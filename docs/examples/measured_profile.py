@@ -10,6 +10,8 @@ height it scatters. Between its samples the profile is a polygon, so that its la
 matrix mixes: the study says so instead of quoting an artefact of the grid.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/measured_profile.png"
+
 from __future__ import annotations
 
 import sys

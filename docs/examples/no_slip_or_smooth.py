@@ -8,6 +8,8 @@ coin depends on the angle and on the foreshortened depth of the teeth, not monot
 1/2, because half of the wall is flat tops.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/no_slip_or_smooth.png"
+
 from __future__ import annotations
 
 import numpy as np

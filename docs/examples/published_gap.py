@@ -7,6 +7,8 @@ The gap of a shallow wall is four times its mean squared slope h, to leading ord
 bumps and for focusing arcs as they get shallower.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/published_gap.png"
+
 from __future__ import annotations
 
 from math import cos, log, sin, tan

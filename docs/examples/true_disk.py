@@ -8,6 +8,8 @@ the true disk is from that limit, and shows both cases of the dichotomy: a const
 alternating one has none.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/true_disk.png"
+
 from __future__ import annotations
 
 import numpy as np

@@ -7,7 +7,7 @@ The law of a wall is the mixture of the laws of its hollows, each with the width
 Lambert's law in their hull, and so a few dozen of them side by side have its first moments to rounding.
 """
 
-# sphinx_gallery_thumbnail_path = "gallery/wall-for-a-law.png"
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/a_wall_for_a_law.png"
 from __future__ import annotations
 
 import sys

@@ -3,7 +3,7 @@
 
 How fast do walls for a law approach it? Joint distance against moments and hollows, from the table of the page."""
 
-# sphinx_gallery_thumbnail_path = "gallery/walls-converge.png"
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/walls_converge.png"
 from __future__ import annotations
 
 import sys

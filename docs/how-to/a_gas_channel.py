@@ -8,6 +8,7 @@ How fast a rarefied gas spreads in a channel of a given length, and how much of 
 import matplotlib.pyplot as plt
 import numpy as np
 
+from asperity import Estimate
 from asperity import kernels as ker
 from asperity import spectral as spec
 
@@ -41,7 +42,8 @@ fig, ax = plt.subplots(layout="constrained")
 for name, law in laws.items():
     found = spec.channel_diffusivity(law, lengths, 1000, rng=1, radius=radius, speed=speed)
     ax.errorbar(1e3 * lengths, found.values, found.errors, marker="o", markersize=4, capsize=3, label=name)
-    print(f"{name:22} leaves |x| < 2 mm after {1e6 * found.times[3]:.1f} +- {1e6 * found.time_errors[3]:.1f} us")
+    time = Estimate(1e6 * found.times[3], 1e6 * found.time_errors[3], "estimate", "1000 particles")
+    print(f"{name:22} leaves |x| < 2 mm after {time} us")
 ax.set(xscale="log", yscale="log", xlabel="L, half of the length (mm)", ylabel=r"diffusivity $L^2/(2\tau)$ (m$^2$/s)")
 ax.set_yticks(ticks := [0.02, 0.05, 0.1, 0.2, 0.5], labels=ticks)
 ax.minorticks_off()

@@ -5,6 +5,8 @@ A granular collision
 Two rough grains collide. How their coefficients of restitution depend on the angle of impact.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/a_granular_collision.png"
+
 import matplotlib.pyplot as plt
 import numpy as np
 

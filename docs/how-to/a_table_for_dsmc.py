@@ -11,6 +11,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
+from asperity import Estimate
 from asperity import geometry as geo
 from asperity import kernels as ker
 
@@ -52,7 +53,7 @@ print(*path.read_text().splitlines()[:7], sep="\n")
 rng = np.random.default_rng(0)
 for theta in (0.3, 1.0, 1.5):
     drawn = np.cos(table.sample(np.full(100_000, theta), rng))
-    spread, exact = 1.96 * drawn.std() / 100_000**0.5, float(law.apply(np.cos, theta))
-    print(f"incoming angle {theta}: mean cosine {drawn.mean():.4f} +- {spread:.4f}, law {exact:.4f}")
+    mean = Estimate(drawn.mean(), 1.96 * drawn.std() / 100_000**0.5, "estimate", "100,000 draws")
+    print(f"incoming angle {theta}: mean cosine {mean}, law {float(law.apply(np.cos, theta)):.4f}")
 cosines = np.cos(table.sample(ker.SINE.sample(100_000, rng), rng))
-print(f"after the cosine law: mean square of the cosine {np.mean(cosines**2):.4f} +- 0.0018, to be 1/3")
+print(f"after the cosine law: mean square of the cosine {np.mean(cosines**2):.4f}, within 0.0018, to be 1/3")

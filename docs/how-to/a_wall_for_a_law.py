@@ -5,6 +5,8 @@ A wall for a law
 Which wall reflects half of the particles diffusely and half of them specularly?
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/a_wall_for_a_law.png"
+
 import matplotlib.pyplot as plt
 
 from asperity import kernels as ker

@@ -5,6 +5,8 @@ No-slip billiards
 Between two no-slip plates a disk stays in a bounded part of the strip for ever. Between rough plates it does not.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/no_slip_billiards.png"
+
 import matplotlib.pyplot as plt
 import numpy as np
 

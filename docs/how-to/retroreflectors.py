@@ -5,6 +5,8 @@ Retroreflectors
 Four hollows that send nearly every ray back where it came from, and how far each is from retroreflection.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/retroreflectors.png"
+
 import matplotlib.pyplot as plt
 
 from asperity import geometry as geo

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, finite_number, frozen, instance, whole_number
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ..curves.curve import LARGEST_COORDINATE
 
 # Metres of the units that headers of profiles have; micro is written in three ways.
@@ -27,8 +28,8 @@ RADIANS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
+@dataclass(frozen=True, eq=False, repr=False)
+class Profile(Summary):
     """Heights above positions along a line, in one unit; ``x, height = profile`` unpacks it.
 
     Parameters

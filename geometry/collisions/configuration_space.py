@@ -304,6 +304,7 @@ class ConfigurationSpace:
             ax.axhspan(middle - gap, middle + gap, color=RAY_COLOURS[4], alpha=0.25, linewidth=0, label=label)
         ax.set_xlabel("x1 / eps")
         ax.set_ylabel("alpha / rho")
+        ax.legend(loc="upper right", fontsize="small")
         return ax
 
 

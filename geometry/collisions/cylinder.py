@@ -22,7 +22,7 @@ from .rigid import check_kinds, checked_states, collide, from_height_0, marked
 LANDING_STEPS = 80
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CylinderCollision(DiskCounts):
     """The results of `collide_cylinder` for n disks.
 
@@ -114,7 +114,7 @@ def collide_cylinder(
     return CylinderCollision(results.position, results.velocity, results.time, results.contacts, results.status)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ModifiedCollision(DiskCounts):
     """The results of `collide_modified` for n disks.
 

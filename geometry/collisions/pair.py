@@ -14,7 +14,7 @@ from .amplification import DiskCounts, DiskStatus, fewest_contacts, mark_amplifi
 from .encounter import MAX_CONTACTS, TOUCHING, Encounter, largest_bend_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PairCollision(DiskCounts):
     """The results of `collide_pair` for n pairs.
 

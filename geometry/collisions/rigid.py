@@ -26,7 +26,7 @@ Block = Callable[[Floats, Floats, DiskResults], None]
 Collide = Callable[[Floats, Floats], DiskResults]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RigidCollision(DiskCounts):
     """The results of `collide` for n disks.
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, instance, whole_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate, fraction_estimate
+from ...core.estimates import Estimate, Summary, fraction_estimate
 from ..curves.curvature import largest_curvature
 from ..curves.segment import Segment
 from ..disk import rolling
@@ -78,8 +78,8 @@ class CollisionConstants:
         return cls(velocity, 1.0 + 2.4 + velocity)
 
 
-@dataclass(frozen=True)
-class Shadow:
+@dataclass(frozen=True, repr=False)
+class Shadow(Summary):
     """One collision on the cylinder with k contacts, and how far the collision of the true disk stays from it.
 
     Lengths are in units of the wall, velocities of the disk's speed (the kinetic norm). The flights are those of the

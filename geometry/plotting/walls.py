@@ -63,7 +63,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     >>> draw_wall(geo.triangular_teeth(1.5), 0.25, np.pi / 2).get_ylabel()
     'y'
     >>> draw_wall(geo.triangular_teeth(3.1)).get_ylabel()
-    'y (stretched 29.1 times against x)'
+    'y, stretched 29.1 times'
     """
     entries, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
     if ax is None:
@@ -85,14 +85,10 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     left, right = (first - MARGIN) * wall.period, (last + MARGIN) * wall.period
     ax.set_xlim(left, right)
     ax.set_ylim(floor, free)
-    unit = verbatim(wall.unit or "")
-    ax.set_xlabel(f"x ({unit or 'length units of the wall'})")
-    factor = vertical_stretch(wall)
-    words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"
-    remarks = [unit] if unit else []
-    remarks += [] if factor == 1.0 else [f"{words} against x"]
-    ax.set_ylabel(f"y ({', '.join(remarks)})" if remarks else "y")
-    ax.set_aspect(factor)
+    across, upwards = axis_labels(wall)
+    ax.set_xlabel(verbatim(across))
+    ax.set_ylabel(verbatim(upwards))
+    ax.set_aspect(vertical_stretch(wall))
     ax.locator_params(axis="both", nbins=6)
     return ax
 
@@ -111,6 +107,15 @@ def vertical_stretch(wall: Wall) -> float:
     free, floor = heights(wall)
     shape = SHALLOW_SHAPE if wall.depth < wall.period else DEEP_SHAPE
     return shape * (1.0 + 2.0 * MARGIN) * wall.period / (free - floor)
+
+
+def axis_labels(wall: Wall) -> tuple[str, str]:
+    """Return the labels of x and y: the unit of the wall, and the factor by which y is stretched."""
+    factor = vertical_stretch(wall)
+    words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"
+    upwards = f"y ({wall.unit})" if wall.unit else "y"
+    upwards += "" if factor == 1.0 else f", {words}"
+    return f"x ({wall.unit or 'length units of the wall'})", upwards
 
 
 def heights(wall: Wall) -> tuple[float, float]:

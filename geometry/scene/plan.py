@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...core.estimates import Summary
 from ..cells.cell import Cell
 from ..cells.hollow_shape import distinct_hollows
 from . import columns as c
 from .scene import Scene
 
 
-@dataclass(frozen=True)
-class TracePlan:
+@dataclass(frozen=True, repr=False)
+class TracePlan(Summary):
     """The optimisations that `trace` applies to a wall; made by ``wall.plan()``.
 
     Attributes

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, frozen, indices, number_between, positive_number, sequence, shaped
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...core.rounding import EPS
 from ..curves.arc import Arc
 from ..curves.curve import Curve
@@ -31,8 +32,8 @@ UNIT_TOLERANCE = 1e-12
 CORNER_ROUNDING = 16.0 * EPS
 
 
-@dataclass(frozen=True)
-class Container:
+@dataclass(frozen=True, repr=False)
+class Container(Summary):
     """The region in which the centre of the disk moves: {x : (x - p_i).n_i >= 0 for all i}, and inside of curves.
 
     The walls bound the centre, not the rim. For example, the centre of a disk of radius 1 between two plates at
@@ -226,6 +227,9 @@ class Container:
             return self
         corners = [(x, y) for x, y in self.points.tolist()]
         return Container.from_curves([Segment(p, q) for p, q in zip(corners, corners[1:] + corners[:1], strict=True)])
+
+    def _facts(self) -> dict[str, object]:
+        return {"walls without ends": len(self.points) or None, "curves": len(self.curves) or None}
 
     @property
     def tangents(self) -> Floats:

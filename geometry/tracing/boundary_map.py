@@ -18,7 +18,7 @@ from .tracing import MAX_COLLISIONS, Status, StatusCounts
 ANGLES = (TINIEST, float(np.nextafter(np.pi, 0.0)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BoundaryStates(StatusCounts):
     """States of particles on the boundary of a container.
 
@@ -43,6 +43,7 @@ class BoundaryStates(StatusCounts):
     time: Floats
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
+    _unit = "radians, and the container's unit of length"
 
 
 def billiard_map(container: Container, s: ArrayLike, theta: ArrayLike, iterations: int = 1) -> BoundaryStates:

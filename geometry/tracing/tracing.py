@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
 from fractions import Fraction
@@ -23,6 +24,8 @@ from ...core.checks import (
     numbers,
     whole_number,
 )
+from ...core.estimates import Summary
+from ...core.long_runs import reported
 from ..scene import columns as c
 from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
@@ -69,10 +72,13 @@ class Status(IntEnum):
     BOUNCE_LIMIT = 3
 
 
-class StatusCounts:
+class StatusCounts(Summary):
     """Mask and counts of a result's array ``status``, of rays or of disks."""
 
     status: NDArray[np.uint8]
+
+    def _facts(self) -> dict[str, object]:
+        return {**super()._facts(), "status": {name: number for name, number in self.counts().items() if number}}
 
     @property
     def escaped(self) -> NDArray[np.bool_]:
@@ -97,7 +103,7 @@ def numbers_of(status: NDArray[np.uint8], outcomes: type[IntEnum]) -> dict[str, 
     return {outcome.name.lower(): int(numbers[outcome]) for outcome in outcomes}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trace(StatusCounts):
     """The outgoing rays, each array in the broadcast shape of ``x`` and ``theta``.
 
@@ -118,6 +124,7 @@ class Trace(StatusCounts):
     theta: Floats
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
+    _unit = "radians, and the wall's unit of length"
 
     @property
     def flagged(self) -> NDArray[np.bool_]:
@@ -214,8 +221,10 @@ def trace(
         trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], found)
         unresolved.append(found.any() and np.any((found == Status.CORNER) | (found == Status.GRAZING)))
 
+    interrupt = None if len(starts) * _work(scene) <= LITTLE_WORK else stop
     try:
-        in_blocks(run, len(starts), threads, stop=None if len(starts) * _work(scene) <= LITTLE_WORK else stop)
+        with reported("trace") if len(starts) >= MANY_RAYS else nullcontext():
+            in_blocks(run, len(starts), threads, stop=interrupt)
     except InvalidRays:
         # the message names the place among all rays
         finite_array("x", x)

@@ -13,6 +13,7 @@ from typing import Any
 
 from ...core.checks import instance
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ..cells.profile import SEPARATORS, read_profile
 from ..disk.disk import Disk
 from .mushroom import mushrooms
@@ -29,8 +30,8 @@ from .named import (
 from .wall import Wall, load_wall
 
 
-@dataclass(frozen=True)
-class NamedWall:
+@dataclass(frozen=True, repr=False)
+class NamedWall(Summary):
     """A wall's constructor with its name, a one-line summary, and the defaults of its parameters as numbers."""
 
     name: str

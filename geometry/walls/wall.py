@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, instance, numbers, positive_number, sequence
 from ...core.errors import InputError, WallError
-from ...core.tables import html_table
+from ...core.estimates import html_table
 from ..cells.cell import Cell
 from ..cells.measured import Profile
 from ..cells.miniature import wall_miniature
@@ -204,7 +204,11 @@ class Wall(Cell):
         Examples
         --------
         >>> Wall.from_vertices([(0, 0), (0.5, 0), (0.5, -1), (1, -1), (1, 0)]).plan()  # doctest: +ELLIPSIS
-        TracePlan(primitives=('lines',), hollows=1, pieces_traced=3, pieces_left_out=1, flat_fraction=0.5, ...)
+        TracePlan
+        primitives        lines
+        hollows           1
+        pieces_traced     3
+        ...
         """
         return plan_of(self.cell, self.cell.scene, self.is_mirror_symmetric)
 
@@ -232,6 +236,7 @@ class Wall(Cell):
             "unit": self.unit, "period": f"{self.period:g}", "depth": f"{self.depth:.6g}",
             "length": f"{self.arc_length:.6g}",
             "mirror-symmetric": "yes" if self.is_mirror_symmetric else "no",
+            "more": ".plan(), .foreshorten(disk), .save(path), geo.draw_wall(wall), ker.WallLaw(wall)",
         }  # fmt: skip
         return html_table(repr(self), lines, wall_miniature(self))
 

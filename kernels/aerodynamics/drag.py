@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, finite_array, instance, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
-from ...core.long_runs import TIME_LIMIT
+from ...core.long_runs import TIME_LIMIT, reported
 from ...geometry.scene.scene import SEGMENT_TIME
 from ..bases.basis import AngleFunction, Basis
 from ..bases.directions import Directions
@@ -51,6 +51,7 @@ def air_resistance(theta: Floats, outgoing: Floats) -> Floats:
     return np.asarray(0.75 * (1.0 + np.cos(outgoing - theta)))
 
 
+@reported("resistance")
 def resistance(
     law: Law,
     tolerance: float = 1e-10,

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.checks import Floats, choice, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate
+from ...core.estimates import Estimate, Summary
 from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
 from ..laws.interval_exchange import IntervalExchangeLaw
@@ -28,8 +28,8 @@ MOST_CELLS = 2048
 ROUNDING = 1e-14
 
 
-@dataclass(frozen=True, eq=False)
-class ExtremalResistance:
+@dataclass(frozen=True, eq=False, repr=False)
+class ExtremalResistance(Summary):
     """The extremal mean of a cost over all symmetric laws.
 
     Attributes

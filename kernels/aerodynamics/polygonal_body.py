@@ -22,7 +22,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import AccuracyError, InputError
-from ...core.estimates import Estimate, mean_of_strata
+from ...core.estimates import Estimate, Summary, mean_of_strata
 from ...geometry import Arc, Container
 from ..bases.measure import SINE
 from .drag import scaled
@@ -36,8 +36,8 @@ UNCHANGED = 1e-9
 BOUNDARY_POINTS = 4096
 
 
-@dataclass(frozen=True)
-class Scattering:
+@dataclass(frozen=True, repr=False)
+class Scattering(Summary):
     """Particles after their reflections from a body; arrays with one entry per particle.
 
     Attributes
@@ -54,8 +54,8 @@ class Scattering:
     reflections: NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
-class PolygonalBody:
+@dataclass(frozen=True, eq=False, repr=False)
+class PolygonalBody(Summary):
     """A body that consists of simple polygons with disjoint interiors, and reflects particles specularly.
 
     Parameters
@@ -308,8 +308,8 @@ def _convex(region: Container) -> Container:
     return around
 
 
-@dataclass(frozen=True)
-class BodyForce:
+@dataclass(frozen=True, repr=False)
+class BodyForce(Summary):
     """The force of a parallel stream on a body, in units of the momentum flux.
 
     Attributes

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ..bases.basis import AngleFunction
 from ..bases.measure import SINE
 from ..laws.law import Law
@@ -32,8 +32,8 @@ LawOfNormal = Callable[[float], Law]
 Laws: TypeAlias = "Law | Sequence[Law] | LawOfNormal"
 
 
-@dataclass(frozen=True, eq=False)
-class RoughBody:
+@dataclass(frozen=True, eq=False, repr=False)
+class RoughBody(Summary):
     r"""A convex body in the plane with a rough boundary, given by boundary elements and their reflection law.
 
     A particle with velocity -u that meets an element with outer normal n leaves with velocity u'. The scattering law

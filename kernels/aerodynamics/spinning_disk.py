@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.checks import Floats, finite_number, positive_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate
+from ...core.estimates import Estimate, Summary
 from ..bases.measure import gauss_rule
 from ..laws.law import Law, is_atomic
 
@@ -25,8 +25,8 @@ SAFETY = 2.0
 TRACED = 1e-8
 
 
-@dataclass(frozen=True)
-class SpinForce:
+@dataclass(frozen=True, repr=False)
+class SpinForce(Summary):
     """Force and torque on a rotating disk, in units of the momentum flux of the stream.
 
     Attributes

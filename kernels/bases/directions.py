@@ -18,7 +18,7 @@ MEAN_SINE = 0.25 * np.pi
 SINE_NORM = float(np.sqrt(2.0 / 3.0 - np.pi**2 / 16.0))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Directions(Basis):
     """1, cos(theta) and sin(theta), made orthonormal for sin(theta)/2 d theta.
 
@@ -52,6 +52,9 @@ class Directions(Basis):
 
     def key(self) -> tuple[object, ...]:
         return ()
+
+    def __repr__(self) -> str:
+        return "cosine and sine of the angle"
 
     def evaluate(self, angle: ArrayLike) -> Floats:
         angle = np.asarray(angle, dtype=np.float64)

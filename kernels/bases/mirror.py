@@ -50,6 +50,14 @@ def reflection_matrix(basis: Basis) -> Floats:
     return overlaps(basis, lambda angle: basis.evaluate(np.pi - angle), edges)
 
 
+def mirror_image(matrix: Floats, basis: Basis, *, rows: bool = True) -> Floats:
+    """J S J, or S J without ``rows``, of a matrix in a basis; a view if the basis is a partition that J keeps."""
+    if isinstance(basis, Bins) and is_mirror_symmetric(basis):
+        return matrix[::-1, ::-1] if rows else matrix[:, ::-1]
+    flip = reflection_matrix(basis)
+    return flip @ matrix @ flip.T if rows else matrix @ flip
+
+
 def mirror_refinement(basis: Basis) -> tuple[Basis, Floats]:
     """A basis with a J-invariant span that contains the span of ``basis``, and the coefficients of ``basis`` in it.
 

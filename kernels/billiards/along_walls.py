@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, finite_array, generator, instance
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...geometry import Disk
 from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 ROUNDING = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class CollisionAlongWall:
+@dataclass(frozen=True, eq=False, repr=False)
+class CollisionAlongWall(Summary):
     r"""The collision law delta_x (x) P~(x, .) (x) delta_{pi - psi} of a disk and a wall whose cell changes along it.
 
     Parameters

@@ -30,7 +30,7 @@ OVERLAP = 1e-9
 BATCHES, BURN_IN, FEWEST_EVENTS = (16, 8, 4), 0.2, 64
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class GasRecord(BilliardRecord):
     """States of all disks of a gas after each event; the first entry of every array is the initial state.
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, choice, number_between, shaped, whole_number
+from ...core.estimates import Summary
 from ...geometry.tables.boundary import FlightStatus
 from ...geometry.tracing.tracing import numbers_of
 
@@ -29,8 +30,8 @@ DRAWN_RADIUS, TRACE = 0.02, 5.0
 LONGEST = 86_400.0
 
 
-@dataclass(frozen=True)
-class BilliardRecord:
+@dataclass(frozen=True, repr=False)
+class BilliardRecord(Summary):
     """States of n disks after each of their collisions; the first entry of every array is the initial state.
 
     A disk that meets no further wall, or whose next collision is not resolved, has fewer ``collisions`` than
@@ -64,6 +65,7 @@ class BilliardRecord:
     wall: NDArray[np.int64]
     collisions: NDArray[np.int64]
     status: NDArray[np.uint8]
+    _show = "container disk time collisions"
 
     def counts(self) -> dict[str, int]:
         """Return the number of disks with every ``FlightStatus``, by name in lower case.
@@ -199,10 +201,11 @@ class BilliardRecord:
         from matplotlib import pyplot
 
         axes = pyplot.subplots()[1] if ax is None else ax
+        # a few points are to be seen too
+        size = float(np.clip(300.0 / len(first), 1.2, 5.0))
         for k in range(first.shape[1]):
-            axes.plot(
-                first[:, k], second[:, k], ".", markersize=1.2, markeredgewidth=0, color=COLOURS[k % len(COLOURS)]
-            )
+            colour = COLOURS[k % len(COLOURS)]
+            axes.plot(first[:, k], second[:, k], ".", markersize=size, markeredgewidth=0, color=colour)
         if coordinates == "boundary":
             axes.set(xlim=(0.0, self.container.perimeter), ylim=(-1.0, 1.0), xlabel="arc length $s$")
             axes.set_ylabel("tangential velocity $v_1/|v|$")

@@ -27,6 +27,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
+from ...core.estimates import html_table
 from ...geometry import Disk, Wall
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
@@ -336,6 +337,11 @@ class VelocityLaw(TensorLaw):
             return foreign(other)
         self._check_disk(other, "add")
         return _law_of([*self.parts(), *other.parts()], self.disk)
+
+    def _repr_html_(self) -> str:
+        facts = {"convention": "paper", "foreshortening": f"{self.disk.foreshortening:.6g}"}
+        more = ".sample(velocity), .apply(function, theta, psi), .branches(theta), .operator(theta_basis, psi_basis)"
+        return html_table(repr(self), {**facts, "more": more})
 
     def _check_disk(self, other: VelocityLaw, verb: str) -> None:
         if self.disk != other.disk:

@@ -25,7 +25,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate, student_95
+from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_errors
 from ...core.frames import data_frame
 from ...core.long_runs import Engine, all_parts
 from ...core.rounding import EPS
@@ -39,8 +39,8 @@ FEWEST_SCALES = 3
 COLUMNS = ("distance", "state_distance", "floor", "psi_defect", "two_satellites", "outliers", "drift", "shift")
 
 
-@dataclass(frozen=True)
-class LimitStudy:
+@dataclass(frozen=True, repr=False)
+class LimitStudy(Summary):
     """Measured distances between the true disk and its limit law; each array has one entry per scale.
 
     Attributes
@@ -95,6 +95,12 @@ class LimitStudy:
     collisions: int
     psi: Floats
     by_psi: dict[str, Floats]
+    _more = ".errors, .order(column), .by_psi, .to_frame()"
+
+    def _facts(self) -> dict[str, object]:
+        """The columns with their half widths of 95 %."""
+        measured = {name: with_errors(getattr(self, name), NORMAL_95 * self.errors[name]) for name in COLUMNS}
+        return {"scales": self.scales, **measured}
 
     def to_frame(self) -> Any:
         """One row a scale; every measured column is followed by its standard error (extra ``studies``)."""

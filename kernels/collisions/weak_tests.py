@@ -23,7 +23,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import Estimate, student_95
+from ...core.estimates import Estimate, Summary, student_95
 from ...core.frames import data_frame
 from ...core.rounding import EPS
 from ..bases.measure import SINE, SINE_SQUARED
@@ -41,8 +41,8 @@ FINEST = 2.0**-10
 DIMENSIONS = 5
 
 
-@dataclass(frozen=True)
-class WeakLimit:
+@dataclass(frozen=True, repr=False)
+class WeakLimit(Summary):
     """The differences of three laws, tested on pairs of functions; arrays of shape (scales, pairs).
 
     Attributes

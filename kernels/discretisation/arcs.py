@@ -16,7 +16,7 @@ from ..bases.assembly import add_blocks, add_masses
 from ..bases.basis import Basis
 from ..bases.intervals import between_cuts, edges_inside, joined_lists
 from ..bases.measure import gauss_on_intervals
-from ..bases.mirror import is_mirror_symmetric, reflection_matrix
+from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..bases.panels import Panels
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
@@ -74,8 +74,7 @@ def arc_matrix(half_angle: float, basis: Basis, tolerance: float = 0.0) -> tuple
         total += (0.5 - counted) * centre
         error += abs(0.5 - counted) * spread
     if len(sides) == 1:
-        flip = reflection_matrix(basis)
-        return total + flip @ total @ flip, 2.0 * error
+        return total + mirror_image(total, basis), 2.0 * error
     return total, error
 
 

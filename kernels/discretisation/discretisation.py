@@ -10,17 +10,17 @@ from typing import Unpack, get_args
 
 import numpy as np
 
-from ...core.checks import Rng, check_memory, choice, finite_number, generator, instance, whole_number
+from ...core.checks import DOUBLE, Rng, check_memory, choice, finite_number, generator, instance, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
-from ...core.long_runs import Engine
+from ...core.long_runs import Engine, reported
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..bases.mirror import reflection_matrix
 from ..bases.tensor import TensorBasis
 from ..laws.law import IsometryLaw, Law
-from ..laws.matrix_law import MatrixLaw, finite_matrix, not_a_law
+from ..laws.matrix_law import MatrixLaw, finite_matrix
 from ..laws.structure import Rules, fold, holds_of_all
 from ..laws.tensor_law import SpatialLaw
 from ..matrices.matrix import KernelMatrix
@@ -28,6 +28,9 @@ from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
 from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SAMPLING, SEED_WITHOUT_RNG, SEGMENTS_A_RAY, Budget, MethodName
 from .methods import recipe
+
+# Memory in which a matrix is computed, in matrices, and least time of an entry.
+MATRICES, SECONDS = 6, 4e-7
 
 
 def discretise(
@@ -160,14 +163,13 @@ def discretise(
             ),
         )
     source = generator(rng, SEED_WITHOUT_RNG)
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    instance("law", law, Law, "ker.WallLaw(wall)")
     instance("basis", basis, Basis, "ker.Bins(64)")
     if isinstance(basis, TensorBasis):
         raise InputError(f"basis: expected a basis of one angle for {law!r}, got {basis!r}; use P.tensor(Q)")
     if basis.measure != SINE:
         return _on_roll_angles(law, basis)
-    check_memory("basis", f"the matrix in {basis!r}", basis.size**2)
+    check_memory("basis", f"computing the matrix in {basis!r}", MATRICES * basis.size**2)
     choice("method", method, get_args(MethodName))
     choice("symmetrise", symmetrise, (True, False))
     if finite_number("tolerance", tolerance) < 0.0:
@@ -182,7 +184,9 @@ def discretise(
     budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)
     exact = finite_matrix(law, edges=basis.edges) if isinstance(basis, Bins) else None
     has_bins = method == "auto" and not holds_of_all(law, lambda part: not isinstance(part, MatrixLaw))
-    found = replace(exact, basis=basis) if exact is not None and has_bins else recipe(law, method)(basis, budget)
+    entries = basis.size**2
+    with reported(f"matrix in {basis!r}", SECONDS * entries, DOUBLE * MATRICES * entries):
+        found = replace(exact, basis=basis) if exact is not None and has_bins else recipe(law, method)(basis, budget)
     return replace(
         found,
         beyond=None if exact is None or found.samples else exact.beyond,

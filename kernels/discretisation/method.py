@@ -98,7 +98,11 @@ class Recipe(Protocol):
 def computed(
     symmetric: Floats, basis: Basis, name: MethodName, error: float, how: str, kind: ErrorKind = "estimate"
 ) -> KernelMatrix:
-    """The matrix of a method without sampling, with its error and the description of the error."""
+    """The matrix of a method without sampling, with its error and the description of the error.
+
+    The array is the caller's no more: it becomes read-only, and is not copied.
+    """
+    symmetric.setflags(write=False)
     return KernelMatrix(symmetric, basis, frobenius_error(error, kind, how), method=name)
 
 

@@ -8,9 +8,10 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
+from ...core.checks import Floats
 from ...core.errors import InputError
 from ..bases.basis import Basis
-from ..bases.mirror import mirror_refinement, reflection_matrix
+from ..bases.mirror import is_mirror_symmetric, mirror_image, mirror_refinement
 from ..laws.law import Law, retroreflection, specular
 from ..laws.structure import LONGEST_WORD, Rules, fold, has_chain, law_of, words_of
 from ..matrices.defects import SymmetryDefect
@@ -124,17 +125,25 @@ class _Sum:
 
     def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
         made = self._matrices(wanted, basis, budget)
-        total = sum((weight * matrix for weight, matrix in made[1:]), start=made[0][0] * made[0][1])
-        sampled = [(weight, matrix) for weight, matrix in made if matrix.samples]
-        single = sampled[0] if len(sampled) == 1 else None
+        methods = " + ".join(dict.fromkeys(matrix.method for _, matrix in made))
+        sampled = [(weight, matrix.samples, matrix.unresolved) for weight, matrix in made if matrix.samples]
+        parts = [(weight * _norm(matrix), matrix.symmetry_defect()) for weight, matrix in made if matrix.samples]
+        weight, matrix = made.pop(0)
+        total = weight * matrix
+        while made:  # no matrix is kept that has been added
+            weight, matrix = made.pop(0)
+            total = total + weight * matrix
+        del matrix
+        # The other terms are not random, so a single sampled term alone has a raw symmetry defect.
+        single = parts[0] if len(parts) == 1 else None
         return replace(
             total,
-            method=" + ".join(dict.fromkeys(matrix.method for _, matrix in made)),
-            samples=sum(matrix.samples for _, matrix in sampled),
-            unresolved=sum(weight * matrix.unresolved for weight, matrix in sampled),
+            method=methods,
+            samples=sum(samples for _, samples, _ in sampled),
+            unresolved=sum(weight * unresolved for weight, _, unresolved in sampled),
             symmetrised=budget.symmetrise and bool(sampled),
-            # The other terms are not random, so the sampled term alone has a raw symmetry defect.
-            raw_defect=_scaled_defect(*single, total) if single else None,
+            raw_defect=single
+            and SymmetryDefect(single[0] / (_norm(total) or 1.0) * single[1], z_score=single[1].z_score),
             error=replace(total.error, method="sum over the terms: " + total.error.method),
             norm_bound=1.0,
         )
@@ -174,17 +183,21 @@ class _Mirrored:
         return self.inner.without_rays(basis)
 
     def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        finer, restriction = mirror_refinement(basis)
+        finer, restriction = (basis, None) if is_mirror_symmetric(basis) else mirror_refinement(basis)
         if wanted == "auto" and not self._has_choice(finer):
             wanted = "quadrature"
         inner = self.inner.matrix(wanted, finer, budget)
-        flipped = reflection_matrix(finer) @ restriction.T
+
+        def mirrored(part: Any) -> Floats:
+            image = mirror_image(part, finer, rows=False)
+            return image if restriction is None else restriction @ image @ restriction.T
+
         return KernelMatrix(
-            restriction @ inner.symmetric @ flipped,
+            mirrored(inner.symmetric),
             basis,
             inner.error,
             method=inner.method,
-            replicates=tuple(restriction @ part @ flipped for part in inner.replicates),
+            replicates=tuple(map(mirrored, inner.replicates)),
             samples=inner.samples,
             unresolved=inner.unresolved,
         )
@@ -225,7 +238,5 @@ def _names(found: _Law | _Sum, basis: Basis) -> tuple[MethodName, ...]:
     return tuple(name for name in NAMES if name == "monte-carlo" or found.has(name, basis))
 
 
-def _scaled_defect(weight: float, matrix: KernelMatrix, total: KernelMatrix) -> SymmetryDefect:
-    raw = matrix.symmetry_defect()
-    fraction = weight * float(np.linalg.norm(matrix.symmetric)) / (float(np.linalg.norm(total.symmetric)) or 1.0)
-    return SymmetryDefect(fraction * float(raw), z_score=raw.z_score)
+def _norm(matrix: KernelMatrix) -> float:
+    return float(np.linalg.norm(matrix.symmetric))

@@ -53,13 +53,13 @@ class RaysOrConditionals:
         first = _by_rays(sampler, basis, replace(budget, rays=min(FIRST_RAYS, budget.rays)))
         if first is not None and float(first.error) <= budget.tolerance:
             return first
+        reached, first = 0.0 if first is None else float(first.error), None
         if isometries.accepts(law, basis):
             return isometries.matrix(law, basis, budget)
         if not _has_conditionals(law, basis, budget):
             return sobol_matrix(sampler, basis, budget)
         found = Traced().matrix(law, basis, budget)
-        enough = budget.tolerance if first is None else max(budget.tolerance, RAYS_GAIN * float(first.error))
-        if float(found.error) <= enough:
+        if float(found.error) <= max(budget.tolerance, RAYS_GAIN * reached):
             return found
         rays = _by_rays(sampler, basis, budget)
         return found if rays is None else min(found, rays, key=lambda matrix: float(matrix.error))

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats
+from ...core.checks import Floats, check_memory
 from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
-from ..bases.mirror import is_mirror_symmetric, reflection_matrix
+from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..expectations.angle_panels import NODES, NORMAL, NULL_RULES, AnglePanels
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
@@ -160,6 +160,9 @@ class _Integrator:
 
         The matrix with the least error is returned, because an interrupted stage may increase the error.
         """
+        # expectations at the nodes of the first panels, and a copy when panels are added
+        values = 2 * (len(self.edges) - 1) * (len(NODES) + 1) * self.basis.size
+        check_memory("basis", f"quadrature of rays in {self.basis!r}", values)
         self._add_panels(self.edges[:-1], self.edges[1:])
         stage = FIRST_STAGE
         while True:
@@ -267,10 +270,9 @@ class _Integrator:
         panels = self.panels.total_error(self.basis)
         conditionals = self.panels.total_mean_error(self.basis)
         if self.halved:
-            flip = reflection_matrix(self.basis)
             # the halves share no row of the matrix if each basis function lives on one side
             both = math.sqrt(2.0) if self.sided else 2.0
-            matrix, panels, conditionals = matrix + flip @ matrix @ flip.T, both * panels, both * conditionals
+            matrix, panels, conditionals = matrix + mirror_image(matrix, self.basis), both * panels, both * conditionals
         return matrix, panels, conditionals, self._asymmetry_factor * float(np.linalg.norm(matrix - matrix.T))
 
     def _worth_dividing(self, goal: float) -> NDArray[np.bool_]:

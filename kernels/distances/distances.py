@@ -31,7 +31,7 @@ MATRIX_TOLERANCE = 1e-7
 SUPREMUM_REST = 3.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Distance(Estimate):
     """A distance between two laws, with its error.
 
@@ -44,10 +44,6 @@ class Distance(Estimate):
     """
 
     noise_floor: float | None = None
-
-    def __str__(self) -> str:
-        floor = "" if self.noise_floor is None else f", noise floor {self.noise_floor:.2g}"
-        return super().__str__() + floor
 
 
 def distance(

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, check_memory, choice, generator, number_between, whole_number
+from ...core.checks import Floats, Rng, check_memory, choice, generator, instance, number_between, whole_number
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
 from .resampling import (
@@ -24,8 +25,8 @@ from .resampling import (
 from .transport import wasserstein_order
 
 
-@dataclass(frozen=True)
-class DifferenceTest:
+@dataclass(frozen=True, repr=False)
+class DifferenceTest(Summary):
     """The outcome of `difference_test`.
 
     Attributes
@@ -41,6 +42,7 @@ class DifferenceTest:
     statistic: float
     p_value: float
     null: Floats
+    _show = "statistic noise_floor p_value"
 
     @property
     def noise_floor(self) -> float:
@@ -100,6 +102,8 @@ def difference_test(
     >>> difference_test(rough, smooth).differs(), difference_test(rough, rough).p_value
     (True, 1.0)
     """
+    instance("first", first, KernelMatrix, "ker.discretise(law, ker.Bins(64))")
+    instance("second", second, KernelMatrix, "ker.discretise(law, ker.Bins(64))")
     check_comparable(first, second)
     choice("kind", kind, ("rows", "sup"))
     number = whole_number("permutations", permutations, 19)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.estimates import shown, text_of
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction, Basis
 from ..bases.given import Vectorised
@@ -41,6 +42,9 @@ class Conditionals(NamedTuple):
     weights: Floats
     starts: NDArray[np.int64]
     error: Floats
+
+    def __repr__(self) -> str:
+        return text_of("Conditionals", {name: shown(value) for name, value in self._asdict().items()})
 
     @classmethod
     def of_atoms(cls, nodes: Floats, weights: Floats, error: float = 0.0) -> Conditionals:

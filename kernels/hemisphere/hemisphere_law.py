@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, finite_number, foreign, frozen, generator, instance, shaped, whole_number
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
@@ -35,8 +35,8 @@ BETWEEN_FACTORS, CHANGE = 2, 3.0
 Term: TypeAlias = "tuple[float, tuple[HemisphereLaw, ...]]"
 
 
-@dataclass(frozen=True)
-class AzimuthalBlock:
+@dataclass(frozen=True, repr=False)
+class AzimuthalBlock(Summary):
     """The matrix of a rotation-invariant law on the Zernike functions of one azimuthal order.
 
     Attributes

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number, sequence
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95
+from ...core.estimates import NORMAL_95, Summary
 from ..collisions.small_scale_limit import limit_study
 from ..distances.distances import distance
 from ..walls.wall_law import WallLaw
@@ -26,8 +26,8 @@ SCALES, SAMPLES = (1e-3, 1e-4, 1e-5), (12, 16, 16)
 FALLEN, STANDING = 0.25, 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Dichotomy:
+@dataclass(frozen=True, eq=False, repr=False)
+class Dichotomy(Summary):
     """The outcome of `dichotomy`.
 
     Attributes

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.checks import Floats, finite_array, finite_number, frozen, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate
+from ...core.estimates import Estimate, Summary
 from ..laws.law import Law
 from ..walls.wall_law import WallLaw
 
@@ -32,8 +32,8 @@ RADIUS_POINTS = 129
 CORNER = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class WallDesign:
+@dataclass(frozen=True, eq=False, repr=False)
+class WallDesign(Summary):
     """The outcome of `design_wall`.
 
     Attributes

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import LEVEL, NORMAL_95, Estimate
+from ...core.estimates import LEVEL, NORMAL_95, Estimate, Summary
 from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.interval_exchange import IntervalExchangeLaw
@@ -41,8 +41,8 @@ PIECE_NODES = 32, 128
 NECK = 0.01
 
 
-@dataclass(frozen=True)
-class Generations:
+@dataclass(frozen=True, repr=False)
+class Generations(Summary):
     """The law of a wall of chambers of several generations; made by `ExchangeHollow.generations`.
 
     Attributes
@@ -67,8 +67,8 @@ class Generations:
     distance: Estimate
 
 
-@dataclass(frozen=True, eq=False)
-class ExchangeHollow:
+@dataclass(frozen=True, eq=False, repr=False)
+class ExchangeHollow(Summary):
     """A wall with a small opening behind which mirrors perform an exchange of intervals; made by `exchange_hollow`.
 
     Attributes

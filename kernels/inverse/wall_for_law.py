@@ -21,8 +21,9 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
+from ...geometry.cells.miniature import wall_miniature
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE
@@ -30,7 +31,7 @@ from ..collisions.collision_law import CollisionLaw
 from ..discretisation.discretisation import discretise
 from ..distances.distances import Distance, distance
 from ..laws.law import Law
-from ..laws.matrix_law import MatrixLaw
+from ..laws.matrix_law import MatrixLaw, not_a_law
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
 from .hollows import UnitHollow, flat, random_polygons, retroreflector, simple_hollows
@@ -64,8 +65,8 @@ DISTANCE_TOLERANCE = 1e-2
 ROUNDED = 64.0 * EPS
 
 
-@dataclass(frozen=True, eq=False)
-class WallForLaw:
+@dataclass(frozen=True, eq=False, repr=False)
+class WallForLaw(Summary):
     """A wall whose law has the moments of a wanted law; made by `wall_for`.
 
     Attributes
@@ -102,6 +103,8 @@ class WallForLaw:
     law: Law | None
     moments: int
     disk: Disk | None = None
+    _show = "law disk wall weights moments defect bound"
+    _more = ".wall, .hollows, .distance, .history, .plot()"
 
     @property
     def wall_law(self) -> WallLaw:
@@ -129,11 +132,8 @@ class WallForLaw:
         axes.set_title(f"{len(self.hollows)} hollows, defect {float(self.defect):.2g} in {self.moments} moments")
         return axes
 
-    def __repr__(self) -> str:
-        return (
-            f"WallForLaw({self.law!r}, {len(self.hollows)} hollows, defect {float(self.defect):.3g} in {self.moments} "
-            f"moments, at most {float(self.bound):.3g} too much)"
-        )
+    def _picture(self) -> str:
+        return wall_miniature(self.wall)
 
 
 def wall_for(
@@ -325,7 +325,7 @@ def _wanted_law(law: Law | KernelMatrix) -> Law:
             )
         law = MatrixLaw(law)
     if not isinstance(law, Law):
-        raise InputError(f"law: expected a Law such as ker.lambertian() or a KernelMatrix, got {law!r}")
+        raise not_a_law("law", "a Law such as ker.lambertian() or a KernelMatrix", law)
     if law.reversible is False:
         raise InputError(f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}")
     # the change is its own inverse

@@ -29,8 +29,8 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
+from ...core.estimates import html_table
 from ...core.rounding import EPS
-from ...core.tables import html_table
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Frame
 from ..bases.given import Vectorised, seed_by_name
@@ -236,6 +236,7 @@ class Law(ABC):
         lines = {
             "convention": self.frame, "reversible": known[self.reversible],
             "mirror-symmetric": known[self.mirror_symmetric], "parts": None if whole is self else whole,
+            "more": ".sample(theta), .apply(function, theta), .branches(theta), ker.discretise(law, basis)",
         }  # fmt: skip
         return html_table(f"Law {self!r}", lines)
 

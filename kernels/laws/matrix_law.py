@@ -8,7 +8,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, common_shape, finite_array, frozen, shortened
+from ...core.checks import Floats, common_shape, finite_array, frozen, given
 from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
@@ -242,13 +242,8 @@ def _matrix_on(law: Law, edges: Floats) -> KernelMatrix:
 
 
 def not_a_law(name: str, expected: str, value: object) -> InputError:
-    """The refusal of a value that is not a law; of an array it has the shape, and names the law of a matrix."""
-    if isinstance(value, np.ndarray):
-        return InputError(
-            f"{name}: expected {expected}, got an array of shape {value.shape}; the law of transition probabilities "
-            "between bins of equal measure is ker.MatrixLaw(array)"
-        )
-    return InputError(f"{name}: expected {expected}, got {shortened(value)}")
+    """The refusal of a value that is not a law, with what makes one of it."""
+    return InputError(f"{name}: expected {expected}, got {given(value, Law)}")
 
 
 def _bin_edges(basis: Basis, size: int) -> Floats:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, angles, check_memory, frozen, generator, shortened, whole_number
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...core.files import write_whole
 from ...core.frames import needed
 from ...core.tables import numbers_as_csv
@@ -41,8 +42,8 @@ WithAtoms: TypeAlias = Callable[[Floats, Floats], tuple[Conditionals, NDArray[np
 Parts: TypeAlias = Sequence[tuple[float, WithAtoms]]
 
 
-@dataclass(frozen=True, eq=False)
-class Table:
+@dataclass(frozen=True, eq=False, repr=False)
+class Table(Summary):
     """The inverse distribution functions of a law on a grid, for other codes to interpolate.
 
     Attributes

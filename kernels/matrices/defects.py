@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ..bases.assembly import LARGE
 
+# Entries of a temporary array, where a square matrix is worked on some rows at a time.
+BLOCK = 2**17
 # Statistics with fewer degrees of freedom than this carry no information.
 LEAST_FREEDOM = 1e-9
 # In its tails the statistic of eight independent replicates follows Student's t. Its degrees of freedom, 3.4 d^0.27,
@@ -86,19 +87,16 @@ def relative_asymmetry(symmetric: NDArray[Any], scale: Floats | None = None) -> 
 
 
 def row_blocks(size: int) -> Iterator[slice]:
-    """The rows of a square matrix, so many at a time that temporary arrays have at most `LARGE` entries."""
-    step = max(1, LARGE // size)
+    """The rows of a square matrix, so many at a time that temporary arrays have at most `BLOCK` entries."""
+    step = max(1, BLOCK // size)
     return (slice(start, start + step) for start in range(0, size, step))
 
 
-def occupied_pairs(counts: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The cells (i, j), i < j, with a count at (i, j) or (j, i)."""
-    found = []
+def occupied_pairs(counts: NDArray[Any]) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """The cells (i, j), i < j, with a count at (i, j) or (j, i), block by block of rows."""
     for rows in row_blocks(len(counts)):
         source, target = np.nonzero(np.triu(counts[rows] + counts[:, rows].T, rows.start + 1))
-        found.append((source + rows.start, target))
-    source, target = (np.concatenate(part) for part in zip(*found, strict=True))
-    return source, target
+        yield source + rows.start, target
 
 
 def reversibility_z_score(counts: NDArray[np.int64]) -> float:
@@ -117,11 +115,14 @@ def reversibility_z_score(counts: NDArray[np.int64]) -> float:
     no information. The sum of Z^2 over pairs is matched to a scaled chi-square by its two moments, and the cube root
     (Wilson-Hilferty) makes it normal.
     """
-    occupied = occupied_pairs(counts)
-    forth, back = counts[occupied].astype(np.float64), counts.T[occupied].astype(np.float64)
-    informative = forth + back >= 2.0
-    pair, difference = (forth + back)[informative], (forth - back)[informative]
-    return _cube_root_score(float(np.sum(difference**2 / pair)), pair.size, float(np.sum(2.0 - 2.0 / pair)))
+    statistic, mean, variance = 0.0, 0, 0.0
+    for occupied in occupied_pairs(counts):
+        forth, back = counts[occupied].astype(np.float64), counts.T[occupied].astype(np.float64)
+        informative = forth + back >= 2.0
+        pair, difference = (forth + back)[informative], (forth - back)[informative]
+        statistic, mean = statistic + float(np.sum(difference**2 / pair)), mean + pair.size
+        variance += float(np.sum(2.0 - 2.0 / pair))
+    return _cube_root_score(statistic, mean, variance)
 
 
 def defect_of_pairs(first: Floats, second: Floats, cells: int) -> SymmetryDefect:
@@ -131,8 +132,10 @@ def defect_of_pairs(first: Floats, second: Floats, cells: int) -> SymmetryDefect
     return SymmetryDefect(relative_asymmetry(counts.astype(np.float64)), z_score=reversibility_z_score(counts))
 
 
-def replicate_z_score(antisymmetric: list[Floats]) -> float:
+def replicate_z_score(antisymmetric: Iterable[Sequence[Floats]]) -> float:
     """The z-score of the mean antisymmetric part from the parts A_r of several replicates, for dependent counts.
+
+    The entries of all A_r come block by block.
 
     If the A_r are independent with mean 0, the inner products <A_r, A_s>, r < s, are uncorrelated with mean 0; their
     average is compared with its standard error. The fewer dimensions the A_r vary in, the heavier are the tails of this
@@ -143,14 +146,16 @@ def replicate_z_score(antisymmetric: list[Floats]) -> float:
     # the survival function of Student's t and its normal quantile; scipy.stats takes .4 s to import
     from scipy.special import ndtri, stdtr
 
-    flat = np.array([part.ravel() for part in antisymmetric])
-    pairs = np.triu_indices(len(flat), 1)
-    products = (flat @ flat.T)[pairs]
+    inner = gram = np.zeros(())
+    for block in antisymmetric:
+        flat = np.array([part.ravel() for part in block])
+        centred = flat - flat.mean(axis=0)
+        inner, gram = inner + flat @ flat.T, gram + centred @ centred.T
+    pairs = np.triu_indices(len(inner), 1)
+    products = inner[pairs]
     error = float(np.std(products, ddof=1)) / np.sqrt(products.size)
     if error <= 0.0:
         return 0.0
-    centred = flat - flat.mean(axis=0)
-    gram = centred @ centred.T
     dimensions = np.mean(np.diag(gram)) ** 2 / max(float(np.var(gram[pairs], ddof=1)), np.finfo(np.float64).tiny)
     freedom = FREEDOM_AT_ONE * max(float(dimensions), 1.0) ** FREEDOM_POWER
     freedom = min(freedom, products.size - 1.0)

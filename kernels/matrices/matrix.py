@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -30,13 +30,12 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, html_table
 from ...core.frames import data_array, data_frame
 from ...core.rounding import EPS
-from ...core.tables import html_table
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
-from ..bases.mirror import is_mirror_symmetric, reflection_matrix
+from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..bases.tensor import TensorBasis
 from . import archive
 from .archive import Arrays, Record, Stored, load_array, store_array
@@ -90,7 +89,7 @@ def scaled(matrix: KernelMatrix, factor: float) -> KernelMatrix:
     error = frobenius_error(abs(factor) * float(matrix.error), matrix.error.kind, matrix.error.method)
     return _derived(
         matrix, factor * matrix.symmetric, error, f"{factor:g}*{_name(matrix)}",
-        replicates=tuple(factor * part for part in matrix.replicates), reversible=matrix.reversible,
+        replicates=Mapped(matrix.replicates, lambda part: factor * part), reversible=matrix.reversible,
         mirror_symmetric=matrix.mirror_symmetric, norm_bound=abs(factor) * matrix.norm_bound,
         beyond=_beyond(lambda number: factor * number, matrix),
     )  # fmt: skip
@@ -99,12 +98,12 @@ def scaled(matrix: KernelMatrix, factor: float) -> KernelMatrix:
 def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     """``first + second``; errors add."""
     check_same_basis(first, second)
-    replicates: tuple[Any, ...] = ()
+    replicates: Sequence[Any] = ()
     # parts of different samples cannot be paired; those of one term are shifted by the other where it has none
     if first.replicates and not second.replicates:
-        replicates = tuple(part + second.symmetric for part in first.replicates)
+        replicates = Mapped(first.replicates, lambda part: part + second.symmetric)
     elif second.replicates and not first.replicates:
-        replicates = tuple(part + first.symmetric for part in second.replicates)
+        replicates = Mapped(second.replicates, lambda part: part + first.symmetric)
     how = f"sum of ({first.error.method}) and ({second.error.method})"
     error = frobenius_error(float(first.error) + float(second.error), joint_kind(first, second), how)
     return _derived(
@@ -173,12 +172,11 @@ def in_other_frame(matrix: KernelMatrix) -> KernelMatrix:
         raise InputError(
             f"{matrix.basis!r} is not kept by theta -> pi - theta; discretise law.in_specular_frame() instead"
         )
-    flip = reflection_matrix(matrix.basis)
     return replace(
         matrix,
-        symmetric=matrix.symmetric @ flip,
+        symmetric=mirror_image(matrix.symmetric, matrix.basis, rows=False),
         counts=None,
-        replicates=tuple(part @ flip for part in matrix.replicates),
+        replicates=Mapped(matrix.replicates, lambda part: mirror_image(part, matrix.basis, rows=False)),
         symmetrised=False,
         law=f"({_name(matrix)}).in_specular_frame()",
         # P J is self-adjoint exactly if P commutes with J
@@ -200,8 +198,23 @@ def _beyond(combined: Callable[..., float], *matrices: KernelMatrix) -> tuple[fl
 def _derived(
     matrix: KernelMatrix, symmetric: Floats, error: Estimate, law: str, basis: TensorBasis | None = None, **facts: Any
 ) -> KernelMatrix:
-    """A matrix that is no sample any more."""
+    """A matrix that is no sample any more, of a new array."""
+    symmetric.setflags(write=False)
     return type(matrix)(symmetric, basis or matrix.basis, error, method="algebra", law=law, frame=matrix.frame, **facts)
+
+
+@dataclass(frozen=True)
+class Mapped(Sequence[Any]):
+    """A function of each replicate, computed when it is asked for."""
+
+    parts: Sequence[Any]
+    function: Callable[[Any], Any]
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def __getitem__(self, number: Any) -> Any:
+        return self.function(self.parts[number])
 
 
 def _name(matrix: KernelMatrix) -> str:
@@ -240,7 +253,7 @@ class KernelMatrix:
         a sampled matrix it is the 95 % quantile of that distance over the rays.
     counts : ndarray of int64, shape (n, n), optional
         Raw counts of sampled pairs (incoming bin, outgoing bin), before any symmetrisation.
-    replicates : tuple of arrays
+    replicates : sequence of arrays
         ``symmetric`` from equal parts of the rays, dense or sparse; their mean is ``symmetric``. For errors.
     symmetrised : bool
         Whether each sampled pair was counted both ways.
@@ -281,7 +294,7 @@ class KernelMatrix:
     basis: Basis
     error: Estimate = None  # type: ignore[assignment]
     counts: NDArray[np.int64] | None = field(default=None, kw_only=True)
-    replicates: tuple[Replicate, ...] = field(default=(), kw_only=True)
+    replicates: Sequence[Replicate] = field(default=(), kw_only=True)
     symmetrised: bool = field(default=False, kw_only=True)
     samples: int = field(default=0, kw_only=True)
     method: str = field(default="given", kw_only=True)
@@ -312,16 +325,15 @@ class KernelMatrix:
             )
         object.__setattr__(self, "symmetric", frozen(symmetric))
         if self.counts is not None:
-            finite_array("counts", self.counts)
-            counts = np.array(self.counts)
+            counts = np.asarray(self.counts)
+            if counts.dtype.kind not in "iu":
+                finite_array("counts", self.counts)
             if counts.shape != (n, n) or counts.dtype.kind not in "iu" or counts.min() < 0 or counts.max() > MOST:
                 raise InputError(
                     f"counts: expected whole numbers of at least 0, shape {(n, n)}, got {counts.dtype} of shape "
                     f"{counts.shape}"
                 )
-            counts = counts.astype(np.int64)
-            counts.setflags(write=False)
-            object.__setattr__(self, "counts", counts)
+            object.__setattr__(self, "counts", frozen(counts, np.int64))
         self._check_fields()
 
     def _check_fields(self) -> None:
@@ -371,7 +383,7 @@ class KernelMatrix:
 
     def __getstate__(self) -> dict[str, Any]:
         # ``array`` stays behind: unpickled it would be writable
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return {field.name: getattr(self, field.name) for field in fields(self)} | {"replicates": (*self.replicates,)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -454,7 +466,7 @@ class KernelMatrix:
             self,
             symmetric=self.symmetric.T,
             counts=None if self.counts is None else self.counts.T,
-            replicates=tuple(cast(Any, part).T for part in self.replicates),
+            replicates=Mapped(self.replicates, lambda part: part.T),
             law=self.law if self.reversible else f"adjoint of {self.law or self.method}",
         )
 
@@ -552,7 +564,7 @@ class KernelMatrix:
         lines = {
             "law": self.law, "method": self.method, "Frobenius error": f"{float(self.error):.2g} ({self.error.kind})",
             "tolerance": self.requested_tolerance and f"{self.requested_tolerance:g}", "samples": self.samples or "",
-            "convention": self.frame,
+            "convention": self.frame, "more": ".array, .error.method, .plot(), .symmetry_defect(), .to_frame()",
         }  # fmt: skip
         return html_table(f"KernelMatrix in {self.basis!r}", lines)
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 # Atoms have densities up to the number of bins; with a square-root colour scale smaller densities remain visible.
 COLOUR_POWER = 0.5
+# Differences of the measures of bins below which they are equal to rounding.
+EQUAL = 1e-12
 TICKS = ([0.0, 0.5 * np.pi, np.pi], ["0", "π/2", "π"])
 
 
@@ -27,7 +29,7 @@ def draw_kernel(edges: Floats, density: Floats, frame: Frame, ax: Axes | None = 
     if ax is None:
         from matplotlib import pyplot
 
-        ax = pyplot.subplots(figsize=(5.2, 4.4), layout="constrained")[1]
+        ax = pyplot.subplots(figsize=(5.6, 4.4), layout="constrained")[1]
     highest = float(density.max())
     norm = PowerNorm(COLOUR_POWER, vmin=0.0, vmax=highest if highest > 0.0 else 1.0)
     mesh = ax.pcolormesh(edges, edges, np.maximum(density, 0.0).T, cmap="viridis", norm=norm, rasterized=True)
@@ -40,7 +42,9 @@ def draw_kernel(edges: Floats, density: Floats, frame: Frame, ax: Axes | None = 
     ax.set_yticks(*TICKS)
     ax.set_xlabel("incoming angle θ (rad)")
     ax.set_ylabel("outgoing angle θ' (rad)")
+    measure = -np.diff(np.cos(edges))
+    bins = f" in {len(measure)} bins of equal measure" if np.ptp(measure) < EQUAL else ""
     figure = ax.get_figure()
     if figure is not None:
-        figure.colorbar(mesh, ax=ax, label="density with respect to the invariant measure, sin θ' dθ'/2")
+        figure.colorbar(mesh, ax=ax, label=f"density{bins}\n(invariant measure sin θ' dθ'/2)")
     return ax

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.checks import Floats, Rng, frozen, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate, fraction_estimate
+from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate
 from ...geometry import Wall
 from ..bases.measure import SINE
 
@@ -17,8 +17,8 @@ from ..bases.measure import SINE
 LEAST_TAIL = 20
 
 
-@dataclass(frozen=True)
-class Displacements:
+@dataclass(frozen=True, repr=False)
+class Displacements(Summary):
     """Displacements x' - x of random rays, x uniform in a period and theta with density sin(theta)/2.
 
     Attributes

@@ -22,6 +22,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...geometry import Wall
 from ..bases.given import Vectorised, seed_by_name
 from ..laws.law import Combination, Law
@@ -30,8 +31,8 @@ from ..walls.wall_law import WallLaw
 PositionFunction = Callable[[Floats, Floats], Floats]
 
 
-@dataclass(frozen=True, eq=False)
-class PositionLaw:
+@dataclass(frozen=True, eq=False, repr=False)
+class PositionLaw(Summary):
     r"""A law P(x, theta; dx' d theta') = delta_x(dx') P~(x, theta, d theta') whose P~ is constant on intervals of x.
 
     Laws of this form, each P~(x, .) symmetric for sin(theta) d theta, are exactly the limits of walls whose

@@ -187,7 +187,8 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
                 job.add_to(sums, job.first_table(task), task)
                 bar.update(job.rays_of(task))
         return
-    run = _Run(job, _State(np.zeros(job.tasks, dtype=bool), sums.tables, sums.unresolved))
+    wide = sums.tables.astype(np.promote_types(sums.tables.dtype, np.int32))
+    run = _Run(job, _State(np.zeros(job.tasks, dtype=bool), wide, sums.unresolved))
     try:
         with ExitStack() as stack:
             store = (
@@ -199,7 +200,7 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
         lost = "without a checkpoint they are lost"
         how = lost if path is None else f"{path} has them: give the same call"
         raise KeyboardInterrupt(f"stopped after {run.rays_done} of {job.total} rays; {how}") from stop
-    sums.tables[:], sums.unresolved = run.state.tables, run.state.unresolved
+    sums.tables, sums.unresolved, sums.most = run.state.tables, run.state.unresolved, job.total
 
 
 def _identity(job: Job) -> dict[str, Any]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from ..matrices.defects import (
     reversibility_z_score,
     row_blocks,
 )
+from ..matrices.matrix import Mapped
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -57,7 +58,7 @@ class SampledArray:
 
     symmetric: Floats
     error: float
-    replicates: tuple[Replicate, ...]
+    replicates: Sequence[Replicate]
     raw_defect: SymmetryDefect
     counts: Counts | None
 
@@ -113,16 +114,15 @@ def sums_of_rows(basis: Basis, incoming: Floats, outgoing: Floats) -> NDArray[An
     return np.array([value.T @ image for value, image in zip(values, images, strict=True)])
 
 
-def array_from_counts(
-    parts: Sequence[Counts | Floats], basis: Basis, *, symmetrise: bool, independent: bool
-) -> SampledArray:
+def array_from_counts(parts: Sequence[Any], basis: Basis, *, symmetrise: bool, independent: bool) -> SampledArray:
     r"""The estimate from counts C of pairs whose incoming angles follow the invariant measure.
 
     Parameters
     ----------
     parts : sequence of (n, n) arrays
         One array for independent pairs. Otherwise one array for each batch, all of one size, or for each replicate of
-        a randomised Sobol sequence; these may hold sums of weights instead of counts.
+        a randomised Sobol sequence; these may hold sums of weights instead of counts. Their rows, columns and entries
+        are asked for some at a time.
     basis : Basis
         The partition whose cells were counted.
     symmetrise : bool
@@ -136,40 +136,51 @@ def array_from_counts(
     AccuracyError
         If a bin has no pairs; ``defect`` is the measure of such bins.
     """
-    counts = parts[0] if len(parts) == 1 else _summed(parts)
+    counts = _summed(parts)
     number, rows = float(counts.sum()), counts.sum(axis=1)
     _check_occupied(rows + counts.sum(axis=0) if symmetrise else rows, basis)
+    fractions = (basis.weights / np.where(rows > 0, rows, 1))[:, None]
 
-    def normalised(flux: Floats) -> Floats:
-        flux *= basis.normalisation[:, None]  # from fluxes to the orthonormal basis
+    def normalised(flux: Floats, some: slice) -> Floats:
+        flux *= basis.normalisation[some, None]  # from fluxes to the orthonormal basis
         flux *= basis.normalisation
         return flux
 
-    fractions = (basis.weights / np.where(rows > 0, rows, 1))[:, None]
-    symmetric = normalised((counts + counts.T) / (2.0 * number) if symmetrise else counts * fractions)
-    replicates = _Replicates(symmetric, len(parts))
+    def numerators(part: Any, some: slice) -> Floats:
+        return normalised(
+            (part[some] + part[:, some].T) / (2.0 * number) if symmetrise else part[some] * fractions[some], some
+        )
+
+    def influence(part: Any, some: slice) -> Floats:
+        """Of a part on the estimate: its numerators minus its denominators times the estimate."""
+        if symmetrise:
+            excess = numerators(part, some) - float(part.sum()) / number * symmetric[some]
+        else:
+            excess = part[some] - (part[some].sum(axis=1) / rows[some])[:, None] * counts[some]
+            excess = normalised(excess * fractions[some], some)
+        excess *= len(parts)
+        return excess
+
+    symmetric = np.empty(counts.shape)
+    for some in row_blocks(len(counts)):
+        symmetric[some] = numerators(counts, some)
+    replicates: Sequence[Replicate] = ()
     if independent:
         error = _quantile(*_moments_of_counts(counts, basis, symmetrise))
         z_score = reversibility_z_score(np.asarray(counts, dtype=np.int64))
     else:
-        for part in parts:
-            # The influence of a part on the estimate: its numerators minus its denominators times the estimate.
-            if symmetrise:
-                excess = normalised((part + part.T) / (2.0 * number)) - float(part.sum()) / number * symmetric
-            else:
-                excess = (part.sum(axis=1) / rows)[:, None] * counts
-                np.subtract(part, excess, out=excess)
-                excess *= fractions
-                normalised(excess)
-            excess *= len(parts)
-            replicates.add(excess)
-        error = replicates.half_width()
-        pairs = occupied_pairs(counts)
-        root = np.sqrt(counts[pairs] + counts.T[pairs])
-        z_score = replicate_z_score([(part[pairs] - part.T[pairs]) / root for part in parts])
+        error = _half_width(lambda some: np.array([influence(part, some) for part in parts]), symmetric, len(parts))
+        z_score = replicate_z_score(
+            [(part[pairs] - part[pairs[::-1]]) / np.sqrt(counts[pairs] + counts.T[pairs]) for part in parts]
+            for pairs in occupied_pairs(counts)
+        )
+        if _may_be_stored(symmetric, len(parts)):  # as counts, which take less memory
+            replicates = Mapped(parts, lambda part: _compact(symmetric + influence(part, slice(None))))
     raw = relative_asymmetry(counts, basis.normalisation)
-    whole = np.asarray(counts, dtype=np.int64) if np.issubdtype(counts.dtype, np.integer) else None
-    return SampledArray(symmetric, error, replicates.stored(), SymmetryDefect(raw, z_score=z_score), whole)
+    for array in (counts, symmetric):
+        array.setflags(write=False)
+    whole = cast(Counts, counts) if counts.dtype == np.int64 else None
+    return SampledArray(symmetric, error, replicates, SymmetryDefect(raw, z_score=z_score), whole)
 
 
 def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
@@ -179,82 +190,79 @@ def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, 
     """
     raw = np.mean(means, axis=0)
     scale = float(np.linalg.norm(raw)) or 1.0
-    z_score = replicate_z_score([(mean - mean.T) / scale for mean in means])
-    fixed = _with_constant(np.asarray(means), basis.constant, keeps_measure or symmetrise)
-    if symmetrise:
-        fixed = 0.5 * (fixed + fixed.transpose(0, 2, 1))
-    symmetric = np.asarray(np.mean(fixed, axis=0))
-    replicates = _Replicates(symmetric, len(means))
+    z_score = replicate_z_score(
+        [(mean[some] - mean[:, some].T) / scale for mean in means] for some in row_blocks(len(raw))
+    )
+    fixed = np.array(means)
     for mean in fixed:
-        replicates.add(mean - symmetric)
-    defect = SymmetryDefect(relative_asymmetry(raw), z_score=z_score)
-    return SampledArray(symmetric, replicates.half_width(), replicates.stored(), defect, None)
+        _keep_constant(mean, basis.constant, keeps_measure or symmetrise)
+        if symmetrise:
+            mean[:] = 0.5 * (mean + mean.T)
+    symmetric = np.asarray(np.mean(fixed, axis=0))
+    error = _half_width(lambda some: fixed[:, some] - symmetric[some], symmetric, len(fixed))
+    stored = tuple(map(_compact, fixed)) if _may_be_stored(symmetric, len(fixed)) else ()
+    return SampledArray(symmetric, error, stored, SymmetryDefect(relative_asymmetry(raw), z_score=z_score), None)
 
 
 def half_width(symmetric: Floats, replicates: Sequence[Replicate]) -> float:
     """The 95 % quantile of the sampling error of a matrix from the matrices of several parts of the rays."""
-    found = _Replicates(symmetric, len(replicates))
-    for part in replicates:
-        found.add(np.asarray(part - symmetric))
-    return found.half_width()
+    parts = list(replicates)
+    return _half_width(
+        lambda some: np.array([np.asarray(part[some] - symmetric[some]) for part in parts]), symmetric, len(parts)
+    )
 
 
-class _Replicates:
-    """The arrays of the parts, collected one by one; stored as sparse arrays if smaller, not stored if too large."""
-
-    def __init__(self, symmetric: Floats, number: int) -> None:
-        self.symmetric, self.number = symmetric, number
-        self.squares = 0.0
-        self.arrays: list[Replicate] = []
-        self.rows = slice(None, None, -(-symmetric.size // MOST_COMPARED))
-        self.differences: list[Floats] = []
-
-    def add(self, difference: Floats) -> None:
-        self.squares += sum(float(np.sum(difference[rows] ** 2)) for rows in row_blocks(len(difference)))
-        self.differences.append(difference[self.rows].ravel())
-        if self.symmetric.nbytes * self.number > LARGEST_REPLICATES:
-            return
-        replicate = self.symmetric + difference
-        if 4 * np.count_nonzero(replicate) > replicate.size:
-            replicate.setflags(write=False)
-            self.arrays.append(replicate)
-            return
-        from scipy.sparse import csr_array
-
-        self.arrays.append(csr_array(replicate))
-
-    def half_width(self) -> float:
-        """The 95 % quantile of the norm of the error of the mean of the parts.
-
-        In one dimension the error follows Student's t. In d equally important dimensions, the squared norm over its
-        estimate follows F with d and (parts - 1) d degrees of freedom. In general let C be the covariance of the parts,
-        d = (tr C)^2 / tr C^2 and w = (tr C^2)^3 / (tr C^3)^2 <= d. The quantile is taken from F with w and
-        (parts - 1) w degrees of freedom, and its distance from 1 is scaled by sqrt(w / d). The mean, variance and
-        skewness of the squared norm are then those of normal parts.
-        """
-        from scipy.special import fdtri
-
-        if self.squares == 0.0:
-            return 0.0
-        freedom = self.number - 1
-        sure = 1.0 - UNSURE_DIMENSIONS / freedom
-        spread, skew = (max(sure * number, 1.0) for number in _dimensions(np.array(self.differences)))
-        beyond = float(fdtri(skew, freedom * skew, LEVEL)) - 1.0
-        quantile = 1.0 + beyond * math.sqrt(skew / spread)
-        return math.sqrt(quantile * self.squares / (self.number * freedom))
-
-    def stored(self) -> tuple[Replicate, ...]:
-        return tuple(self.arrays)
+def _may_be_stored(symmetric: Floats, number: int) -> bool:
+    return symmetric.nbytes * number <= LARGEST_REPLICATES
 
 
-def _dimensions(differences: Floats) -> tuple[float, float]:
-    """(tr C)^2 / tr C^2 and (tr C^2)^3 / (tr C^3)^2 of normal vectors from their differences from their mean.
+def _compact(replicate: Floats) -> Replicate:
+    """A read-only array, or a sparse one if that is smaller."""
+    if 4 * np.count_nonzero(replicate) > replicate.size:
+        replicate.setflags(write=False)
+        return replicate
+    from scipy.sparse import csr_array
+
+    return csr_array(replicate)
+
+
+def _half_width(differences: Callable[[slice], Floats], symmetric: Floats, number: int) -> float:
+    """The 95 % quantile of the norm of the error of the mean of the parts, from some rows of all differences at a time.
+
+    In one dimension the error follows Student's t. In d equally important dimensions, the squared norm over its
+    estimate follows F with d and (parts - 1) d degrees of freedom. In general let C be the covariance of the parts,
+    d = (tr C)^2 / tr C^2 and w = (tr C^2)^3 / (tr C^3)^2 <= d. The quantile is taken from F with w and
+    (parts - 1) w degrees of freedom, and its distance from 1 is scaled by sqrt(w / d). The mean, variance and
+    skewness of the squared norm are then those of normal parts.
+    """
+    from scipy.special import fdtri
+
+    squares, products = 0.0, np.zeros((number, number))
+    step = -(-symmetric.size // MOST_COMPARED)
+    for some in row_blocks(len(symmetric)):
+        block = differences(some)
+        for part in block:
+            squares += float(np.sum(part**2))
+        compared = block[:, -some.start % step :: step].reshape(number, -1)
+        products += compared @ compared.T
+    if squares == 0.0:
+        return 0.0
+    freedom = number - 1
+    sure = 1.0 - UNSURE_DIMENSIONS / freedom
+    spread, skew = (max(sure * found, 1.0) for found in _dimensions(products))
+    beyond = float(fdtri(skew, freedom * skew, LEVEL)) - 1.0
+    quantile = 1.0 + beyond * math.sqrt(skew / spread)
+    return math.sqrt(quantile * squares / (number * freedom))
+
+
+def _dimensions(products: Floats) -> tuple[float, float]:
+    """(tr C)^2 / tr C^2 and (tr C^2)^3 / (tr C^3)^2 of normal vectors from products of differences from their mean.
 
     Means of products of traces of Wishart matrices give unbiased estimates of (tr C)^2, tr C^2 and tr C^3. They are
     clipped to values possible for a covariance: the second number is at least 1 and at most the first.
     """
-    freedom = len(differences) - 1
-    gram = differences @ differences.T / freedom
+    freedom = len(products) - 1
+    gram = products / freedom
     trace, square, cube = float(np.trace(gram)), float(np.sum(gram**2)), float(np.sum((gram @ gram) * gram))
     of_square = (square - trace**2 / freedom) * freedom**2 / ((freedom - 1) * (freedom + 2))
     # Smaller fractions are rounding errors.
@@ -267,16 +275,17 @@ def _dimensions(differences: Floats) -> tuple[float, float]:
     return squared / of_square, of_square**3 / of_cube**2
 
 
-def _with_constant(arrays: Floats, constant: Floats, both: bool) -> Floats:
-    """Arrays, shape (parts, n, n), of which each keeps the constant function, on one side or on both."""
-    arrays = arrays - (arrays @ constant - constant)[..., None] * constant
-    return arrays - constant[:, None] * (constant @ arrays - constant)[:, None, :] if both else arrays
+def _keep_constant(array: Floats, constant: Floats, both: bool) -> None:
+    """Change an array such that it keeps the constant function, on one side or on both."""
+    array -= (array @ constant - constant)[:, None] * constant
+    if both:
+        array -= constant[:, None] * (constant @ array - constant)
 
 
-def _summed(parts: Sequence[Counts | Floats]) -> Counts | Floats:
-    total = np.array(parts[0], dtype=np.result_type(parts[0], np.int64))
-    for number in range(1, len(parts)):
-        total += parts[number]
+def _summed(parts: Sequence[Any]) -> Counts | Floats:
+    total = np.empty((len(parts[0]),) * 2, dtype=np.result_type(parts[0][:0], np.int64))
+    for some in row_blocks(len(total)):
+        total[some] = sum(part[some] for part in parts)
     return total
 
 
@@ -286,37 +295,48 @@ def _moments_of_counts(counts: Counts | Floats, basis: Basis, symmetrise: bool) 
     if not symmetrise:
         # Entry (i, j) of the array is C_ij w_i h_i h_j / N_i, and each row is an independent multinomial.
         rows = counts.sum(axis=1)
-        found = [_squared_norms(counts[some], normalisation**2, rows[some]) for some in row_blocks(len(rows))]
+        found = [_squared_norms([(counts[some], normalisation**2)], rows[some]) for some in row_blocks(len(rows))]
         mean, variance = (np.concatenate(part) for part in zip(*found, strict=True))
         scale = (weights * normalisation / rows) ** 2
         return float(scale @ mean), float(scale**2 @ variance)
     # A pair counts one half at each of its two entries, or fully on the diagonal.
     number = float(counts.sum())
-    squares = np.outer(normalisation, normalisation) ** 2 / number**2
-    upper = np.triu_indices(len(weights), 1)
-    pairs = np.concatenate([np.diagonal(counts), (counts + counts.T)[upper]])
-    weight = np.concatenate([np.diagonal(squares), 0.5 * squares[upper]])
-    mean, variance = _squared_norms(pairs[None], weight, np.array([number]))
+
+    def blocks() -> Iterator[tuple[Counts | Floats, Floats]]:
+        for some in row_blocks(len(weights)):
+            squares = np.outer(normalisation[some], normalisation) ** 2 / number**2
+            first, upper = some.start, np.triu(np.ones(squares.shape, dtype=np.bool_), some.start + 1)
+            pairs = [np.diagonal(counts[some], first), (counts[some] + counts[:, some].T)[upper]]
+            weight = [np.diagonal(squares, first), 0.5 * squares[upper]]
+            yield np.concatenate(pairs)[None], np.concatenate(weight)
+
+    mean, variance = _squared_norms(blocks(), np.array([number]))
     return float(mean[0]), float(variance[0])
 
 
-def _squared_norms(counts: Counts | Floats, weight: Floats, number: Counts | Floats) -> tuple[Floats, Floats]:
+def _squared_norms(blocks: Iterable[tuple[Counts | Floats, Floats]], number: Counts | Floats) -> tuple[Floats, Floats]:
     """Mean and variance of sum_j w_j (C_j - N p_j)^2 for multinomial rows C of N pairs, both estimated from C.
 
-    It equals the sum of k(x, y) = sum_j w_j (1[x = j] - p_j) (1[y = j] - p_j) over all pairs (x, y) of the N draws, so
+    The cells j come block by block, each as C and w. The number equals the sum of
+    k(x, y) = sum_j w_j (1[x = j] - p_j) (1[y = j] - p_j) over all pairs (x, y) of the N draws, so
     its variance is N Var k(x, x) + 2 N (N - 1) E k(x, y)^2. The first term dominates if most counts are 0 or 1; without
     it the counts would be treated as normal.
     """
     number = np.asarray(number, dtype=np.float64)  # the square of a number of pairs can exceed int64
-    fraction = counts / number[:, None]
-    # An unbiased estimate of p^2, because the bias matters for small counts.
-    square = np.maximum(fraction * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
-    spread = np.einsum("ij,j->i", fraction * (1.0 - fraction), weight)
+    sums = np.zeros((6, number.size))
+    for counts, weight in blocks:
+        fraction = counts / number[:, None]
+        # An unbiased estimate of p^2, because the bias matters for small counts.
+        square = np.maximum(fraction * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
+        tilted = weight * (1.0 - 2.0 * fraction)
+        sums += [
+            np.einsum("ij,j->i", fraction * (1.0 - fraction), weight), fraction @ weight,
+            np.einsum("ij,ij->i", fraction, tilted**2), np.einsum("ij,ij->i", fraction, tilted),
+            np.einsum("ij,j->i", square * (1.0 - 2.0 * fraction), weight**2), square @ weight,
+        ]  # fmt: skip
     # A single pair does not determine its spread, which is then overestimated.
-    mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * spread, fraction @ weight)
-    tilted = weight * (1.0 - 2.0 * fraction)
-    own = np.einsum("ij,ij->i", fraction, tilted**2) - np.einsum("ij,ij->i", fraction, tilted) ** 2
-    other = np.einsum("ij,j->i", square * (1.0 - 2.0 * fraction), weight**2) + (square @ weight) ** 2
+    mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * sums[0], sums[1])
+    own, other = sums[2] - sums[3] ** 2, sums[4] + sums[5] ** 2
     return mean, number * np.maximum(own, 0.0) + 2.0 * number * (number - 1.0) * np.maximum(other, 0.0)
 
 

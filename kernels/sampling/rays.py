@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,30 +13,35 @@ from ...core.checks import Floats, check_memory
 from ...core.errors import AccuracyError
 from ..bases.assembly import LARGE, largest_square_sum
 from ..bases.basis import Basis
-from ..bases.mirror import reflection_matrix
+from ..bases.mirror import mirror_image
 from ..laws.law import Law
+from ..matrices.defects import BLOCK
 from ..walls.traced_map import UNRESOLVED_TOLERANCE
 from .counts import SampledArray, array_from_counts, array_from_sums, sums_of_rows
 
+# Memory of sums of real numbers: the tables, their means, and the replicates.
+TABLES = 3
 # Rays in a chunk: at least SMALLEST_CHUNK, and one for CELLS_A_RAY matrix entries, so that adding matrices is cheap.
 SMALLEST_CHUNK, CELLS_A_RAY = 2**16, 16
-# Memory in which a sampled matrix is computed, in matrices of doubles.
-MOST_MATRICES = 8
 
 
 @dataclass(frozen=True)
-class _WithImages(Sequence[Any]):
-    """Tables to which their mirror images are added when they are asked for, so that no copy is kept."""
+class _Counts:
+    """A table of small integers as int64, and with its mirror image, entry by entry when they are asked for."""
 
-    tables: NDArray[Any]
-    image: Callable[[Any], Any]
+    table: NDArray[Any]
+    mirrored: bool
 
     def __len__(self) -> int:
-        return len(self.tables)
+        return len(self.table)
 
-    def __getitem__(self, number: Any) -> Any:
-        table = self.tables[int(number)]
-        return table + self.image(table)
+    def __getitem__(self, key: Any) -> NDArray[np.int64]:
+        found: NDArray[np.int64] = self.table[key].astype(np.int64)
+        return found + self.table[::-1, ::-1][key] if self.mirrored else found
+
+    def sum(self) -> int:
+        """The sum of all entries."""
+        return (1 + self.mirrored) * int(self.table.sum())
 
 
 class RaySums:
@@ -45,7 +50,9 @@ class RaySums:
     Attributes
     ----------
     tables : ndarray of shape (parts, n, n)
-        Integers if the basis is a partition.
+        Integers if the basis is a partition: of large ones two bytes each, or more as soon as a count needs them.
+    most : int
+        The largest count of a large partition.
     each : int
         Number of rays in every part.
     unresolved : int
@@ -55,19 +62,18 @@ class RaySums:
     def __init__(self, law: Law, basis: Basis, parts: int) -> None:
         self.law, self.basis = law, basis
         shape = parts, basis.size, basis.size
-        check_memory("basis", f"sampling in {basis!r}", MOST_MATRICES * basis.size**2)
-        counts = np.int32 if parts > 1 and self._is_large else np.int64
+        if not basis.is_partition:
+            check_memory("basis", f"sampling in {basis!r}", TABLES * math.prod(shape))
+        self.is_large = basis.is_partition and basis.size**2 > BLOCK
+        counts = np.uint16 if self.is_large else np.int64
         self.tables = np.zeros(shape, dtype=counts if basis.is_partition else np.float64)
-        self.each, self.unresolved = 0, 0
-
-    @property
-    def _is_large(self) -> bool:
-        return self.basis.size**2 > LARGE
+        self.each, self.unresolved, self.most = 0, 0, 0
 
     @property
     def chunk(self) -> int:
         """Rays in a chunk: a power of two, which preserves the balance of the Sobol sequence."""
-        cells = 0 if self._is_large or not self.basis.is_partition else self.basis.size**2
+        cells = self.basis.size**2 if self.basis.is_partition else 0
+        cells *= cells <= LARGE
         return max(SMALLEST_CHUNK, 1 << (cells // CELLS_A_RAY).bit_length())
 
     def add(self, table: int, incoming: Floats, outgoing: Floats) -> None:
@@ -76,12 +82,16 @@ class RaySums:
 
     def add_rows(self, first: int, incoming: Floats, outgoing: Floats) -> None:
         """Add rays, shape (rows, rays), row by row to the tables from ``first`` on."""
-        tables = self.tables[first : first + len(incoming)]
-        if not (self._is_large and self.basis.is_partition):
-            tables += sums_of_rows(self.basis, incoming, outgoing)
+        rows = slice(first, first + len(incoming))
+        if not self.is_large:
+            self.tables[rows] += sums_of_rows(self.basis, incoming, outgoing)
             return
-        for table, sources, targets in zip(tables, self.basis.index(incoming), self.basis.index(outgoing), strict=True):
-            np.add.at(table, (sources, targets), 1)
+        needed = np.min_scalar_type(self.most + incoming.shape[1])
+        self.tables = self.tables.astype(np.promote_types(self.tables.dtype, needed), copy=False)
+        cells = self.basis.index(incoming) * self.basis.size + self.basis.index(outgoing)
+        for table, cell in zip(self.tables[rows].reshape(len(cells), -1), cells, strict=True):
+            np.add.at(table, cell, 1)
+            self.most = max(self.most, int(table[cell].max(initial=0)))
 
     def count_unresolved(self, escaped: NDArray[np.bool_] | None) -> None:
         """Count the rays that did not escape."""
@@ -106,11 +116,14 @@ class RaySums:
                 "geometry.trace(wall, x, theta).counts() says how they ended",
                 fraction,
             )
-        parts: Any = _WithImages(self.tables, self._mirror_image) if mirrored else self.tables
         if self.basis.is_partition:
+            parts = [_Counts(table, mirrored) for table in self.tables]
             array = array_from_counts(parts, self.basis, symmetrise=symmetrise, independent=len(parts) == 1)
         else:
-            means = [part / (2 * self.each if mirrored else self.each) for part in parts]
+            means = [
+                (table + mirror_image(table, self.basis)) / (2 * self.each) if mirrored else table / self.each
+                for table in self.tables
+            ]
             keeps_measure = bool(self.law.reversible)
             array = array_from_sums(means, self.basis, symmetrise=symmetrise, keeps_measure=keeps_measure)
         array = array.with_missed_events(used)
@@ -118,10 +131,3 @@ class RaySums:
             extra = 2.0 * fraction * largest_square_sum(self.basis)
             array = SampledArray(array.symmetric, array.error + extra, array.replicates, array.raw_defect, array.counts)
         return array, used, fraction
-
-    def _mirror_image(self, table: Any) -> Any:
-        """The table of the rays (pi - theta, pi - theta')."""
-        if self.basis.is_partition:
-            return table[::-1, ::-1]
-        flip = reflection_matrix(self.basis)
-        return flip @ table @ flip.T

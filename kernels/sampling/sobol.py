@@ -188,6 +188,8 @@ class SobolSampler:
                 self.sums.law, self.sums.basis, self.shifts, self.beyond, self.seed, self.halved,
                 self.sums.each, each,
             )  # fmt: skip
+            # earlier matrices have the tables of their replicates
+            self.sums.tables = self.sums.tables.copy() if self.sums.each else self.sums.tables
             count_long(self.sums, rays, engine or {})
             self.sums.each = each
         return self.sums.array(symmetrise=symmetrise, mirrored=self.halved)

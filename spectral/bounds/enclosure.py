@@ -9,16 +9,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, positive_number, whole_number
-from ...core.estimates import ErrorKind
+from ...core.checks import Floats, instance, positive_number, whole_number
+from ...core.estimates import ErrorKind, Summary, with_error
 from ...core.frames import data_frame
 from ...core.rounding import EPS
-from ...core.tables import html_table
 from ...kernels import Basis, CollisionLaw, DensityLaw, Law, Legendre, discretise
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, Power
-from ...kernels.laws.matrix_law import finite_matrix, not_a_law
+from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.walls.wall_law import made_of_isometries
 from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
@@ -43,8 +42,8 @@ QUOTIENT_ROUNDING = 4.0 * EPS
 ROUNDED = (HenyeyGreensteinLaw, LambertianLaw)
 
 
-@dataclass(frozen=True)
-class Enclosure:
+@dataclass(frozen=True, repr=False)
+class Enclosure(Summary):
     """An interval that contains a point of the spectrum of a law.
 
     Attributes
@@ -78,6 +77,7 @@ class Enclosure:
     kind: ErrorKind
     reason: str
     parity: Parity = "none"
+    _more = ".residual, .reason"
 
     @property
     def width(self) -> float:
@@ -88,13 +88,21 @@ class Enclosure:
         return self.low <= number <= self.high
 
     def __str__(self) -> str:
-        name = self.label if self.index is None else f"{self.label} {self.index}"
         parity = "" if self.parity == "none" else f", {self.parity}"
-        return f"[{self.low:.15g}, {self.high:.15g}] {name}{parity} ({self.kind}: {self.reason})"
+        return f"[{self.low:.15g}, {self.high:.15g}] holds {self._held()}{parity} ({self.kind}: {self.reason})"
+
+    def _held(self) -> str:
+        return "a point of the spectrum" if self.index is None else f"eigenvalue {self.index}"
+
+    def _headline(self) -> str:
+        return with_error(0.5 * (self.low + self.high), 0.5 * self.width)
+
+    def _facts(self) -> dict[str, object]:
+        return {"holds": self._held(), "parity": self.parity, "kind": self.kind}
 
 
-@dataclass(frozen=True)
-class Enclosures:
+@dataclass(frozen=True, repr=False)
+class Enclosures(Summary):
     """Enclosures, with the one of the constants first and the others by decreasing value; a sequence.
 
     Attributes
@@ -110,6 +118,7 @@ class Enclosures:
     separation: Separation
     convention: str
     method: str
+    _more = ".method, .separation, .to_frame(), [k]"
 
     def __len__(self) -> int:
         return len(self.items)
@@ -120,17 +129,14 @@ class Enclosures:
     def __getitem__(self, position: int) -> Enclosure:
         return self.items[position]
 
-    def __str__(self) -> str:
-        return "\n".join([f"{self.convention} convention, {self.method}", *map(str, self.items)])
-
     def to_frame(self) -> Any:
         """One row an enclosure, one column a field, as a pandas.DataFrame (extra ``studies``)."""
         names = [field.name for field in fields(Enclosure)]
         return data_frame({name: [getattr(item, name) for item in self.items] for name in names})
 
-    def _repr_html_(self) -> str:
-        numbers = {f"{k} {item.label}": f"[{item.low:.12g}, {item.high:.12g}]" for k, item in enumerate(self.items)}
-        return html_table(f"Enclosures, {self.convention} convention", {**numbers, "method": self.method})
+    def _facts(self) -> dict[str, object]:
+        names = ("point {}" if item.index is None else f"{{}} {item.parity}" for item in self.items)
+        return {"convention": self.convention, **{name.format(k): self.items[k] for k, name in enumerate(names)}}
 
 
 def enclosures(
@@ -188,8 +194,7 @@ def enclosures(
     positive_number("tolerance", tolerance)
     if isinstance(law, CollisionLaw):
         law = law.law
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    instance("law", law, Law, "ker.WallLaw(wall)")
     refuse_unless_self_adjoint(law)
     own = finite_matrix(law)
     matrix = finite_matrix(law, k + 1) if own is not None and own.size > 1 else None
@@ -322,7 +327,7 @@ def _of_matrix(found: Spectrum, k: int, beyond: float) -> Enclosures:
     items = []
     for index, i in enumerate(order[:k].tolist()):
         value, error, certain = float(found.values[i]), float(errors[i]), moduli[i] - errors[i] > beyond
-        why = reason if certain else f"not indexed: infinitely many have the modulus {beyond:.6g}; {reason}"
+        why = reason if certain else f"its number is not known: infinitely many have the modulus {beyond:.6g}; {reason}"
         label: Label = "indexed" if certain else "contains-spectrum"
         items.append(
             Enclosure(
@@ -413,7 +418,7 @@ def _enclosed(
         reason = f"{apart.reason}: the rest is within {apart.radius:.6g}"
         return Enclosure(value, low, high, "indexed", rank, norm, kind, reason, own)
     radius = norm + float(found.quotient_errors[position]) + QUOTIENT_ROUNDING
-    reason = f"not indexed: the rest of the spectrum reaches {apart.radius:.6g} for all that is known ({apart.reason})"
+    reason = f"its number is not known: the rest reaches {apart.radius:.6g} for all that is known ({apart.reason})"
     kind = "bound" if exact else "estimate"
     return Enclosure(
         value, value - radius, min(value + radius, 1.0), "contains-spectrum", None, norm, kind, reason, own

@@ -99,7 +99,7 @@ def _adapted(law: Law, k: int, tolerance: float, most_levels: int, bar: Any) -> 
         goal = float(np.sqrt(tolerance * _room(values, k)))
         joint = float(np.sqrt(squares[:, :k].sum()))
         history.append((level.panels.size, joint))
-        bar.set_postfix_str(f"residual {joint:.1g}, asked for {goal:.1g}", refresh=False)
+        bar.describe(f"residual {joint:.1g}, asked for {goal:.1g}")
         bar.update()
         if joint <= goal or len(history) == most_levels or len(edges) > most_panels:
             break
@@ -172,10 +172,11 @@ class _Level:
 
     def leading(self, k: int, algebraic: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
         """Eigenvalues of largest modulus, constants first, with vectors and parities (0 without mirror symmetry)."""
-        found = [self._leading_of(parity, k, algebraic) for parity in ((1, -1) if self.mirrored else (0,))]
+        signs = (1, -1) if self.mirrored else (0,)
+        found = [self._leading_of(parity, k, algebraic) for parity in signs]
         values = np.concatenate([part[0] for part in found])
         vectors = np.concatenate([part[1] for part in found], axis=1)
-        parity = np.concatenate([np.full(len(part[0]), sign) for part, sign in zip(found, (1, -1), strict=False)])
+        parity = np.concatenate([np.full(len(part[0]), sign) for part, sign in zip(found, signs, strict=True)])
         order = np.argsort(-np.abs(values), kind="stable")
         # the constants are the first vector of the first part, regardless of rounding
         order = np.append(0, order[order != 0])[:k]

@@ -17,17 +17,19 @@ from ...core.checks import (
     finite_array,
     frozen,
     generator,
+    instance,
     number_between,
     shortened,
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate
+from ...core.estimates import NORMAL_95, Estimate, Summary, with_errors
 from ...core.long_runs import Engine, all_parts
 from ...core.version import __version__
-from ...kernels import Law
+from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.bases.measure import SINE
-from ...kernels.laws.matrix_law import not_a_law
+from ...kernels.laws.law import IsometryLaw
+from ...kernels.laws.structure import holds_of_all
 
 Arrangement = Literal["mirror", "half-turn"]
 
@@ -41,8 +43,8 @@ LARGEST = 1e150
 TOGETHER = 4096
 
 
-@dataclass(frozen=True)
-class ExitTimes:
+@dataclass(frozen=True, repr=False)
+class ExitTimes(Summary):
     """Times to leave -L < x < L, for particles that start at x = 0 with the invariant distribution of angles.
 
     Attributes
@@ -59,6 +61,11 @@ class ExitTimes:
     times: Floats
     radius: float
     speed: float
+    _unit = "times in length / speed"
+
+    def _facts(self) -> dict[str, object]:
+        half = NORMAL_95 * self.times.std(axis=0, ddof=1) / np.sqrt(len(self.times))
+        return {"lengths": self.lengths, "means": with_errors(self.means, half), "particles": len(self.times)}
 
     @property
     def means(self) -> Floats:
@@ -133,8 +140,8 @@ def exit_times(
     Raises
     ------
     InputError
-        If the lengths do not increase, or a particle has not left after 10^6 flights; if the checkpoint is of another
-        simulation.
+        If the lengths do not increase, a particle has not left after 10^6 flights, or every ray keeps its angle to the
+        wall, so that the mean exit times are infinite; if the checkpoint is of another simulation.
 
     Examples
     --------
@@ -159,6 +166,7 @@ def simulated_times(
 ) -> ExitTimes:
     """`exit_times` at ``least`` lengths or more."""
     paper, levels = checked(law, "lengths", lengths, arrangement, particles, least)
+    refuse_kept_sines(paper)
     width, pace = 2.0 * number_between("radius", radius, 0.0, LARGEST), number_between("speed", speed, 0.0, LARGEST)
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     job = _Particles(paper, levels, particles, root, width, pace, arrangement)
@@ -168,8 +176,7 @@ def simulated_times(
 
 def in_paper_frame(law: Law) -> Law:
     """The law in the paper's convention; an InputError if it is no law."""
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    instance("law", law, Law, "ker.WallLaw(wall)")
     return law.in_specular_frame() if law.frame == "specular" else law
 
 
@@ -184,6 +191,25 @@ def checked(
     choice("arrangement", arrangement, get_args(Arrangement))
     check_memory("particles", f"the table of {name}", 2 * found.size * whole_number("particles", particles, 2))
     return paper, found
+
+
+def refuse_kept_sines(law: Law) -> None:
+    """An InputError if every ray keeps its angle to the wall."""
+    if holds_of_all(law, _keeps_sines):
+        raise InputError(
+            "law: every ray keeps its angle to the wall, so all flights of a particle are equally long, the mean "
+            f"exit times are infinite and the particles have no common diffusivity; got {law!r}, expected a law that "
+            "changes angles, as a mixture with lambertian() does"
+        )
+
+
+def _keeps_sines(law: Law) -> bool:
+    """Whether a law is known to consist of theta' = theta and theta' = pi - theta."""
+    if isinstance(law, (WallLaw, PolygonLaw)):
+        wall = law.wall
+        steps = [np.subtract(piece.end, piece.start) for loop in (wall.pieces, *wall.islands) for piece in loop]
+        return wall.is_polygonal and all(np.count_nonzero(step) == 1 for step in steps)
+    return isinstance(law, (IsometryLaw, RectangularTeethLaw))
 
 
 def reflected(law: Law, incoming: Floats, rng: np.random.Generator) -> Floats:

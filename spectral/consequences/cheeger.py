@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.checks import Floats, frozen
+from ...core.checks import Floats, frozen, instance
 from ...core.errors import InputError
+from ...core.estimates import Summary
+from ...kernels import KernelMatrix
 from ..eigenvalues.spectra import matrix_spectrum
 
-if TYPE_CHECKING:
-    from ...kernels import KernelMatrix
 
-
-@dataclass(frozen=True)
-class Conductance:
+@dataclass(frozen=True, repr=False)
+class Conductance(Summary):
     """The best cut by a level of the second eigenfunction, and its bounds for the gap.
 
     Attributes
@@ -66,6 +64,7 @@ def conductance(matrix: KernelMatrix) -> Conductance:
     >>> round(found.value, 12), round(found.gap_above, 12), round(found.gap_below, 12)
     (0.1, 0.2, 0.005)
     """
+    instance("matrix", matrix, KernelMatrix, "ker.discretise(law, ker.Bins(64))")
     if not matrix.basis.is_partition or matrix.size < 2:
         raise InputError(f"matrix: expected one in at least two bins, got {matrix.basis!r}")
     found = matrix_spectrum(matrix, matrix.size)

@@ -13,6 +13,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ...core.checks import Floats, Rng, choice, generator, number_between, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, RULE_OF_THREE, Estimate, student_95
+from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...kernels import KernelMatrix, Law, Legendre, discretise, lambertian, specular
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
@@ -96,6 +97,7 @@ GEOMETRIES: dict[Section, _Geometry] = {
 }
 
 
+@reported("transmission")
 def transmission(
     law: Law | DirectionLaw, length: float, section: Section = "channel", tolerance: float = 1e-4, rng: Rng = None
 ) -> Estimate:
@@ -185,7 +187,10 @@ def transmission(
         smooth = _by_polynomials(paper, far, wanted, source)
         if smooth.error <= wanted:
             return smooth
-        flown = _by_flights(section, far, wanted, source, _entered_in_plane, lambda angle: _turn(paper, angle, source))
+        flown = _by_flights(
+            section, far, wanted, source, _entered_in_plane, lambda angle: _turn(paper, angle, source),
+            least=2.0 * smooth.error,
+        )  # fmt: skip
         return min(smooth, flown, key=lambda found: found.error)
     if diffuse is None:
         raise InputError(
@@ -229,14 +234,14 @@ def _by_polynomials(law: Law, length: float, tolerance: float, rng: np.random.Ge
             levels = []
         if not levels or _in_polynomials(matrix, length, *levels[0])[1] <= 0.5 * tolerance:
             break
-    for size, nodes in levels:
-        if size > FIRST_SIZE:
-            matrix = discretise(law, Legendre(size), tolerance=accuracy, rng=rng)
-        before = value
-        value, noise = _in_polynomials(matrix, length, size, nodes)
+    for degree, nodes in levels:
+        if degree > FIRST_SIZE:
+            matrix = discretise(law, Legendre(degree), tolerance=accuracy, rng=rng)
+        finer, noise = _in_polynomials(matrix, length, degree, nodes)
         if noise > tolerance:
             break
-        changes = [abs(value - before), *(change / GAIN for change in changes)]
+        changes = [abs(finer - value), *(change / GAIN for change in changes)]
+        value, size = finer, degree
         # one small change may be chance
         if len(changes) >= FEWEST_LEVELS:
             error = max(changes[:-1]) + noise
@@ -408,8 +413,13 @@ def _by_flights(
     rng: np.random.Generator,
     enter: Callable[[float, np.random.Generator], tuple[Floats, Floats]],
     reflect: Reflections,
+    *,
+    least: float = math.inf,
 ) -> Estimate:
-    """The fraction without collision, exactly, and of the others the fraction that leaves at the far end, by rays."""
+    """The fraction without collision, exactly, and of the others the fraction that leaves at the far end, by rays.
+
+    Flights end early if by their spread they would not come below the error ``least`` at the limit of their work.
+    """
     direct = float(GEOMETRIES[section].passing(np.array(length)))
     through = particles = unresolved = work = 0
     value, error = math.nan, math.inf
@@ -424,6 +434,8 @@ def _by_flights(
         # of particles that are still inside, none or all may leave at the far end
         value = direct + (1.0 - direct) * (fraction + half)
         error = (1.0 - direct) * (max(spread, RULE_OF_THREE / count) + half)
+        if error * math.sqrt(work / MOST_REFLECTIONS) > least:
+            break
     method = f"flights of {particles} particles" + f", {unresolved} of them still inside" * (unresolved > 0)
     return Estimate(value, error, "estimate", method)
 

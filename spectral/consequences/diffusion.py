@@ -11,13 +11,11 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, choice, frozen, positive_number
 from ...core.errors import AccuracyError, AsperityError, InputError
-from ...core.estimates import NORMAL_95, ErrorKind, Estimate
+from ...core.estimates import NORMAL_95, ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
-from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
-from ...kernels.laws.law import IsometryLaw
-from ...kernels.laws.structure import holds_of_all
+from ...kernels import Law
 from ..essential.edge import grazing_symbol
-from .channel import Arrangement, in_paper_frame, simulated_times
+from .channel import Arrangement, in_paper_frame, refuse_kept_sines, simulated_times
 
 # Sign of the displacement of rays that leave near theta = 0 and near theta = pi.
 DIRECTION = np.array([1.0, -1.0])
@@ -64,15 +62,15 @@ class Diffusivity(Estimate):
     zeta_error: float
     arrangement: Arrangement
     onset: float
+    _unit = "radius x speed"
 
     def __str__(self) -> str:
-        digits = f"{self.value:.4g}" if self.error <= 1e-4 * abs(self.value) else super().__str__()
         far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "beyond 2000 r at least"
-        return f"{digits}, the slope of L^2/tau against ln(L/r) for L {far}"
+        return f"{super().__str__()}, the slope of L^2/tau against ln(L/r) for L {far}"
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         same = ", the same for all walls that turn grazing flights" if abs(self.eta - 1.0) <= self.eta_error else ""
-        return f"Diffusivity({self}{same}; eta={self.eta:.6g}, zeta={self.zeta:.6g}, kind={self.kind!r})"
+        return f"{self}{same}"
 
 
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
@@ -137,7 +135,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
 
 
 @dataclass(frozen=True, repr=False)
-class ChannelDiffusivity:
+class ChannelDiffusivity(Summary):
     r"""Mean exit times tau(L) from channels -L < x < L, and the diffusivity L^2/(2 tau) at each length.
 
     Particles that diffuse by Fick's law, with the variance 2 D_F t, leave in the mean time L^2/(2 D_F). So L^2/(2 tau)
@@ -166,6 +164,8 @@ class ChannelDiffusivity:
     particles: int
     radius: float
     speed: float
+    _show = "lengths values onset particles"
+    _unit = "values in radius x speed"
 
     @property
     def values(self) -> Floats:
@@ -176,12 +176,6 @@ class ChannelDiffusivity:
     def errors(self) -> Floats:
         """Half widths of the 95 % intervals of ``values``, to first order."""
         return np.asarray(self.values * self.time_errors / self.times)
-
-    def __repr__(self) -> str:
-        numbers = (Estimate(*pair, "estimate", "") for pair in zip(self.values, self.errors, strict=True))
-        text = ", ".join(f"{number} at L = {length:g}" for length, number in zip(self.lengths, numbers, strict=True))
-        far = f"well above {self.onset:.2g}" if np.isfinite(self.onset) else "from an unknown length on"
-        return f"ChannelDiffusivity(L^2/(2 tau): {text}; logarithmic in L {far})"
 
 
 def channel_diffusivity(
@@ -226,11 +220,17 @@ def channel_diffusivity(
 
     >>> from asperity import kernels as ker, spectral as spec
     >>> spec.channel_diffusivity(ker.lambertian(), [20.0], rng=1)
-    ChannelDiffusivity(L^2/(2 tau): 1.26(4) at L = 20; logarithmic in L well above 3.2)
-    >>> spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
-    ChannelDiffusivity(L^2/(2 tau): 3.63(9) at L = 20; logarithmic in L well above 36)
+    ChannelDiffusivity
+    lengths   20
+    values    1.26(4)
+    onset     3.17352
+    particles 4096
+    unit      values in radius x speed
+    more      .times, .time_errors, .radius, .speed, .errors
+    >>> shallow = spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
+    >>> print(*shallow.values.round(2), round(shallow.onset))
+    3.63 36
     """
-    _refuse_kept_sines(law)
     found = simulated_times(law, lengths, particles, rng, radius, speed, arrangement, {}, least=1)
     errors = NORMAL_95 * found.times.std(axis=0, ddof=1) / np.sqrt(len(found.times))
     try:
@@ -258,7 +258,7 @@ def logarithmic_slope(law: Law, radius: float, speed: float, arrangement: Arrang
             f"law: {law!r} keeps the direction of grazing flights (zeta = {zeta:.6g}), so the diffusivity is infinite; "
             "expected a law that turns them round at times, as a mixture with lambertian() does"
         )
-    _refuse_kept_sines(law)
+    refuse_kept_sines(law)
     # the limit follows from the structure of the law, or from the shape of the wall at y = 0
     exact = symbol.entry_error == 0.0
     if not exact and zeta + uncertainty >= 1.0 - BALLISTIC:
@@ -291,21 +291,3 @@ def _onset(law: Law, zeta: float) -> float:
     far = np.abs(means + zeta) > NEAR_LIMIT
     first = int(np.flatnonzero(far)[-1]) + 1 if far.any() else 0
     return float(1.0 / np.tan(ONSET_ANGLES[first])) if first < ONSET_ANGLES.size else np.inf
-
-
-def _refuse_kept_sines(law: Law) -> None:
-    if isinstance(law, Law) and holds_of_all(law, _keeps_sines):
-        raise InputError(
-            "law: every ray keeps its angle to the wall, so all flights of a particle are equally long and the "
-            f"particles have no common diffusivity; got {law!r}, expected a law that changes angles, as a mixture with "
-            "lambertian() does"
-        )
-
-
-def _keeps_sines(law: Law) -> bool:
-    """Whether a law is known to consist of theta' = theta and theta' = pi - theta."""
-    if isinstance(law, (WallLaw, PolygonLaw)):
-        wall = law.wall
-        steps = [np.subtract(piece.end, piece.start) for loop in (wall.pieces, *wall.islands) for piece in loop]
-        return wall.is_polygonal and all(np.count_nonzero(step) == 1 for step in steps)
-    return isinstance(law, (IsometryLaw, RectangularTeethLaw))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...core.errors import InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ...kernels import Law
 from ...kernels.bases.directions import SINE_NORM
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
@@ -19,8 +19,8 @@ TANGENTIAL, NORMAL = 0.5, 13.5 * SINE_NORM**2
 WEIGHTS = 0.9, 0.1
 
 
-@dataclass(frozen=True)
-class SpaceAccommodation:
+@dataclass(frozen=True, repr=False)
+class SpaceAccommodation(Summary):
     r"""How far particles that a wall with grooves reflects forget the momentum with which they came.
 
     Incoming velocities of speed 1 have the cosine law, and grooves of any direction the same means: of a drifting gas

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.checks import Floats, frozen, whole_number
+from ...core.checks import Floats, frozen, instance, whole_number
+from ...core.estimates import Summary
 from ...kernels import Law, Legendre, discretise
-from ...kernels.laws.matrix_law import not_a_law
 
 if TYPE_CHECKING:
     from ...geometry import Wall
@@ -21,8 +21,8 @@ CHORDS = 4096
 STEEPENING = 1.2
 
 
-@dataclass(frozen=True)
-class LaplacianComparison:
+@dataclass(frozen=True, repr=False)
+class LaplacianComparison(Summary):
     r"""Comparison of a law in Feres' convention with 1 + 2 h d/dz (1 - z^2) d/dz, z = cos(theta).
 
     Attributes
@@ -74,8 +74,7 @@ def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) ->
     [1.0, 0.99]
     """
     whole_number("degrees", degrees, 1)
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a law such as WallLaw(wall)", law)
+    instance("law", law, Law, "ker.WallLaw(wall)")
     specular = law if law.frame == "specular" else law.in_specular_frame()
     matrix = discretise(specular, Legendre(2 * degrees + 2), tolerance=tolerance)
     order = np.arange(1, degrees + 1)

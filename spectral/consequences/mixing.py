@@ -10,10 +10,11 @@ import numpy as np
 
 from ...core.checks import Floats, choice, number_between
 from ...core.errors import AccuracyError, InputError
-from ...core.estimates import ErrorKind, Estimate
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, KernelMatrix, Law
 from ...kernels.bases.measure import SINE
+from ...kernels.laws.matrix_law import not_a_law
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..gap.gap import modulus_gap
 
@@ -25,8 +26,8 @@ SOUGHT, TOLERANCE = 6, 1e-4
 PANELS, NODES = 48, 16
 
 
-@dataclass(frozen=True)
-class MixingTime:
+@dataclass(frozen=True, repr=False)
+class MixingTime(Summary):
     """The number of steps after which a chain is near its invariant distribution.
 
     Attributes
@@ -54,9 +55,15 @@ class MixingTime:
     distance: Distance
     initial: float
     kind: ErrorKind
+    _show = "distance initial earliest relaxation_time slem kind"
+    _unit = "times in steps"
+    _more = ".relaxation_time.method, .slem.method"
 
     def __float__(self) -> float:
         return float(self.steps)
+
+    def _headline(self) -> str:
+        return f"{self.steps} steps"
 
 
 def mixing_time(
@@ -110,6 +117,8 @@ def mixing_time(
     """
     within = number_between("within", within, 0.0, np.inf)
     choice("distance", distance, get_args(Distance))
+    if not isinstance(kernel, Law | KernelMatrix | Spectrum):
+        raise not_a_law("kernel", "a Law, a KernelMatrix or a Spectrum", kernel)
     steps_before, size = 0, number_between("initial", initial, 0.0, np.inf, closed="low")
     if density is not None:
         size = _distance_of(density)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, angles, finite_array, frozen, generator, positive_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, ErrorKind, Estimate
+from ...core.estimates import FEW, NORMAL_95, ErrorKind, Estimate, Summary, with_error
 from ...core.rounding import EPS
 from ...kernels import SINE, Law, Panels, discretise
 from ...kernels.bases.basis import Basis
@@ -47,8 +47,8 @@ GRAZING_DRAWS, GRADED, GRADED_UP_TO = 2**14, 16, 0.4
 RULE_SHARE, LEAST_TOLERANCE = 0.1, 1e-13
 
 
-@dataclass(frozen=True)
-class Accommodation:
+@dataclass(frozen=True, repr=False)
+class Accommodation(Summary):
     r"""How far the reflected particles forget the momentum with which they came.
 
     Attributes
@@ -93,6 +93,22 @@ class Accommodation:
     misfit_at: Floats
     misfit_errors: Floats
     kind_at: ErrorKind
+    _show = "tangential normal maxwell_fraction misfit incidence_deg"
+    _unit = "degrees; the misfit in units of the speed"
+    _more = ".tangential_at, .tangential_errors, .normal_at, .normal_errors, .by_angle(), .tangential.method"
+
+    def _facts(self) -> dict[str, object]:
+        return {**super()._facts(), **(self.by_angle() if self.theta.size <= FEW else {})}
+
+    def by_angle(self) -> dict[str, str]:
+        """The coefficients in words, by the angle from the normal."""
+        found = {}
+        tangential = zip(self.tangential_at, self.tangential_errors, strict=True)
+        normal = zip(self.normal_at, self.normal_errors, strict=True)
+        for degrees, *pair in zip(self.incidence_deg, tangential, normal, strict=True):
+            words = ["not defined" if np.isnan(one[0]) else with_error(*map(float, one)) for one in pair]
+            found[f"at {degrees:.6g} degrees"] = f"tangential {words[0]}, normal {words[1]}"
+        return found
 
     @property
     def incidence_deg(self) -> Floats:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, frozen, generator, positive_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate, student_95
+from ...core.estimates import NORMAL_95, Estimate, Summary, student_95
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from .channel import MOST_FLIGHTS, SMALLEST, Arrangement, checked, passed, reflected
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 GROUPS = 32
 
 
-@dataclass(frozen=True)
-class ChannelPaths:
+@dataclass(frozen=True, repr=False)
+class ChannelPaths(Summary):
     """Positions along a channel of particles that start at 0 on a wall, with the invariant distribution of angles.
 
     Attributes

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, frozen
 from ...core.errors import AccuracyError
-from ...core.estimates import NORMAL_95, Estimate
+from ...core.estimates import NORMAL_95, Estimate, Summary, with_error
 from ...core.frames import data_frame
 from ...core.rounding import EPS
-from ...core.tables import html_table
 from ...kernels import Basis, Bins, KernelMatrix
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
 from .dense import ExtremalEigenvalues, compressed, end_values
@@ -82,8 +81,8 @@ def _padded(values: Floats, length: int) -> Floats:
     return np.concatenate([values, np.full(length - len(values), np.nan)])
 
 
-@dataclass(frozen=True)
-class SpectrumErrors:
+@dataclass(frozen=True, repr=False)
+class SpectrumErrors(Summary):
     """The three errors of every eigenvalue, each of shape (k,).
 
     Attributes
@@ -113,8 +112,8 @@ class SpectrumErrors:
         return np.asarray(self.algebraic + self.discretisation + self.quantile * self.sampling)
 
 
-@dataclass(frozen=True)
-class Spectrum:
+@dataclass(frozen=True, repr=False)
+class Spectrum(Summary):
     """The k eigenvalues of largest modulus of a reversible law, sorted descending.
 
     Attributes
@@ -166,6 +165,7 @@ class Spectrum:
     completeness: str = ""
     verdict: Verdict = "undecided"
     evidence: tuple[str, ...] = ()
+    _more = ".errors, .completeness, .evidence, .plot(), .plot_eigenfunctions(), .to_frame()"
 
     @property
     def intervals(self) -> Floats:
@@ -229,16 +229,14 @@ class Spectrum:
         parity = self.parity or ("none",) * len(self.values)
         return data_frame({"value": self.values, "error": errors.total(), "parity": parity, **parts})
 
-    def _repr_html_(self) -> str:
+    def _headline(self) -> str:
+        return f"gap {with_error(self.gap, self.gap_error)}, {self.verdict}"
+
+    def _facts(self) -> dict[str, object]:
         names = [f"{k} {parity}" if parity != "none" else str(k) for k, parity in enumerate(self.parity)]
         names = names or [str(k) for k in range(len(self.values))]
-        numbers = dict(zip(names, map(str, self.estimates()), strict=True))
-        lines = {"verdict": self.verdict, "basis": repr(self.basis), "completeness": self.completeness}
-        return html_table(f"Eigenvalues, {self.convention} convention", {**numbers, **lines})
-
-    def __repr__(self) -> str:
-        numbers = f"k={len(self.values)}, gap={self.gap:.10g}, slem={self.slem:.10g}"
-        return f"Spectrum({numbers}, verdict={self.verdict!r}, convention={self.convention!r})"
+        numbers = dict(zip(names, self.estimates(), strict=True))
+        return {"convention": self.convention, "basis": self.basis, **numbers}
 
 
 def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) -> Spectrum:

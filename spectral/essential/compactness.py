@@ -22,7 +22,7 @@ UNSEEN = 1e-3
 FALLING = 0.7
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class HilbertSchmidtNorm(Estimate):
     r"""The Hilbert-Schmidt norm of a law in L^2(sin theta d theta): of a reversible law (sum_l lambda_l^2)^(1/2).
 

@@ -8,8 +8,8 @@ from functools import reduce
 
 import numpy as np
 
-from ...core.checks import Floats
-from ...core.estimates import ErrorKind
+from ...core.checks import Floats, instance
+from ...core.estimates import ErrorKind, Summary, with_error
 from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import IsometryLaw
@@ -22,8 +22,8 @@ from .straight_pieces import straight_part
 ROUNDING = 1e-15
 
 
-@dataclass(frozen=True)
-class EssentialEdge:
+@dataclass(frozen=True, repr=False)
+class EssentialEdge(Summary):
     """An interval that contains the supremum of the essential spectrum.
 
     Attributes
@@ -90,6 +90,7 @@ def essential_edge(law: Law) -> EssentialEdge:
     >>> essential_edge(0.25 * ker.lambertian() + 0.75 * ker.TriangularTeethLaw(0.7)).value
     0.75
     """
+    instance("law", law, Law, "ker.WallLaw(wall)")
     part = fold(law, ISOMETRIES) if made_of_isometries(law) else _taken_apart(law)
     matrix = part.grazing
     root = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
@@ -123,7 +124,7 @@ def _leaf(law: Law) -> _Part:
         return replace(_isometric(law), grazing=limit.matrix, error=limit.error, entry_error=limit.entry_error)
     limit = grazing_limit(law)
     errors = (limit.error, limit.entry_error)
-    how = f"-> {limit.root:.8f} +- {limit.error:.1g} as theta -> 0 or pi"
+    how = f"-> {with_error(limit.root, limit.error)} as theta -> 0 or pi"
     if not limit.resolved:
         how = "has no limit that can be told in double precision, so the essential spectrum may reach 1"
     elif limit.error == 0.0:

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...core.checks import Rng, generator, positive_number
 from ...core.errors import AccuracyError
-from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
+from ...core.estimates import with_error
+from ...core.long_runs import TIME_LIMIT, OutOfTime, reported, time_limited
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
@@ -66,7 +67,9 @@ def _gap_of_enclosures(law: Law, number: int, tolerance: float) -> SpectralGap |
     if top is None or top.low <= max(found.separation.radius, 0.0) or top.high >= 1.0:
         return None
     gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
-    return SpectralGap(gap, error, top.kind, f"indexed enclosure; {found.method}", "isolated", (str(top),), law.frame)
+    return SpectralGap(
+        gap, error, top.kind, f"bounds of the eigenvalue; {found.method}", "isolated", (str(top),), law.frame
+    )
 
 
 def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
@@ -80,6 +83,7 @@ def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
     return int(found[0]) + 2 if found.size else None
 
 
+@reported("spectral gap")
 def spectral_gap(
     law: Law | KernelMatrix | CollisionLaw | DirectionLaw,
     tolerance: float = 1e-6,
@@ -165,7 +169,7 @@ def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
     found = matrix_spectrum(matrix, EIGENVALUES)
     method = made_from(found, f"algebraic + {ONE_MATRIX:.0f} x two-grid + 1.96 x sampling error")
     evidence = (
-        f"{UNREFINED}; the gap of the matrix itself is {found.gap:.15g} +- {found.gap_errors.algebraic[0]:.2g}, an "
+        f"{UNREFINED}; the gap of the matrix itself is {with_error(found.gap, found.gap_errors.algebraic[0])}, an "
         "upper bound of the law's but for noise and the errors of entries",
     )
     gap = SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
@@ -212,7 +216,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     if least + error < top - upper.error or least <= edge.high:
         # the edge bounds the modulus of the essential spectrum, because the parts of the law are positive operators
         return upper
-    evidence = (*upper.evidence, f"the least eigenvalue is {-least:.10g} +- {error:.2g}")
+    evidence = (*upper.evidence, f"the least eigenvalue is {with_error(-least, error)}")
     method = f"least eigenvalue, {listed.basis!r}, {listed.method}"
     if least - error > max(top + upper.error, edge.high):
         gap = SpectralGap(1.0 - least, error, "estimate", method, "isolated", evidence, law.frame, listed)
@@ -330,11 +334,12 @@ def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:
         frequency, quotient, spread = least_quotient(law)
     except AccuracyError as failure:
         return replace(found, evidence=(*found.evidence, f"not held against fast oscillations: {failure}"))
-    most = quotient + SIGMAS * spread
+    half = SIGMAS * spread
+    most = quotient + half
     if most >= found.value - found.error:
         return found
     reason = (
-        f"by {RAYS} rays cos(t theta + phase), t = {frequency:.6g}, has the quotient {quotient:.3g} +- {spread:.2g}: "
+        f"by {RAYS} rays cos(t theta + phase), t = {frequency:.6g}, has the quotient {with_error(quotient, half)}: "
         f"the gap is not {found.value:.6g}, that of slow functions, but {most:.3g} or less"
     )
     evidence = (*found.evidence, reason)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.checks import Rng, frozen, generator, number_between, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.long_runs import TIME_LIMIT
+from ...core.long_runs import TIME_LIMIT, reported
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import not_a_law
@@ -25,6 +25,7 @@ from .verdict import SpectralGap
 TOLERANCE = 1e-4
 
 
+@reported("spectrum")
 def spectrum(
     kernel: KernelMatrix | Law | CollisionLaw,
     k: int = 10,
@@ -83,8 +84,8 @@ def spectrum(
     >>> from asperity import kernels as ker, spectral as spec
     >>> spec.spectrum(ker.henyey_greenstein(0.5), k=4).values.round(12).tolist()
     [1.0, 0.5, 0.25, 0.125]
-    >>> spec.spectrum(ker.TriangularTeethLaw(0.7))
-    Spectrum(k=10, gap=0, slem=1, verdict='no gap', convention='paper')
+    >>> spec.spectrum(ker.TriangularTeethLaw(0.7)).verdict
+    'no gap'
     """
     whole_number("k", k, 1)
     seconds = positive_number("time_limit", time_limit)

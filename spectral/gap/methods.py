@@ -132,7 +132,7 @@ def _spectrum_of(found: EnclosedTrialSpace, k: int) -> Spectrum:
         completeness=(
             f"the rest of the spectrum is within {radius:.6g}: {found.enclosures.separation.reason}"
             if found.indexed
-            else "not all are indexed: see enclosures(law, k)"
+            else "not all have a known number: see enclosures(law, k)"
         ),
     )
 

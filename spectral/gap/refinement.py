@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.estimates import with_error
 from ...core.long_runs import progress_bar
 from ...kernels import Basis, Law, Legendre, discretise
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
@@ -122,9 +123,9 @@ def _refined(
         matrix = discretise(law, basis, tolerance=wanted, samples=samples, rng=rng)
         found = matrix_spectrum(matrix, EIGENVALUES, margin=1.0)
         levels.append(found)
-        evidence.append(f"{basis!r}: gap {found.gap:.12g} +- {found.gap_error:.2g} ({matrix.method})")
+        evidence.append(f"{basis!r}: gap {with_error(found.gap, found.gap_error)} ({matrix.method})")
         steps = Refinement(tuple(levels), _converges(levels, tolerance), tuple(evidence))
-        bar.set_postfix_str(f"error {steps.error:.1g}, asked for {tolerance:.1g}", refresh=False)
+        bar.describe(f"error {steps.error:.1g}, asked for {tolerance:.1g}")
         bar.update()
         near_edge = near_edge and 1.0 - found.gap - found.gap_error < edge.high
         if len(levels) >= FEWEST_LEVELS and steps.converges and steps.error <= tolerance:

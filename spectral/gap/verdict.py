@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.estimates import Estimate, rounded
-from ...core.tables import html_table
+from ...core.estimates import Estimate, with_error
 from ..eigenvalues.spectra import EIGENVALUE, Spectrum, Verdict
 from ..essential.edge import EssentialEdge
 from ..plotting import draw_eigenvalues
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SpectralGap(Estimate):
     """The gap 1 - sup(spectrum off the constants), with its error and a verdict.
 
@@ -42,22 +41,15 @@ class SpectralGap(Estimate):
     convention: str
     spectrum: Spectrum | None = None
     self_adjoint: bool = True
+    _more = ".method, .evidence, .spectrum"
 
     def cut_at_zero(self) -> SpectralGap:
         """The gap with its interval cut at 0, because the norm of a law is 1 and no gap is negative."""
         low, high = self.value - self.error, max(self.value + self.error, 0.0)
         if low >= 0.0 or high == np.inf:
             return self
-        cut = f"a gap is never negative: the interval {self.value:.6g} +- {self.error:.2g} is cut at 0"
+        cut = f"a gap is never negative: the interval {with_error(self.value, self.error)} is cut at 0"
         return replace(self, value=0.5 * high, error=0.5 * high, evidence=(*self.evidence, cut))
-
-    def _repr_html_(self) -> str:
-        title = "Spectral gap" if self.self_adjoint else "1 - norm on functions of mean 0"
-        lines = {
-            "verdict": self.verdict, "convention": self.convention, "error": f"{self.error:.2g} ({self.kind})",
-            "method": self.method, "evidence": "; ".join(self.evidence),
-        }  # fmt: skip
-        return html_table(f"{title} {self}", lines)
 
 
 def made_from(found: Spectrum, how: str) -> str:
@@ -84,5 +76,5 @@ def draw_spectrum(found: Spectrum, gap: SpectralGap, ax: Axes | None = None) -> 
     """
     gapless = gap.verdict == "no gap"
     label = f"eigenvalue of the matrix in {found.basis!r}" if gapless else EIGENVALUE
-    shaded = None if gapless else (gap.value, f"gap {rounded(gap).replace('+-', '±')} ({gap.verdict})")
+    shaded = None if gapless else (gap.value, f"gap {gap} ({gap.verdict})")
     return draw_eigenvalues(found.values, found.errors.total(), found.convention, label, shaded, ax)

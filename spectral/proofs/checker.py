@@ -4,7 +4,6 @@ Every inequality is decided in balls, and nothing of asperity is imported. The t
 docstrings name are proved in docs/theory/proved-gaps.md.
 """
 
-import heapq
 import json
 import sys
 from itertools import pairwise
@@ -62,19 +61,29 @@ def exact(number):
     return arb(number) if isinstance(number, str) else arb(*number)
 
 
-def product(first, second):
-    total = {}
-    for m, x in first.items():
-        for n, y in second.items():
-            total[m + n] = total.get(m + n, 0) + x * y
+def unit(angle):
+    return (UNIT * angle).exp()
+
+
+def root(z, analytic):
+    """Square root, of balls in the right half plane tighter than the library's."""
+    if not z.real > 0:
+        return z.sqrt(analytic=analytic)
+    real = (((z.real * z.real + z.imag * z.imag).sqrt() + z.real) / 2).sqrt()
+    return acb(real, z.imag / (2 * real))
+
+
+def integral(f, low, high, bits):
+    return acb.integral(f, low, high, rel_tol=ONE / 2**bits, abs_tol=ONE / 2**bits)
+
+
+def at(waves, u):
+    """The sum of waves[m] u^m."""
+    total, up, down, back = waves.get(0, ZERO), acb(1), acb(1), 1 / u
+    for m in range(1, max(waves) + 1):
+        up, down = up * u, down * back
+        total += waves[m] * up + waves[-m] * down
     return total
-
-
-def weighted(fourier, a):
-    """Integral of a Fourier sum times sin(beta) over beta from a to pi - a."""
-    h = PI / 2 - a
-    waves = {p: (h * p).sin() / p if p else h for m in fourier for p in (m - 1, m + 1)}
-    return sum((x * UNIT**m * (waves[m + 1] + waves[m - 1]) for m, x in fourier.items()), acb(0))
 
 
 def negative_pivots(matrix):
@@ -98,36 +107,28 @@ def primitive(p, n):
 
 
 class Trial:
-    """v = cos(theta)^odd p(sin(theta)), less its mean; also the sum of fourier[m] e^(i m theta)."""
+    """v = c0 cos(m theta) + c1 sin((m + 1) theta) + c2 cos((m + 2) theta) + ..., m = 1 if odd, or 0, less its mean."""
 
     def __init__(self, coefficients, odd):
-        self.p, self.odd = [arb(c) for c in coefficients], odd
+        self.odd, self.waves = odd, {}
+        for m, c in enumerate(coefficients, int(odd)):
+            for sign in (1, -1):
+                factor = -sign * UNIT / 2 if (m + odd) % 2 else acb(0.5)
+                self.waves[sign * m] = self.waves.get(sign * m, ZERO) + arb(c) * factor
         if not odd:
-            self.p[0] -= weighted(self.expansion(), ZERO).real / 2
-        self.fourier = self.expansion()
-        self.norm = weighted(product(self.fourier, self.fourier), ZERO).real / 2
-        self.largest = max(abs(self(ball(PI * i / 512, PI * (i + 1) / 512))).upper() for i in range(512))
-
-    def expansion(self):
-        total, power = {}, {1: acb(0.5), -1: acb(0.5)} if self.odd else {0: acb(1)}
-        for c in self.p:
-            for m, x in power.items():
-                total[m] = total.get(m, 0) + c * x
-            power = product(power, {1: -UNIT / 2, -1: UNIT / 2})
-        return total
-
-    def jet(self, t):
-        """Value and derivative by Horner's rule."""
-        s, c = t.sin(), t.cos()
-        value = slope = s * 0
-        for a in reversed(self.p):
-            slope, value = slope * s + value, value * s + a
-        return (value * c, c * c * slope - s * value) if self.odd else (value, slope * c)
+            self.waves[0] -= integral(lambda t, _: self(t) * t.sin(), 0, PI / 2, 60).real
+        self.norm = integral(lambda t, _: self(t) * self(t) * t.sin(), 0, PI / 2, 60).real
+        slopes, step = {m: UNIT * m * c for m, c in self.waves.items()}, PI / 2048
+        parts = [(step * (2 * i + 1) / 2, ball(step * i, step * (i + 1))) for i in range(1024)]
+        self.largest = max(abs(self(t) + at(slopes, unit(part)) * (part - t)).upper() for t, part in parts)
 
     def __call__(self, t):
-        """Value by the mean value theorem."""
-        middle = arb(t.mid())
-        return self.jet(middle)[0] + self.jet(t)[1] * (t - middle)
+        return at(self.waves, unit(t))
+
+    def swept(self, u, glance):
+        """An antiderivative of v(2 s - theta) sin(s) in s, at u = e^(i (2 s - theta)) and glance = e^(i s)."""
+        up, down = ({m: c / (2 * m + k) for m, c in self.waves.items()} for k in (1, -1))
+        return (at(down, u) / glance - at(up, u) * glance) / 2
 
 
 class Pieces:
@@ -149,7 +150,7 @@ class Pieces:
     def integral(self, function):
         """Integral of a function of v times sin(theta) up to pi/2."""
         waves = [(a, b, c, primitive(function(p), 1)) for a, b, c, p in self.half]
-        return sum(((UNIT * b).exp() * q(b - c) - (UNIT * a).exp() * q(a - c) for a, b, c, q in waves), acb(0)).imag
+        return sum((unit(b) * q(b - c) - unit(a) * q(a - c) for a, b, c, q in waves), acb(0)).imag
 
     def wave(self, n, low, high):
         """Integral of v(x) e^(i x/n) from low to high, nothing if these are in the wrong order."""
@@ -162,7 +163,7 @@ class Pieces:
         for (a, b, c, _), q in zip(self.all, self.waves[n], strict=True):
             if not (b < first or a > last):
                 x, y = clipped(first, a, b), clipped(last, a, b)
-                total += (UNIT * y / n).exp() * q(y - c) - (UNIT * x / n).exp() * q(x - c)
+                total += unit(y / n) * q(y - c) - unit(x / n) * q(x - c)
         return total
 
     def __call__(self, t):
@@ -209,8 +210,8 @@ class Bumps(Wall):
     s = theta - psi with the arc.
     """
 
-    def __init__(self, curvature, effort):
-        self.K, self.R, self.steepest, self.effort = curvature, 1 / curvature, (curvature / 2).asin(), effort
+    def __init__(self, curvature):
+        self.K, self.R, self.steepest = curvature, 1 / curvature, (curvature / 2).asin()
         demand(self.K > 0 and self.K * self.K < 2, "a curvature between 0 and sqrt(2)")
 
     def hits(self, s, a):
@@ -223,136 +224,85 @@ class Bumps(Wall):
         found = self.hits(s, a), self.hits(PI - s, PI - a)
         return False if True in found else None if None in found else True
 
-    def follow(self, s, a, ds=None, da=None, count=1, came=None):
-        """(reflections, direction, its derivatives) of every way that a ray can take after a reflection (lemma 3)."""
-        if count > 12:
-            # too many to follow: these may leave at any angle
-            return [(count, ball(0, PI), None)]
-        views = {1: (s, a), -1: (PI - s, PI - a)}
-        hit = {side: False if side == came else self.hits(*view) for side, view in views.items()}
-        ends = [] if True in hit.values() else [(count, a, da)]
-        for side, (near, direction) in views.items():
-            if hit[side] is False or hit[-side]:
+    def tangent(self, theta):
+        """The direction in which the ray from theta leaves that then touches the next arc (lemma 3)."""
+
+        def excess(a, t):
+            return self.K * a.sin() - 2 * ((t + a) / 4).sin() * ((t + a) / 4).sin()
+
+        def slope(a, t):
+            return self.K * a.cos() - ((t + a) / 2).sin() / 2
+
+        t, a = theta.real.mid(), ZERO
+        for _ in range(10):
+            a = (a - excess(a, t) / slope(a, t)).mid()
+        r = 2 * abs(excess(a, theta) / slope(a, theta)).upper()
+        if not (r < 1 and a > 0 and a < self.steepest):
+            return acb(ZERO / 0)
+        around = a + acb(ball(-r, r), ball(-r, r))
+        steep, found = slope(around, theta), a - excess(a, theta) / slope(around, theta)
+        return found if steep.real > 0 and around.contains_interior(found) else acb(ZERO / 0)
+
+    def twice(self, v, theta, steep, last, bits):
+        """Integral of v sin(s) over the rays that are reflected twice, to the right; a = last - q (lemma 5)."""
+        low, corner = (theta - 2 * self.steepest, (3 * self.steepest - theta) / 2) if steep else (-theta, ZERO)
+        deepest, quarter = corner.sin() * corner.sin() if steep else self.K * theta.sin() / 2, (last - low) / 4
+
+        def rise(a, quarter):
+            return 2 * self.K * ((a + last) / 2).cos() * quarter.cos() - ((2 * theta + a + last) / 4).sin()
+
+        length = 4 * deepest / (rise(low, quarter) * quarter.sinc())
+
+        def integrand(t, analytic):
+            q = length * t * t
+            a, ratio = last - q, length / 4 * (q / 4).sinc()
+            square = ratio * rise(a, q / 4)
+            half = root(1 - t * t * square, analytic) + UNIT * t * root(square, analytic)
+            return at(v.waves, unit(a) * half**4) * ((theta + a) / 2).sin() * t
+
+        if bits:
+            return length * integral(integrand, 0, 1, bits)
+        parts = [acb(ball(ONE * i / 16, ONE * (i + 1) / 16)) for i in range(16)]
+        return length * sum((integrand(part, True) for part in parts), ZERO) / 16
+
+    def reflected(self, v, theta, sides, analytic, bits):
+        """P v (lemma 5); the sides of the kinks say which of its formulas holds."""
+        steep, above, left = sides
+        bits, turn = 0 if analytic or theta.rad() > ONE / 2**44 else bits, unit(self.steepest)
+        size, total = self.K * theta.sin(), ZERO
+        first = unit(theta) / turn if steep else acb(1)
+        half = root(1 - size / 2, analytic) + UNIT * root(size / 2, analytic)
+        last = unit(theta) * turn if steep else half * half
+        if not above:
+            a = self.tangent(theta)
+            total, first = total + self.twice(v, theta, steep, a, bits), unit((theta + a) / 2)
+        if left:
+            a = self.tangent(PI - theta)
+            total += (-1 if v.odd else 1) * self.twice(v, PI - theta, True, a, bits)
+            last = unit((PI + theta - a) / 2)
+        return (total + v.swept(last * last / unit(theta), last) - v.swept(first * first / unit(theta), first)) / size
+
+    def form_and_residual(self, v, sign, guess, first, bits):
+        """<v, (1 - sign P) v> and a bound of |(1 - sign P - guess) v|^2 (lemma 6)."""
+        demand(first > 0 and first < self.steepest, "a first angle below the steepest slope")
+        kinks, off = (self.steepest, 3 * self.steepest, PI - 3 * self.steepest), ONE / 2**46
+        cuts = sorted((x for x in (first, *kinks, PI / 2) if not x > PI / 2), key=lambda x: float(x.mid()))
+        total, missed = acb(0), PI / 2 - first
+        for low, high in ((x + off, y - off) for x, y in pairwise(cuts)):
+            if not low < high:
                 continue
-            square = (near / 2).sin() ** 2 - self.K * direction.sin() / 2
-            w = 2 * ball(*(min(max(x, ZERO), ONE).sqrt().asin() for x in (square.lower(), square.upper())))
-            dw = ds and [(s.sin() * x * side - self.K * a.cos() * y) / w.sin() for x, y in zip(ds, da, strict=True)]
-            turned = dw and [y + 2 * side * x for x, y in zip(dw, da, strict=True)]
-            glance = w if side == 1 else PI - w
-            ends += self.follow(glance, a + 2 * side * w, dw and [side * x for x in dw], turned, count + 1, side)
-        return ends
+            demand(all(high < x or low > x for x in kinks), "pieces between the kinks")
 
-    def form_and_residual(self, v, sign, guess):
-        """<v, (1 - sign P) v>, and a bound of |(1 - sign P - guess) v|^2."""
-        angles = [arb(t) for t in self.effort["angles"]]
-        demand(increasing([ZERO, *angles]) and angles[-1] > PI / 2 and angles[-1] < 3, "increasing angles up to pi/2")
-        square = (angles[0] * v.largest * (2 + abs(guess))) ** 2 / 2
-        square += sum((self.residual(v, sign, guess, *ends) for ends in pairwise(angles)), ZERO)
-        return self.once(v, sign) + self.several(v, sign), square
+            def integrand(theta, analytic, sides=tuple(low > x for x in kinks)):
+                own = v(theta)
+                rest = (1 - guess) * own - sign * self.reflected(v, theta, sides, analytic, bits + 4)
+                return (rest + UNIT * own) * rest * theta.sin()
 
-    def once(self, v, sign):
-        """The form of the rays that are reflected once (lemma 5)."""
-
-        def integrand(psi, analytic):
-            root = (1 - 2 * self.R * psi.sin()).sqrt(analytic=analytic)
-            tangent = PI / 2 - (self.K * root).atan() - (psi.cos() / (self.K - psi.sin())).atan()
-            turns = {m: UNIT * (psi * m).sin() if sign > 0 else (psi * m).cos() for m in v.fourier}
-            waves = {m: 2 * c * turns[m] for m, c in v.fourier.items()}
-            return weighted(product(waves, waves), psi + tangent)
-
-        end = self.steepest * (1 - ONE / 2**40)
-        most = acb.integral(integrand, 0, acb(end), rel_tol=ONE / 2**40, abs_tol=ONE / 2**44).real
-        return (most + up_to((self.steepest - end) * 8 * v.largest**2)) * self.R / 2
-
-    def chord(self, u, t):
-        """Slopes of two points that face each other, direction between them, distance over u, angles with the arcs."""
-        p, q, skew, edge = u * (1 - t) / 2, u * t / 2, u * (2 * t - 1) / 2, self.steepest
-        along = self.R * ((edge - p).cos() * p.sinc() * (1 - t) + (edge - q).cos() * q.sinc() * t)
-        up = self.R * (edge - u / 2).sin() * skew.sinc() * (2 * t - 1)
-        a = (up / along).atan() if along > 0 else ball(-edge, edge)
-        return edge - 2 * p, edge - 2 * q, a, (along * along + up * up).sqrt(), a + edge - 2 * p, edge - 2 * q - a
-
-    def several(self, v, sign):
-        """The form of other rays, by boxes of their first two points; the least certain is halved next (lemma 5)."""
-        heap = [(0.0, 0, (ZERO, 2 * arb(self.steepest.upper()), ZERO, ONE), ZERO / 0)]
-        for _ in range(self.effort["halvings"]):
-            u0, u1, t0, t1 = heapq.heappop(heap)[2]
-            u, t = arb(((u0 + u1) / 2).mid()), (t0 + t1) / 2
-            for half in ((u0, u, t0, t1), (u, u1, t0, t1)) if u1 - u0 > t1 - t0 else ((u0, u1, t0, t), (u0, u1, t, t1)):
-                found = self.facing(v, sign, *half)
-                heapq.heappush(heap, (-float(found.rad()), len(heap), half, found))
-        return sum((found for *_, found in heap), ZERO) * self.R / 2
-
-    def facing(self, v, sign, u0, u1, t0, t1):
-        """R times the integral of sin(s) sin(w) (v - sign v')^2 / distance over a box."""
-        u, t, R = ball(u0, u1), ball(t0, t1), self.R
-        one, two, a, r, s, w = self.chord(u, t)
-        theta, out = a + 2 * one, 2 * two - a
-        seen = False if s <= 0 or w <= 0 or one < 0 or two < 0 else self.sees(s, theta)
-        if seen is False:
-            return ZERO
-        sure = seen and s > 0 and w > 0 and one > 0 and two > 0
-        area, m = R * (u1 - u0) * (t1 - t0), s.sin() * w.sin() / r
-        ends = self.follow(w, out, count=2, came=1)
-        changes = [v(theta) - sign * v(end) for _, end, _ in ends]
-        if not sure or not u > 0 or [count for count, *_ in ends] != [2]:
-            squares = spread([abs(d) for d in changes])
-            most = up_to(area * m * squares.upper() ** 2)
-            return area * m * spread([max(squares.lower(), ZERO) ** 2, squares.upper() ** 2]) if sure else most
-        (d,), before, after = changes, v.jet(theta)[1], sign * v.jet(out)[1]
-        turn, stretch = R * (t * w.sin() - (1 - t) * s.sin()) / r, R * ((1 - t) * s.cos() + t * w.cos()) - r
-        by_u = t - 1, -t, turn / u, stretch / u
-        by_t = u, -u, R * (s.sin() + w.sin()) / r, R * (w.cos() - s.cos())
-        off, x, y = ZERO, (u0 + u1) / 2, (t0 + t1) / 2
-        for (first, second, bend, longer), step in ((by_u, u - x), (by_t, t - y)):
-            m_slope = s.cos() * w.sin() * (bend + first) + s.sin() * w.cos() * (second - bend) - m * longer
-            slope = m_slope / r * d * d + 2 * m * d * (before * (bend + 2 * first) - after * (2 * second - bend))
-            off += (slope - arb(slope.mid())) * step
-        # to the second order, because the box is symmetric about its middle
-        one, two, a, r, s, w = self.chord(x, y)
-        d = v(a + 2 * one) - sign * v(2 * two - a)
-        return area * (s.sin() * w.sin() / r * d * d + off)
-
-    def residual(self, v, sign, guess, first, last):
-        """The squared residual between two angles, by boxes of theta and psi (lemma 6)."""
-        theta = ball(first, last)
-        t = arb(theta.mid())
-        off, own, cot = theta - t, v(theta), theta.cos() / theta.sin()
-        (value_t, _), slope = v.jet(t), v.jet(theta)[1]
-        tolerance, finest, edge = self.K * arb(self.effort["tolerance"]) / t, (last - first) / 32, self.steepest.upper()
-        # at positive slopes the flux vanishes where s does, at others s > 0
-        stack, constant, linear = [(-edge, ZERO), (ZERO, min(edge, arb(last.upper())))], ZERO, ZERO
-        while stack:
-            low, high = stack.pop()
-            psi, x = ball(low, high), arb(((low + high) / 2).mid())
-            s = theta - psi
-            seen = False if s <= 0 or psi > self.steepest or psi < -self.steepest else self.sees(s, theta)
-            if seen is False:
-                continue
-            sure = seen and s > 0 and abs(psi) < self.steepest
-            up, down = high.sin() - low.sin(), high.cos() - low.cos()
-            ends = self.follow(s, s - psi, [ONE, -ONE], [ONE, -2 * ONE])
-            _, a, gradient = ends[0]
-            if sure and len(ends) == 1 and gradient and gradient[1].is_finite():
-                ((_, middle, _),) = self.follow(t - x, t - 2 * x)
-                by_theta, by_psi = (y - sign * v.jet(a)[1] * z for y, z in zip((slope, 0), gradient, strict=True))
-                value, steady, tilt = value_t - sign * v.jet(middle)[0], arb(by_theta.mid()), arb(by_psi.mid())
-                rest = (by_psi - tilt) * (psi - x) + (by_theta - steady) * off
-                # integrals of sin(s)/sin(theta), of its derivative, and of it times psi - x
-                mass, falling = up + t.cos() / t.sin() * down, -down / theta.sin() ** 2
-                moment = (high - x) * high.sin() - (low - x) * low.sin() + down
-                moment += cot * ((high - x) * high.cos() - (low - x) * low.cos() - up)
-                uncertain = mass * rest + tilt * moment + falling * off * (rest + steady * off)
-                flat, rising = mass * value + uncertain, mass * steady + value * falling
-            else:
-                rising, mass = ZERO, up + cot * down if sure else up_to(up + cot * down)
-                flat = uncertain = mass * spread([own - sign * v(end) for _, end, _ in ends])
-            if uncertain.rad() < tolerance or high - low < finest:
-                constant, linear = constant + flat, linear + rising
-            else:
-                stack += [(low, x), (x, high)]
-        missed = self.R * constant - guess * value_t + (self.R * linear - guess * slope) * off
-        return missed * missed * theta.sin() * (last - first)
+            total, missed = total + integral(integrand, low, high, bits), missed - (high - low)
+        # where nothing is known but the size of v
+        most = (first * first / 2 + missed) * (2 + abs(guess)) * v.largest * v.largest
+        form = guess * v.norm + total.imag + ball(-most.upper(), most.upper())
+        return form, total.real + up_to(most * (2 + abs(guess)))
 
     def least(self, theta, eta):
         """The least density, from bin to bin, of rays that are certainly reflected once."""
@@ -420,7 +370,7 @@ class FocusingArcs(Wall):
                 break
             if not high > low:
                 high, rises = spread([high, low]), spread([rises, falls])
-            wave = (UNIT * t / n).exp() / n * v.wave(n, top(lower, t)[0], -top(upper, t)[0])
+            wave = unit(t / n) / n * v.wave(n, top(lower, t)[0], -top(upper, t)[0])
             value += wave.imag
             slope += wave.real / n + off * v.largest * (abs(rises) + abs(falls) + (high - low) / n) / (n * n)
             slope += sum(rate * v(x) * ((x + theta) / n).sin() / n for x, rate in ((high, rises), (low, -falls)))
@@ -458,12 +408,13 @@ class FocusingArcs(Wall):
 
 def of_bumps(curvature, certificate, signs):
     """Bounds of the least eigenvalues of 1 - sign P on odd functions, and on even ones of mean 0 (lemma 9)."""
-    law, odd = Bumps(exact(curvature), certificate["effort"]), certificate["odd"]
+    law, odd = Bumps(exact(curvature)), certificate["odd"]
     above, other = exact(certificate["threshold"]), exact(certificate["other"])
     found = law.count(certificate["bins"], not odd, signs[not odd], other)
     demand(found <= (1 if odd else 0), "no eigenvalue of the other parity below its threshold")
     v, guess = Trial(certificate["trial"], odd), arb(certificate["guess"])
-    return {odd: temple(law, v, signs[odd], guess, certificate["bins"], above), not odd: (other, arb(2))}
+    accuracy = arb(certificate["first"]), certificate["bits"]
+    return {odd: temple(law, v, signs[odd], guess, certificate["bins"], above, *accuracy), not odd: (other, arb(2))}
 
 
 def of_focusing_arcs(half_angle, certificate, signs):
@@ -475,11 +426,11 @@ def of_focusing_arcs(half_angle, certificate, signs):
     return values
 
 
-def temple(law, v, sign, guess, bins, above):
+def temple(law, v, sign, guess, bins, above, *accuracy):
     """Bounds of the least eigenvalue of 1 - sign P on functions of the parity of v, of mean 0 (lemma 9)."""
     found = law.count(bins, v.odd, sign, above)
     demand(found <= (1 if v.odd else 2), "one eigenvalue of the trial function's parity below the threshold")
-    form, square = law.form_and_residual(v, sign, guess)
+    form, square = law.form_and_residual(v, sign, guess, *accuracy)
     ends, square = [arb(x) for x in ((form / v.norm).lower(), (form / v.norm).upper())], arb((square / v.norm).upper())
     demand(above > ends[1] and square.is_finite(), "a quotient below the next eigenvalue, and a finite residual")
     # concave in the quotient, so least at an end

@@ -13,31 +13,18 @@ import numpy as np
 from ...core.checks import Floats
 from ...kernels import CircularArcLaw, Law, Panels, discretise
 from ...kernels.bases.mirror import reflection_matrix
-from .checker import Bumps, FocusingArcs, Refused, Trial, Wall, arb, ctx, exact
+from .checker import Bumps, FocusingArcs, Refused, Wall, ctx, exact
 
-BITS = 64
-# Powers of sin(theta) in trial functions, at first and at most, and Gauss nodes of a quarter turn.
-POWERS, NODES = (6, 8, 10, 12), 40
+# Bits of balls, and of integrals; the angle below which nothing is known but the size of the trial function.
+BITS, ACCURACY, FIRST = 96, 40, "1e-7"
+# Cosines and sines in trial functions that are tried, and Gauss nodes of a piece.
+TERMS, NODES = (6, 8, 10, 12, 14), 60
 # Bins of a half turn, and the angle below which all is grazing.
 BINS, GRAZING, RATIO = 150, 1e-4, 1.08
 # Thresholds between the gap and the next eigenvalue that are tried, as fractions of the distance.
 FRACTIONS = 0.85, 0.7, 0.5, 0.35
-# Parts of the width that the first angle and the trial function's own residual may take, and all boxes of residuals.
-FIRST, OWN, BOXES = 0.01, 0.15, 0.5
-# Resolutions of the boxes: ratios of angles less 1 and tolerances.
-RESOLUTIONS = (
-    (0.08, 1e-4),
-    (0.04, 3e-5),
-    (0.02, 1e-5),
-    (0.01, 3e-6),
-    (0.005, 1e-6),
-    (0.0025, 3e-7),
-    (0.00125, 1e-7),
-    (0.0006, 3e-8),
-)
-# Ratio of angles where little of the residual is, below SMALL; beyond WIDE angles are equidistant.
-COARSE, SMALL, WIDE = 0.05, 0.02, 0.3
-FEW, MOST_HALVINGS = 1000, 2 * 10**6
+# The part of the width that the residual may take.
+PART = 0.9
 # Of focusing arcs: bits, because integrals of polynomials cancel; degree and greatest width of the pieces; how many
 # kinks at half angle (1 +- 1/k) are edges; reflections that are followed; numbers of bins of a quarter turn that are
 # tried, and how small the relative width may be with so many intervals a piece, at first.
@@ -68,88 +55,61 @@ def certificates(law: Law, content: dict[str, Any], width: float) -> Iterator[di
     if content["law"]["family"] == "focusing arcs":
         yield from _of_arcs(content, width)
         return
-    law = law.in_specular_frame()
+    law, curvature = law.in_specular_frame(), exact(content["law"]["curvature"])
     signs = {True: 1 if content["frame"] == "specular" else -1, False: 1}
-    for powers in POWERS:
-        classes = {odd: _galerkin(law, odd, sign, powers) for odd, sign in signs.items()}
-        yield from _of_bumps(content, classes, width, powers == POWERS[-1])
-
-
-def _galerkin(law: Law, odd: bool, sign: int, powers: int) -> _Class:
-    """The lowest two values of the form on cos(theta)^odd sin(theta)^k, k < powers, without the constants."""
-
-    def functions(angle: Floats) -> Floats:
-        rising = np.sin(angle)[..., None] ** np.arange(powers)
-        return np.asarray(rising * np.cos(angle)[..., None] if odd else rising)
-
-    node, weight = np.polynomial.legendre.leggauss(NODES)
-    place = 0.5 * (node + 1.0)
-    # denser towards grazing; the other quarter turn is a mirror image
-    angle = 0.5 * np.pi * place**2
-    weight = 0.5 * np.pi * weight * place * np.sin(angle)
-    own, after = functions(angle), law.apply(functions, angle)
-    if not odd:
-        means = weight @ own
-        own, after = own - means, after - means
-    size, change = own.T @ (weight[:, None] * own), own - sign * after
-    form = own.T @ (weight[:, None] * change)
-    scale, axes = np.linalg.eigh(size)
-    known = scale > 1e-10 * scale[-1]
-    basis = axes[:, known] / np.sqrt(scale[known])
-    values, vectors = np.linalg.eigh(basis.T @ (0.5 * (form + form.T)) @ basis)
-    coefficients = basis @ vectors[:, 0]
-    missed = (change - values[0] * own) @ coefficients
-    return _Class(odd, sign, float(values[0]), float(values[1]), coefficients, float(np.sqrt(weight @ missed**2)))
-
-
-def _of_bumps(
-    content: dict[str, Any], classes: dict[bool, _Class], width: float, last: bool
-) -> Iterator[dict[str, Any]]:
-    """Certificates with a trial function of one parity, if its own residual is small enough."""
+    bumps, bins = Bumps(curvature), _bins()
+    spaces = [{odd: _galerkin(law, float(bumps.steepest), odd, sign, n) for odd, sign in signs.items()} for n in TERMS]
     weight, specular, retro, _ = (float(middle) for middle, _ in content["weights"].values())
 
     def mixed(one: _Class, value: float) -> float:
         return 1.0 - one.sign * (specular + (-retro if one.odd else retro)) - weight * (1.0 - value)
 
-    mine = min(classes.values(), key=lambda one: mixed(one, one.value))
-    other = classes[not mine.odd]
-    gap = mixed(mine, mine.value)
-    wanted, distance = width * gap / weight, mine.following - mine.value
-    if mine.residual**2 / distance > OWN * wanted and not last:
-        return
-    bumps = Bumps(exact(content["law"]["curvature"]), {})
-    bins = _bins()
-    threshold = _threshold(bumps, bins, mine, [mine.value + part * distance for part in FRACTIONS])
+    best = min(spaces[-1].values(), key=lambda one: mixed(one, one.value))
+    other, gap = spaces[-1][not best.odd], mixed(best, best.value)
+    distance = best.following - best.value
+    threshold = _threshold(bumps, bins, best, [best.value + part * distance for part in FRACTIONS])
     # where the mixture of the other parity has the gap, and some of the way beyond
     level = (gap - mixed(other, other.value)) / weight + other.value
     beyond = _threshold(bumps, bins, other, [level + part * (other.value - level) for part in (0.3, 0.1, 0.03)])
-    trial = Trial([repr(float(c)) for c in mine.coefficients], mine.odd)
-    size = float(trial.norm.mid())
-    spare = wanted * (threshold - mine.value) * size
-    first = math.sqrt(FIRST * 2.0 * spare) / (float(trial.largest) * (2.0 + mine.value))
-    certificate = {
+    tried = [space[best.odd] for space in spaces]
+    small = [one for one in tried if one.residual**2 <= PART * width * gap / weight * (threshold - one.value)]
+    mine = small[0] if small else min(tried, key=lambda one: one.residual)
+    yield {
         **content, "precision": BITS, "odd": mine.odd, "trial": [repr(float(c)) for c in mine.coefficients],
         "guess": repr(mine.value), "threshold": repr(threshold), "other": repr(beyond), "bins": bins,
-        "effort": {"halvings": _halvings(bumps, trial, mine, wanted * size)},
+        "first": FIRST, "bits": ACCURACY,
     }  # fmt: skip
-    end = 0.5 * math.pi * (1.0 + 1e-9)
-    for ratio, tolerance in RESOLUTIONS:
-        bumps.effort = {"tolerance": repr(tolerance)}
-        steep = np.linspace(WIDE, end, 2 + int((end - WIDE) / (WIDE * ratio)))
-        angles = [*_geometric(first, SMALL, COARSE)[:-1], *_geometric(SMALL, WIDE, ratio)[:-1], *map(float, steep)]
-        # a sample of the boxes foretells the sum
-        sample = sum(
-            float(bumps.residual(trial, mine.sign, arb(repr(mine.value)), arb(a), arb(b)).upper()) * 8
-            for a, b in list(pairwise(angles))[::8]
-        )
-        if sample < BOXES * spare or (ratio, tolerance) == RESOLUTIONS[-1]:
-            effort = certificate["effort"] | {"tolerance": repr(tolerance), "angles": [repr(a) for a in angles]}
-            yield {**certificate, "effort": effort}
-            return
 
 
-def _geometric(low: float, high: float, ratio: float) -> list[float]:
-    return [float(x) for x in np.geomspace(low, high, 2 + int(math.log(high / low) / math.log1p(ratio)))]
+def _galerkin(law: Law, steepest: float, odd: bool, sign: int, terms: int) -> _Class:
+    """The lowest two values of the form on the first functions of `Trial`, without the constants."""
+
+    def functions(angle: Floats) -> Floats:
+        degrees = range(int(odd), terms + int(odd))
+        return np.stack([(np.sin if (m + odd) % 2 else np.cos)(m * angle) for m in degrees], axis=-1)
+
+    node, weight = np.polynomial.legendre.leggauss(NODES)
+    place, weight = 0.5 * (node + 1.0), 0.5 * weight
+    # denser towards grazing; pieces between the kinks of a quarter turn, the other one is a mirror image
+    kinks = [x for x in (steepest, 3.0 * steepest, math.pi - 3.0 * steepest) if x < 0.5 * math.pi - 1e-9]
+    pieces = list(pairwise(sorted([0.0, *kinks, 0.5 * math.pi])))
+    angle = np.concatenate([low + (high - low) * place**2 for low, high in pieces])
+    weight = np.concatenate([(high - low) * 2.0 * place * weight for low, high in pieces]) * np.sin(angle)
+    own, after = functions(angle), law.apply(functions, angle)
+    if not odd:
+        means = (weight @ own) / weight.sum()
+        own, after = own - means, after - means
+    triangular = np.linalg.qr(np.sqrt(weight)[:, None] * own, mode="r")
+    basis = np.linalg.pinv(triangular, rcond=1e-10)
+    own, after = own @ basis, after @ basis
+    change = own - sign * after
+    form = own.T @ (weight[:, None] * change)
+    values, vectors = np.linalg.eigh(0.5 * (form + form.T))
+    # the other columns of a basis of less than all dimensions are 0
+    first = int(np.argmax(np.abs(vectors.T @ (own.T @ (weight[:, None] * own)) @ vectors).diagonal() > 0.5))
+    missed = (change - values[first] * own) @ vectors[:, first]
+    residual = float(np.sqrt(weight @ missed**2))
+    return _Class(odd, sign, float(values[first]), float(values[first + 1]), basis @ vectors[:, first], residual)
 
 
 def _bins() -> list[str]:
@@ -170,13 +130,6 @@ def _threshold(law: Wall, bins: list[str], one: _Class, tried: list[float]) -> f
         except Refused:
             continue
     raise Refused(f"{most} eigenvalues of {'odd' if one.odd else 'even'} functions below {tried[-1]:.6f}")
-
-
-def _halvings(bumps: Bumps, trial: Trial, one: _Class, wanted: float) -> int:
-    """How many halvings bring the form's uncertainty below a third of the width; it falls as their inverse."""
-    bumps.effort = {"halvings": FEW}
-    first = float(bumps.several(trial, one.sign).rad())
-    return min(max(FEW, int(1.3 * FEW * first / (wanted / 6.0))), MOST_HALVINGS)
 
 
 def _of_arcs(content: dict[str, Any], width: float) -> Iterator[dict[str, Any]]:

@@ -15,8 +15,9 @@ import numpy as np
 from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
 from ...core.checks import Floats, Rng, check_memory, generator, instance, positive_number, whole_number
 from ...core.errors import AsperityError, InputError
-from ...core.estimates import Estimate
+from ...core.estimates import Estimate, Summary
 from ...core.frames import data_frame
+from ...core.long_runs import reported
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...kernels import Basis, KernelMatrix, discretise
@@ -36,8 +37,8 @@ SEED_WITHOUT_RNG = 0
 SEED = "rng"
 
 
-@dataclass(frozen=True)
-class EnsembleRow:
+@dataclass(frozen=True, repr=False)
+class EnsembleRow(Summary):
     """One quantity over all realisations.
 
     Attributes
@@ -66,8 +67,8 @@ def _cells(row: EnsembleRow) -> list[str | float | int]:
     return [row.quantity, mean.value, mean.error, spread.value, spread.error, row.realisations, row.refused]
 
 
-@dataclass(frozen=True)
-class Ensemble:
+@dataclass(frozen=True, repr=False)
+class Ensemble(Summary):
     """Quantities over random walls; made by `ensemble`.
 
     Attributes
@@ -80,6 +81,10 @@ class Ensemble:
 
     table: SweepTable
     rows: tuple[EnsembleRow, ...]
+
+    def _facts(self) -> dict[str, object]:
+        means = {row.quantity: f"mean {row.mean}, spread {row.spread}" for row in self.rows}
+        return {"walls": self.rows[0].realisations, **means, "refused": self.table.refusals()}
 
     def of(self, quantity: str) -> EnsembleRow:
         """Mean and spread of one quantity.
@@ -245,6 +250,7 @@ class _Matrices:
         return content
 
 
+@reported("mean law")
 def mean_law(
     family: Family,
     realisations: int,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...core.checks import whole_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate
+from ...core.estimates import Estimate, Summary
 from ...core.rounding import EPS
 
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ SHARP = 0.1
 SAFETY = 2.0
 
 
-@dataclass(frozen=True)
-class Extremum:
+@dataclass(frozen=True, repr=False)
+class Extremum(Summary):
     """The largest or smallest value of a quantity in the interval that a sweep covers.
 
     Attributes

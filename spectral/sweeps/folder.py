@@ -12,7 +12,6 @@ import numpy as np
 
 from ...core.checkpoints import Checkpoint
 from ...core.errors import FileExistsRefusal, InputError
-from ...core.estimates import described
 from ...core.files import draw_whole, write_whole
 from .ensembles import Ensemble
 from .table import FILES, SweepTable
@@ -83,21 +82,3 @@ def _draw(table: SweepTable, stream: IO[bytes]) -> None:
     for quantity, panel in zip(table.quantities, np.atleast_1d(figure.subplots(number)), strict=True):
         table.plot(quantity, panel)
     figure.savefig(stream, dpi=100, format="png")
-
-
-def in_words(table: SweepTable) -> str:
-    """How many rows have values, and why the others have none."""
-    refused = [row for row in table.rows if row.value is None]
-    lines = [f"{len(table.rows)} rows, {len(refused)} of them refused"]
-    reasons = dict.fromkeys(row.message for row in refused)
-    return "\n".join([*lines, *(f"refused: {reason}" for reason in reasons)])
-
-
-def means_in_words(found: Ensemble) -> str:
-    """A line for each quantity, and why realisations were refused."""
-    lines = [
-        f"{row.quantity:24s} mean {described(row.mean)}, spread {described(row.spread)}, "
-        f"{row.realisations} walls, {row.refused} of them refused"
-        for row in found.rows
-    ]
-    return "\n".join([*lines, in_words(found.table)])

@@ -10,6 +10,8 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.tables import verbatim
+from ...geometry import WALLS
+from .row import UNITS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,10 +20,14 @@ if TYPE_CHECKING:
 
 MARKERS = {"isolated": "o", "essential edge": "s", "no gap": "x", "undecided": "^", "": "."}
 NO_GAP = "0.9"
+# Units of the parameters of named walls; the others are pure numbers.
+UNITS_OF_PARAMETERS = {"angle": "rad", "half_angle": "rad", "curvature": "1 / period"}
 
 
-def draw_curves(rows: Sequence[SweepRow], parameters: Sequence[str], quantity: str, ax: Axes | None = None) -> Axes:
-    """Draw the rows of one quantity against the first parameter that is a number.
+def draw_curves(
+    rows: Sequence[SweepRow], parameters: Sequence[str], quantity: str, family: str, ax: Axes | None = None
+) -> Axes:
+    """Draw the rows of one quantity against the first parameter that is a number, which is named with its family.
 
     Raises
     ------
@@ -45,13 +51,18 @@ def draw_curves(rows: Sequence[SweepRow], parameters: Sequence[str], quantity: s
     verdicts = dict.fromkeys(row.verdict for row in rows if row.verdict and row.value is not None)
     for verdict in verdicts:
         ax.plot([], [], MARKERS[verdict], color="0.3", linestyle="none", label=verdict)
-    for number, (low, high) in enumerate(gapless(next(iter(curves.values())), name) if len(curves) == 1 else []):
-        ax.axvspan(low, high, color=NO_GAP, zorder=0, label="no gap" if number == 0 else None)
-    ax.set_xlabel(verbatim(name.replace("_", " ")))
-    ax.set_ylabel(verbatim(quantity.replace("_", " ")))
+    for low, high in gapless(next(iter(curves.values())), name) if len(curves) == 1 else []:
+        ax.axvspan(low, high, color=NO_GAP, zorder=0)
+    is_named = family.partition(":")[0].replace("_", "-") in WALLS
+    ax.set_xlabel(_label(name, UNITS_OF_PARAMETERS.get(name) if is_named else None, f" of {family}" if family else ""))
+    ax.set_ylabel(_label(quantity, UNITS.get(quantity)))
     if ax.get_legend_handles_labels()[0]:
         ax.legend(frameon=False)
     return ax
+
+
+def _label(name: str, unit: str | None, owner: str = "") -> str:
+    return verbatim(name.replace("_", " ") + owner + (f" ({unit})" if unit else ""))
 
 
 def _draw_curve(ax: Axes, curve: Sequence[SweepRow], name: str, colour: str, label: str) -> None:

@@ -8,14 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.checks import finite_number, number_between
-from ...core.estimates import Estimate, finite
+from ...core.estimates import Estimate, Summary, finite, shown
 from .points import Point, Value
 
 COLUMNS = ("quantity", "value", "error", "kind", "verdict", "method", "seconds", "version", "message")
+# What the quantities are measured in; all others are pure numbers.
+UNITS = {"relaxation_time": "collisions"}
 
 
-@dataclass(frozen=True)
-class SweepRow:
+@dataclass(frozen=True, repr=False)
+class SweepRow(Summary):
     """One quantity at one point.
 
     Attributes
@@ -47,6 +49,15 @@ class SweepRow:
     seconds: float
     version: str
     message: str
+    _show = "kind verdict message"
+
+    def _headline(self) -> str:
+        return f"{self.quantity} {self.in_words()}"
+
+    def in_words(self) -> str:
+        """The value with its error, and the point."""
+        number = "refused" if self.value is None else self._fact("value")
+        return f"{number} at {', '.join(map(shown, self.point.values()))}"
 
     @staticmethod
     def of(point: Point, quantity: str, found: Estimate, verdict: str, seconds: float, version: str) -> SweepRow:

@@ -19,6 +19,7 @@ from ...core.version import __version__
 from ...core.workers import connected, results
 from ...geometry import Wall
 from ...kernels import CollisionLaw, Law, WallLaw
+from ...kernels.laws.matrix_law import not_a_law
 from .points import Grid, Point, key_of
 from .quantities import Quantity, UserQuantity, listed_quantities, name_of, quantities_from
 from .row import SweepRow
@@ -148,7 +149,9 @@ def sweep(
     study = _Study(family, listed, wanted)
     run = _Run(study, points, found[0].names[0])
     rows = run.all_rows(checkpoint, key, client, progress)
-    return SweepTable(points.names, rows, not points.is_product, study.rows)
+    # walls of the command line have a text, functions a name
+    name = str(getattr(family, "text", getattr(family, "__name__", "")))
+    return SweepTable(points.names, rows, not points.is_product, study.rows, "" if "<" in name else name)
 
 
 class _Run:
@@ -177,7 +180,7 @@ class _Run:
                 store = stack.enter_context(Checkpoint(checkpoint, self.identity(key is not None), key=key))
             known = {} if store is None else dict(store.parts(self._read))
             workers = stack.enter_context(connected(client))
-            bar = stack.enter_context(progress_bar(self.grid.size, "point", shown=progress))
+            bar = stack.enter_context(progress_bar(self.grid.size, "point", "sweep", shown=progress))
             plan = self.grid.plan()
             portion = next(plan, [])
             while portion:
@@ -253,7 +256,7 @@ def law_of(made: object) -> Law:
     if isinstance(made, CollisionLaw):
         return made.law
     if not isinstance(made, Law):
-        raise InputError(f"family: expected a function that returns a wall or a law, got {made!r} from it")
+        raise not_a_law("family", "a function that returns a wall or a law", made)
     return made
 
 

@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import FileExistsRefusal, InputError
+from ...core.estimates import Summary
 from ...core.files import write_whole
 from ...core.frames import data_frame, needed
 from .extremum import Extremum, refined_extremum
 from .picture import draw_curves
 from .points import Point, key_of
-from .row import COLUMNS, SweepRow
+from .row import COLUMNS, UNITS, SweepRow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,13 +26,11 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 FORMAT = 1
-# What the quantities are measured in; all others are pure numbers.
-UNITS = {"relaxation_time": "collisions"}
 FILES = ("table.csv", "table.json")
 
 
-@dataclass(frozen=True)
-class SweepTable:
+@dataclass(frozen=True, repr=False)
+class SweepTable(Summary):
     """What a sweep found.
 
     Attributes
@@ -43,6 +42,8 @@ class SweepTable:
         Whether the points are no product of values.
     solve : callable or None
         Computes the rows of further points; None for a table that was read.
+    family : str
+        The name of the walls or laws, for the axis of pictures; empty of a function without name.
 
     Examples
     --------
@@ -56,6 +57,24 @@ class SweepTable:
     rows: tuple[SweepRow, ...]
     zipped: bool = False
     solve: Callable[[Point], Sequence[SweepRow]] | None = field(default=None, repr=False, compare=False)
+    family: str = field(default="", repr=False)
+    _more = ".rows, .of(quantity), .to_frame(), .plot(), .extremum()"
+
+    def _headline(self) -> str:
+        return f"over {', '.join(self.parameters)}"
+
+    def _facts(self) -> dict[str, object]:
+        """The points, least and greatest value of each quantity, and why rows were refused."""
+        facts: dict[str, object] = {"points": len(self.of(self.quantities[0])) if self.rows else 0}
+        for name in self.quantities:
+            known = sorted((row for row in self.of(name) if row.value is not None), key=lambda row: row.value or 0.0)
+            facts[name] = " to ".join(dict.fromkeys(row.in_words() for row in (known[:1] + known[-1:])))
+        return {**facts, "refused": self.refusals()}
+
+    def refusals(self) -> str | None:
+        """How many rows have no value, and why the first of them, or None."""
+        refused = [row.message for row in self.rows if row.value is None]
+        return f"{len(refused)} of {len(self.rows)}: {refused[0]}" if refused else None
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -126,8 +145,8 @@ class SweepTable:
     def to_json(self) -> str:
         """The table as JSON, which `of_json` reads."""
         data = {
-            "format": FORMAT, "parameters": self.parameters, "zipped": self.zipped, "columns": ["point", *COLUMNS],
-            "rows": [row.as_list() for row in self.rows],
+            "format": FORMAT, "family": self.family, "parameters": self.parameters, "zipped": self.zipped,
+            "columns": ["point", *COLUMNS], "rows": [row.as_list() for row in self.rows],
         }  # fmt: skip
         return json.dumps(data, indent=1, allow_nan=False)
 
@@ -145,7 +164,8 @@ class SweepTable:
             if data["format"] != FORMAT or data["columns"] != ["point", *COLUMNS]:
                 raise InputError(f"JSON: expected a table of format {FORMAT}, got {data['format']}")
             rows = tuple(SweepRow.of_list(data["parameters"], cells) for cells in data["rows"])
-            return SweepTable(tuple(data["parameters"]), rows, bool(data["zipped"]))
+            family = str(data.get("family", ""))
+            return SweepTable(tuple(data["parameters"]), rows, bool(data["zipped"]), family=family)
         except (ValueError, KeyError, TypeError, RecursionError) as reason:
             raise InputError(f"JSON: expected what SweepTable.to_json() gives: {reason}") from reason
 
@@ -192,7 +212,7 @@ class SweepTable:
         the other parameters is a curve.
         """
         name = self.quantities[0] if quantity is None else quantity
-        return draw_curves(self.of(name), self.parameters, name, ax)
+        return draw_curves(self.of(name), self.parameters, name, self.family, ax)
 
     def extremum(self, quantity: str | None = None, *, largest: bool = True, evaluations: int = 40) -> Extremum:
         """The largest or smallest value, by default of the first quantity, refined between the points of the sweep.

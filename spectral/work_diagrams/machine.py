@@ -12,11 +12,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ...core.estimates import Summary
+
 PACKAGES = ("asperity", "numpy", "scipy", "numba")
 
 
-@dataclass(frozen=True)
-class Machine:
+@dataclass(frozen=True, repr=False)
+class Machine(Summary):
     """The machine and the software on which times were measured.
 
     Attributes

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
+from ...core.estimates import Summary, with_error
 
 # Least number of points of a fit with a confidence interval.
 FEWEST_POINTS = 3
@@ -20,8 +21,8 @@ ALLOWANCE = 0.15
 OrderVerdict = Literal["agrees", "differs", "not resolved"]
 
 
-@dataclass(frozen=True)
-class FittedOrder:
+@dataclass(frozen=True, repr=False)
+class FittedOrder(Summary):
     """The order p of error ~ size^-p, fitted in the logarithms.
 
     Attributes
@@ -55,7 +56,10 @@ class FittedOrder:
         return "not resolved" if self.low <= declared <= self.high else "differs"
 
     def __str__(self) -> str:
-        return f"{self.order:.2f} [{self.low:.2f}, {self.high:.2f}]"
+        return with_error(self.order, max(self.high - self.order, self.order - self.low))
+
+    def _headline(self) -> str:
+        return str(self)
 
 
 def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = None) -> FittedOrder | None:

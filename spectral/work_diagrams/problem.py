@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, finite_number, frozen, sequence
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...core.rounding import EPS
 
 # Relative error of a value that counts as exact: rounding of a few thousand operations.
@@ -19,8 +20,8 @@ ROUNDED = 4096.0 * EPS
 ErrorNorm = Callable[[Floats], float]
 
 
-@dataclass(frozen=True, eq=False)
-class ReferenceValue:
+@dataclass(frozen=True, eq=False, repr=False)
+class ReferenceValue(Summary):
     """A reference value of a quantity.
 
     Parameters
@@ -86,8 +87,8 @@ ARRAY_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({"Frobenius": frobenius,
 MATRIX_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({**ARRAY_NORMS, "operator": operator_norm})
 
 
-@dataclass(frozen=True, eq=False)
-class WorkProblem:
+@dataclass(frozen=True, eq=False, repr=False)
+class WorkProblem(Summary):
     """A quantity with its reference values and error norms.
 
     Parameters
@@ -147,8 +148,8 @@ class WorkProblem:
         return {name: norm(found - reference) for name, norm in self.norms.items()}
 
 
-@dataclass(frozen=True, eq=False)
-class WorkMethod:
+@dataclass(frozen=True, eq=False, repr=False)
+class WorkMethod(Summary):
     """A method that computes the quantity of a problem.
 
     Parameters

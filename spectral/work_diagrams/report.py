@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.checks import choice
 from ...core.errors import InputError
+from ...core.estimates import Summary
 from ...core.frames import data_frame
 from ...core.tables import table, verbatim
 from .machine import Machine
@@ -31,8 +32,8 @@ MARKERS = "osv^D<>Ph*X"
 DECADE = 10.0
 
 
-@dataclass(frozen=True)
-class WorkRow:
+@dataclass(frozen=True, repr=False)
+class WorkRow(Summary):
     """One row of a report on error against run time.
 
     Attributes
@@ -150,8 +151,8 @@ class MethodFacts:
     floor: float
 
 
-@dataclass(frozen=True)
-class WorkReport:
+@dataclass(frozen=True, repr=False)
+class WorkReport(Summary):
     """Errors and run times measured by `work_precision`.
 
     Attributes
@@ -181,6 +182,14 @@ class WorkReport:
     methods: Mapping[str, MethodFacts]
     machine: Machine
     rows: tuple[WorkRow, ...] = ()
+    _more = ".table(), .rows, .front(), .choice(), .order(method), .plot(), .machine"
+
+    def _headline(self) -> str:
+        return self.problem
+
+    def _facts(self) -> dict[str, str]:
+        """Of each method on the front the least error there, with the time that it took."""
+        return {row.method: f"error {self.error(row):.1e} in {row.least:.2g} s" for row in self.front()}
 
     @classmethod
     def of(cls, problem: WorkProblem, methods: Sequence[WorkMethod], machine: Machine) -> WorkReport:

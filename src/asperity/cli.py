@@ -19,7 +19,6 @@ import click
 
 from . import __version__
 from .core.errors import INTERRUPTED, AccuracyError, AsperityError, FileExistsRefusal, InputError
-from .core.estimates import described
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile. This is mirrored to make it periodic, or repeated with
@@ -48,6 +47,7 @@ class OneLineErrors(click.Group):
 NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
 FORMAT = click.Choice(["png", "svg", "pdf"])
 NEW_FILE = click.Path(path_type=Path, dir_okay=False)
+VERBOSE = click.option("-v", "--verbose", is_flag=True, help="Print methods and evidence too.")
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of the random generator.")
 
@@ -120,12 +120,15 @@ def study(
       asperity study triangular-teeth --incidence 0,30,60 --table law.csv
     """
     from .core.files import removed_on_failure
+    from .core.long_runs import QUIET
     from .geometry import Disk, wall_from_text
     from .kernels import WallLaw
     from .study import prepare_folder, study_wall
 
     if quiet and (as_json or verbose):
         raise click.UsageError("--quiet prints nothing; leave --json and --verbose out")
+    if quiet:
+        os.environ[QUIET] = "1"
     given = {name: value for name, value in (("mass", mass), ("inertia", inertia)) if value is not None}
     disk = Disk(**given) if given else None
     found_wall = wall_from_text(wall)
@@ -156,12 +159,13 @@ def study(
 @click.option("--specular", is_flag=True, help="In Feres' convention, where specular reflection is the identity.")
 @click.option("--tolerance", default=1e-6, help="Error asked for.")
 @click.option("--enclose", default=0, type=click.IntRange(min=0), help="Also enclose this many eigenvalues.")
+@VERBOSE
 @JSON
-def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool) -> None:
-    """The spectral gap of WALL's reflection law, with its error, its verdict and the evidence.
+def gap(wall: str, specular: bool, tolerance: float, enclose: int, verbose: bool, as_json: bool) -> None:
+    """The spectral gap of WALL's reflection law, with its error and its verdict; with --verbose also the evidence.
 
     The first line can be pasted into a paper: value, error, whether that is a bound or an estimate, verdict,
-    convention, method. In Feres' convention the law of a wall without mirror symmetry is not self-adjoint; the number
+    convention. In Feres' convention the law of a wall without mirror symmetry is not self-adjoint; the number
     is 1 - its norm on functions of mean 0 then, and the lines below say so.
     """
     import json
@@ -174,11 +178,13 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool
     law = WallLaw(wall_from_text(wall))
     chosen = law.in_specular_frame() if specular else law
     found = spectral_gap(chosen, tolerance)
-    lines, plain = [quotation(found), *(f"  {line}" for line in found.evidence)], gap_as_dict(found)
+    why = [found.method, *found.evidence] if verbose else []
+    lines, plain = [quotation(found), *(f"  {line}" for line in why)], gap_as_dict(found)
     if enclose:
         try:
             enclosed = enclosures(chosen, enclose)
-            lines += ["enclosures:", *(f"  {line}" for line in enclosures_as_text(enclosed))]
+            shown = ["enclosures:", *enclosures_as_text(enclosed)] if verbose else repr(enclosed).splitlines()
+            lines.append("\n  ".join(shown))
             plain["enclosures"] = enclosures_as_list(enclosed)
         except (AccuracyError, InputError) as reason:
             lines.append(f"enclosures refused: {reason}")
@@ -276,12 +282,12 @@ def sweep_walls(
       asperity sweep first.toml second.toml koch --quantity gap_specular,accommodation --out walls
     """
     from .spectral import sweep
-    from .spectral.sweeps.folder import in_words, save_all
+    from .spectral.sweeps.folder import save_all
     from .spectral.sweeps.named_families import family_and_grid
 
     family, grid = family_and_grid(walls, over, adaptive, resolution)
     table = _run_in_folder(partial(sweep, family, grid, zipped=zipped), out, **asked)
-    click.echo(in_words(table))
+    click.echo(repr(table))
     for path in save_all(table, out):
         click.echo(f"wrote {path}")
 
@@ -316,7 +322,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
     from .kernels import Bins
     from .spectral import ensemble as over_random_walls
     from .spectral import mean_law
-    from .spectral.sweeps.folder import LAW_CHECKPOINT, MEAN_LAW, means_in_words, save_ensemble
+    from .spectral.sweeps.folder import LAW_CHECKPOINT, MEAN_LAW, save_ensemble
     from .spectral.sweeps.named_families import RandomFamily, spectrum_from_text
 
     kind = {name: given.pop(name) for name in ("points", "rms_slope", "rms_height", "period", "smooth")}
@@ -324,7 +330,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
     # a wall that cannot be made is refused before the work
     family(seed)
     found = _run_in_folder(partial(over_random_walls, family, walls, rng=seed), out, **given)
-    click.echo(means_in_words(found))
+    click.echo(repr(found))
     for path in save_ensemble(found, out):
         click.echo(f"wrote {path}")
     if bins is not None:
@@ -365,11 +371,12 @@ def explore(wall: str, port: int, no_browser: bool, out: Path | None) -> None:
 @click.option("--mass", type=float, help="Unforeshorten the wall for a disk of this mass ...")
 @click.option("--inertia", type=float, help="... and this moment of inertia.")
 @SEED
+@VERBOSE
 @click.option("--out", type=NEW_FILE, help="Write the wall into this TOML file.")
 @click.option("--force", is_flag=True, help="Replace the file if it exists.")
 def realise(
     law: str, moments: int, tolerance: float, hollows: int | None, mass: float | None, inertia: float | None,
-    seed: int, out: Path | None, force: bool,
+    seed: int, verbose: bool, out: Path | None, force: bool,
 ) -> None:  # fmt: skip
     """Find a wall whose reflection law has the moments of LAW, or on which a disk collides by it.
 
@@ -397,10 +404,12 @@ def realise(
     wall = found.wall if disk is None else found.wall.unforeshorten(disk)
     click.echo(
         f"wall       {len(found.hollows)} hollows, {len(wall.pieces)} pieces, depth {wall.depth:.6g}\n"
-        f"defect     {described(found.defect)} in {found.moments} moments; at most {float(found.bound):.2g} too much"
+        f"defect     {found.defect} in {found.moments} moments; at most {float(found.bound):.2g} too much"
     )
     if found.law is not None:
-        click.echo(f"distance   {described(found.distance)} (joint)")
+        click.echo(f"distance   {found.distance} (joint)")
+    if verbose:
+        click.echo(f"methods    of the defect: {found.defect.method}; of the distance: {found.distance.method}")
     if out is not None:
         wall.save(out, overwrite=force)
         click.echo(f"wrote      {out}")

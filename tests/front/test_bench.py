@@ -74,6 +74,7 @@ def test_problems_are_found_by_scene_by_quantity_and_by_both():
     assert problem_names(["koch/law"]) == ["koch/law"]
     assert problem_names(["cusps"]) == [f"cusps/{name}" for name in ("law", "moment", "lambda2", "collision", "disk")]
     assert len(problem_names(["moment"])) == 8
+    assert problem_names(["diffuse-tube"]) == ["diffuse-tube/transmission"]
     assert problem_names(["distance"]) == [f"{name}/distance" for name in standard_names()[:3]]
     assert problem_names(["random-3"]) == ["random-3/moment"]
 
@@ -144,6 +145,22 @@ def test_the_resistance_is_read_off_a_matrix(law, expected):
 def test_rays_at_a_small_angle_come_to_the_diffusivity(name, angle):
     wall = wall_of(name)
     assert eta_at(wall, angle) == pytest.approx(float(known_reference(f"{name}/eta").value), abs=2e-3)
+
+
+@pytest.mark.parametrize(("scene", "known"), [("diffuse-channel", 0.24056), ("diffuse-tube", 0.1909424)])
+def test_the_transmission_of_diffuse_walls_is_known_beyond_the_printed_digits(scene, known):
+    reference = known_reference(f"{scene}/transmission")
+    assert float(reference.value) == pytest.approx(known, abs=5e-6) and reference.error < 1e-12
+
+
+@pytest.mark.parametrize("scene", ["diffuse-channel", "diffuse-tube", "focusing-arc"])
+def test_errors_of_transmissions_hold_at_every_tolerance(scene):
+    reference = known_reference(f"{scene}/transmission")
+    for method, budgets, _ in methods_of(f"{scene}/transmission"):
+        for budget in budgets:
+            found = method.solve(budget, np.random.default_rng(2))
+            assert abs(float(found) - float(reference.value)) <= found.error + 2.0 * reference.error
+            assert found.error <= 1.0 / budget and (method.name == "flights") == found.method.startswith("flights")
 
 
 def test_the_correlation_of_v1_is_that_of_the_ideal_disks():
@@ -259,6 +276,7 @@ def rough_references(monkeypatch):
     monkeypatch.setitem(FINEST, "beams", (1e4,))
     monkeypatch.setitem(FINEST, "adaptive angles", (1e3,))
     monkeypatch.setitem(FINEST, "randomised QMC", (4.0**9,))
+    monkeypatch.setitem(FINEST, "flights", (1e2,))
 
 
 @pytest.fixture
@@ -294,6 +312,15 @@ def test_references_made_for_a_wall_are_those_that_are_stored(text, exact):
     for method in (*FINEST, "auto", "stratified", "Monte Carlo"):
         beside = next(one for one in found if method not in one.made_by)
         assert method == "randomised QMC" or not beside.source.startswith(method)
+
+
+@pytest.mark.usefixtures("rough_references")
+def test_flights_are_the_reference_of_the_transmission_of_a_wall_for_all_methods():
+    with ChildProcess() as child:
+        (found,) = made_references("focusing-arcs:half_angle=1.2/transmission", child, 60.0)
+    right = known_reference("focusing-arc/transmission")
+    assert abs(float(found.value) - float(right.value)) <= found.error + 2.0 * right.error
+    assert found.made_by == () and found.source.startswith("flights with budget 100")
 
 
 @pytest.fixture

@@ -4,11 +4,12 @@ import io
 import os
 import time
 import zipfile
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -16,10 +17,11 @@ from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.explore.answers import Answer, answers_to, first_answer, histogram, largest_gap
 from asperity.explore.background import GONE, Background
-from asperity.explore.drawing import pictured_and_answered
+from asperity.explore.drawing import pictured, pictured_and_answered
 from asperity.explore.files import LARGEST, new_folder, opened, plain_name, studied, unpacked, wall_as_toml
 from asperity.explore.question import Question, pinned, with_new_vertex
 from asperity.explore.server import _called, _usable
+from asperity.study.result import resistance_from
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:.* is deprecated and will be removed in version 2:PendingDeprecationWarning"
@@ -315,7 +317,7 @@ def test_vertices_and_numbers_beyond_the_limits_are_refused_before_any_work(page
     x = np.linspace(0.0, 1.0, 100_000)
     vertices = {"x": x.tolist(), "y": (-x * (1.0 - x)).tolist()}
     for changed, name, value, words in (
-        (page.wall_figure.vertices, "data", vertices, "expected at most 400 vertices"),
+        (page.wall_figure.vertices, "data", vertices, "expected at most 30 vertices"),
         (page.parameters["generations"], "value", 10, "generations: expected 1 to 4, got 10"),
     ):
         begun = time.process_time()
@@ -324,9 +326,107 @@ def test_vertices_and_numbers_beyond_the_limits_are_refused_before_any_work(page
 
 
 def test_walls_of_too_many_pieces_are_refused_with_another_command():
-    wall = lambda: geo.Wall.from_vertices(np.c_[np.linspace(0, 1, 10_002), np.r_[0, np.full(10_000, -0.1), 0]])  # noqa: E731
-    with pytest.raises(InputError, match="at most 10000 pieces, got 10001; thin it out, or use the command"):
+    wall = lambda: geo.Wall.from_vertices(np.c_[np.linspace(0, 1, 50_002), np.r_[0, np.full(50_000, -0.1), 0]])  # noqa: E731
+    with pytest.raises(InputError, match="at most 50000 pieces, got 50001; thin it out, or use the command"):
         next(pictured_and_answered(wall, "long"))
+
+
+class Script:
+    """A computation whose results the test chooses."""
+
+    busy, outdated = True, False
+
+    def __init__(self):
+        self.results = []
+
+    def ask(self, *_, **__):
+        pass
+
+    def collect(self):
+        found, self.results = self.results, []
+        return found
+
+    drop = ask
+
+
+def told(page, *results):
+    """What the table, the status and the figures say after results, each a pair of an error or None and a result."""
+    page._background.results = list(results)
+    page.collect()
+    figures = page.wall_figure, page.kernel, page.spectrum, page.collision
+    titles = [getattr(figure.plot.title.text, "text", figure.plot.title.text) for figure in figures]
+    return page.table.object, page.status.object, titles, len(page.kernel._image.data["root"])
+
+
+def test_no_old_answer_stands_under_a_new_wall(page):
+    page._background.drop()
+    page._background = Script()
+    teeth, arcs = (Question(wall, name) for wall, name in ((TEETH, "teeth"), (geo.focusing_arcs(1.0), "arcs")))
+    of_teeth, of_arcs = first_answer(teeth), first_answer(arcs)
+    assert told(page, (None, pictured(teeth)), (None, of_teeth))[0].count("computing") == 1
+    page.ask(arcs.wall, "arcs")
+    # for a moment the last wall stays, with its answers; then they go, also where the new wall has not been made
+    table, status, titles, images = told(page)
+    assert "no gap" in table and "computing" in status and titles[0].startswith("teeth") and images == 1
+    page._due = 0.0
+    table, _, titles, images = told(page)
+    assert (table.count("computing"), "no gap" in table, images) == (4, False, 0)
+    assert titles[1:] == ["Kernel: computing", "Eigenvalues: computing", "Collision: computing"]
+    # of a wall that is refused the last answers come back
+    table, _, titles, images = told(page, ("no such wall", None))
+    assert "no gap" in table and titles[0].startswith("teeth") and images == 1
+    page.ask(arcs.wall, "arcs")
+    assert told(page, (None, pictured(arcs)))[2][0].startswith("teeth")
+    page._due = 0.0
+    table, _, titles, images = told(page)
+    assert titles[0].startswith("arcs") and table.count("computing") == 4 and images == 0
+    assert "undecided" in told(page, (None, of_arcs))[0]
+    # the same wall, asked for again, keeps its answer
+    page.ask(arcs.wall, "arcs")
+    told(page, (None, pictured(arcs)))
+    page._due = 0.0
+    assert "undecided" in told(page)[0]
+    # what ends without answer says so
+    page.ask(TEETH, "teeth")
+    table = told(page, (None, pictured(teeth)), (GONE, None))[0]
+    assert "computing" not in table and table.count("want of memory") == 5
+
+
+def test_accommodation_and_resistance_stand_beside_the_gap_with_their_errors():
+    from asperity.explore.page import answer_as_html
+
+    arcs = geo.dispersing_arcs(1.0)
+    _, found = islice(answers_to(Question(arcs, "arcs", convention="specular")), 2)
+    momentum, law, text = found.accommodation, ker.WallLaw(arcs), answer_as_html(found)
+    known = spec.accommodation(law, 1e-4, 1.0, rng=1)
+    for mine, yours in (
+        (momentum.tangential, known.tangential), (momentum.normal, known.normal),
+        (resistance_from(momentum), ker.resistance(law, 1e-4)),
+    ):  # fmt: skip
+        assert abs(mine.value - yours.value) <= mine.error + yours.error
+        assert f"<b>{mine}</b>" in text
+    assert text.index("<td>gap") < text.index("<td>accommodation") < text.index("<td>kernel")
+
+
+@pytest.mark.parametrize(("number", "handles"), [(30, 30), (31, 0)])
+def test_profiles_of_many_vertices_have_no_handles(number, handles):
+    x = np.linspace(0.0, 1.0, number)
+    wall = geo.Wall.from_vertices(np.c_[x, -0.3 * x * (1.0 - x)])
+    assert len(Question(wall, "profile").handles) == handles
+
+
+def test_a_shallow_wall_is_stretched_as_in_its_picture_and_says_so():
+    from asperity.explore.drawing import WallFigure
+
+    figure = WallFigure()
+    for wall, hint in ((geo.dispersing_arcs(1e-3), "angles not to scale"), (TEETH, "drag a vertex, tap to add one")):
+        figure.show(pictured(Question(wall, "wall")), dragged=False)
+        picture = geo.draw_wall(wall, ax=Figure().subplots())
+        # bokeh's number is the width of a square over its height, matplotlib's the height over the width
+        assert figure.plot.aspect_scale == pytest.approx(1.0 / picture.get_aspect())
+        labels = [axis.axis_label.text for axis in (figure.plot.xaxis[0], figure.plot.yaxis[0])]
+        assert labels == [picture.get_xlabel(), picture.get_ylabel()]
+        assert figure._hint.text == hint
 
 
 def collected(page, until, seconds=300.0):

@@ -1,7 +1,8 @@
-"""The page in a real browser: load, drag, change, save, wrong files, two tabs; and who may ask the server."""
+"""The page in a real browser: load, drag, change, profiles, phone, dark, save, two tabs; and who may ask the server."""
 
 import asyncio
 import http.client
+import io
 import re
 import shutil
 import signal
@@ -10,9 +11,12 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from asperity import geometry as geo
+from asperity.geometry.plotting.walls import vertical_stretch
 from commands import ended, environment, started
 
 pytest.importorskip("panel", reason="the page needs asperity[explore]")
@@ -25,7 +29,10 @@ FLAGS = [
 PATIENCE = 60_000
 # Bytes of memory that a closed tab may leave; without a leak it is about 1,000.
 LEFT = 100_000
-# The pixel of the vertex k, and all vertices, from bokeh's own views.
+# Milliseconds: longer than the server waits for the websocket of a page that it has given.
+LATE = 7000
+# Of the figure of the wall, from bokeh's own views: the pixel of the vertex k, all vertices, the words above the wall
+# and beside it, pixels a unit of y over those of x; and the answers at the same moment.
 VERTEX = """k => {
   const find = view => {
     if (view.model.toolbar?.tools?.some(tool => tool.type == "PointDrawTool")) return view
@@ -37,8 +44,20 @@ VERTEX = """k => {
   const {data} = view.model.toolbar.tools.find(tool => tool.type == "PointDrawTool").renderers[0].data_source
   const {left, top} = view.el.getBoundingClientRect()
   const x = Array.from(data.x), y = Array.from(data.y)
-  return {x, y, at: [left + view.frame.x_scale.compute(x[k]), top + view.frame.y_scale.compute(y[k])]}
-}"""
+  const {x_scale, y_scale} = view.frame, size = scale => Math.abs(scale.compute(1) - scale.compute(0))
+  const {title, above, left: beside} = view.model
+  const words = [title.text.text ?? title.text, ...above.map(one => one.text), beside[0].axis_label.text].join(" | ")
+  return {x, y, at: [left + x_scale.compute(x[k]), top + y_scale.compute(y[k])], words,
+          stretch: size(y_scale) / size(x_scale), answers: FIND(".asperity-answers").innerText}
+}""".replace(
+    "FIND",
+    """(selector => {
+    const find = root => root.querySelector(selector) ?? Array.from(root.querySelectorAll("*"))
+      .map(one => one.shadowRoot && find(one.shadowRoot)).find(found => found)
+    return find(document)
+  })""",
+)
+PHONE = {"viewport": {"width": 360, "height": 740}, "is_mobile": True, "has_touch": True}
 
 
 class Server:
@@ -100,12 +119,14 @@ def page(browser, server):
     yield from opened_tab(browser, server)
 
 
-def opened_tab(browser, server):
-    tab = browser.new_page(viewport={"width": 1400, "height": 1100})
+def opened_tab(browser, server, late=0, **options):
+    tab = browser.new_page(**{"viewport": {"width": 1400, "height": 1100}, **options})
     tab.set_default_timeout(PATIENCE)
     tab.requests, tab.errors = [], []
     tab.on("request", lambda request: tab.requests.append(request.url))
     tab.on("pageerror", lambda error: tab.errors.append(str(error)))
+    if late:
+        tab.route("**/bokeh.min.js*", lambda route: (tab.wait_for_timeout(late), route.continue_()))
     tab.goto(server.address)
     settled(tab)
     yield tab
@@ -223,6 +244,65 @@ def test_another_wall_and_another_convention_change_the_gap(page):
     page.locator(".asperity-answers").get_by_text("specular convention").wait_for()
     page.locator(".asperity-answers").get_by_text("isolated").wait_for()
     assert "0.688" in answers(page)
+
+
+def test_no_old_answer_stands_under_a_new_wall(page):
+    page.get_by_label("Wall", exact=True).select_option("dispersing-arcs")
+    seen = []
+    while not (seen and "isolated" in seen[-1]["answers"]):
+        seen.append(page.evaluate(VERTEX, 0))
+        page.wait_for_timeout(20)
+    # teeth have no gap, arcs have one
+    assert "dispersing" in seen[-1]["words"]
+    assert all("triangular" in found["words"] or "no gap" not in found["answers"] for found in seen)
+
+
+@pytest.mark.parametrize("number", [400, 20_000])
+def test_a_profile_is_stretched_and_has_its_answers(page, tmp_path, number):
+    x, rng = np.linspace(0.0, 200.0, number), np.random.default_rng(0)
+    waves = np.arange(1, 60)
+    heights = np.cos(x[:, None] * waves * np.pi / 100.0 + rng.uniform(0.0, 6.0, waves.size)) @ (0.5 / waves**1.5)
+    np.savetxt(tmp_path / "rough.csv", np.c_[x, heights], delimiter=",", header="x [um], height [um]", comments="")
+    page.locator("input[type=file]").set_input_files(tmp_path / "rough.csv")
+    page.get_by_role("status").filter(has_text="known so far").wait_for()
+    page.locator(".asperity-answers").get_by_text("tangential").wait_for()
+    found = page.evaluate(VERTEX, 0)
+    stretch = vertical_stretch(geo.wall_from_text(str(tmp_path / "rough.csv")))
+    assert stretch > 5.0
+    assert found["stretch"] == pytest.approx(stretch, rel=1e-6)
+    assert found["words"].startswith("rough, depth")
+    assert f"angles not to scale | y (um), stretched {stretch:.3g} times" in found["words"]
+    assert found["x"] == []
+    assert re.search(r"tangential 0\.\d+\(\d+\), normal 0\.\d+\(\d+\); resistance of a tumbling body 1\.\d+\(\d+\)",
+                     found["answers"])  # fmt: skip
+
+
+def test_on_a_phone_nothing_is_wider_than_the_screen_and_the_answers_come_first(browser, server):
+    for tab in opened_tab(browser, server, **PHONE):
+        assert tab.evaluate("[innerWidth, document.documentElement.scrollWidth]") == [360, 360]
+        boxes = [
+            tab.locator(selector).first.bounding_box()
+            for selector in ("[role=status]", ".asperity-answers", ".bk-Figure", "select", "input[type=file]")
+        ]
+        assert all(box["x"] >= 0 and box["x"] + box["width"] <= 360 for box in boxes)
+        tops = [box["y"] for box in boxes]
+        assert tops == sorted(tops)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_is_dark_where_the_system_is(browser, server, scheme):
+    for tab in opened_tab(browser, server, color_scheme=scheme):
+        grey = imread(io.BytesIO(tab.screenshot()), format="png")[..., :3].mean(axis=2)
+        # but for the kernel, the wall and the letters everything has the one colour
+        assert (np.median(grey) < 0.2) == (scheme == "dark")
+        assert np.mean(grey > 0.95) < 0.02 or scheme == "light"
+
+
+def test_a_tab_that_connects_late_asks_the_network_for_nothing(browser, server):
+    for tab in opened_tab(browser, server, late=LATE):
+        tab.get_by_label("Wall", exact=True).select_option("mushrooms")
+        tab.get_by_text("stem_to_cap").wait_for()
+        assert {url.split("/")[2] for url in tab.requests if "//" in url} == {f"127.0.0.1:{server.port}"}
 
 
 def test_the_disk_changes_the_collision(page):
@@ -422,9 +502,9 @@ if __name__ == "__main__":
     tracemalloc.start()
     server.io_loop.run_sync(lambda: open_and_close(server, 2))
     before = tracemalloc.get_traced_memory()[0]
-    server.io_loop.run_sync(lambda: open_and_close(server, 5))
+    server.io_loop.run_sync(lambda: open_and_close(server, 2))
     left = tracemalloc.get_traced_memory()[0] - before
-    print(left // 5, sum(type(thing) is Page for thing in gc.get_objects()))
+    print(left // 2, sum(type(thing) is Page for thing in gc.get_objects()))
 """
 
 

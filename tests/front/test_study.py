@@ -162,7 +162,7 @@ def test_a_law_without_mirror_axis_is_said_not_to_be_self_adjoint_and_contracts_
 def test_the_summary_lists_all_eigenvalues_by_modulus(arcs):
     """The second largest modulus is that of the most negative one: facts 10."""
     line = next(line for line in arcs.summary(verbose=True).splitlines() if line.startswith("spectrum"))
-    numbers = [float(part.split(" +- ")[0]) for part in line.split("modulus: ")[1].split(" (")[0].split(", ")]
+    numbers = [float(part.split("(")[0].split()[0]) for part in line.split("modulus: ")[1].split(" (")[0].split(", ")]
     assert len(numbers) == 10 and "the 10 of largest modulus" in line
     assert np.all(np.diff(np.abs(numbers)) <= 0.0) and numbers[2] == pytest.approx(-0.311346443, abs=1e-3)
 
@@ -230,7 +230,7 @@ def test_the_summary_is_ten_short_lines_with_errors_in_brackets(which, request):
     assert len(lines) == 10 and max(map(len, lines)) <= 130
     gap = "gap        0.63297(5) isolated" if which == "arcs" else "gap        0 no gap"
     assert sum(line.startswith(gap) for line in lines) == 1
-    assert repr(report) == f"<Study\n{report.summary()}>"
+    assert all(line[11:] in repr(report) for line in lines) and repr(report).startswith("Study of ")
 
 
 def test_the_summary_of_a_profile_begins_with_momentum_and_any_with_a_disk_that_was_given(arcs, teeth):

@@ -1,5 +1,6 @@
 """Examples and scripts of pages run and are right, and the reference lists all public names."""
 
+import importlib
 import importlib.util
 import inspect
 import math
@@ -19,6 +20,7 @@ from asperity import spectral as spec
 
 DOCS = Path(__file__).parents[2] / "docs"
 HOW_TO = sorted(path.stem for path in (DOCS / "how-to").glob("*.py"))
+TUTORIALS = sorted((DOCS / "tutorials").glob("*.py"))
 
 
 @pytest.fixture
@@ -27,7 +29,7 @@ def run(monkeypatch):
     from matplotlib import pyplot
 
     monkeypatch.setattr(pyplot, "show", lambda: None)
-    yield lambda name: runpy.run_path(str(DOCS / "how-to" / f"{name}.py"))
+    yield lambda name, folder="how-to": runpy.run_path(str(DOCS / folder / f"{name}.py"))
     pyplot.close("all")
 
 
@@ -114,6 +116,12 @@ def test_least_resistance_is_below_the_smooth_body_and_the_best_triangle_below_r
     assert math.sqrt(2) < float(names["best"].value) < names["most"].upper == 1.5
 
 
+def test_the_mushroom_between_flat_tops_is_the_farthest_from_retroreflection(run):
+    walls = run("retroreflectors")["walls"]
+    distance = {name: float(ker.retroreflection_distance(wall, rng=1)) for name, wall in walls.items()}
+    assert max(distance, key=distance.get) == "mushroom" and distance["helmet"] < 0.5 * distance["mushroom"]
+
+
 def test_the_wall_has_the_wanted_moments(run):
     names = run("a_wall_for_a_law")
     assert abs(names["difference"]).max() < 1e-10
@@ -153,6 +161,16 @@ def test_the_slower_examples_agree_with_what_is_known(run, name):
         assert names["table"].rows[-1].value == pytest.approx(1 - 3 / 8 * math.log(9), abs=1e-6)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
+def test_a_tutorial_says_what_it_computes(path, run):
+    """Its assertions hold, and its pages are linked where readers begin."""
+    source = path.read_text(encoding="utf-8")
+    run(path.stem, "tutorials")
+    assert source.count("\n# %%\n") >= 12 and source.count("\nassert ") >= 8
+    assert f"docs/tutorials/{path.name}" in (DOCS.parent / "README.md").read_text(encoding="utf-8")
+
+
 def test_no_line_of_a_page_is_lost_as_a_comment():
     """A line that begins with a percent sign is a comment in Markdown of MyST: "95 %" may not be broken before it."""
     pages = [page for page in DOCS.rglob("*.md") if not {"_build", "generated"} & set(page.parts)]
@@ -180,8 +198,24 @@ def test_every_campaign_of_the_table_has_a_section():
     assert {anchor for _, anchor, *_ in rows} == headings
 
 
-def test_every_short_example_is_in_the_story(reference):
+def test_every_short_example_is_in_the_story_and_runs_here(reference):
     assert sorted(reference.STORY) == HOW_TO
+    # `make check` builds the documentation without running them
+    text = Path(__file__).read_text(encoding="utf-8")
+    assert [name for name in HOW_TO if f'"{name}"' not in text] == []
+
+
+def test_small_pictures_of_pages_are_drawn_and_exist(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(DOCS)
+    thumbnails = importlib.import_module("thumbnails")
+    thumbnails.write_thumbnails(tmp_path / "generated" / "thumbnails")
+    asked = [
+        re.findall(r'^# sphinx_gallery_thumbnail_path = "(.*)"$', path.read_text(encoding="utf-8"), re.M)
+        for folder in ("tutorials", "how-to", "examples") for path in (DOCS / folder).glob("*.py")
+    ]  # fmt: skip
+    names = {name for found in asked for name in found}
+    assert {f"generated/thumbnails/{name}.png" for name in thumbnails.PICTURES} <= names
+    assert all((DOCS / name).exists() or (tmp_path / name).stat().st_size > 2000 for name in names)
 
 
 def test_the_reference_lists_every_public_name_once(reference, tmp_path):
@@ -232,21 +266,16 @@ def test_inventories_have_the_links_of_the_table(reference, tmp_path):
 
 # What a block of these pages expects before it, and its numbers in small.
 BEFORE = {"sweeps.md": "law, client = ker.lambertian(), None"}
-SMALLER = {
-    "1.5, 50)": "1.5, 3)", "points=50": "points=8", "family, 100": "family, 4", "client=2": "client=None",
-    "10**10": "2**12", "0.1), 64": "0.1), 8", "resolution=0.01": "resolution=0.5", "1e-6,": "1e-2,", "1e-4,": "1e-1,",
-    # tests of their own have the extremum of a sweep, which takes a minute, and gaps of random walls
-    'table.extremum("gap")': "table.extremum", '"gap_specular", "resistance"]': '"resistance", "eta"]',
-    'of("gap_specular")': 'of("resistance")',
-}  # fmt: skip
+SMALLER = {"points=50": "points=8", "10**10": "2**12", "resolution=0.01": "resolution=0.5"}
 
 
 def python_blocks():
     pages = [page for page in DOCS.rglob("*.md") if not {"_build", "generated"} & set(page.parts)]
     for page in [*pages, DOCS.parent / "README.md"]:
         blocks = re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
-        # neither a batch system nor a package that the library does not use is at hand
-        blocks = [block for block in blocks if not re.search("SLURMCluster|uncertainties", block)]
+        # neither a batch system nor a package that the library does not use is at hand; scripts that start workers are
+        # run in tests/runs/test_sweep_faults.py
+        blocks = [block for block in blocks if not re.search(r"SLURMCluster|uncertainties|client=\d", block)]
         if blocks:
             yield pytest.param(page.name, blocks, id=page.name)
 
@@ -264,3 +293,15 @@ def test_the_scripts_on_a_page_run_in_small(page, blocks, tmp_path, monkeypatch)
         for full, small in SMALLER.items():
             block = block.replace(full, small)
         exec(compile(block, page, "exec"), names)
+
+
+@pytest.mark.parametrize("room", ["geometry", "kernels", "spectral"])
+def test_the_help_of_a_room_lists_each_public_name_once_below_what_people_do(reference, room):
+    module = importlib.import_module(f"asperity.{room}")
+    lines = [line.partition(": ") for line in module.__doc__.split("\n- ")[1:]]
+    listed = [name for _, _, names in lines for name in re.findall(r"\w+", names)]
+    assert sorted(listed) == sorted(module.__all__)
+    titles, heads = [title for _, title, _ in reference.sections()], [head for head, _, _ in lines]
+    assert [*(title for title in titles if title in heads), *(set(heads) - set(titles))] == heads
+    assert set(heads) - set(titles) <= {"Verify a formula, and the formulas of a disk"}
+    assert set(dir(module)) == set(module.__all__) and set(dir(asperity)) == set(asperity.__all__)

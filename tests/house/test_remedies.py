@@ -11,7 +11,8 @@ import asperity
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import AsperityError, FileExistsRefusal
+from asperity.core.checks import MAKES
+from asperity.errors import AsperityError, FileExistsRefusal, InputError
 from asperity.estimates import Estimate
 
 ROOT = Path(asperity.__file__).parent
@@ -203,3 +204,29 @@ def test_the_names_that_are_advised_for_files_are_written(tmp_path):
         assert Path(advised).read_text() == "precious"
         save(advised, overwrite=True)
         assert Path(advised).read_text(errors="replace") != "precious"
+
+
+def test_a_refusal_of_another_kind_names_the_constructor_that_makes_the_wanted_one():
+    wall, array, matrix, law = geo.koch(1), np.eye(2), P, LAW
+    points, profile = [(0.0, 0.0), (0.5, -1.0), (1.0, 0.0)], geo.Profile([0, 1], [0, 1])
+    given = {
+        "wall": wall, "array": array, "matrix": matrix, "law": law, "text": "koch", "profile": profile, "ker": ker,
+        "points": points, "density": lambda a, b: 0.5 * np.sin(b) + 0.0 * a, "map": lambda theta: np.pi - theta,
+        "geo": geo,
+    }  # fmt: skip
+    kinds = {"Law": ker.Law, "Wall": geo.Wall, "KernelMatrix": ker.KernelMatrix}
+    generations = geo.MushroomGenerations(0.25, 0.5, 2)
+    for wanted, makes in MAKES.items():
+        for kind, text in makes.items():
+            for one in text.split(" or "):
+                names = {**given, "wall": generations} if kind == "MushroomGenerations" else given
+                owner = {"CollisionLaw": ker.CollisionLaw(law, DISK), "NamedWall": geo.WALLS["koch"]}
+                found = eval(one.replace("its .", "own."), {**names, "own": owner.get(kind, ker.WallLaw(wall))})
+                assert isinstance(found, kinds[wanted]), (wanted, kind, one)
+    with pytest.raises(InputError, match=r"take ker\.WallLaw\(geo\.wall_from_text\(text\)\)"):
+        ker.resistance("koch")
+    for call in (spec.essential_edge, spec.mixing_time):
+        with pytest.raises(InputError, match=r"take ker\.WallLaw\(wall\)"):
+            call(wall)
+    with pytest.raises(InputError, match=r"take ker\.discretise\(law, ker\.Bins\(64\)\)"):
+        spec.conductance(law)

@@ -194,7 +194,7 @@ REFUSED = {
             ((1.0, 0.1, "guess", ""), "kind"), (("many", 0.1, "bound", ""), "value"),
             ((10**400, 0.1, "bound", ""), "value"), ((1.0, 0.1, "bound", 3), "method"),
         )),
-        *((call, r"1000000\) takes 8e\+03 GB of memory") for basis in (ker.Bins(10**6), ker.Legendre(10**6))
+        *((call, r"1000000\) takes (8e\+03|4\.8e\+04) GB of memory") for basis in (ker.Bins(10**6), ker.Legendre(10**6))
           for call in (lambda basis=basis: ker.discretise(DIFFUSE, basis), estimate([1.0] * 100, [1.0] * 100, basis))),
         (lambda: matrix(np.eye(2), ker.Bins(2)) @ np.ones(3), "expected 2 entries"),
         (lambda: matrix(np.eye(2), ker.Bins(2)) ** -1, "exponent"),
@@ -205,7 +205,7 @@ REFUSED = {
         (lambda: matrix(np.eye(2), ker.Bins([0.0, 1.0, np.pi])).in_specular_frame(), "discretise law"),
         (lambda: matrix([[0.4, 0.6], [0.6, 0.4]], ker.Bins(2)).save("/no/folder/kernel.npz"), "cannot write"),
         (lambda: ker.load_matrix("missing.npz"), "No such file"),
-        (lambda: ker.discretise("flat", ker.Bins(4)), "law: expected a law"),
+        (lambda: ker.discretise("flat", ker.Bins(4)), "law: expected a Law"),
         (lambda: ker.discretise(DIFFUSE, 12), "basis: expected a Basis such as"),
         (lambda: ker.discretise(DIFFUSE, ker.Bins(4, weight="sin2")), "weight 'sin'"),
         (lambda: ker.discretise(DIFFUSE, ker.Bins(4), "guess"), "method: expected 'auto', "),
@@ -284,7 +284,7 @@ REFUSED = {
         (lambda: wedge_record().phase_portrait("boundary"), "from curves"),
         (lambda: wedge_record().phase_portrait("angle"), "'boundary' or 'velocity'"),
         (lambda: wedge_record().animate(duration=1e308), "duration: expected a number in"),
-        (lambda: spec.channel_paths("lambertian", [1, 2, 3]), "expected a law"),
+        (lambda: spec.channel_paths("lambertian", [1, 2, 3]), "expected a Law such as"),
         (lambda: spec.channel_paths(DIFFUSE, [1, 2]), "increasing positive times"),
         *((lambda r=r: spec.channel_paths(DIFFUSE, [1, 2, 3], bend=r, speed=1e308), "flights") for r in (3, math.inf)),
         (lambda: spec.channel_paths(DIFFUSE, [1, 2, 3], bend=1.0), "greater than the radius"),
@@ -378,7 +378,7 @@ REFUSED = {
         (lambda: spec.prove_gap(np.eye(2)), "law: expected a Law such as"),
         *((lambda angle=angle: spec.accommodation(DIFFUSE, theta=[1.0, angle]), "take one beside it")
           for angle in (np.pi / 2, np.arcsin(np.pi / 4), np.pi - np.arcsin(np.pi / 4))),
-        (lambda: spec.accommodation(FLAT), "law: expected a law such as WallLaw"),
+        (lambda: spec.accommodation(FLAT), r"law: expected a Law such as ker\.WallLaw.*; take ker\.WallLaw\(wall\)"),
         (lambda: spec.mixing_time(ker.maxwell(0.5), start=1.0), "start: expected a law with a density"),
         (lambda: spec.diffusivity(MIRROR), "infinite"),
         (lambda: spec.diffusivity(DIFFUSE, arrangement="glide"), "arrangement"),

@@ -1,8 +1,12 @@
-"""Progress bars appear on a terminal and in a notebook, after two seconds, and nowhere else."""
+"""Progress: bars on a terminal and in a notebook, lines elsewhere, and an end at Ctrl-C."""
 
 import io
 import multiprocessing
+import re
+import signal
+import subprocess
 import sys
+import time
 from types import ModuleType
 
 import numpy as np
@@ -15,6 +19,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core import long_runs
 from asperity.core.long_runs import progress_bar
+from asperity.kernels.discretisation import discretisation
 
 
 class Terminal(io.StringIO):
@@ -25,6 +30,7 @@ class Terminal(io.StringIO):
 def written(monkeypatch, stream, seconds=0.0):
     """The stream, which takes the place of standard error; in a fixture pytest would take it away again."""
     monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.delenv(long_runs.QUIET, raising=False)
     monkeypatch.setattr(long_runs, "SLOW_SECONDS", seconds)
     monkeypatch.setattr(long_runs, "RENEWED_SECONDS", 0.0)
     return stream
@@ -35,7 +41,7 @@ def shown(count=3):
     with progress_bar(count, "part", "work") as bar:
         for _ in range(count):
             bar.update()
-        return not bar.disable
+        return bar.bar is not None and not bar.bar.disable
 
 
 def test_a_bar_appears_on_a_terminal_after_two_seconds_and_nowhere_else(monkeypatch):
@@ -108,3 +114,80 @@ def test_long_files_are_counted_by_a_bar_and_short_ones_are_not(monkeypatch, tmp
             geo.Wall.from_vertices(np.column_stack([x, -x * (1.0 - x)])).save(tmp_path / "wall.toml", overwrite=True)
             geo.load_wall(tmp_path / "wall.toml")
         assert (("line" if form == "profile" else "piece") in terminal.getvalue()) is shown
+
+
+def reports(monkeypatch, work, seconds=0.05):
+    """The lines that a work writes where standard error is no terminal, with short intervals."""
+    monkeypatch.setattr(long_runs, "REPORTED_SECONDS", 4.0 * seconds)
+    monkeypatch.setattr(long_runs, "PREDICTED_SECONDS", seconds)
+    stream = written(monkeypatch, io.StringIO())
+    work()
+    return stream.getvalue().splitlines()
+
+
+def slow_parts(count=8, seconds=0.1):
+    with long_runs.reported("study"), progress_bar(count, "part") as bar:
+        for _ in range(count):
+            time.sleep(seconds)
+            bar.describe("error 0.1")
+            bar.update()
+
+
+def test_without_a_terminal_lines_say_what_is_done_and_left(monkeypatch):
+    assert long_runs.REPORTED_SECONDS == 10.0 and long_runs.PREDICTED_SECONDS == 1.0
+    found = reports(monkeypatch, slow_parts)
+    assert 3 <= len(found) <= 6 and not long_runs.Progress.running
+    # the first predicts, as soon as a part is done
+    line = r"asperity: study: \d s, (\d) of 8 parts, error 0\.1, about \d s left"
+    counts = [int(re.fullmatch(line, text)[1]) for text in found]
+    assert counts == sorted(counts) and counts[0] <= 2
+
+
+def test_what_its_size_predicts_to_be_long_is_said_before(monkeypatch):
+    def work():
+        with long_runs.reported("matrix", 40.0, 3e9), long_runs.reported("its part", 20.0, 1e9):
+            pass
+
+    assert reports(monkeypatch, work) == ["asperity: matrix: about 40 s and 3.0 GB of memory"]
+    # time of an entry by the time of this matrix, of 2^22 entries
+    assert 10.0 < discretisation.SECONDS * 8000**2 < 60.0
+
+
+def test_short_work_and_a_quiet_process_report_nothing(monkeypatch):
+    assert reports(monkeypatch, lambda: slow_parts(1), seconds=1.0) == []
+    stream = written(monkeypatch, io.StringIO())
+    monkeypatch.setenv("ASPERITY_QUIET", "1")
+    with long_runs.reported("matrix", 40.0):
+        slow_parts()
+    assert stream.getvalue() == ""
+
+
+INTERRUPTED = """
+import time
+from asperity import geometry as geo, kernels as ker, spectral as spec
+wall = ker.WallLaw(geo.dispersing_arcs(1.0))
+print(flush=True)
+{call}
+"""
+CALLS = {
+    "rays": "ker.discretise(wall, ker.Bins(64), 'monte-carlo', samples=2**32)",
+    "quadrature": "ker.discretise(wall, ker.Bins(600), 'quadrature', 1e-12)",
+    "gap": "spec.spectral_gap(ker.WallLaw(geo.mushrooms(0.3, 0.2)), 1e-9, time_limit=1e4)",
+    "transmission": "spec.transmission(wall, 20.0, tolerance=1e-7)",
+    "proof": "spec.prove_gap(0.5 * wall + 0.5 * ker.lambertian(), 1e-12)",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
+def test_ctrl_c_ends_a_long_call_at_once(call):
+    with subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED.format(call=call)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        process.stdout.readline()
+        time.sleep(3.0)
+        begun = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60.0)
+    # a second, and the end of the process on a busy machine
+    assert "KeyboardInterrupt" in errors and time.monotonic() - begun < 5.0

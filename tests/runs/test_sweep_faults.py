@@ -208,10 +208,13 @@ def test_an_example_that_starts_workers_runs_as_a_script_and_says_what_it_lacks_
         "1e-6": "1e-2",
         "1e-4": "1e-2",
         "client=2": "client=1",
-        "Bins(32)": "Bins(4)",
+        "Bins(32)": "Bins(4), 1e-2",
         "family, 100": "family, 4",
         ", 64,": ", 6,",
+        # tests of their own have the extremum of a sweep, which takes a minute, and gaps of random walls
         ".extremum(": ".plot(",
+        '"gap_specular", "resistance"]': '"resistance", "eta"]',
+        'of("gap_specular")': 'of("resistance")',
     }
     for long, short in shorter.items():
         block = block.replace(long, short)

@@ -14,6 +14,7 @@ from asperity import AsperityError, Estimate, FileExistsRefusal, InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.spectral.sweeps.named_families import NamedFamily
 from commands import run
 
 GRID = {"diffuse_fraction": [0.25, 0.5, 1.0]}
@@ -167,10 +168,21 @@ def test_the_picture_marks_verdicts_and_shades_where_there_is_no_gap():
     )
     ax = table.plot(ax=Figure().subplots())
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert labels == ["no gap", "isolated", "no gap"]
+    assert labels == ["no gap", "isolated"]
     (shaded,) = ax.patches
     assert (shaded.get_x(), shaded.get_x() + shaded.get_width()) == (0.0, 0.2)
     assert ax.get_xlabel() == "fraction"
+
+
+def test_the_axes_of_a_picture_have_wall_and_unit():
+    from matplotlib.figure import Figure
+
+    for family, name in ((geo.focusing_arcs, "focusing_arcs"), (NamedFamily("focusing-arcs"), "focusing-arcs")):
+        table = spec.sweep(family, {"half_angle": [1.0, 1.2]}, "relaxation_time", tolerance=1e-2)
+        again = spec.SweepTable.of_json(table.to_json())
+        assert again == table
+        ax = again.plot(ax=Figure().subplots())
+        assert ax.get_xlabel() == f"half angle of {name} (rad)" and ax.get_ylabel() == "relaxation time (collisions)"
 
 
 # ---- checkpoints ------------------------------------------------------------------------------------------------
@@ -287,7 +299,7 @@ def test_the_command_writes_its_folder_and_goes_on_there(tmp_path):
     asked = ["sweep", "focusing-arcs", "--over", "half_angle=0.2:1.7:3", "--quantity", "resistance,eta", "--out"]
     first = run(*asked, tmp_path / "arcs")
     assert first.exit_code == 0, first.output
-    assert "6 rows, 2 of them refused" in first.stdout and "expected a number in (0, 1.5708], got 1.7" in first.stdout
+    assert "2 of 6: half_angle" in first.stdout and "expected a number in (0, 1.5708], got 1.7" in first.stdout
     names = {"sweep.checkpoint", "table.csv", "table.json", "table.parquet", "table.png"}
     assert {path.name for path in (tmp_path / "arcs").iterdir()} == names
     before = (tmp_path / "arcs" / "table.csv").read_bytes()

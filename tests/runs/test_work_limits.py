@@ -1,6 +1,7 @@
 """Limits on work: samples bound the time, a time limit leads to a larger error, and matrices fit into memory."""
 
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -8,22 +9,12 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.core import checks
 from asperity.core.long_runs import OutOfTime, count_time, time_limited
+from asperity.errors import InputError
+from asperity.kernels.discretisation.discretisation import MATRICES
 from asperity.kernels.walls.conditionals import WallConditionals
 from commands import ended
-
-# Peak of a computation over the memory before it, in matrices of 2500 bins (50 MB); 1,000 MB are for the rays.
-PEAK = """
-import resource
-from asperity import geometry as geo, kernels as ker
-def peak():
-    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-law = {law}
-ker.discretise(law, ker.Bins(16){more})
-before = peak()
-ker.discretise(law, ker.Bins(2500){more})
-print((peak() - before) / 5e7)
-"""
 
 
 def comb(rng: np.random.Generator) -> geo.Wall:
@@ -87,14 +78,58 @@ def test_time_is_counted_only_within_a_limit() -> None:
     count_time(1e9)
 
 
-@pytest.mark.slow
+WALL = ker.WallLaw(geo.dispersing_arcs(1.0))
+HALF = 0.5 * ker.lambertian() + 0.5 * ker.WallLaw(geo.mushrooms(0.3, 0.2))
+
+
+def peak_of(law: ker.Law, bins: int, method: str) -> int:
+    """Bytes at most at a time."""
+    tracemalloc.start()
+    try:
+        ker.discretise(law, ker.Bins(bins), method, samples=2**16)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
 @pytest.mark.parametrize(
-    ("law", "more"),
+    ("law", "method"),
     [
-        ("ker.TriangularTeethLaw(0.7)", ""),
-        ("ker.WallLaw(geo.dispersing_arcs(1.0))", ", method='qmc'"),
+        *((WALL, method) for method in ("auto", "qmc", "monte-carlo")),
+        *((law, "auto") for law in (HALF, ker.TriangularTeethLaw(0.7), ker.LeastResistanceLaw())),
     ],
+    ids=["wall", "qmc", "monte-carlo", "sum", "isometries", "least resistance"],
 )
-def test_a_matrix_is_computed_in_the_memory_of_eight(law: str, more: str) -> None:
-    done = ended("-c", PEAK.format(law=law, more=more), check=True)
-    assert float(done.stdout) < 8.0 + 20.0, "eight matrices, and 1,000 MB for rays and nodes"
+def test_a_matrix_is_computed_in_the_memory_of_six(law: ker.Law, method: str) -> None:
+    few, many = (2100, 2500) if law is HALF else (1100, 1700)
+    # what rays, nodes and blocks of rows take does not grow with the matrix; sums of small ones keep replicates
+    more = peak_of(law, many, method) - peak_of(law, few, method)
+    assert more < MATRICES * 8 * (many**2 - few**2)
+
+
+def test_what_exceeds_the_memory_is_refused_with_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert 2**27 < checks.memory_left() < 2**60
+    for limit, size in ((10**9, 5000), (3 * 10**9, 20_000)):
+        monkeypatch.setattr(checks, "memory_left", lambda limit=limit: limit)
+        words = (
+            rf"Bins\({size}\) takes {6 * 8e-9 * size**2:.2g} GB of memory, more than there is \({limit / 1e9:.2g} GB\)"
+        )
+        with pytest.raises(InputError, match=words):
+            ker.discretise(WALL, ker.Bins(size))
+    # rules of fifteen nodes on each bin, twice; the wall is mirror-symmetric
+    with pytest.raises(InputError, match=r"quadrature of rays in Bins\(5000\) takes 3\.2 GB"):
+        ker.discretise(WALL, ker.Bins(5000), "quadrature")
+
+
+def test_a_limit_of_the_process_counts_as_its_memory() -> None:
+    code = """
+import resource
+from asperity import kernels as ker
+from asperity.errors import InputError
+resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30, resource.RLIM_INFINITY))
+try:
+    ker.discretise(ker.lambertian(), ker.Bins(10_000))
+except InputError as reason:
+    print(reason)
+"""
+    assert "takes 4.8 GB of memory, more than there is (" in ended("-c", code, check=True).stdout

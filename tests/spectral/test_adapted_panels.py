@@ -114,6 +114,15 @@ def test_trial_functions_are_orthonormal_and_of_one_parity():
     assert np.allclose(here[::-1], sign * here, atol=1e-12)
 
 
+def test_trial_functions_of_a_lopsided_wall_have_no_parity():
+    law = ker.WallLaw(geo.Wall([geo.Bezier([(0, -0.15), (0.15, 0.05), (0.5, 0.05), (1, -0.15)])]))
+    space = adapted_trial_space(law, 3, 1e-4)
+    assert space.parities == ("none",) * 3 and not space.mirrored
+    # neither even nor odd
+    values = space.basis.evaluate([0.4, np.pi - 0.4]) @ space.vectors[:, 1:]
+    assert np.all(abs(abs(values[0]) - abs(values[1])) > 0.05)
+
+
 @pytest.mark.parametrize("basis", [ker.Legendre(8), ker.Bins(32), ker.Bins([0.0, 1.0, np.pi])], ids=repr)
 @pytest.mark.parametrize("half_angle", [0.3, 1.0, np.pi / 2])
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-5])

@@ -461,11 +461,11 @@ def test_enclosures_are_read_as_a_sequence_and_as_text():
     both = Enclosures((first, second), REST, "paper", "by hand")
     assert len(both) == 2 and list(both) == [first, second] and both[1] is second
     assert first.width == 0.5 and 0.25 in first and 0.75 in first and 0.2 not in first and 0.8 not in first
-    assert str(both).splitlines() == [
-        "paper convention, by hand",
-        "[0.25, 0.75] indexed 1 (bound: why)",
-        "[-0.5, 0] contains-spectrum (bound: why)",
+    assert [str(one) for one in both] == [
+        "[0.25, 0.75] holds eigenvalue 1 (bound: why)",
+        "[-0.5, 0] holds a point of the spectrum (bound: why)",
     ]
+    assert "0.50(25)" in str(both) and "-0.25(25)" in str(both) and "convention paper" in str(both)
     trials = enclosure.EnclosedTrialSpace(both, ker.Legendre(2), np.eye(2))
     assert trials.worst == 0.25 and not trials.indexed
     assert enclosure.EnclosedTrialSpace(Enclosures((first,), REST, "paper", ""), ker.Legendre(2), np.eye(2)).indexed

@@ -16,7 +16,7 @@ def test_maxwell_has_one_indexed_eigenvalue_and_the_rest_is_refused_with_the_rea
     assert [item.label for item in found] == ["indexed", "contains-spectrum", "contains-spectrum"]
     # .7 and -.7 are eigenvalues of infinite multiplicity: which of them come first is a matter of rounding
     assert 1.0 in found[0] and all(0.7 in item or -0.7 in item for item in found[1:])
-    assert "not indexed" in found[1].reason and "Lambertian fraction" in found[1].reason
+    assert "its number is not known" in found[1].reason and "Lambertian fraction" in found[1].reason
 
 
 SHALLOW_CURVES = [

@@ -173,7 +173,7 @@ def test_the_text_of_a_diffusivity_says_that_it_is_a_slope_and_from_where_on():
     """At L = 160 r the constant beside the slope of shallow arcs, whose L^2/(D_0 tau) is 45, is the larger part."""
     shallow, deep = spec.diffusivity(ker.CircularArcLaw(0.05), radius=2.0), spec.diffusivity(ker.CircularArcLaw(1.2))
     for text in (str(shallow), repr(shallow), f"{shallow}", shallow._repr_html_()):
-        assert "2.546, the slope of L^2/tau against ln(L/r) for L well above" in text
+        assert "2.5464790894" in text and ", the slope of L^2/tau against ln(L/r) for L well above" in text
     assert shallow.onset > 2.0 * 160.0 > 10.0 * deep.onset
     # of all flights beyond the onset the persistence is near its limit, by rays of another seed
     angle = 0.5 * np.arctan(2.0 * 2.0 / shallow.onset)
@@ -221,7 +221,7 @@ def test_the_diffusivity_of_channels_grows_by_half_of_the_slope():
     found = spec.channel_diffusivity(ker.lambertian(), [20.0, 200.0], rng=2)
     slope = 2.0 * (found.values[1] - found.values[0]) / np.log(10.0)
     assert abs(slope - float(spec.diffusivity(ker.lambertian()))) < 2.0 * found.errors.sum() / np.log(10.0) + 0.05
-    assert found.onset < 20.0 and "at L = 200; logarithmic in L well above 3.2" in repr(found)
+    assert found.onset < 20.0 and "onset     3.1" in repr(found)
 
 
 def test_the_diffusivity_of_one_length_scales_with_radius_and_speed():
@@ -233,7 +233,7 @@ def test_the_diffusivity_of_one_length_scales_with_radius_and_speed():
 def test_a_channel_whose_slope_is_unknown_has_times_all_the_same():
     law = ker.WallLaw(geo.rectangular_teeth()) @ ker.henyey_greenstein(0.5)
     found = spec.channel_diffusivity(law, [1.0, 2.0], 200, 3)
-    assert found.onset == np.inf and np.all(found.times > 0.0) and "well above inf" not in repr(found)
+    assert found.onset == np.inf and np.all(found.times > 0.0)
 
 
 @pytest.mark.parametrize("lengths", [[], [0.0], [-1.0], [2.0, 1.0], [1.0, np.inf], [np.nan]])
@@ -246,6 +246,8 @@ def test_a_channel_whose_particles_keep_their_angles_has_no_mean_exit_time():
     for law in (ker.RectangularTeethLaw(1.0), 0.5 * ker.specular() + 0.5 * ker.retroreflection()):
         with pytest.raises(InputError, match="every ray keeps its angle"):
             spec.channel_diffusivity(law, [5.0])
+        with pytest.raises(InputError, match="every ray keeps its angle"):
+            spec.exit_times(law, [1.0, 2.0, 4.0], 10)
 
 
 # without a closed form

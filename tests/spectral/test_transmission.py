@@ -233,6 +233,30 @@ def test_flights_end_at_their_limit_and_count_particles_inside_as_error(monkeypa
     assert 2e-4 < short.error < 3e-3 and "still inside" not in short.method
 
 
+def test_flights_end_at_once_where_polynomials_are_better(monkeypatch):
+    law, flown = ker.henyey_greenstein(0.5), []
+    whole = clausing._flown
+    monkeypatch.setattr(clausing, "LEVELS", clausing.LEVELS[:3])
+    monkeypatch.setattr(clausing, "_flown", lambda *how: flown.append(1) or whole(*how))
+    found = spec.transmission(law, 3.0, tolerance=1e-12, rng=0)
+    assert "polynomials" in found.method and found.error > 1e-12 and len(flown) == 1
+
+
+def test_a_matrix_with_too_large_an_error_leaves_the_transmission_of_the_one_before(monkeypatch):
+    law, solve = ker.henyey_greenstein(0.8), clausing._in_polynomials
+    monkeypatch.setattr(clausing, "LEVELS", ((4, 4), *clausing.LEVELS[:3]))
+    finest = clausing._by_polynomials(law, 3.0, 1e-12, np.random.default_rng(0))
+    assert "32 polynomials" in finest.method
+
+    def noisy(matrix, length, size, nodes):
+        value, noise = solve(matrix, length, size, nodes)
+        return (value + 0.1, 0.1) if size == 32 else (value, noise)
+
+    monkeypatch.setattr(clausing, "_in_polynomials", noisy)
+    found = clausing._by_polynomials(law, 3.0, 1e-12, np.random.default_rng(0))
+    assert abs(float(found) - float(finest)) < found.error < 0.05 and "16 polynomials" in found.method
+
+
 def test_a_seed_gives_the_same_number_again():
     first, second = (spec.transmission(SAW, 1.0, tolerance=3e-3, rng=rng) for rng in (4, np.random.default_rng(4)))
     assert first == second and first != spec.transmission(SAW, 1.0, tolerance=3e-3, rng=5)

@@ -17,13 +17,15 @@ from .quantities.collision import COLLISION, DISK, TRUE_DISK, by_true_disks
 from .quantities.matrix import DISTANCE, LAW, MOMENT, RESISTANCE
 from .quantities.methods import Methods
 from .quantities.spectral import DIFFUSIVITY, EIGENVALUE
+from .quantities.transmission import DIFFUSE, TRANSMISSION, diffuse_methods
 from .quantities.walls import scenes, standard_names, wall_of
 
 QUANTITIES = {
-    one.name: one for one in (LAW, MOMENT, EIGENVALUE, COLLISION, TRUE_DISK, RESISTANCE, DISTANCE, DIFFUSIVITY)
+    one.name: one
+    for one in (LAW, MOMENT, EIGENVALUE, COLLISION, TRUE_DISK, RESISTANCE, DISTANCE, DIFFUSIVITY, TRANSMISSION)
 }
 # The quantity of the random walls, and those of a wall of the user.
-RANDOM_QUANTITY, OWN_QUANTITIES = MOMENT.name, (LAW.name, MOMENT.name, RESISTANCE.name)
+RANDOM_QUANTITY, OWN_QUANTITIES = MOMENT.name, (LAW.name, MOMENT.name, RESISTANCE.name, TRANSMISSION.name)
 # The repeat whose generator makes the rays of a reference: no row has as many.
 REFERENCE_REPEAT = 2**20
 
@@ -35,7 +37,7 @@ def problem_names(patterns: Sequence[str] = ()) -> list[str]:
     """
     standard = {
         f"{scene}/{one.name}": (scene, one.name)
-        for scene in standard_names() for one in QUANTITIES.values() if scene in one.scenes
+        for scene in (*standard_names(), *DIFFUSE) for one in QUANTITIES.values() if scene in one.scenes
     }  # fmt: skip
     # a quantity alone means the scenes of the standard set
     random = {f"{scene}/{RANDOM_QUANTITY}": (scene,) for scene in scenes() if scene not in standard_names()}
@@ -53,7 +55,7 @@ def _of_wall(text: str) -> list[str]:
     except InputError as reason:
         raise InputError(
             f"{reason}; expected a wall, or of the standard set SCENE, QUANTITY or SCENE/QUANTITY, scenes "
-            f"{', '.join(standard_names())}, random-N, quantities {', '.join(QUANTITIES)}"
+            f"{', '.join((*standard_names(), *DIFFUSE))}, random-N, quantities {', '.join(QUANTITIES)}"
         ) from reason
     return [f"{text}/{quantity}" for quantity in OWN_QUANTITIES]
 
@@ -65,6 +67,8 @@ def prepare(scene: str) -> None:
     from ..kernels import Legendre, WallLaw, discretise
     from ..kernels.walls.conditionals import adaptive_conditionals
 
+    if scene in DIFFUSE:
+        return
     wall = wall_of(scene)
     # a wall of the user has no problem with disks
     for one in (wall, wall.foreshorten(DISK)) if scene in scenes() else (wall,):
@@ -83,7 +87,7 @@ def prepare(scene: str) -> None:
 def methods_of(name: str) -> Methods:
     """The methods of a problem with their budgets, made once in each process."""
     scene, _, quantity = name.rpartition("/")
-    return QUANTITIES[quantity].methods(wall_of(scene))
+    return diffuse_methods(scene) if scene in DIFFUSE else QUANTITIES[quantity].methods(wall_of(scene))
 
 
 def _method(problem: str, name: str) -> WorkMethod:

@@ -18,7 +18,7 @@ from ..spectral import ReferenceValue
 from ..spectral.bounds.images import is_traced
 from ..spectral.work_diagrams.runs import FAILURES
 from .problems import methods_of, value_of
-from .quantities.methods import AUTO, BEAMS, CLOSED_FORM, QMC, ROWS
+from .quantities.methods import AUTO, BEAMS, CLOSED_FORM, FLIGHTS, QMC, ROWS
 from .quantities.walls import wall_of
 from .run import scene_of
 
@@ -26,7 +26,9 @@ FILE = Path(__file__).with_name("standard_references.json")
 # Budgets of the reference of a user's wall: of each method the finest that is done in time. Rays are more than in rows.
 FINEST = {
     CLOSED_FORM: (1.0,), BEAMS: (1e4, 1e5, 1e6), ROWS: (1e3, 1e4, 1e6, 1e8), QMC: (4.0**9, 4.0**12),
+    FLIGHTS: (1e2, 1e3, 1e4),
 }  # fmt: skip
+RAYS = (QMC, FLIGHTS)
 # A reference that is farther from that of rays, in half widths of 95 %, has this distance as its error.
 DISAGREE = 3.0
 
@@ -62,14 +64,14 @@ def made_references(name: str, child: ChildProcess, seconds: float) -> tuple[Ref
     """
     applicable = {method.name for method, _, _ in methods_of(name)}
     found = {method: _finest(name, method, child, seconds) for method in FINEST if method in applicable}
-    rays = found.pop(QMC)
+    (rays,) = (found.pop(method) for method in RAYS if method in found)
     checked = [one if rays is None else _beside(one, rays) for one in found.values() if one is not None]
     return tuple(sorted([*checked, *([] if rays is None else [rays])], key=lambda one: one.error))
 
 
 def _finest(name: str, method: str, child: ChildProcess, seconds: float) -> ReferenceValue | None:
     """The value at the largest budget that is done in time and reports an error."""
-    found, made_by = None, () if method == QMC else (method, *_chooses(scene_of(name), method))
+    found, made_by = None, () if method in RAYS else (method, *_chooses(scene_of(name), method))
     child.start()
     end = time.monotonic() + seconds
     for budget in FINEST[method]:

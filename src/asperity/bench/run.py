@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.errors import FileExistsRefusal, InputError
+from ..core.estimates import Summary
 from ..core.files import moved_when_complete
 from ..core.tables import table
 from ..spectral import WorkReport
@@ -26,8 +27,8 @@ GOOD_CHOICE = 2.0
 COLUMNS, WIDTH, HEIGHT = 3, 4.6, 3.8
 
 
-@dataclass(frozen=True)
-class BenchRun:
+@dataclass(frozen=True, repr=False)
+class BenchRun(Summary):
     """Reports on problems, in the order in which they were run.
 
     Attributes
@@ -36,6 +37,7 @@ class BenchRun:
     """
 
     reports: tuple[WorkReport, ...]
+    _more = ".summary(), .tables(), .save(folder)"
 
     def summary(self) -> str:
         """The library's choice beside the best method for each problem; declared orders, references, the machine."""

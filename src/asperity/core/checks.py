@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numbers as kinds_of_numbers
 import os
+import re
 from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -16,12 +19,30 @@ Floats = NDArray[np.float64]
 T = TypeVar("T")
 # What `generator` takes.
 Rng: TypeAlias = np.random.Generator | np.random.BitGenerator | np.random.SeedSequence | int | None
-# Characters of a value that a message repeats.
-SHOWN = 80
-# Bytes of a double.
-DOUBLE = 8
+# Characters of a value that a message repeats, in one line.
+SHOWN, LINE_ENDS = 80, re.compile(r"\s*\n\s*")
+# Bytes of a double, and the number of doubles for which no machine is asked.
+DOUBLE, ALWAYS_THERE = 8, 2**24
 # Whole numbers beyond do not fit into arrays.
 LARGEST = 2**63 - 1
+# By the wanted class and that of what was given instead: what makes the one from the other.
+MAKES = {
+    "Law": {
+        "Wall": "ker.WallLaw(wall)", "MushroomGenerations": "ker.MushroomLaw(wall)",
+        "str": "ker.WallLaw(geo.wall_from_text(text))", "ndarray": "ker.MatrixLaw(array)",
+        "list": "ker.MatrixLaw(array)", "KernelMatrix": "ker.MatrixLaw(matrix)",
+        "function": "ker.DensityLaw(density) or ker.InvolutionLaw(map)", "CollisionLaw": "its .law",
+    },
+    "Wall": {
+        "str": "geo.wall_from_text(text)", "ndarray": "geo.Wall.from_vertices(points)",
+        "list": "geo.Wall.from_vertices(points)", "Profile": "geo.Wall.from_profile(*profile)",
+        "NamedWall": "its .build()", "WallLaw": "its .wall",
+    },
+    "KernelMatrix": {
+        "Law": "ker.discretise(law, ker.Bins(64))", "Wall": "ker.discretise(ker.WallLaw(wall), ker.Bins(64))",
+        "ndarray": "ker.discretise(ker.MatrixLaw(array), ker.Bins(len(array)))",
+    },
+}  # fmt: skip
 # Seeds are below this number, the size of numpy's own.
 SEEDS = 2**128
 
@@ -130,7 +151,20 @@ def instance(name: str, value: object, kind: type, example: str) -> None:
     """
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
-        raise InputError(f"{name}: expected {article} {kind.__name__} such as {example}, got {shortened(value)}")
+        raise InputError(f"{name}: expected {article} {kind.__name__} such as {example}, got {given(value, kind)}")
+
+
+def given(value: object, kind: type) -> str:
+    """What was given for an object of a kind, and what makes one of it.
+
+    Examples
+    --------
+    >>> given("koch", type("Wall", (), {}))
+    "'koch'; take geo.wall_from_text(text)"
+    """
+    makes = MAKES.get(kind.__name__, {})
+    found = next((makes[one.__name__] for one in type(value).__mro__ if one.__name__ in makes), None)
+    return shortened(value) + (f"; take {found}" if found else "")
 
 
 def sequence(name: str, value: Iterable[T], kind: type[T] | None = None, example: str = "") -> tuple[T, ...]:
@@ -213,7 +247,7 @@ def shortened(value: object) -> str:
     ('[1.0, 2.0]', 83, 'a value of type int')
     """
     try:
-        text = repr(value)
+        text = LINE_ENDS.sub(" ", repr(value))
     except Exception:  # of foreign objects, and of integers with thousands of digits
         return f"a value of type {type(value).__name__}"
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
@@ -227,17 +261,33 @@ def foreign(operand: object) -> Any:
 
 
 def check_memory(name: str, what: str, numbers: int) -> None:
-    """Refuse an array of more doubles than this machine's memory holds, before it is asked for.
+    """Refuse what takes more doubles than this process can have, before it is asked for.
 
     Examples
     --------
-    >>> check_memory("basis", "its matrix", 10**15)
+    >>> check_memory("n", "a matrix", 10**15)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    asperity.errors.InputError: basis: its matrix takes 8e+06 GB of memory, more than there is; take a smaller one
+    asperity.errors.InputError: n: a matrix takes 8e+06 GB of memory, more than there is (... GB); take a smaller one
     """
-    if DOUBLE * numbers > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
+    if numbers > ALWAYS_THERE and DOUBLE * numbers > (left := memory_left()):
         size = f"{DOUBLE * numbers / 1e9:.2g}" if numbers < 10**30 else "too many"
-        raise InputError(f"{name}: {what} takes {size} GB of memory, more than there is; take a smaller one")
+        there = f"more than there is ({left / 1e9:.2g} GB)"
+        raise InputError(f"{name}: {what} takes {size} GB of memory, {there}; take a smaller one")
+
+
+def memory_left() -> int:
+    """Bytes that this process can still have: of the machine, of its container and of a limit of its own."""
+    import resource
+
+    page = os.sysconf("SC_PAGE_SIZE")
+    found = [os.sysconf("SC_PHYS_PAGES") * page]
+    with suppress(OSError, ValueError, IndexError):  # not Linux, or no container
+        found.append(1024 * int(re.findall(r"MemAvailable: +(\d+) kB", Path("/proc/meminfo").read_text())[0]))
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit != resource.RLIM_INFINITY:
+            found.append(limit - page * int(Path("/proc/self/statm").read_text().split()[0]))
+        found.append(int(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return min(found)
 
 
 def angles(name: str, value: ArrayLike) -> Floats:
@@ -305,8 +355,10 @@ def generator(rng: Rng, default: int | None = None) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-def frozen(array: ArrayLike) -> Floats:
-    """Return a read-only float64 copy."""
-    copy = np.array(array, dtype=np.float64)
+def frozen(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
+    """Return a read-only copy, or the array itself if it owns its numbers and nobody can write to it."""
+    if isinstance(array, np.ndarray) and array.dtype == dtype and array.flags.owndata and not array.flags.writeable:
+        return array
+    copy: NDArray[Any] = np.array(array, dtype=dtype)
     copy.setflags(write=False)
     return copy

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import multiprocessing
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -19,6 +18,8 @@ from weakref import WeakSet
 
 from numba import njit
 from numba.core import event
+
+from .long_runs import is_heard
 
 logger = logging.getLogger("asperity")
 
@@ -109,7 +110,7 @@ def announce() -> None:
     """Say that functions are being compiled."""
     text = "asperity: compiling, once (about 10 s)"
     logger.info(text)
-    if sys.stderr is not None and sys.stderr.isatty() and multiprocessing.parent_process() is None:
+    if is_heard() and sys.stderr.isatty():
         print(text, file=sys.stderr, flush=True)
 
 

@@ -1,19 +1,21 @@
 """Long runs in parts: each depends on its number alone, is computed by any worker, and stored when it is finished.
 
-The progress bar of everything that takes long is here too.
+The progress bars and reports of everything that takes long are here too.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from functools import partial
 from pathlib import Path
-from typing import Any, TypedDict, TypeVar
+from typing import Any, ClassVar, TypedDict, TypeVar
 
 from .checkpoints import Arrays, Checkpoint, Stored, packed_arrays, unpacked_arrays
 from .errors import AsperityError, InputError
@@ -28,6 +30,10 @@ TIME_LIMIT = 10.0
 NUMBERS_AT_ONCE = 2**21
 # Before that no progress bar appears.
 SLOW_SECONDS = 2.0
+# Seconds between two reports, and after which the rate of the first part of the work predicts the rest.
+REPORTED_SECONDS, PREDICTED_SECONDS = 10.0, 1.0
+# The variable of the environment that silences bars and reports.
+QUIET = "ASPERITY_QUIET"
 # Least seconds between two pictures of a bar.
 RENEWED_SECONDS = 0.1
 # Of fewer items no bar is made, and the bar of more is renewed after so many.
@@ -108,10 +114,12 @@ def all_parts(
                 packed |= {int(key): content for key, content in store.parts(read)}
             workers = stack.enter_context(connected(engine.get("client")))
             rest = [part for part in range(number) if part not in packed]
+            progress = stack.enter_context(progress_bar(len(rest), "part", str(identity.get("computation", "run"))))
             for part, content in results(partial(_packed_part, function), rest, workers):
                 if isinstance(content, tuple):
                     raise (InputError if content[0] == "InputError" else AsperityError)(content[1])
                 packed[part] = content
+                progress.update()
                 if store is not None:
                     store.put(str(part), content)
     except KeyboardInterrupt as stop:
@@ -161,10 +169,100 @@ def count_time(seconds: float) -> None:
     left[0] -= seconds
 
 
-def progress_bar(total: int | None, unit: str, text: str | None = None, *, shown: bool = True) -> Any:
-    """A progress bar of tqdm, on a terminal and in a notebook, which appears after SLOW_SECONDS and leaves no trace.
+class Progress:
+    """What is known of a piece of work: a bar shows it on a terminal and in a notebook, else lines report it.
 
-    It is silent where standard error is no terminal, and in the processes of workers.
+    A thread writes the lines, so that they come also during a long call of compiled code.
+    """
+
+    running: ClassVar[list[Progress]] = []
+
+    def __init__(self, total: int | None, unit: str, text: str | None, bar: Any = None) -> None:
+        self.total, self.unit, self.text, self.bar = total, unit, text, bar
+        self.done, self.detail, self.begun, self.ended = 0, "", time.monotonic(), threading.Event()
+
+    def update(self, number: int = 1) -> None:
+        """Count what has been done."""
+        self.done += number
+        if self.bar is not None:
+            self.bar.update(number)
+
+    def describe(self, detail: str) -> None:
+        """Say how far an iteration is."""
+        self.detail = detail
+        if self.bar is not None:
+            self.bar.set_postfix_str(detail, refresh=False)
+
+    def __enter__(self) -> Progress:
+        if is_heard():
+            self.running.append(self)
+            if self.running[0] is self:
+                threading.Thread(target=self._report, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.ended.set()
+        if self in self.running:
+            self.running.remove(self)
+        if self.bar is not None:
+            self.bar.close()
+
+    def _report(self) -> None:
+        """Write every ten seconds how far the work is, and as soon as its first part predicts more than ten."""
+        due, predicted = REPORTED_SECONDS, False
+        while not self.ended.wait(PREDICTED_SECONDS):
+            # the first of those that run that counts, for the others are its parts
+            running = tuple(self.running)
+            last, spent = next((one for one in running if one.done), self), time.monotonic() - self.begun
+            left = (last.total / last.done - 1.0) * (time.monotonic() - last.begun) if last.total and last.done else 0.0
+            if spent < due and (predicted or left < REPORTED_SECONDS):
+                continue
+            predicted = predicted or left > 0.0
+            due += REPORTED_SECONDS * (spent >= due)
+            # a bar that counts says more
+            if not any(one.done and one.bar is not None and not one.bar.disable for one in running):
+                counts = f"{last.done} of {last.total} {last.unit}s" if last.total else f"{last.done} {last.unit}s"
+                told = (
+                    f"{spent:.0f} s",
+                    counts * bool(last.unit),
+                    last.detail,
+                    f"about {left:.0f} s left" * (left > 0.0),
+                )
+                report(f"{self.text or self.unit}: {', '.join(filter(None, told))}")
+
+
+def is_heard() -> bool:
+    """Whether this process may write reports: no worker, and not with the variable `QUIET` in its environment."""
+    return sys.stderr is not None and multiprocessing.parent_process() is None and not os.environ.get(QUIET)
+
+
+def report(text: str) -> None:
+    """Write a line to standard error."""
+    if is_heard():
+        print(f"asperity: {text}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def reported(text: str, seconds: float = 0.0, memory: float = 0.0) -> Iterator[Progress]:
+    """Report a call, before it begins if more than ten ``seconds`` are predicted, and every ten seconds.
+
+    Parameters
+    ----------
+    text : str
+        The name of the call.
+    seconds, memory : float
+        What its size predicts; the memory in bytes.
+    """
+    if seconds > REPORTED_SECONDS and not Progress.running:
+        report(f"{text}: about {seconds:.0f} s and {memory / 1e9:.1f} GB of memory")
+    with Progress(None, "", text) as progress:
+        yield progress
+
+
+def progress_bar(total: int | None, unit: str, text: str | None = None, *, shown: bool = True) -> Progress:
+    """The progress of a piece of work, whose bar of tqdm appears after SLOW_SECONDS and leaves no trace.
+
+    There is no bar where standard error is no terminal, nor in the processes of workers.
 
     Parameters
     ----------
@@ -175,30 +273,27 @@ def progress_bar(total: int | None, unit: str, text: str | None = None, *, shown
     text : str, optional
         What stands before the bar.
     shown : bool
-        Without it the bar is silent everywhere.
+        Without it there is no bar anywhere.
 
     Examples
     --------
     >>> with progress_bar(2, "part", shown=False) as bar:
     ...     bar.update()
-    >>> bar.disable
-    True
+    >>> bar.done
+    1
     """
+    if not shown or not is_heard():
+        return Progress(total, unit, text)
     from tqdm.auto import tqdm
 
     # tqdm.auto takes the bar for notebooks only in one, where standard error is no terminal
     notebook = sys.modules.get("tqdm.notebook")
     in_notebook = notebook is not None and issubclass(tqdm, notebook.tqdm_notebook)
-    in_worker = multiprocessing.parent_process() is not None
-    if in_worker:
-        # tqdm's own lock has a semaphore of the system, of which Python warns where a worker is ended
-        tqdm.set_lock(threading.RLock())
-    silent = not shown or in_worker
-    return tqdm(
+    bar = tqdm(
         desc=text, total=total, unit=unit, unit_scale=unit == "ray", delay=SLOW_SECONDS, leave=False,
-        mininterval=RENEWED_SECONDS,
-        disable=True if silent else False if in_notebook else None,
+        mininterval=RENEWED_SECONDS, disable=False if in_notebook else None,
     )  # fmt: skip
+    return Progress(total, unit, text, bar)
 
 
 def counted(items: Sequence[T], unit: str, text: str) -> Iterator[T]:

@@ -1,9 +1,8 @@
-"""Tables in Markdown, HTML and CSV, and text that pictures show as it is."""
+"""Tables in Markdown and CSV, and text that pictures show as it is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from html import escape
+from collections.abc import Iterable, Iterator, Sequence
 
 
 def table_lines(heads: str, rows: Iterable[str | Iterable[object]]) -> Iterator[str]:
@@ -50,24 +49,3 @@ def verbatim(text: str) -> str:
     """
     # fonts have no letters for halves of surrogate pairs
     return text.encode("utf-8", "replace").decode().replace("$", r"\$")
-
-
-def html_table(title: str, lines: Mapping[str, object], picture: str = "") -> str:
-    """A title, a picture and one row a fact; lines that are None or empty are left out.
-
-    Parameters
-    ----------
-    picture : str
-        HTML, as it stands; all other text is escaped.
-
-    Examples
-    --------
-    >>> html_table("a < b", {"error": 0.5, "method": None})
-    '<div><b>a &lt; b</b><table><tr><th>error</th><td>0.5</td></tr></table></div>'
-    """
-    rows = "".join(
-        f"<tr><th>{escape(name)}</th><td>{escape(str(value))}</td></tr>"
-        for name, value in lines.items()
-        if value is not None and value != ""
-    )
-    return f"<div><b>{escape(title)}</b>{picture}<table>{rows}</table></div>"

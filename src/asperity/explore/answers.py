@@ -14,7 +14,8 @@ from ..core.estimates import LEVEL, NORMAL_95, Estimate
 from ..core.rounding import EPS
 from ..geometry import Disk
 from ..kernels import Bins, KernelMatrix, discretise, no_slip_matrix, smooth_matrix
-from ..spectral import SpectralGap, spectral_gap, spectrum
+from ..spectral import SpectralGap, accommodation, spectral_gap, spectrum
+from ..spectral.consequences.momentum_accommodation import Accommodation
 from ..study.pictures import INCOMING, allowed_velocities
 from .question import Question
 
@@ -22,6 +23,8 @@ from .question import Question
 FIRST_BINS, FIRST_TOLERANCE, FIRST_RAYS = 48, 0.1, 2**15
 # Errors asked of the gap, one after the other.
 GAP_TOLERANCES = (0.1, 1e-3, 1e-6)
+# First and last error asked of the accommodation, and the one angle at which it is computed besides the averages.
+FIRST_MOMENTUM, MOMENTUM, ONE_ANGLE = 1e-2, 1e-3, 1.0
 # The last matrix, and the error asked of the image of each of its bins.
 BINS, BIN_TOLERANCE, RAYS = 96, 1e-3, 2**22
 EIGENVALUES, EIGENVALUE_TOLERANCE = 10, 1e-4
@@ -41,8 +44,7 @@ class Eigenvalues:
     ----------
     values, errors : ndarray, shape (k,)
         Sorted descending; half widths, inf if unknown.
-    of : str
-        "the law", or the basis of the matrix.
+    of : {"the law", "the matrix"}
     """
 
     values: Floats
@@ -74,6 +76,11 @@ class Histogram:
     no_slip: float
 
 
+# What an answer consists of, by the names of its attributes.
+QUANTITIES = {"gap": "gap", "accommodation": "accommodation", "matrix": "kernel", "eigenvalues": "spectrum",
+              "collision": "collision"}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Answer:
     """What is known of a question so far; None where nothing is known yet, or where ``refusals`` says why not."""
@@ -82,13 +89,24 @@ class Answer:
     matrix: KernelMatrix | None = None
     gap: SpectralGap | None = None
     eigenvalues: Eigenvalues | None = None
+    accommodation: Accommodation | None = None
     collision: Histogram | None = None
     refusals: tuple[tuple[str, str], ...] = ()
     finished: bool = False
 
+    def missing(self, quantity: str) -> str:
+        """Why a quantity is None, in a word."""
+        return "refused" if quantity in dict(self.refusals) else "computing"
+
     def refused(self, quantity: str, reason: object) -> Answer:
         """The same with a reason why a quantity is missing."""
         return replace(self, refusals=(*self._refusals_but(quantity), (quantity, str(reason))))
+
+    def ended(self, reason: object) -> Answer:
+        """The same with a reason for all that is still missing."""
+        known = {name for attribute, name in QUANTITIES.items() if self.__dict__[attribute] is not None}
+        missing = dict.fromkeys(set(QUANTITIES.values()) - known, str(reason)) | dict(self.refusals)
+        return replace(self, refusals=tuple(sorted(missing.items())))
 
     def improved(self, quantity: str, compute: Callable[[], dict[str, Any]], *, keep: bool = False) -> Answer:
         """The same with the attributes that are computed, or with the reason why not, unless the old ones are kept."""
@@ -115,6 +133,8 @@ def answers_to(question: Question) -> Iterator[Answer]:
     """
     answer = first_answer(question)
     yield answer
+    answer = replace(_with_accommodation(answer, question, FIRST_MOMENTUM), stage="accommodation")
+    yield answer
     decided = answer.gap is not None and answer.gap.verdict == "no gap"
     for tolerance in () if decided else GAP_TOLERANCES[:-1]:
         if not _reached(answer, tolerance):
@@ -122,6 +142,7 @@ def answers_to(question: Question) -> Iterator[Answer]:
             yield answer
     answer = replace(_with_collision(answer, question, COLLISIONS), stage="collision")
     yield answer
+    answer = _with_accommodation(answer, question, MOMENTUM)
     answer = replace(_with_matrix(answer, question, BINS, BIN_TOLERANCE * BINS**0.5, RAYS), stage="kernel")
     yield answer
     answer = _with_eigenvalues_of_matrix(answer)
@@ -178,7 +199,7 @@ def _with_eigenvalues_of_matrix(answer: Answer) -> Answer:
         found = spectrum(matrix, EIGENVALUES)
         parts = found.errors
         errors = parts.algebraic + parts.quantile * parts.sampling + (0.0 if matrix.samples else float(matrix.error))
-        return {"eigenvalues": Eigenvalues(found.values, errors, f"the matrix in {matrix.basis!r}")}
+        return {"eigenvalues": Eigenvalues(found.values, errors, "the matrix")}
 
     return answer.improved("spectrum", compute)
 
@@ -195,6 +216,13 @@ def _with_gap(answer: Answer, question: Question, tolerance: float) -> Answer:
     return answer.improved(
         "gap", lambda: {"gap": spectral_gap(question.law, tolerance, 0)}, keep=answer.gap is not None
     )
+
+
+def _with_accommodation(answer: Answer, question: Question, tolerance: float) -> Answer:
+    def compute() -> dict[str, Any]:
+        return {"accommodation": accommodation(question.law, tolerance, ONE_ANGLE, rng=0)}
+
+    return answer.improved("accommodation", compute, keep=answer.accommodation is not None)
 
 
 def _with_matrix(answer: Answer, question: Question, bins: int, tolerance: float, rays: int) -> Answer:

@@ -11,18 +11,19 @@ import numpy as np
 from ..core.checks import Floats
 from ..core.errors import InputError
 from ..geometry import Wall
-from ..geometry.plotting.walls import MARGIN, RAY_COLOURS, RayPath, heights, vertical_stretch
+from ..geometry.plotting.walls import MARGIN, RAY_COLOURS, RayPath, axis_labels, heights, vertical_stretch
 from ..study.pictures import chosen_rays
 from .answers import Answer, answers_to
 from .question import Question
 
-KNOWN, SOLID = "#0072B2", "#d1d1d1"
+# What is grey is seen on white and on black.
+KNOWN, SOLID, GREY = "#0072B2", "#d1d1d1", "#808080"
 # Pixels a side of the kernel, and the power of its colour scale.
 PIXELS, COLOUR_POWER = 240, 0.5
 # Tolerance of curves relative to the period.
 OUTLINE = 2e-4
-# Pieces of a wall that is shown: to draw its rays takes three seconds.
-MOST_PIECES = 10_000
+# Pieces of a wall that is shown: the first answer takes a second or two, of twice as many a quarter of a minute.
+MOST_PIECES = 50_000
 # Milliseconds between two messages of a vertex that is being dragged.
 DRAG_INTERVAL = 100
 ANGLES = {0.0: "0", 0.5 * np.pi: "π/2", np.pi: "π"}
@@ -89,16 +90,18 @@ def _clear(source: Any) -> None:
 
 
 def _both(paths: list[Floats]) -> dict[str, Any]:
-    """Columns of a source of many lines."""
-    return {"xs": [path[:, 0].tolist() for path in paths], "ys": [path[:, 1].tolist() for path in paths]}
+    """Columns of a source of many lines, as arrays, which are sent as bytes."""
+    return {"xs": [path[:, 0].copy() for path in paths], "ys": [path[:, 1].copy() for path in paths]}
 
 
 def _figure(title: str, **options: Any) -> Any:
     from bokeh.plotting import figure
 
-    plot: Any = figure(title=title, height=380, min_width=300, sizing_mode="stretch_width", toolbar_location="above",
-                  **options)  # fmt: skip
+    plot: Any = figure(title=title, height=380, min_width=200, sizing_mode="stretch_width", toolbar_location="below",
+                  frame_align=False, **options)  # fmt: skip
     plot.toolbar.logo = None
+    # a finger that is moved over the figure scrolls the page
+    plot.toolbar.active_drag = plot.toolbar.active_tap = None
     plot.title.text_font_size = "11pt"
     plot.grid.grid_line_alpha = 0.4
     return plot
@@ -109,11 +112,15 @@ class WallFigure:
 
     def __init__(self) -> None:
         from bokeh.models import CustomJS, DataRange1d, PanTool, PointDrawTool, ResetTool, WheelZoomTool
+        from bokeh.models.annotations import Title
 
+        self._picture: Picture | None = None
         self.vertices, self._view, self._solid = _empty("x", "y"), _empty("x", "y"), _empty("xs", "ys")
         self._rays, self._ends = _empty("xs", "ys", "colour"), _empty("x", "y", "fill", "colour")
         self.plot = plot = _figure("Wall", tools="", match_aspect=True, x_range=DataRange1d(range_padding=0.0),
                                    y_range=DataRange1d(range_padding=0.0))  # fmt: skip
+        self._hint = Title(text="", text_font_style="normal", text_font_size="9pt")
+        plot.add_layout(self._hint, "above")
         plot.patches("xs", "ys", source=self._solid, fill_color=SOLID, line_color="#333333", line_width=1.2)
         plot.multi_line("xs", "ys", source=self._rays, line_color="colour", line_width=1.6)
         plot.scatter("x", "y", source=self._ends, size=7, fill_color="fill", line_color="colour", line_width=1.5)
@@ -124,18 +131,30 @@ class WallFigure:
                                nonselection_fill_alpha=1.0, nonselection_line_alpha=1.0)  # fmt: skip
         view = plot.scatter("x", "y", source=self._view, alpha=0.0)
         plot.x_range.renderers = plot.y_range.renderers = [view]
-        draw = PointDrawTool(renderers=[handles], drag=True, add=True, description=HOW_TO_DRAW)
-        plot.add_tools(draw, PanTool(), WheelZoomTool(), ResetTool())
-        plot.toolbar.active_drag = plot.toolbar.active_tap = draw
+        self._tool = PointDrawTool(renderers=[handles], drag=True, add=True, description=HOW_TO_DRAW)
+        plot.add_tools(self._tool, PanTool(), WheelZoomTool(), ResetTool())
         send = CustomJS(args={"vertices": self.vertices, "interval": DRAG_INTERVAL}, code=SEND_WHILE_DRAGGING)
         plot.js_on_event("pan", send)
 
-    def show(self, picture: Picture, title: str, *, dragged: bool) -> None:
+    def show(self, picture: Picture, *, dragged: bool) -> None:
         """Draw a wall; while a vertex is being dragged the vertices and the view are left alone."""
+        if picture is not self._picture:
+            self._picture = picture
+            self._draw(picture)
+        if not dragged:
+            self._settle(picture)
+
+    def _draw(self, picture: Picture) -> None:
         from bokeh.models.text import PlainText
 
+        wall, handles, name = picture.question.seen, picture.question.handles, picture.question.name
+        stretch, (across, upwards) = vertical_stretch(wall), axis_labels(wall)
+        felt = ", as the disk feels it" if picture.question.foreshortened else ""
+        hints = ["drag a vertex, tap to add one"] * bool(handles) + ["angles not to scale"] * (stretch != 1.0)
         # in other text bokeh reads formulas
-        self.plot.title.text = PlainText(text=title)
+        self.plot.title.text = PlainText(text=f"{name}, depth {wall.depth:.4g}{felt}")
+        self._hint.text = "; ".join(hints)
+        self.plot.xaxis.axis_label, self.plot.yaxis.axis_label = PlainText(text=across), PlainText(text=upwards)
         self._solid.data = _both(picture.solids)
         colours = [RAY_COLOURS[k % len(RAY_COLOURS)] for k in range(len(picture.rays))]
         self._rays.data = {**_both(picture.rays), "colour": colours}
@@ -146,17 +165,18 @@ class WallFigure:
             "fill": [fill for colour in colours for fill in (colour, "white")],
             "colour": [colour for colour in colours for _ in range(2)],
         }  # fmt: skip
-        if dragged:
-            return
+
+    def _settle(self, picture: Picture) -> None:
+        """Set vertices and view."""
         wall, handles = picture.question.seen, picture.question.handles
-        vertices = {"x": [x for x, _ in handles], "y": [y for _, y in handles]}
-        if vertices != {name: list(self.vertices.data[name]) for name in vertices}:
-            self.vertices.data = vertices
         left, right = -MARGIN * wall.period, (1.0 + MARGIN) * wall.period
-        self._view.data = {"x": [left, right], "y": list(heights(wall))}
-        self.plot.aspect_scale = vertical_stretch(wall)
-        self.plot.xaxis.axis_label = PlainText(text=f"x ({wall.unit or 'length units of the wall'})")
-        self.plot.yaxis.axis_label = PlainText(text=f"y ({wall.unit})" if wall.unit else "y")
+        vertices = {"x": [x for x, _ in handles], "y": [y for _, y in handles]}
+        for source, data in (self.vertices, vertices), (self._view, {"x": [left, right], "y": list(heights(wall))}):
+            if data != {name: list(source.data[name]) for name in data}:
+                source.data = data
+        self.plot.toolbar.active_multi = self._tool if handles else None
+        # the width over the height of a square
+        self.plot.aspect_scale = 1.0 / vertical_stretch(wall)
 
 
 def solids(wall: Wall, floor: float) -> list[Floats]:
@@ -186,7 +206,8 @@ class KernelFigure:
         image = plot.image("root", x=0.0, y=0.0, dw=np.pi, dh=np.pi, source=self._image, color_mapper=self._mapper)
         for column, dash in (("retro", "dashed"), ("specular", "dotted")):
             plot.line("x", column, source=self._lines, line_color="white", line_alpha=0.7, line_dash=dash)
-        bar = ColorBar(color_mapper=self._mapper, width=10, title="√density", ticker=BasicTicker(desired_num_ticks=5))
+        bar = ColorBar(color_mapper=self._mapper, width=10, title="√density", ticker=BasicTicker(desired_num_ticks=5),
+                       title_text_color=GREY, major_label_text_color=GREY, background_fill_alpha=0.0)  # fmt: skip
         plot.add_layout(bar, "right")
         plot.add_tools(HoverTool(renderers=[image], tooltips=[("θ, θ'", "$x, $y"), ("density", "@density{0.000}")]))
         for axis, label in ((plot.xaxis, "incoming angle θ (rad)"), (plot.yaxis, "outgoing angle θ' (rad)")):
@@ -195,11 +216,11 @@ class KernelFigure:
             axis.major_label_overrides = ANGLES
 
     def show(self, answer: Answer) -> None:
-        """Draw the matrix with its error in the title; nothing where it is refused."""
+        """Draw the matrix with its error in the title; nothing where it is missing."""
         matrix = answer.matrix
         if matrix is None:
             _clear(self._image)
-            self.plot.title.text = "Kernel: refused"
+            self.plot.title.text = f"Kernel: {answer.missing('kernel')}"
             return
         # uniform angles, and the cell in which each is
         angle = np.pi * (np.arange(PIXELS) + 0.5) / PIXELS
@@ -210,7 +231,7 @@ class KernelFigure:
         self._image.data = {"root": [root.astype(np.float32)], "density": [density.astype(np.float32)]}
         retro = [0.0, np.pi] if matrix.frame == "paper" else [np.pi, 0.0]
         self._lines.data = {"x": [0.0, np.pi], "retro": retro, "specular": retro[::-1]}
-        self.plot.title.text = f"Kernel in {matrix.basis!r}, Frobenius error {float(matrix.error):.1e}"
+        self.plot.title.text = f"Kernel in {matrix.basis!r} ± {float(matrix.error):.0e}"
 
 
 class SpectrumFigure:
@@ -233,11 +254,11 @@ class SpectrumFigure:
         plot.yaxis.axis_label = "eigenvalue"
 
     def show(self, answer: Answer) -> None:
-        """Draw eigenvalues and gap; nothing where they are refused."""
+        """Draw eigenvalues and gap; nothing where they are missing."""
         found, gap = answer.eigenvalues, answer.gap
         if found is None:
             _clear(self._values)
-            self.plot.title.text = "Spectrum: not known"
+            self.plot.title.text = f"Eigenvalues: {answer.missing('spectrum')}"
         else:
             error = np.where(np.isfinite(found.errors), found.errors, 2.0)
             low, high = np.clip(found.values - error, -1.0, 1.0), np.clip(found.values + error, -1.0, 1.0)
@@ -265,10 +286,9 @@ class CollisionFigure:
         self.plot = plot = _figure("Collision", tools="pan,wheel_zoom,reset")
         plot.quad(left="left", right="right", top="top", bottom=0.0, source=self._bins, fill_color="#8c8c8c",
                   line_color="white", line_width=0.5)  # fmt: skip
-        upper, lower = TeeHead(size=4), TeeHead(size=4)
-        plot.add_layout(
-            Whisker(base="middle", lower="low", upper="high", source=self._bins, upper_head=upper, lower_head=lower)
-        )
+        upper, lower = (TeeHead(size=4, line_color=GREY) for _ in range(2))
+        plot.add_layout(Whisker(base="middle", lower="low", upper="high", source=self._bins, line_color=GREY,
+                                upper_head=upper, lower_head=lower))  # fmt: skip
         self._marks = {}
         for name, colour, dash in (("smooth", "#0072B2", "solid"), ("no-slip", "#D55E00", "dashed")):
             mark = Span(dimension="height", line_color=colour, line_width=2, line_dash=dash, visible=False)
@@ -278,17 +298,18 @@ class CollisionFigure:
             self._marks[name] = mark
         # beside the bars, not over them
         plot.add_layout(plot.legend[0], "above")
-        plot.legend.orientation = "horizontal"
+        plot.legend.orientation, plot.legend.label_text_color = "horizontal", GREY
+        plot.legend.background_fill_alpha = plot.legend.border_line_alpha = plot.legend.padding = 0
         plot.xaxis.axis_label = "outgoing v1 (radius / time)"
         plot.yaxis.axis_label = "probability per bin"
         plot.y_range.start = 0.0
 
     def show(self, answer: Answer) -> None:
-        """Draw the histogram with intervals of 95 %; nothing where it is refused."""
+        """Draw the histogram with intervals of 95 %; nothing where it is missing."""
         found = answer.collision
         if found is None:
             _clear(self._bins)
-            self.plot.title.text = "Collision: refused"
+            self.plot.title.text = f"Collision: {answer.missing('collision')}"
             return
         self._bins.data = {
             "left": found.edges[:-1].tolist(), "right": found.edges[1:].tolist(), "top": found.fractions.tolist(),
@@ -297,4 +318,4 @@ class CollisionFigure:
         }  # fmt: skip
         for name, velocity in (("smooth", found.smooth), ("no-slip", found.no_slip)):
             self._marks[name].location, self._marks[name].visible = velocity, True
-        self.plot.title.text = "Disk in with v = (1, -1), no spin: mean v1"
+        self.plot.title.text = "Disk in with v = (1, -1), no spin"

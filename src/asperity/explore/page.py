@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import io
+import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
@@ -13,16 +14,19 @@ import panel as pn
 from bokeh.events import PanEnd, PanStart
 
 from ..core.errors import AsperityError
-from ..core.estimates import compact
 from ..geometry import WALLS, Disk, Wall, wall_from_text
+from ..study.result import resistance_from
 from . import drawing
 from .answers import Answer
 from .background import Background
 from .files import new_folder, opened, plain_name, studied, unpacked, wall_as_toml
 from .question import MOST_HANDLES, Question, draggable_vertices, pinned, with_new_vertex
+from .style import TEXT
 
 # Milliseconds between two looks for better answers.
 INTERVAL = 40
+# Seconds that a new wall waits for its first answer, so that both are shown at once; then the old one goes.
+GRACE = 0.4
 # Ranges of the sliders of the named walls.
 RANGES = {
     "angle": (0.05, 3.0), "height_to_width": (0.05, 6.0), "half_angle": (0.05, 1.55), "curvature": (0.02, 1.98),
@@ -34,11 +38,6 @@ CONVENTIONS = {"retroreflection = identity": "paper", "specular = identity": "sp
 STRETCH: dict[str, Any] = {"sizing_mode": "stretch_width"}
 # As many columns of figures as fit.
 GRID = {"display": "grid", "grid-template-columns": "repeat(auto-fit, minmax(min(400px, 100%), 1fr))"}
-STYLE = """
-:host { font-family: system-ui, sans-serif; }
-.asperity-answers td { padding: 1px 10px 1px 0; vertical-align: top; }
-.asperity-answers td:first-child { color: #555; white-space: nowrap; }
-"""
 
 
 class Page:
@@ -58,7 +57,7 @@ class Page:
     Attributes
     ----------
     question, answer
-        What is asked, and the last valid answer or None.
+        Of the last valid wall: what is asked, and the best answer so far or None.
     message : str
         Why the last wall was refused; empty if it was not.
     """
@@ -73,6 +72,8 @@ class Page:
         self._background, self._saving = Background(), Background()
         self._dragging = self._filling = self._awaited = False
         self._picture: drawing.Picture | None = None
+        # when the answer that is shown goes, if no other has come
+        self._due: float | None = None
         self._archive: bytes | None = None
         self._was_busy = False
         self._make_figures()
@@ -102,7 +103,7 @@ class Page:
         self.foreshortened = pn.widgets.Toggle(name="Foreshorten: the wall as the disk feels it", **STRETCH)
         self.file = pn.widgets.FileInput(name="Wall file or profile", **STRETCH)
         self.options = pn.widgets.TextInput(name="Options of a profile", placeholder="seam=step,units=um/nm", **STRETCH)
-        self.status, self.table, self.saved = (pn.pane.HTML("", stylesheets=[STYLE], **STRETCH) for _ in range(3))
+        self.status, self.table, self.saved = (pn.pane.HTML("", stylesheets=[TEXT], **STRETCH) for _ in range(3))
         self._make_saving()
         self._make_sliders(parameters)
         self.choice.param.watch(lambda _: self._wall_chosen(), "value")
@@ -137,7 +138,7 @@ class Page:
         self.sliders[:] = list(self.parameters.values())
 
     def view(self) -> Any:
-        """Everything, in columns that wrap on narrow screens."""
+        """Everything, in columns that wrap on narrow screens, the answers first."""
         figures = (self.wall_figure, self.kernel, self.spectrum, self.collision)
         panes = [pn.pane.Bokeh(figure.plot, margin=4, **STRETCH) for figure in figures]
         controls = pn.Column(
@@ -145,10 +146,11 @@ class Page:
             self.file, self.save, self.study, self.take, self.saved, styles={"flex": "1 1 240px", "min-width": "240px"},
             margin=4,
         )  # fmt: skip
-        title = pn.pane.HTML("<h2 style='margin: 4px 0'>asperity explore</h2>", stylesheets=[STYLE])
+        title = pn.pane.HTML("<h2 style='margin: 4px 0'>asperity explore</h2>", stylesheets=[TEXT])
         plots = pn.Column(*panes, styles=GRID, margin=0, **STRETCH)
-        shown = pn.Column(self.status, self.table, plots, styles={"flex": "5 1 300px", "min-width": "300px"}, margin=4)
-        return pn.Column(title, pn.FlexBox(controls, shown, align_items="flex-start", **STRETCH), **STRETCH)
+        shown = pn.Column(self.status, self.table, plots, styles={"flex": "5 1 300px", "min-width": "0"}, margin=4)
+        both = pn.FlexBox(shown, controls, flex_direction="row-reverse", align_items="flex-start", **STRETCH)
+        return pn.Column(title, both, **STRETCH)
 
     # -- what the user does
 
@@ -197,13 +199,13 @@ class Page:
     def _drag_ends(self, _event: Any) -> None:
         self._dragging = False
         if not self._awaited:
-            self._settle()
+            self._show(self.answer)
 
     def _vertices_changed(self, _name: str, _old: Any, new: Any) -> None:
         number = len(new["x"])
         if number > MOST_HANDLES:
             self._refuse(f"expected at most {MOST_HANDLES} vertices to drag, got {number}; open a file instead")
-            self._settle()
+            self._show(self.answer)
             return
         points = list(zip(new["x"], new["y"], strict=True))
         before = [] if self._picture is None else self._picture.question.handles
@@ -213,15 +215,10 @@ class Page:
             points = with_new_vertex(points)
         if len(points) < 2:
             # a curved wall has no vertices to add to, and one vertex is not a wall
-            self._refuse("this wall has no vertices to drag; choose a polygon")
-            self._settle()
+            self._refuse(f"this wall has no vertices to drag; choose a polygon of at most {MOST_HANDLES}")
+            self._show(self.answer)
             return
         self._ask_polygon(pinned(points, self.question.wall.period))
-
-    def _settle(self) -> None:
-        """Show the last valid wall with its vertices, also where later ones were refused or moved."""
-        if self._picture is not None:
-            self._show_wall(self._picture, dragged=self._dragging)
 
     # -- what it does
 
@@ -238,10 +235,11 @@ class Page:
             self._refuse(str(reason))
             return
         self.message, self._awaited, self._asked = "", True, (wall, name, of_catalogue)
-        # two results, so that a wall that is dragged has answers and not pictures alone
+        self._due = self._due or time.monotonic() + GRACE
+        # three results, so that a wall that is dragged has answers and not pictures alone
         self._background.ask(
             drawing.pictured_and_answered, wall, name, disk, self.convention.value, bool(self.foreshortened.value),
-            of_catalogue, first=2,
+            of_catalogue, first=3,
         )  # fmt: skip
         self._show_status()
 
@@ -251,12 +249,16 @@ class Page:
         wall, name, of_catalogue = self._asked if self._awaited else last
         self.ask(wall, name, of_catalogue=of_catalogue)
 
-    def _show_wall(self, picture: drawing.Picture, *, dragged: bool) -> None:
-        question = picture.question
-        felt = ", as the disk feels it" if question.foreshortened else ""
-        hint = ": drag its vertices, tap to add one" if question.handles else ""
-        title = f"{question.name}, depth {question.seen.depth:.4g}{felt}{hint}"
-        self.wall_figure.show(picture, title, dragged=dragged)
+    def _show(self, answer: Answer | None) -> None:
+        """Show the last valid wall, with its vertices unless others are awaited, and an answer or "computing"."""
+        self._due = None
+        answer = answer or Answer("computing")
+        self.table.object = answer_as_html(answer)
+        for figure in (self.kernel, self.spectrum, self.collision):
+            figure.show(answer)
+        # last, so that no old answer is under a new wall even for a moment: messages arrive one by one
+        if self._picture is not None:
+            self.wall_figure.show(self._picture, dragged=self._dragging or self._awaited)
 
     def collect(self) -> None:
         """Show the results that have come."""
@@ -268,10 +270,12 @@ class Page:
                 self._came(result, outdated=outdated)
             else:
                 self.answer = result
-                for figure in (self.kernel, self.spectrum, self.collision):
-                    figure.show(result)
-                self.table.object = answer_as_html(result)
+                self._show(result)
+                # an answer of the wall before the one that is awaited
+                self._due = time.monotonic() + GRACE if self._awaited else None
             self._show_status()
+        if self._due is not None and time.monotonic() > self._due:
+            self._show(None if self._awaited else self.answer)
         for error, archive in self._saving.collect():
             self._study_came(error, archive)
         if self._was_busy != self._background.busy:
@@ -279,9 +283,10 @@ class Page:
             self._show_status()
 
     def _came(self, picture: drawing.Picture, *, outdated: bool) -> None:
-        """Take a valid wall; vertices that have changed since are left alone."""
+        """Take a valid wall, which is shown with its first answer, or without when the time is over."""
+        if self._picture is None or picture.question != self.question:
+            self.answer = None
         self._picture, self.question, self._awaited = picture, picture.question, outdated
-        self._show_wall(picture, dragged=self._dragging or outdated)
         if not self.question.of_catalogue and self.choice.value != DRAWN:
             self._choose(DRAWN)
 
@@ -291,20 +296,24 @@ class Page:
             return
         refused, self._awaited = self._awaited, False
         if refused:
-            self._settle()
+            self._show(self.answer)
             if self._picture is not None and not (self.answer and self.answer.finished):
                 # go on with the last valid wall
                 self._ask_again()
                 self._awaited = False
+        else:
+            self.answer = (self.answer or Answer("ended")).ended(error)
+            self._show(self.answer)
         self.message = error
 
     def _show_status(self) -> None:
         if self.message:
-            role, style = "alert", "background: #fde8d8; border-left: 4px solid #D55E00"
+            role, style = "alert", "background: #D55E0030; border-left: 4px solid #D55E00"
             text = f"{html.escape(self.message)}. The last valid answer stays."
         elif self._background.busy:
             role, style = "status", "border-left: 4px solid #56B4E9"
-            text = f"refining; known so far: {'nothing yet' if self.answer is None else self.answer.stage}"
+            known = "" if self._awaited or self.answer is None else self.answer.stage
+            text = f"refining; known so far: {known}" if known else "computing"
         else:
             role, style, text = "status", "border-left: 4px solid #009E73", "done"
         self.status.object = f"<div role='{role}' style='{style}; padding: 6px'>{text}</div>"
@@ -370,28 +379,30 @@ def answer_as_html(answer: Answer) -> str:
 
     Examples
     --------
-    >>> "not known yet" in answer_as_html(Answer("coarse"))
+    >>> "computing" in answer_as_html(Answer("coarse"))
     True
     """
-    gap = answer.gap
-    if gap is None:
-        line = "not known yet"
-    elif gap.verdict == "no gap":
-        line = f"<b>0</b>, no gap ({html.escape(gap.evidence[0])})"
-    else:
+    gap, momentum, matrix = answer.gap, answer.accommodation, answer.matrix
+    rows = dict.fromkeys(("gap", "accommodation", "kernel", "collision"), "computing")
+    if gap is not None and gap.verdict == "no gap":
+        rows["gap"] = f"<b>0</b>, no gap ({html.escape(gap.evidence[0])}); {gap.convention} convention"
+    elif gap is not None:
         name = "" if gap.self_adjoint else "1 - norm on functions of mean 0: "
-        line = f"{name}<b>{html.escape(compact(gap))}</b>, {gap.verdict}, error {gap.error:.1e} ({gap.kind})"
-    rows = {"gap": f"{line}; {gap.convention} convention" if gap else line}
-    if gap is not None and gap.verdict != "no gap":
+        value = f"{name}<b>{html.escape(str(gap))}</b>"
+        rows["gap"] = f"{value}, {gap.verdict}, error {gap.error:.1e} ({gap.kind}); {gap.convention} convention"
         rows["by"] = html.escape(gap.method)
-    if answer.matrix is not None:
-        matrix, error = answer.matrix, answer.matrix.error
-        kernel = f"{matrix.basis!r}, {matrix.method}, Frobenius error {float(error):.1e} ({error.kind})"
+    if momentum is not None:
+        resistance = resistance_from(momentum)
+        rows["accommodation"] = (
+            f"of momentum: tangential <b>{momentum.tangential}</b>, normal <b>{momentum.normal}</b>; "
+            f"resistance of a tumbling body <b>{resistance}</b>, of a smooth one 1 ({resistance.kind})"
+        )
+    if matrix is not None:
+        kernel = f"{matrix.basis!r}, {matrix.method}, Frobenius error {float(matrix.error):.1e} ({matrix.error.kind})"
         rows["kernel"] = html.escape(kernel)
     if answer.collision is not None:
         mean = answer.collision.mean
-        value = f"<b>{html.escape(compact(mean))}</b>"
-        rows["collision"] = f"mean outgoing v1 {value}, error {mean.error:.1e}, {mean.method}"
+        rows["collision"] = f"mean outgoing v1 <b>{html.escape(str(mean))}</b>, error {mean.error:.1e}, {mean.method}"
     rows |= {quantity: f"refused: {html.escape(reason)}" for quantity, reason in answer.refusals}
     cells = "".join(f"<tr><td>{title}</td><td>{text}</td></tr>" for title, text in rows.items())
     return f"<table class='asperity-answers'>{cells}</table>"

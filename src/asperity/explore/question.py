@@ -16,7 +16,7 @@ from ..kernels.bases.basis import Frame
 
 Points: TypeAlias = Sequence[tuple[float, float]]
 # Of a wall with more vertices none can be dragged.
-MOST_HANDLES = 400
+MOST_HANDLES = 30
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from typing import Any
 from ..core.errors import INTERRUPTED, InputError
 from ..geometry import WALLS, wall_from_text
 from .background import end_all, private_folder
+from .style import COMPONENTS, HEAD
 
 ADDRESS, PORT = "127.0.0.1", 5006
 # The file descriptor.
@@ -53,11 +54,16 @@ def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = Non
     wall = wall_from_text(text)
     name, parameters = _called(text)
     panel = _panel()
+    from panel.io.resources import LOCAL_DIST
     from tornado.ioloop import IOLoop
 
     from .page import Page
 
     def page() -> Any:
+        document = panel.state.curdoc
+        document.template = HEAD
+        # panel sets it when it answers with the page; a tab that connects late would ask the network for styles
+        document.template_variables["dist_url"] = LOCAL_DIST
         shown = Page(wall, name, parameters, out)
         panel.state.on_session_destroyed(lambda _: shown.close())
         return shown.view()
@@ -177,5 +183,5 @@ def _panel() -> Any:
         raise InputError("the page needs panel and bokeh: pip install 'asperity[explore]'") from reason
     for name in ("tornado.access", "tornado.general", "bokeh"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    panel.extension()
+    panel.extension(raw_css=[COMPONENTS])
     return panel

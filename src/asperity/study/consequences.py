@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..core.errors import AsperityError
-from ..core.estimates import Estimate, estimate_as_dict, finite, rounded
+from ..core.estimates import Estimate, Summary, estimate_as_dict, finite, with_error
 from ..geometry import Wall
 from ..kernels import Law
 from ..spectral import SpectralGap, Spectrum, mean_squared_slope
@@ -15,8 +15,8 @@ from ..spectral.consequences.diffusion import Diffusivity, logarithmic_slope
 from ..spectral.consequences.mixing import relaxation_time, slem_from_gap
 
 
-@dataclass(frozen=True)
-class Consequences:
+@dataclass(frozen=True, repr=False)
+class Consequences(Summary):
     """What a study derives from the law and its gaps.
 
     Attributes
@@ -64,17 +64,17 @@ class Consequences:
         lines = []
         if self.slem is not None and self.relaxation_time is not None:
             if math.isfinite(self.relaxation_time.error):
-                time = f"relaxation time {rounded(self.relaxation_time)} steps"
+                time = f"relaxation time {self.relaxation_time} steps"
             else:
                 time = f"no relaxation time: slem {'is' if self.without_gap else 'may be'} 1"
-            lines.append(f"slem {rounded(self.slem)} ({self.slem.kind}: {self.slem.method}), {time}")
+            lines.append(f"slem {self.slem} ({self.slem.kind}: {self.slem.method}), {time}")
         if (found := self.diffusion) is None:
             lines.append(f"diffusivity refused: {self.refusal}")
         else:
-            eta = Estimate(found.eta, found.eta_error, found.kind, "")
             lines.append(
                 f"channel of half-width 1, speed 1: D = {found}, not L^2/tau itself, which has a constant besides; "
-                f"eta = {rounded(eta)}, zeta = {found.zeta:.6g} ({found.kind}: {found.method})"
+                f"eta = {with_error(found.eta, found.eta_error)}, "
+                f"zeta = {with_error(found.zeta, found.zeta_error)} ({found.kind}: {found.method})"
             )
         if math.isfinite(self.flatness):
             use = "" if self.without_gap else "; for shallow walls the specular gap is about 4 h"

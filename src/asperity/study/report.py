@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.estimates import Estimate, compact, estimate_as_dict, finite, rounded
+from ..core.estimates import Estimate, estimate_as_dict, finite
 from ..core.version import __version__
 from ..geometry import Wall
 from ..kernels import KernelMatrix
@@ -57,7 +57,7 @@ def summary_of(study: StudyResult, by_angle: bool) -> str:
         "relaxation": _relaxation(found.relaxation_time, found.without_gap),
         "diffusion": _refused(found.refusal)
         if found.diffusion is None
-        else f"D = {found.diffusion}; half-width 1, speed 1, tau the exit time",
+        else f"D = {found.diffusion}; r = 1, speed 1, tau the exit time",
     }
     lines |= {} if study.disk_given or of_profile else of_disk
     titled = {title: [line] for title, line in lines.items()}
@@ -85,16 +85,7 @@ def _momentum_lines(study: StudyResult, verbose: bool) -> dict[str, str]:
 
 
 def _at_angles(found: Accommodation | None) -> list[str]:
-    """The coefficients at each angle."""
-    if found is None:
-        return []
-    lines = []
-    tangential = zip(found.tangential_at, found.tangential_errors, strict=True)
-    normal = zip(found.normal_at, found.normal_errors, strict=True)
-    for degrees, *pair in zip(found.incidence_deg, tangential, normal, strict=True):
-        words = ["not defined" if math.isnan(one[0]) else compact(Estimate(*one, found.kind_at, "")) for one in pair]
-        lines.append(f"at {degrees:.6g} degrees: tangential {words[0]}, normal {words[1]}")
-    return lines
+    return [] if found is None else [f"{angle}: {words}" for angle, words in found.by_angle().items()]
 
 
 def _symmetry(wall: Wall) -> str:
@@ -111,7 +102,7 @@ def _rays(tracer: TracerCheck | None) -> str:
     total, escaped = sum(tracer.counts.values()), tracer.counts.get("escaped", 0)
     count = f"all {total}" if escaped == total else f"{escaped} of {total}"
     return (
-        f"{count} left the wall after {compact(tracer.mean_collisions)} collisions on average, "
+        f"{count} left the wall after {tracer.mean_collisions} collisions on average, "
         f"Kac's formula {tracer.expected_collisions:.6g}"
     )
 
@@ -127,8 +118,8 @@ def _gap_words(study: StudyResult, which: str) -> str:
         return _refused(study.refusals[which])
     words = CONVENTIONS[gap.convention]
     if not gap.self_adjoint:
-        return f"norm {compact(_norm(gap))} on functions of mean 0, not self-adjoint ({words})"
-    number = "0" if gap.verdict == "no gap" else compact(gap)
+        return f"norm {_norm(gap)} on functions of mean 0, not self-adjoint ({words})"
+    number = "0" if gap.verdict == "no gap" else gap
     return f"{number} {gap.verdict} ({words})"
 
 
@@ -142,7 +133,7 @@ def _relaxation(time: Estimate | None, without_gap: bool) -> str:
         return "refused with the gap"
     if time.error == float("inf"):
         return "infinite: a modulus in the spectrum is 1" if without_gap else "not known: slem may be 1"
-    return f"{compact(time)} steps"
+    return f"{time} steps"
 
 
 def details_of(study: StudyResult, by_angle: bool) -> str:
@@ -196,8 +187,7 @@ def _tracer_lines(tracer: TracerCheck) -> list[str]:
     found, expected = tracer.mean_collisions, tracer.expected_collisions
     lines = [
         f"{total} into the hollows; " + (f"not escaped: {', '.join(flagged)}" if flagged else "all escaped"),
-        f"mean collisions {rounded(found)}, length of boundary over opening (Kac) {expected:.6g}, "
-        f"z = {tracer.z_score:+.2f}",
+        f"mean collisions {found}, length of boundary over opening (Kac) {expected:.6g}, z = {tracer.z_score:+.2f}",
     ]
     if tracer.z_score < -KAC_Z:
         lines.append(
@@ -231,12 +221,10 @@ def _gap_line(study: StudyResult, which: str) -> str:
     if gap.verdict == "no gap":
         return words + "0 (no gap): " + gap.evidence[0].split(":")[0]
     met = _met(gap.error <= study.tolerance, study.tolerance)
-    if gap.verdict == "undecided" and gap.error >= abs(gap.value):
-        # rounding to its error would leave nothing of the number
-        words += f"not decided; {gap.value:.4g} at the finest basis, error up to {gap.error:.2g}"
-    else:
-        words += f"{rounded(gap)}, {gap.verdict}"
-    return f"{words} ({gap.kind}: {gap.method}), {met}"
+    # rounding to its error would leave nothing of some numbers
+    unknown = gap.verdict == "undecided" and gap.error >= abs(gap.value)
+    number = f"not decided; {gap.value:.4g} at the finest basis, error up to {gap.error:.2g}"
+    return f"{words}{number if unknown else f'{gap}, {gap.verdict}'} ({gap.kind}: {gap.method}), {met}"
 
 
 def _contraction(gap: SpectralGap, tolerance: float) -> str:
@@ -245,7 +233,7 @@ def _contraction(gap: SpectralGap, tolerance: float) -> str:
     if gap.verdict == "no gap":
         return words + "its norm on functions of mean 0 is 1 (no gap)"
     return (
-        f"{words}a step shrinks functions of mean 0 by the factor {rounded(_norm(gap))} at most, its norm there and "
+        f"{words}a step shrinks functions of mean 0 by the factor {_norm(gap)} at most, its norm there and "
         f"the slem of P~ ({gap.kind}: {gap.method}), {_met(gap.error <= tolerance, tolerance)}"
     )
 
@@ -258,7 +246,7 @@ def _spectrum_lines(study: StudyResult) -> list[str]:
     numbers = found.estimates()
     # the second largest modulus may be that of the most negative
     order = sorted(range(len(numbers)), key=lambda i: (i > 0, -abs(numbers[i].value)))
-    shown = [rounded(numbers[i]) + ("" if found.parity[i] == "none" else f" {found.parity[i]}") for i in order]
+    shown = [str(numbers[i]) + ("" if found.parity[i] == "none" else f" {found.parity[i]}") for i in order]
     of_grid = study.gap is not None and study.gap.verdict == "no gap"
     caution = "; they belong to the grid, for the law has no gap" if of_grid else ""
     return [
@@ -329,13 +317,10 @@ def gap_as_dict(gap: SpectralGap) -> dict[str, Any]:
 
 
 def quotation(gap: SpectralGap) -> str:
-    """One line to paste into a paper: value, error, kind, verdict, convention, method, version."""
-    number = "0" if gap.verdict == "no gap" else rounded(gap)
+    """One line to paste into a paper: value, error, kind, verdict, convention, version."""
+    number = "0" if gap.verdict == "no gap" else gap
     what = "spectral gap" if gap.self_adjoint else "not known to be self-adjoint: 1 - norm on functions of mean 0"
-    return (
-        f"{what} {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; {gap.method}; "
-        f"asperity {__version__}"
-    )
+    return f"{what} {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; asperity {__version__}"
 
 
 def enclosures_as_list(found: Enclosures) -> list[dict[str, Any]]:

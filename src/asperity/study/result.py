@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..core.estimates import NORMAL_95, Estimate
+from ..core.estimates import NORMAL_95, Estimate, Summary
 from ..core.rounding import EPS
 from ..geometry import Disk, Wall
 from ..kernels import CollisionLaw, KernelMatrix
@@ -15,8 +15,8 @@ from ..spectral.consequences.momentum_accommodation import WEIGHTS, Accommodatio
 from .consequences import Consequences
 
 
-@dataclass(frozen=True)
-class TracerCheck:
+@dataclass(frozen=True, repr=False)
+class TracerCheck(Summary):
     """What a sample of rays says of the tracer on this wall.
 
     Attributes
@@ -41,8 +41,8 @@ class TracerCheck:
         return deviation / self.mean_collisions.error * NORMAL_95 if self.mean_collisions.error > 0.0 else 0.0
 
 
-@dataclass(frozen=True)
-class StudyResult:
+@dataclass(frozen=True, repr=False)
+class StudyResult(Summary):
     """Everything that `study_wall` found: the fields of a `Study`.
 
     Attributes
@@ -102,13 +102,16 @@ class StudyResult:
 
     @property
     def resistance(self) -> Estimate | None:
-        """That of a tumbling body with this wall, where a smooth one has 1; None where accommodation is.
+        """That of a tumbling body with this wall, where a smooth one has 1; None where accommodation is."""
+        return None if self.accommodation is None else resistance_from(self.accommodation)
 
-        With c = cos(theta) and s = sin(theta), R = (3/4)(1 + <c, P c> + <s, P s>), and accommodation has both entries.
-        """
-        if (found := self.accommodation) is None:
-            return None
-        across, along = found.normal, found.tangential
-        value = 1.0 + 0.75 * (WEIGHTS[0] * along.value - WEIGHTS[1] * across.value)
-        error = 0.75 * (WEIGHTS[0] * along.error + WEIGHTS[1] * across.error) + EPS
-        return Estimate(value, error, along.kind, along.method)
+
+def resistance_from(found: Accommodation) -> Estimate:
+    """The resistance of a tumbling body, where a smooth one has 1.
+
+    With c = cos(theta) and s = sin(theta), R = (3/4)(1 + <c, P c> + <s, P s>), and accommodation has both entries.
+    """
+    across, along = found.normal, found.tangential
+    value = 1.0 + 0.75 * (WEIGHTS[0] * along.value - WEIGHTS[1] * across.value)
+    error = 0.75 * (WEIGHTS[0] * along.error + WEIGHTS[1] * across.error) + EPS
+    return Estimate(value, error, along.kind, along.method)

@@ -20,7 +20,6 @@ from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, Input
 from ..core.estimates import NORMAL_95, Estimate
 from ..core.files import moved_when_complete
 from ..core.long_runs import progress_bar
-from ..core.tables import html_table
 from ..geometry import Disk, Wall, trace
 from ..geometry.cells.miniature import wall_miniature
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
@@ -75,12 +74,16 @@ class Study(StudyResult):
         """
         return details_of(self, by_angle) if verbose else summary_of(self, by_angle)
 
-    def __repr__(self) -> str:
-        return f"<Study\n{self.summary()}>"
+    _more = ".summary(verbose=True), .refusals, .to_json(), .save(folder)"
 
-    def _repr_html_(self) -> str:
-        lines = {line[:11].strip() or "gap, specular": line[11:] for line in self.summary().splitlines()}
-        return html_table(f"Study of {self.name}", lines, wall_miniature(self.wall))
+    def _headline(self) -> str:
+        return f"of {self.name}"
+
+    def _facts(self) -> dict[str, object]:
+        return {line[:11].strip() or "gap, specular": line[11:] for line in self.summary().splitlines()}
+
+    def _picture(self) -> str:
+        return wall_miniature(self.wall)
 
     def save(
         self, folder: str | Path, *, overwrite: bool = False, picture_format: str = "png", dpi: float = RESOLUTION

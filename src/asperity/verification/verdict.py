@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.errors import InputError
+from ..core.estimates import Summary
 
 Answer = Literal["proved", "agrees", "refuted", "undecided"]
 # from the answer that decides a conjunction first to the answer that decides it last
 _WEIGHT: dict[Answer, int] = {"refuted": 0, "undecided": 1, "agrees": 2, "proved": 3}
 
 
-@dataclass(frozen=True)
-class Verdict:
+@dataclass(frozen=True, repr=False)
+class Verdict(Summary):
     """The answer of a check, with its evidence.
 
     Parameters
@@ -63,11 +64,6 @@ class Verdict:
     def stands(self) -> bool:
         """Whether the formula was proved or agrees with the numbers."""
         return self.answer in ("proved", "agrees")
-
-    def __str__(self) -> str:
-        where = ", ".join(f"{name} = {value}" for name, value in self.counterexample.items())
-        sides = f": {self.values[0]} against {self.values[1]}" if self.values else ""
-        return f"{self.answer} ({self.evidence})" + (f" at {where}{sides}" if where else sides)
 
 
 def every(*verdicts: Verdict) -> Verdict:

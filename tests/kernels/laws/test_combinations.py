@@ -209,14 +209,15 @@ KINDS = [
     "specular", "retroreflection", "lambertian", "maxwell", "scattering", "density", "triangles", "rectangles", "arcs",
     "least resistance", "lopsided matrix", "wall in closed form", "traced wall", "sum", "product",
 ]  # fmt: skip
-# Values of `apply`, fewer than by default, and seconds of this process for them; the first call may compile.
-MOST_VALUES, LONGEST = 10**6, 20.0
+# Values of `apply` and branches, fewer than by default, and seconds of this process; the first call may compile.
+MOST_VALUES, MOST_BRANCHES, LONGEST = 10**6, 16, 20.0
 
 
 @pytest.mark.parametrize("law", KINDS, indirect=True)
 @pytest.mark.parametrize("exponents", [(3,), (3, 3), (2**31 - 1,)], ids=str)
 def test_powers_end_soon_or_are_refused(law, exponents, monkeypatch):
     monkeypatch.setattr("asperity.kernels.laws.law.MOST_VALUES", MOST_VALUES)
+    monkeypatch.setattr("asperity.kernels.laws.branches.MOST_BRANCHES", MOST_BRANCHES)
     for exponent in exponents:
         law = law**exponent
     for name, method in METHODS.items():

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -157,20 +158,20 @@ def test_the_mean_of_the_squared_error_is_estimated_without_bias(number: int) ->
     mean = 0.0
     for draws in itertools.product(range(3), repeat=number):
         counts = np.bincount(draws, minlength=3)
-        estimate, _ = counting._squared_norms(counts[None], weight, np.array([number]))
+        estimate, _ = counting._squared_norms([(counts[None], weight)], np.array([number]))
         mean += np.prod(fraction[list(draws)]) * float(estimate[0])
     assert mean == pytest.approx(number * float(weight @ (fraction * (1.0 - fraction))), rel=1e-12)
 
 
 def test_a_single_pair_has_a_large_spread() -> None:
-    mean, variance = counting._squared_norms(np.array([[0, 1, 0]]), np.array([2.0, 5.0, 1.0]), np.array([1]))
+    mean, variance = counting._squared_norms([(np.array([[0, 1, 0]]), np.array([2.0, 5.0, 1.0]))], np.array([1]))
     assert mean[0] == 5.0 and variance[0] == 0.0
 
 
 def test_the_variance_of_the_squared_error_is_that_of_poisson_counts_in_small_cells() -> None:
     # (C - m)^2 of a Poisson C has variance m + 2 m^2; c + 2 c (c - 1) estimates it without bias
     counts, weight = np.array([[10**12, 1, 3, 7]]), np.array([0.0, 1.0, 2.0, 0.5])
-    mean, variance = counting._squared_norms(counts, weight, counts.sum(axis=1))
+    mean, variance = counting._squared_norms([(counts, weight)], counts.sum(axis=1))
     assert mean[0] == pytest.approx(1.0 + 6.0 + 3.5, rel=1e-9)
     assert variance[0] == pytest.approx(1.0 + 4.0 * (3 + 12) + 0.25 * (7 + 84), rel=1e-9)
 
@@ -178,7 +179,7 @@ def test_the_variance_of_the_squared_error_is_that_of_poisson_counts_in_small_ce
 def test_the_variance_of_four_draws_is_counted_by_hand() -> None:
     # two and two: squares of fractions are estimated as 1/6 each, so E k^2 = (1/3)^2, for 12 ordered pairs of draws,
     # twice
-    mean, variance = counting._squared_norms(np.array([[2, 2]]), np.ones(2), np.array([4]))
+    mean, variance = counting._squared_norms([(np.array([[2]]), np.ones(1))] * 2, np.array([4]))
     assert mean[0] == pytest.approx(16 / 3 * 0.5) and variance[0] == pytest.approx(24 / 9)
 
 
@@ -187,7 +188,7 @@ def test_the_variance_of_the_squared_error_is_that_of_binomials(number: int, fra
     first = np.arange(number + 1)
     with np.errstate(all="raise", under="ignore"):
         counts = np.stack([first, number - first], axis=1)
-        _, found = counting._squared_norms(counts, np.array([1.0, 2.0]), np.full(number + 1, number))
+        _, found = counting._squared_norms([(counts, np.array([1.0, 2.0]))], np.full(number + 1, number))
     likely = binom.pmf(first, number, fraction)
     square = 3.0 * (first - number * fraction) ** 2
     exact = likely @ square**2 - (likely @ square) ** 2
@@ -220,11 +221,11 @@ def test_dimensions_are_the_ratio_of_traces_whose_means_wishart_gave(number: int
     # E tr W^2 = (1 + 1/f) tr C^2 + (tr C)^2 / f and E (tr W)^2 = (tr C)^2 + 2 tr C^2 / f, solved for the two
     table = [[1.0 + 1.0 / freedom, 1.0 / freedom], [2.0 / freedom, 1.0]]
     of_square, squared = np.linalg.solve(table, [np.trace(covariance @ covariance), np.trace(covariance) ** 2])
-    assert counting._dimensions(differences)[0] == pytest.approx(squared / of_square, rel=1e-10)
-    assert counting._dimensions(differences[:, :1]) == pytest.approx((1.0, 1.0), rel=1e-10)
+    assert counting._dimensions(differences @ differences.T)[0] == pytest.approx(squared / of_square, rel=1e-10)
+    assert counting._dimensions(differences[:, :1] @ differences[:, :1].T) == pytest.approx((1.0, 1.0), rel=1e-10)
     # the same in all directions that the parts allow: nothing is left of the trace of the square
     for scale in (1.0, 1e-5, 1e5):
-        assert counting._dimensions(scale * (np.eye(number) - 1.0 / number))[0] > 1e12
+        assert counting._dimensions(scale**2 * (np.eye(number) - 1.0 / number))[0] > 1e12
 
 
 @pytest.mark.parametrize("number", [8, 33])
@@ -233,7 +234,7 @@ def test_the_skewness_is_that_of_wisharts_third_moment(number: int) -> None:
     differences = np.random.default_rng(4).normal(size=(number, 151)) * np.sqrt(spectrum)
     differences -= differences.mean(axis=0)
     covariance = differences.T @ differences / freedom
-    spread, skew = counting._dimensions(differences)
+    spread, skew = counting._dimensions(differences @ differences.T)
     # back from (tr C)^2 / tr C^2, (tr C^2)^3 / (tr C^3)^2 and E (tr W)^2 = (tr C)^2 + 2 tr C^2 / f to the traces
     second = np.trace(covariance) ** 2 / (spread + 2.0 / freedom)
     first, third = math.sqrt(spread * second), math.sqrt(second**3 / skew)
@@ -268,7 +269,7 @@ def test_half_widths_follow_student_and_fisher(monkeypatch) -> None:
     square = float(np.sum(differences**2)) / 56.0
 
     def exact(compared: np.ndarray) -> float:
-        spread, skew = (max((1.0 - 1.5 / 7.0) * number, 1.0) for number in counting._dimensions(compared))
+        spread, skew = (max((1.0 - 1.5 / 7.0) * number, 1.0) for number in counting._dimensions(compared @ compared.T))
         return math.sqrt((1.0 + (f.ppf(0.95, skew, 7 * skew) - 1.0) * math.sqrt(skew / spread)) * square)
 
     assert half_width(middle, parts) == pytest.approx(exact(differences), rel=1e-10)
@@ -280,26 +281,17 @@ def test_half_widths_follow_student_and_fisher(monkeypatch) -> None:
 
 
 def test_replicates_are_sparse_where_that_is_smaller_and_dropped_where_too_large(monkeypatch) -> None:
-    def kept(base: np.ndarray) -> tuple:
-        means = [base * (1.0 + step) for step in (-0.1, 0.1)]
-        found = counting._Replicates(base, 2)
-        for mean in means:
-            found.add(mean - base)
-        assert all(
-            np.allclose(r.toarray() if issparse(r) else r, m) for r, m in zip(found.stored(), means, strict=False)
-        )
-        return found.stored()
+    def kept(diagonal: np.ndarray) -> Sequence:
+        parts = [np.diag(diagonal + step) for step in (0, 1, 2)]
+        return array_from_counts(parts, Bins(len(diagonal)), symmetrise=False, independent=False).replicates
 
     assert 2**26 <= counting.LARGEST_REPLICATES <= 2**30
-    assert not any(issparse(part) for part in kept(np.ones((4, 4))))
-    assert all(issparse(part) for part in kept(np.eye(4)))  # a quarter is not zero
-    more = np.eye(4)
-    more[0, 1] = 1.0
-    assert not any(issparse(part) for part in kept(more))
-    monkeypatch.setattr(counting, "LARGEST_REPLICATES", 2 * 16 * 8)
-    assert len(kept(np.ones((4, 4)))) == 2
-    monkeypatch.setattr(counting, "LARGEST_REPLICATES", 2 * 16 * 8 - 1)
-    assert kept(np.ones((4, 4))) == ()
+    assert not any(issparse(part) for part in kept(np.full(3, 5)))
+    assert all(issparse(part) for part in kept(np.full(4, 5)))  # a quarter is not zero
+    monkeypatch.setattr(counting, "LARGEST_REPLICATES", 3 * 16 * 8)
+    assert len(kept(np.full(4, 5))) == 3
+    monkeypatch.setattr(counting, "LARGEST_REPLICATES", 3 * 16 * 8 - 1)
+    assert kept(np.full(4, 5)) == ()
 
 
 @pytest.mark.parametrize(("symmetrise", "keeps"), [(True, True), (True, False), (False, True), (False, False)])

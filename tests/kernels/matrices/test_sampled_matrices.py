@@ -12,8 +12,10 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
 from asperity.kernels.laws.law import DrivenLaw, RandomMap
+from asperity.kernels.sampling import rays
 from asperity.kernels.sampling.counts import LEVEL, _squared_norms
-from asperity.kernels.sampling.sobol import PARTS
+from asperity.kernels.sampling.rays import RaySums
+from asperity.kernels.sampling.sobol import PARTS, SobolSampler
 
 
 @pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
@@ -163,7 +165,26 @@ def test_squared_errors_vary_as_multinomial_counts_do_also_where_most_are_none()
     fraction, weight = np.full(200, 1 / 200), np.where(np.arange(200) % 2, 1.0, 10.0)
     counts = np.random.default_rng(1).multinomial(40, fraction, size=20_000)
     squares = (counts - 0.2) ** 2 @ weight
-    mean, variance = _squared_norms(counts, weight, counts.sum(axis=1))
+    mean, variance = _squared_norms([(counts, weight)], counts.sum(axis=1))
     assert np.mean(mean) == pytest.approx(np.mean(squares), rel=0.01)
     # fractions from so few draws are uneven, which takes 11 % away
     assert np.mean(variance) == pytest.approx(np.var(squares), rel=0.2)
+
+
+def test_counts_of_large_partitions_grow_into_wider_integers(monkeypatch) -> None:
+    monkeypatch.setattr(rays, "BLOCK", 4)
+    sums, angle = RaySums(ker.lambertian(), ker.Bins(3), 1), np.full((1, 2**15), 0.3)
+    kinds = []
+    for _ in range(4):
+        sums.add_rows(0, angle, angle)
+        kinds.append(sums.tables.dtype)
+    assert kinds == [np.uint16, np.uint32, np.uint32, np.uint32] and sums.most == 4 * 2**15
+    assert sums.tables[0].tolist() == [[4 * 2**15, 0, 0], [0, 0, 0], [0, 0, 0]]
+
+
+def test_a_sample_that_goes_on_leaves_earlier_matrices_as_they_are(bounce) -> None:
+    sampler = SobolSampler(bounce(), ker.Bins(4), np.random.default_rng(0))
+    first, *_ = sampler.sampled(2**12, symmetrise=False)
+    before = np.array(first.replicates)
+    sampler.sampled(2**14, symmetrise=False)
+    assert np.array_equal(np.array(first.replicates), before)

@@ -20,6 +20,7 @@ Methods = list[tuple[WorkMethod, tuple[float, ...], tuple[float, ...]]]
 QUICK_RAYS, RAYS = tuple(4.0**k for k in (6, 7, 8)), tuple(4.0**k for k in (5, 6, 7, 8, 9, 10))
 # Names of methods that are the library's own choice, or make references.
 AUTO, CLOSED_FORM, BEAMS, ROWS, QMC = "auto", "closed form", "beams", "adaptive angles", "randomised QMC"
+FLIGHTS = "flights"
 # The error of sampled rays decreases with order 1/2. Strata and scrambled Sobol sequences in two dimensions reach 3/4
 # if the integrand jumps along curves, as for indicators of bins and the laws of most walls.
 RANDOM_ORDER, JUMPING_ORDER = 0.5, 0.75
