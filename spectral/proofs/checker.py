@@ -150,7 +150,7 @@ class Pieces:
     def integral(self, function):
         """Integral of a function of v times sin(theta) up to pi/2."""
         waves = [(a, b, c, primitive(function(p), 1)) for a, b, c, p in self.half]
-        return sum(((UNIT * b).exp() * q(b - c) - (UNIT * a).exp() * q(a - c) for a, b, c, q in waves), acb(0)).imag
+        return sum((unit(b) * q(b - c) - unit(a) * q(a - c) for a, b, c, q in waves), acb(0)).imag
 
     def wave(self, n, low, high):
         """Integral of v(x) e^(i x/n) from low to high, nothing if these are in the wrong order."""
@@ -163,7 +163,7 @@ class Pieces:
         for (a, b, c, _), q in zip(self.all, self.waves[n], strict=True):
             if not (b < first or a > last):
                 x, y = clipped(first, a, b), clipped(last, a, b)
-                total += (UNIT * y / n).exp() * q(y - c) - (UNIT * x / n).exp() * q(x - c)
+                total += unit(y / n) * q(y - c) - unit(x / n) * q(x - c)
         return total
 
     def __call__(self, t):
@@ -371,7 +371,7 @@ class FocusingArcs(Wall):
                 break
             if not high > low:
                 high, rises = spread([high, low]), spread([rises, falls])
-            wave = (UNIT * t / n).exp() / n * v.wave(n, top(lower, t)[0], -top(upper, t)[0])
+            wave = unit(t / n) / n * v.wave(n, top(lower, t)[0], -top(upper, t)[0])
             value += wave.imag
             slope += wave.real / n + off * v.largest * (abs(rises) + abs(falls) + (high - low) / n) / (n * n)
             slope += sum(rate * v(x) * ((x + theta) / n).sin() / n for x, rate in ((high, rises), (low, -falls)))

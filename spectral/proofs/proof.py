@@ -35,18 +35,10 @@ LEMMAS = {
     "powers": "The Henyey-Greenstein law has the eigenvalue g^l on the Legendre polynomial of degree l.",
     "Temple": "With one eigenvalue below nu, it is at least q - r^2/(nu - q) for the quotient q and the residual r.",
 }
+OF_BUMPS = "bins", "next arc", "two reflections", "grazing", "law applied", "form and residual", "mixtures", "Temple"
 USED = {
     "powers": ("mixtures", "powers"),
-    "dispersing arcs": (
-        "bins",
-        "next arc",
-        "two reflections",
-        "grazing",
-        "law applied",
-        "form and residual",
-        "mixtures",
-        "Temple",
-    ),
+    "dispersing arcs": OF_BUMPS,
     "focusing arcs": ("bins", "grazing", "mixtures", "Temple", "chords", "intervals"),
 }
 
