@@ -307,7 +307,7 @@ def test_every_picture_shows_the_texts_of_users_letter_by_letter(teeth, text, tm
     figures = [Figure() for _ in range(4)]
     geo.draw_wall(wall, ax=figures[0].subplots())
     draw_study_wall(report, figures[1].subplots())
-    draw_curves(rows, [f"b{text}", "wall"], f"q{text}", figures[2].subplots())
+    draw_curves(rows, [f"b{text}", "wall"], f"q{text}", f"f{text}", figures[2].subplots())
     work = spec.work_precision(
         spec.WorkProblem(text, spec.ReferenceValue(1.0, 0.0, "by hand")),
         [spec.WorkMethod(text, lambda n: 1.0 + 1.0 / n)], [1, 2], repeats=1, warm_up=False,
