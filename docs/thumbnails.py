@@ -150,6 +150,7 @@ PICTURES: dict[str, Callable[[Axes], None]] = {
     "maxwell_or_rough": law_of(ker.CircularArcLaw(0.5)),
     "measured_profile": profile,
     "no_slip_or_smooth": wall_with(geo.rectangular_teeth(1.0), 0.6, 1.1, -0.6, 0.3),
+    "best_proved_gap": wall_with(geo.focusing_arcs(0.752), 0.3, 1.1, -0.4, 0.4),
     "published_gap": wall_with(geo.dispersing_arcs(1.0), 0.35, 1.1, -0.3, 0.4),
     "true_disk": true_disk,
 }

@@ -58,7 +58,10 @@ def increasing(numbers):
 
 def exact(number):
     """The ball of a text, or of a middle and a radius."""
-    return arb(number) if isinstance(number, str) else arb(*number)
+    texts = [number] if isinstance(number, str) else number
+    plain = isinstance(texts, list) and len(texts) in (1, 2) and all(isinstance(x, str) and x.isprintable() for x in texts)
+    demand(plain, "numbers as texts, or as lists of middle and radius")
+    return arb(*texts)
 
 
 def unit(angle):
@@ -356,7 +359,10 @@ class FocusingArcs(Wall):
                 paired += h * (own * after + wide * rest) + (bend - arb(bend.mid())) * h * h / 4
                 missed = (1 - guess) * own * t.sin() - scale * (after + rest)
                 change = (1 - guess) * (slope * theta.sin() + wide * theta.cos()) - scale * by_theta
-                demand(low > 0 or rest == 0, "a first interval out of reach of rays with many reflections")
+                demand(
+                    low > 0 or (low.is_zero() and rest == 0),
+                    "a first interval out of reach of rays with many reflections",
+                )
                 missed = (missed + change * off) / theta.sin() if low > 0 else change / theta.sinc()
                 square += missed * missed * (low.cos() - high.cos())
         return v.norm - scale * paired, square
@@ -402,7 +408,8 @@ class FocusingArcs(Wall):
 
         def entering(theta):
             seen = [x for x in (theta, PI - theta) if not (x > 2 * self.alpha + eps or x < 2 * self.alpha - 3 * eps)]
-            return len(seen) * self.R * eps / (2 * arb(theta.sin().lower()))
+            # divided by a ball, so that nothing is known where it contains 0
+            return arb((len(seen) * self.R * eps / (2 * theta.sin())).upper())
 
         return ONE, ZERO, entering
 
@@ -430,9 +437,11 @@ def temple(law, v, sign, guess, bins, above):
     """Bounds of the least eigenvalue of 1 - sign P on functions of the parity of v, of mean 0 (lemma 9)."""
     found = law.count(bins, v.odd, sign, above)
     demand(found <= (1 if v.odd else 2), "one eigenvalue of the trial function's parity below the threshold")
+    demand(v.norm > 0, "a trial function with a norm")
     form, square = law.form_and_residual(v, sign, guess)
     ends, square = [arb(x) for x in ((form / v.norm).lower(), (form / v.norm).upper())], arb((square / v.norm).upper())
-    demand(above > ends[1] and square.is_finite(), "a quotient below the next eigenvalue, and a finite residual")
+    finite = all(x.is_finite() for x in (*ends, square))
+    demand(finite and above > ends[1], "a finite quotient below the next eigenvalue, and a finite residual")
     # concave in the quotient, so least at an end
     return min((x - square / (above - x)).lower() for x in ends), ends[1]
 
@@ -470,6 +479,7 @@ def enclose(certificate):
 def check(certificate):
     """Raise Refused unless the certificate proves its interval."""
     demand(certificate["format"] == "asperity proved gap 1", "a certificate of a proved gap")
+    demand(isinstance(certificate["interval"], list), "an interval of two numbers")
     (low, high), (first, last) = enclose(certificate), map(exact, certificate["interval"])
     demand(first <= low and high <= last, f"the interval from {low.str(12)} to {high.str(12)}")
 

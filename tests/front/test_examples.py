@@ -49,6 +49,13 @@ def test_the_published_gap_is_found():
     assert found["focusing 0.2, gap/(4h)"] == pytest.approx(0.9876, abs=2e-4)
 
 
+def test_the_gap_of_the_best_wall_is_proved():
+    table, best, proof = load("best_proved_gap").main((1.4, 1.5), width=0.05)
+    gap, low, high = table.rows[0], *map(float, proof.interval)
+    assert best == 1.4 and gap.value > table.rows[1].value
+    assert low - gap.error < gap.value < high + gap.error
+
+
 def test_the_gap_study_finds_what_is_published_and_goes_on(tmp_path):
     study = load("gap_study")
     found = study.main((0.1,), (0.1, 1 / 3), 1e-4, tmp_path)

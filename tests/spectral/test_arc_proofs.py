@@ -97,6 +97,12 @@ def test_gaps_of_both_conventions_are_proved(half_angle, frame):
     assert low - gap.error <= gap.value <= high + gap.error
 
 
+def test_bins_that_begin_where_the_sine_of_a_bin_is_of_unknown_sign_are_refused():
+    """The least sine of such a bin was negative, and with it the chance to enter grazing angles."""
+    with ctx.workprec(64), pytest.raises(Refused):
+        FocusingArcs(exact("0.9"), {}).count(["2.5118864315e-9"], False, 1, arb("0.99"))
+
+
 @pytest.mark.parametrize(
     ("path", "change"),
     [

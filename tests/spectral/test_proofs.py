@@ -195,6 +195,10 @@ def changed(certificate, path, value):
         pytest.param(*(("effort", "bits"), lambda number: 2), marks=pytest.mark.slow),
         (("precision",), lambda bits: 20),
         (("format",), lambda text: "asperity proved gap 2"),
+        (("interval",), lambda ends: "09"),
+        # what is printed is what is proved
+        (("weights", "law"), lambda pair: [f"{pair[0]}\0 and more", pair[1]]),
+        (("weights", "law"), lambda pair: [*pair, "0"]),
     ],
 )
 def test_a_certificate_that_was_tampered_with_is_refused(proof, path, change):
