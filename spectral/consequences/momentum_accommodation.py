@@ -94,7 +94,7 @@ class Accommodation(Summary):
     misfit_errors: Floats
     kind_at: ErrorKind
     _show = "tangential normal maxwell_fraction misfit incidence_deg"
-    _unit = "degrees; the misfit in units of the speed"
+    _unit = "degrees from the normal; the misfit in units of the speed"
     _more = ".tangential_at, .tangential_errors, .normal_at, .normal_errors, .by_angle(), .tangential.method"
 
     def _facts(self) -> dict[str, object]:

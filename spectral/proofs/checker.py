@@ -59,7 +59,9 @@ def increasing(numbers):
 def exact(number):
     """The ball of a text, or of a middle and a radius."""
     texts = [number] if isinstance(number, str) else number
-    plain = isinstance(texts, list) and len(texts) in (1, 2) and all(isinstance(x, str) and x.isprintable() for x in texts)
+    plain = (
+        isinstance(texts, list) and len(texts) in (1, 2) and all(isinstance(x, str) and x.isprintable() for x in texts)
+    )
     demand(plain, "numbers as texts, or as lists of middle and radius")
     return arb(*texts)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ...core.checks import whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, Summary
+from ...core.long_runs import reported
 from ...core.rounding import EPS
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ class Extremum(Summary):
         Whether it lies at an end of the sweep, beyond which it may go on.
     evaluations : int
         Points that were computed besides those of the sweep.
+    names : tuple of two str
+        Of the quantity and of the parameter.
 
     Notes
     -----
@@ -53,6 +56,13 @@ class Extremum(Summary):
     largest: bool
     at_end: bool
     evaluations: int
+    names: tuple[str, str] = ("", "")
+    _show = "at_end evaluations"
+    _more = ".value, .parameter"
+
+    def _headline(self) -> str:
+        quantity, parameter = self.names
+        return f"{'largest' if self.largest else 'smallest'} {quantity} {self.value} at {parameter} = {self.parameter}"
 
 
 @dataclass(frozen=True)
@@ -99,7 +109,8 @@ def refined_extremum(
     swept = sorted(filter(None, map(signed, rows)), key=lambda one: one.x)
     if not swept:
         raise InputError(f"extremum: no point of the sweep has a value of {quantity}")
-    return _Search(swept, computed).extremum(evaluations, sign)
+    with reported(f"extremum of {quantity}"):
+        return replace(_Search(swept, computed).extremum(evaluations, sign), names=(quantity, name))
 
 
 class _Search:

@@ -291,6 +291,7 @@ def test_the_smallest_value_and_the_end_of_a_sweep():
     assert abs(least.parameter.value - 0.31) <= least.parameter.error < 0.01
     assert abs(least.value.value - 0.01) <= least.value.error
     most = table.extremum("gap")
+    assert repr(most).startswith(f"Extremum largest gap {most.value} at ")
     assert most.at_end and most.value.value == 0.9 and abs(most.parameter.value - 0.9) <= most.parameter.error
 
 

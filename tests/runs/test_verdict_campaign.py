@@ -153,5 +153,5 @@ def test_the_command_line_says_so_too(tmp_path):
     ARROW.wall.save(path)
     done = run("gap", path, "--specular", "--enclose", 2)
     assert done.exit_code == 0
-    assert done.output.startswith("not known to be self-adjoint: 1 - norm on functions of mean 0 0 ")
+    assert done.output.startswith("not known to be self-adjoint, 1 - norm on functions of mean 0: 0 ")
     assert "is not self-adjoint" in done.output and "enclosures refused" in done.output

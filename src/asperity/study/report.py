@@ -319,7 +319,7 @@ def gap_as_dict(gap: SpectralGap) -> dict[str, Any]:
 def quotation(gap: SpectralGap) -> str:
     """One line to paste into a paper: value, error, kind, verdict, convention, version."""
     number = "0" if gap.verdict == "no gap" else gap
-    what = "spectral gap" if gap.self_adjoint else "not known to be self-adjoint: 1 - norm on functions of mean 0"
+    what = "spectral gap" if gap.self_adjoint else "not known to be self-adjoint, 1 - norm on functions of mean 0:"
     return f"{what} {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; asperity {__version__}"
 
 
