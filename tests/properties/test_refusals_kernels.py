@@ -374,7 +374,7 @@ REFUSED = {
         (lambda: spec.enclosures(np.eye(2), 1), "law: expected"),
         (lambda: spec.enclosures(ARC @ HG(0.5) @ ARC, 2), "no known error"),
         *((lambda width=width: spec.prove_gap(DIFFUSE, width), "width") for width in (0.0, 1.0, math.nan)),
-        *((lambda law=law: spec.prove_gap(law), "law: expected the law of") for law in (ARC, ARC @ HG(0.5))),
+        *((lambda law=law: spec.prove_gap(law), "law: expected the law of") for law in (ARC @ ARC, ARC @ HG(0.5))),
         (lambda: spec.prove_gap(np.eye(2)), "law: expected a Law such as"),
         *((lambda angle=angle: spec.accommodation(DIFFUSE, theta=[1.0, angle]), "take one beside it")
           for angle in (np.pi / 2, np.arcsin(np.pi / 4), np.pi - np.arcsin(np.pi / 4))),

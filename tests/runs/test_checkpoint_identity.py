@@ -4,6 +4,7 @@ import inspect
 import math
 import sqlite3
 import sys
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from functools import partial
 from itertools import combinations
@@ -287,11 +288,11 @@ def test_every_function_that_takes_a_checkpoint_is_here_and_takes_a_key():
 
 def told(found):
     """All fields to the last bit."""
-    if is_dataclass(found):
+    if is_dataclass(found) and not isinstance(found, Sequence):
         return {one.name: told(getattr(found, one.name)) for one in fields(found) if one.repr}
     if isinstance(found, np.ndarray):
         return found.shape, found.tobytes()
-    return [told(one) for one in found] if isinstance(found, tuple) else repr(found)
+    return [told(one) for one in found] if isinstance(found, Sequence) and not isinstance(found, str) else repr(found)
 
 
 @pytest.mark.parametrize("name", CALLS)

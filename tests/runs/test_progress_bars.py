@@ -176,7 +176,7 @@ CALLS = {
     "quadrature": "ker.discretise(wall, ker.Bins(600), 'quadrature', 1e-12)",
     "gap": "spec.spectral_gap(ker.WallLaw(geo.mushrooms(0.3, 0.2)), 1e-9, time_limit=1e4)",
     "transmission": "spec.transmission(wall, 20.0, tolerance=1e-7)",
-    "proof": "spec.prove_gap(0.5 * wall + 0.5 * ker.lambertian(), 1e-12)",
+    "proof": "spec.prove_gap(ker.CircularArcLaw(0.9), 1e-12)",
 }
 
 

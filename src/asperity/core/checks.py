@@ -164,7 +164,8 @@ def given(value: object, kind: type) -> str:
     """
     makes = MAKES.get(kind.__name__, {})
     found = next((makes[one.__name__] for one in type(value).__mro__ if one.__name__ in makes), None)
-    return shortened(value) + (f"; take {found}" if found else "")
+    got = f"an array of shape {value.shape}" if isinstance(value, np.ndarray) else shortened(value)
+    return got + (f"; take {found}" if found else "")
 
 
 def sequence(name: str, value: Iterable[T], kind: type[T] | None = None, example: str = "") -> tuple[T, ...]:
