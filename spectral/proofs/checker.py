@@ -116,6 +116,7 @@ class Trial:
 
     def __init__(self, coefficients, odd):
         self.odd, self.waves = odd, {}
+        demand(all(arb(c).is_finite() for c in coefficients), "finite coefficients")
         for m, c in enumerate(coefficients, int(odd)):
             for sign in (1, -1):
                 factor = -sign * UNIT / 2 if (m + odd) % 2 else acb(0.5)
@@ -439,7 +440,7 @@ def temple(law, v, sign, guess, bins, above):
     """Bounds of the least eigenvalue of 1 - sign P on functions of the parity of v, of mean 0 (lemma 9)."""
     found = law.count(bins, v.odd, sign, above)
     demand(found <= (1 if v.odd else 2), "one eigenvalue of the trial function's parity below the threshold")
-    demand(v.norm > 0, "a trial function with a norm")
+    demand(v.norm > 0 and guess.is_finite(), "a trial function with a norm, and a finite guess")
     form, square = law.form_and_residual(v, sign, guess)
     ends, square = [arb(x) for x in ((form / v.norm).lower(), (form / v.norm).upper())], arb((square / v.norm).upper())
     finite = all(x.is_finite() for x in (*ends, square))
