@@ -3,7 +3,6 @@
 import math
 import sys
 from decimal import Decimal
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -17,38 +16,15 @@ from asperity.errors import InputError
 from asperity.estimates import Estimate
 from asperity.study import study_wall
 from commands import ended
+from html_pages import Balanced
 
 LAW = ker.henyey_greenstein(0.5)
 ISLAND = geo.Wall([geo.Segment((0, -1), (1, -1))], islands=[[geo.Arc((0.3, -0.4), (0.1, 0.2), 0, 2 * math.pi)]])
 GAP = Estimate(0.0373214, 0.00004, "estimate", "two <resolutions>")
 
 
-class Balanced(HTMLParser):
-    """Every tag is closed in its turn."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.text = ""
-
-    def handle_starttag(self, tag, attrs):
-        self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        pass
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text += data
-
-
 def text_of(value) -> str:
-    parser = Balanced()
-    parser.feed(value._repr_html_())
-    assert parser.open == []
-    return parser.text
+    return "".join(Balanced(value._repr_html_()).text)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import is_dataclass
-from html.parser import HTMLParser
 from importlib import import_module
 
 import numpy as np
@@ -20,6 +19,7 @@ from asperity import verify
 from asperity.core.estimates import Estimate, Summary, html_table, shown, text_of, with_error, with_errors
 from asperity.errors import InputError
 from asperity.study import study_wall
+from html_pages import Balanced
 
 # Lines of a result, and characters of a line; a study has one more for every fact of a disk.
 LINES, LINE = 18, 180
@@ -78,30 +78,6 @@ LEFT_OUT = {
 
 def half_diffuse(rng):
     return ker.maxwell(np.random.default_rng(rng).uniform(0.25, 0.75))
-
-
-class Balanced(HTMLParser):
-    """The text of a page whose tags are closed in their turn."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.text: list[str] = []
-        self.feed(page)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        pass
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text.append(data)
 
 
 def made() -> dict[str, object]:

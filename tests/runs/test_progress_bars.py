@@ -4,7 +4,6 @@ import io
 import multiprocessing
 import re
 import signal
-import subprocess
 import sys
 import time
 from types import ModuleType
@@ -20,6 +19,7 @@ from asperity import spectral as spec
 from asperity.core import long_runs
 from asperity.core.long_runs import progress_bar
 from asperity.kernels.discretisation import discretisation
+from commands import started
 
 
 class Terminal(io.StringIO):
@@ -183,9 +183,7 @@ CALLS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
 def test_ctrl_c_ends_a_long_call_at_once(call):
-    with subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTED.format(call=call)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    with started("-c", INTERRUPTED.format(call=call)) as process:
         process.stdout.readline()
         time.sleep(3.0)
         begun = time.monotonic()
