@@ -259,6 +259,13 @@ def test_no_proof_relies_on_the_search(name, blind):
     assert verify(*(FALSE | REFUTED)[name], time_limit=None).answer == "undecided"
 
 
+def test_no_verdict_depends_on_luck(monkeypatch):
+    """Points that sympy draws to factor polynomials of several symbols can cost minutes where they are unlucky."""
+    monkeypatch.delattr("sympy.polys.factortools._randint")
+    a, b, c = x * y + y + 1, x * y**2 + 2, x**2 * y + y + 3
+    assert verify(sp.sqrt(sp.expand(a * b * c) ** 2), a * b * c, [x > 0, y > 0], time_limit=None).answer == "proved"
+
+
 def test_a_proof_on_the_open_domain_says_nothing_of_a_closed_end(blind):
     for lhs, rhs, opened, closed in [
         (sp.sign(x), 1, [x > 0], [x >= 0]),

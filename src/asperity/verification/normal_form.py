@@ -10,12 +10,13 @@ dependent.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Iterable
 from math import comb, lcm
 from typing import Any
 
 import sympy as sp
-from flint import ctx
+from flint import Ordering, ctx, fmpz_mpoly_ctx
 
 from .balls import MANY_BITS, Constant, Unclear, evaluate, is_below, sign_of
 from .constants import ONE, built, visible
@@ -154,7 +155,7 @@ class Parameters:
 
     def factored(self, e: Any) -> Any:
         """The normal form as a product, for `sign_in`."""
-        return sp.factor(sp.together(self._on_circles(self.normal(e))))
+        return product(self._on_circles(self.normal(e)))
 
     def _rebuilt(self, e: Any) -> Any:
         if isinstance(e, Constant):
@@ -184,7 +185,7 @@ class Parameters:
             return sp.Mul(*(_absolute(factor) ** times for factor, times in _factors(parts[0])))
         if e.func is sp.log:
             return _logarithm(parts[0])
-        return built(e.func, [sp.factor(part) for part in parts] if e.is_Function else parts)
+        return built(e.func, [product(part) for part in parts] if e.is_Function else parts)
 
     def _on_circles(self, e: Any) -> Any:
         """Reduce every sine to at most its first power; the value does not change."""
@@ -307,11 +308,36 @@ def _running(interval: tuple[Any, Any], symbol: Any) -> Any:
     return (low + high * t) / (1 + t)
 
 
+def product(e: Any) -> Any:
+    """An expression as the product of its factors."""
+    return sp.Mul(*(base**times for base, times in _irreducible(e)))
+
+
+def _irreducible(e: Any) -> Iterable[tuple[Any, Any]]:
+    """Irreducible polynomials, what is no polynomial, and numbers, with their exponents.
+
+    By flint, because ``sympy.factor`` draws points at random and can take minutes where it is unlucky.
+    """
+    found: dict[Any, Any] = defaultdict(lambda: sp.Integer(0))
+    for factor in sp.Mul.make_args(sp.together(e)):
+        base, times = factor.as_base_exp()
+        if not (base.is_Add and times.is_Integer):
+            found[base] += times
+            continue
+        shared, polynomial = sp.Poly(base).clear_denoms(convert=True)
+        ring = fmpz_mpoly_ctx.get(("x", len(polynomial.gens)), Ordering.lex)
+        content, parts = ring.from_dict({powers: int(c) for powers, c in polynomial.terms()}).factor()
+        found[sp.Integer(int(content)) / shared] += times
+        for part, often in parts:
+            terms = {powers: int(c) for powers, c in part.terms()}
+            found[sp.Poly(terms, *polynomial.gens).as_expr()] += often * times
+    return found.items()
+
+
 def _factors(e: Any) -> list[tuple[Any, Any]]:
     """Factors and their exponents: factors of known sign separately, numbers as powers of primes."""
     found: list[tuple[Any, Any]] = []
-    for factor in sp.Mul.make_args(sp.factor(sp.together(e))):
-        base, times = factor.as_base_exp()
+    for base, times in _irreducible(e):
         if base.is_Rational and base != 0 and times.is_Integer:
             found += [(sp.Integer(p), k * times) for p, k in sp.factorint(abs(base.p)).items() if p != 1]
             found += [(sp.Integer(p), -k * times) for p, k in sp.factorint(base.q).items() if p != 1]
@@ -353,7 +379,7 @@ def _logarithm(e: Any) -> Any:
     factors = _factors(e)
     if all(sign_in(factor) == POSITIVE for factor, _ in factors):
         return sp.Add(*(times * built(sp.log, [sp.expand(factor)]) for factor, times in factors))
-    return built(sp.log, [sp.factor(e)])
+    return built(sp.log, [product(e)])
 
 
 def _with_root_symbols(e: Any, roots: dict[Any, tuple[Any, int]]) -> Any:

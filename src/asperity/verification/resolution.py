@@ -23,6 +23,7 @@ from .normal_form import (
     ZERO,
     Parameters,
     Signs,
+    product,
     sign_in,
     signs_of,
 )
@@ -193,7 +194,7 @@ class Part:
 def _with_squares(e: Any) -> Any:
     """Replace a positive parameter under a square root by a square, and factor."""
     squares = {p.base: sp.Dummy(positive=True) ** 2 for p in e.atoms(sp.Pow) if p.exp == sp.S.Half and p.base.is_Dummy}
-    return sp.factor(e.xreplace({t: square for t, square in squares.items() if t.is_positive}))
+    return product(e.xreplace({t: square for t, square in squares.items() if t.is_positive}))
 
 
 def is_infinite(e: Any) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from textwrap import shorten
 from types import MappingProxyType
 from typing import Any, Literal, NoReturn
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.errors import InputError
-from ..core.estimates import Summary
+from ..core.estimates import LONGEST, Summary
 
 Answer = Literal["proved", "agrees", "refuted", "undecided"]
 # from the answer that decides a conjunction first to the answer that decides it last
@@ -51,6 +52,10 @@ class Verdict(Summary):
     evidence: str
     counterexample: Mapping[str, Any] = field(default_factory=dict)
     values: tuple[str, str] | None = None
+
+    def _facts(self) -> dict[str, object]:
+        why = shorten(self.evidence, LONGEST) if self.answer == "undecided" else None
+        return {**super()._facts(), "evidence": why}
 
     def __post_init__(self) -> None:
         if self.answer not in _WEIGHT:
