@@ -11,8 +11,6 @@ DEV := $(VENV)/.installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help study test test-all test-lowest test-newest check format-check lint types docs bench build format clean distclean
-# two installs into one environment must not run side by side
-.NOTPARALLEL:
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -37,9 +35,10 @@ test-newest: ## run the tests with the newest versions of all dependencies, in .
 	.venv-newest/bin/python -m pip install --quiet --upgrade --upgrade-strategy eager --editable '.[dev]'
 	.venv-newest/bin/python -m pytest --numprocesses auto --dist worksteal
 
-# the tests run the examples
-check: GALLERY := -D plot_gallery=0
-check: format-check lint types docs test-all ## everything a change must pass
+# without the gallery, whose examples the tests run
+check: $(DEV) ## everything a change must pass
+	$(MAKE) --jobs 2 --output-sync format-check lint types docs GALLERY='-D plot_gallery=0'
+	$(MAKE) test-all
 
 format-check: $(DEV)
 	$(PY) -m ruff format --check .
@@ -88,7 +87,6 @@ $(RUN): pyproject.toml
 	$(PY) -m pip install --quiet --editable .
 	@touch $@
 
-$(DEV): pyproject.toml
-	$(make_environment)
+$(DEV): pyproject.toml | $(RUN)
 	$(PY) -m pip install --quiet --editable '.[dev]'
-	@touch $(RUN) $@
+	@touch $@

@@ -65,6 +65,8 @@ def test_the_proved_interval_contains_the_estimate(run):
     low, high = map(float, names["proof"].interval)
     gap = spec.spectral_gap(names["law"], tolerance=1e-6)
     assert low - gap.error < gap.value < high + gap.error
+    # Feres and Zhang 2010
+    assert f"{low:.4f}" == f"{high:.4f}" == "0.0373"
     assert high - low < 1e-4 * high
 
 

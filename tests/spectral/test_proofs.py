@@ -44,7 +44,7 @@ def proof():
         patch.setattr(search, "GRAZING", 1e-3)
         patch.setattr(search, "TERMS", (4, 6))
         patch.setattr(search, "ACCURACY", 16)
-        return spec.prove_gap(bumps(1.0), width=0.2)
+        return spec.prove_gap(bumps(0.5), width=0.2)
 
 
 @pytest.mark.parametrize(
@@ -68,8 +68,8 @@ def test_gaps_of_powers_are_proved_to_rounding(law):
 
 def test_the_interval_of_bumps_contains_the_gap(proof):
     low, high = map(float, proof.interval)
-    # by a textbook tracer and polynomials, and by indexed enclosures
-    assert low < 0.342535 < high
+    # by polynomials and by indexed enclosures
+    assert low < 0.084695 < high
     assert high - low < 0.2 * high
 
 
@@ -88,16 +88,6 @@ def test_specular_reflection_scales_the_gap_and_other_laws_add_to_it(proof, monk
         found = [float(end) for end in checker.enclose({**proof.certificate, "weights": texts})]
         assert found[0] == pytest.approx(gap(low), rel=1e-12)
         assert found[1] >= gap(high) * (1.0 - 1e-12)
-
-
-@pytest.mark.slow
-def test_the_published_gap_of_a_third_and_the_estimate_are_in_the_interval():
-    found = spec.prove_gap(bumps(1 / 3), width=1e-3)
-    gap = spec.spectral_gap(bumps(1 / 3))
-    low, high = map(float, found.interval)
-    assert low <= gap.value + gap.error
-    assert gap.value - gap.error <= high
-    assert f"{low:.4f}" == f"{high:.4f}" == "0.0373"
 
 
 @pytest.mark.parametrize("curvature", ["1/3", "1", "1.4"])
@@ -126,8 +116,7 @@ def test_reflected_trial_functions_are_those_of_the_law(curvature, odd):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("curvature", ["1/3", "1", "1.4"])
+@pytest.mark.parametrize(("curvature", "sign"), [("1/3", 1), ("1", -1), ("1.4", 1)])
 def test_the_form_is_that_of_traced_rays_and_the_residual_that_of_quadrature(curvature, sign):
     size = eval(curvature)
     rng, wall, rays = np.random.default_rng(4), geo.dispersing_arcs(size), 2**18
@@ -165,41 +154,44 @@ def changed(certificate, path, value):
     return new
 
 
+# Each path is refused with its number changed so; what needs the form again is slow.
+AT_ONCE = [
+    (("law",), lambda law: {**law, "note": "0.5"}),
+    (("weights",), lambda weights: {**weights, "specular reflection": "0"}),
+    (("weights", "law"), lambda pair: ["0.9", "0"]),
+    (("weights", "lambertian"), lambda pair: ["-1e-6", "0"]),
+    (("threshold",), lambda text: "0.95"),
+    (("other",), lambda text: "0.95"),
+    (("bins", 5), lambda text: "1.0"),
+    (("bins", -1), lambda text: "1.6"),
+    (("effort", "first"), lambda text: "-0.1"),
+    (("effort", "first"), lambda text: "0.6"),
+    (("precision",), lambda bits: 20),
+    (("format",), lambda text: "asperity proved gap 2"),
+    (("interval",), lambda ends: "09"),
+    # what is printed is what is proved
+    (("weights", "law"), lambda pair: [f"{pair[0]}\0 and more", pair[1]]),
+    (("weights", "law"), lambda pair: [*pair, "0"]),
+]
+WITH_THE_FORM = [
+    (("interval", 0), lambda text: str(Decimal(text) + Decimal("1e-9"))),
+    (("interval", 1), lambda text: str(Decimal(text) - Decimal("1e-9"))),
+    (("law", "curvature"), lambda pair: [str(float(pair[0]) * 1.001), pair[1]]),
+    (("weights", "specular"), lambda pair: ["1e-6", "0"]),
+    (("frame",), lambda text: "paper"),
+    (("odd",), lambda odd: False),
+    (("trial", 0), lambda text: "-1.0"),
+    (("trial", 1), lambda text: "nan"),
+    (("trial", 0), lambda text: str(float(text) * 0.9)),
+    (("guess",), lambda text: "nan"),
+    (("guess",), lambda text: str(float(text) * 1.05)),
+    (("effort", "first"), lambda text: "0.1"),
+    (("effort", "bits"), lambda number: 2),
+]
+
+
 @pytest.mark.parametrize(
-    ("path", "change"),
-    [
-        pytest.param(*(("interval", 0), lambda text: str(Decimal(text) + Decimal("1e-9"))), marks=pytest.mark.slow),
-        pytest.param(*(("interval", 1), lambda text: str(Decimal(text) - Decimal("1e-9"))), marks=pytest.mark.slow),
-        pytest.param(
-            *(("law", "curvature"), lambda pair: [str(float(pair[0]) * 1.001), pair[1]]), marks=pytest.mark.slow
-        ),
-        (("law",), lambda law: {**law, "note": "0.5"}),
-        (("weights",), lambda weights: {**weights, "specular reflection": "0"}),
-        (("weights", "law"), lambda pair: ["0.9", "0"]),
-        pytest.param(*(("weights", "specular"), lambda pair: ["1e-6", "0"]), marks=pytest.mark.slow),
-        (("weights", "lambertian"), lambda pair: ["-1e-6", "0"]),
-        pytest.param(*(("frame",), lambda text: "paper"), marks=pytest.mark.slow),
-        pytest.param(*(("odd",), lambda odd: False), marks=pytest.mark.slow),
-        pytest.param(*(("trial", 0), lambda text: "-1.0"), marks=pytest.mark.slow),
-        pytest.param(*(("trial", 3), lambda text: str(float(text) * 1.05)), marks=pytest.mark.slow),
-        pytest.param(*(("guess",), lambda text: "nan"), marks=pytest.mark.slow),
-        pytest.param(*(("trial", 1), lambda text: "nan"), marks=pytest.mark.slow),
-        pytest.param(*(("guess",), lambda text: str(float(text) * 1.05)), marks=pytest.mark.slow),
-        (("threshold",), lambda text: "0.95"),
-        (("other",), lambda text: "0.95"),
-        (("bins", 5), lambda text: "1.0"),
-        (("bins", -1), lambda text: "1.6"),
-        (("effort", "first"), lambda text: "-0.1"),
-        (("effort", "first"), lambda text: "0.6"),
-        pytest.param(*(("effort", "first"), lambda text: "0.1"), marks=pytest.mark.slow),
-        pytest.param(*(("effort", "bits"), lambda number: 2), marks=pytest.mark.slow),
-        (("precision",), lambda bits: 20),
-        (("format",), lambda text: "asperity proved gap 2"),
-        (("interval",), lambda ends: "09"),
-        # what is printed is what is proved
-        (("weights", "law"), lambda pair: [f"{pair[0]}\0 and more", pair[1]]),
-        (("weights", "law"), lambda pair: [*pair, "0"]),
-    ],
+    ("path", "change"), [*AT_ONCE, *(pytest.param(*one, marks=pytest.mark.slow) for one in WITH_THE_FORM)]
 )
 def test_a_certificate_that_was_tampered_with_is_refused(proof, path, change):
     old = proof.certificate
