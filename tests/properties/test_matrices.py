@@ -1,7 +1,6 @@
 """Properties of the matrix of every law in every basis: mass, balance, mirror images, frames, all methods alike."""
 
 import numpy as np
-import pytest
 
 from asperity import kernels as ker
 from asperity.errors import InputError
@@ -45,16 +44,17 @@ def test_entries_are_means_of_products_with_images(law, basis, matrix) -> None:
         assert np.linalg.norm(entries - matrix.symmetric) <= float(matrix.error) + rule
 
 
-@pytest.mark.parametrize("method", ["exact", "quadrature", "qmc", "monte-carlo"])
-def test_a_law_has_the_same_matrix_by_every_method_that_it_has(law: ker.Law, method: str) -> None:
+def test_a_law_has_the_same_matrix_by_every_method_that_it_has(law: ker.Law) -> None:
     bins = ker.Bins(4)
-    best = ker.discretise(law, bins, tolerance=1e-4)
-    try:
-        found = ker.discretise(law, bins, method, 1e-4, samples=2**13, rng=5)
-    except InputError as refusal:
-        assert "method" in str(refusal)
-        return
-    assert method in found.method
-    # a sampled error is a half width of 95 %, and here are many cases; of what is rarer than 3 rays it knows nothing
-    unseen = 3.0 / found.samples if found.samples else 0.0
-    assert np.linalg.norm(found.symmetric - best.symmetric) <= 3.0 * found.error.value + best.error.value + unseen
+    best = ker.discretise(law, bins, tolerance=1e-3)
+    for method in ("exact", "quadrature", "qmc", "monte-carlo"):
+        try:
+            found = ker.discretise(law, bins, method, 1e-3, samples=2**13, rng=5)
+        except InputError as refusal:
+            assert "method" in str(refusal)
+            continue
+        assert method in found.method
+        # a sampled error is a half width of 95 %, and here are many cases; of what is rarer than 3 rays it knows
+        # nothing
+        unseen = 3.0 / found.samples if found.samples else 0.0
+        assert np.linalg.norm(found.symmetric - best.symmetric) <= 3.0 * found.error.value + best.error.value + unseen

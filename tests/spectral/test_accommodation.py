@@ -73,10 +73,10 @@ def test_rays_agree_with_averages_and_with_the_misfit(law):
         assert abs(drawn.mean() - value) < 4.5 * drawn.std() / np.sqrt(number) + 1e-6
 
 
-def test_the_fraction_is_where_the_misfit_is_least():
-    law = ker.CircularArcLaw(0.3)
+@pytest.mark.parametrize("law", [ker.TriangularTeethLaw(0.7), ker.CircularArcLaw(0.3), ker.LeastResistanceLaw()])
+def test_the_fraction_is_where_the_misfit_is_least_and_its_error_holds_against_a_fine_rule(law):
     found = spec.accommodation(law)
-    angle, weight = ker.SINE.quadrature(np.linspace(0.0, np.pi, 65), 8)
+    angle, weight = ker.SINE.quadrature(np.linspace(0.0, np.pi, 4097), 4)
     along, across = law.apply(np.cos, angle), law.apply(np.sin, angle) - np.pi / 4.0
 
     def misfit(fraction):
@@ -84,33 +84,8 @@ def test_the_fraction_is_where_the_misfit_is_least():
         return np.sqrt(weight @ (rest[0] ** 2 + rest[1] ** 2))
 
     best = found.maxwell_fraction.value
-    assert 0.0 < best < 1.0
-    assert misfit(best) == pytest.approx(found.misfit.value, abs=2.0 * found.misfit.error + 1e-6)
-    assert misfit(best) < min(misfit(best - 1e-3), misfit(best + 1e-3))
-
-
-@pytest.mark.parametrize("law", [ker.TriangularTeethLaw(0.7), ker.CircularArcLaw(1.2), ker.LeastResistanceLaw()])
-def test_the_error_of_the_misfit_holds_against_a_fine_rule(law):
-    found = spec.accommodation(law)
-    angle, weight = ker.SINE.quadrature(np.linspace(0.0, np.pi, 4097), 4)
-    keeps = 1.0 - found.maxwell_fraction.value
-    rest = (
-        law.apply(np.cos, angle) + keeps * np.cos(angle),
-        law.apply(np.sin, angle) - np.pi / 4.0 - keeps * (np.sin(angle) - np.pi / 4.0),
-    )
-    fine = np.sqrt(weight @ (rest[0] ** 2 + rest[1] ** 2))
-    assert abs(fine - found.misfit.value) <= found.misfit.error + 1e-6
-
-
-@pytest.mark.slow
-def test_laws_without_known_means_are_sampled_with_honest_errors():
-    # a product of two driven laws: its conditional means have no error of their own
-    law = ker.WallLaw(geo.dispersing_arcs(0.5)) @ ker.WallLaw(geo.dispersing_arcs(0.5))
-    found = spec.accommodation(law, 1e-3, theta=[0.4, 1.2])
-    known = ker.WallLaw(geo.dispersing_arcs(0.5))
-    exact = 1.0 + known.apply(lambda t: known.apply(np.cos, t), [0.4, 1.2]) / np.cos([0.4, 1.2])
-    assert np.all(found.tangential_errors > 0.0)
-    assert np.all(np.abs(found.tangential_at - exact) < 2.3 * found.tangential_errors)
+    assert abs(misfit(best) - found.misfit.value) <= found.misfit.error + 1e-6
+    assert misfit(best) < min(misfit(other) for other in (best - 1e-3, best + 1e-3) if other < 1.0)
 
 
 @pytest.mark.parametrize("law", [ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.4), (1, 0)])),
@@ -161,9 +136,11 @@ def test_the_fraction_at_an_angle_is_where_the_misfit_is_least(law):
         assert np.all(found.misfit_at <= found.misfit_errors) and found.misfit_errors.max() < 1e-14
 
 
-def test_errors_of_the_fraction_at_an_angle_hold_for_sampled_laws():
+def test_errors_at_an_angle_hold_for_laws_without_known_means():
+    # a product of two driven laws: its conditional means have no error of their own
     one = ker.WallLaw(geo.dispersing_arcs(0.5))
-    sampled = spec.accommodation(one @ one, 1e-3, incidence_deg=[10.0, 50.0])
+    sampled = spec.accommodation(one @ one, 1e-4, incidence_deg=[10.0, 50.0])
+    assert sampled.tangential_missed.all()
     theta, exact = sampled.theta, []
     for function in (np.cos, np.sin):
         exact.append(one.apply(lambda t, function=function: one.apply(function, t), theta))
@@ -171,6 +148,7 @@ def test_errors_of_the_fraction_at_an_angle_hold_for_sampled_laws():
     complete = np.stack([np.cos(theta), np.sin(theta) - np.pi / 4.0], axis=1)
     fraction = np.clip(np.sum(changes * complete, axis=1) / np.sum(complete**2, axis=1), 0.0, 1.0)
     misfit = np.linalg.norm(changes - fraction[:, None] * complete, axis=1)
+    assert np.all(np.abs(1.0 + exact[0] / np.cos(theta) - sampled.tangential_at) < 2.3 * sampled.tangential_errors)
     assert np.all(np.abs(fraction - sampled.maxwell_fraction_at) < 1.5 * sampled.maxwell_fraction_errors)
     assert np.all(np.abs(misfit - sampled.misfit_at) < 1.5 * sampled.misfit_errors)
     assert np.all(sampled.misfit_errors > 1e-4)
@@ -274,20 +252,6 @@ def test_the_mean_accommodation_of_walls_is_four_times_their_mean_squared_slope(
             assert found.normal.value / square == pytest.approx(1.0 / (1.0 - 3.0 * np.pi**2 / 32.0), rel=1e-2)
 
 
-@pytest.mark.parametrize("wall", [geo.dispersing_arcs(1e-3), geo.focusing_arcs(0.02), geo.triangular_teeth(3.1)])
-def test_averages_of_shallow_walls_are_mean_squared_changes_of_rays(wall):
-    law, number, rng = ker.WallLaw(wall), 400_000, np.random.default_rng(8)
-    found = spec.accommodation(law)
-    theta = ker.SINE.sample(number, rng)
-    onward = np.pi - law.sample(theta, rng)
-    for function, square, value in (
-        (np.cos, 1.0 / 3.0, found.tangential), (np.sin, 2.0 / 3.0 - np.pi**2 / 16.0, found.normal)
-    ):  # fmt: skip
-        drawn = 0.5 * (function(onward) - function(theta)) ** 2 / square
-        assert abs(drawn.mean() - value.value) < 4.5 * drawn.std() / np.sqrt(number) + value.error
-        assert value.error < 1e-3 * value.value
-
-
 def test_the_misfit_of_very_shallow_teeth_is_that_of_their_exact_changes():
     size = 1e-5
     vertices = [(0.0, 0.0), (0.5, -0.5 * size), (1.0, 0.0)]
@@ -311,7 +275,4 @@ def test_angles_at_which_the_tolerance_is_missed_are_named():
     assert found.tangential_missed.tolist() == found.normal_missed.tolist() == [True, False]
     # the mean over so few rays has an error all the same, and it holds
     assert 0.0 < found.tangential_errors[0] < 0.2 * found.tangential_at[0]
-    law = ker.WallLaw(geo.dispersing_arcs(0.5))
-    sampled = spec.accommodation(law @ law @ law, 1e-3, theta=[0.5])
-    assert sampled.tangential_missed.all()
     assert not spec.accommodation(ker.specular(), theta=[0.5]).tangential_missed.any()

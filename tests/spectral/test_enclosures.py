@@ -19,18 +19,8 @@ def test_maxwell_has_one_indexed_eigenvalue_and_the_rest_is_refused_with_the_rea
     assert "its number is not known" in found[1].reason and "Lambertian fraction" in found[1].reason
 
 
-SHALLOW_CURVES = [
-    geo.Bezier([(0, 0), (0.3, -0.12), (1, 0)]),
-    geo.Bezier([(0, 0), (0.2, -0.15), (0.7, -0.1), (1, 0)]),
-    geo.Bezier([(0, 0), (0.5, -0.15), (1, 0)]),
-]
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    "wall",
-    [geo.focusing_arcs(0.3), geo.dispersing_arcs(0.5), *(geo.Wall([curve]) for curve in SHALLOW_CURVES)],
-    ids=["arc", "bumps", "skew", "skew cubic", "parabola"],
+    "wall", [geo.dispersing_arcs(0.5), geo.Wall([geo.Bezier([(0, 0), (0.3, -0.12), (1, 0)])])], ids=["bumps", "skew"]
 )
 def test_enclosures_of_curved_walls_hold_against_a_finer_run(wall):
     law = ker.WallLaw(wall)

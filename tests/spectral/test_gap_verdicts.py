@@ -108,15 +108,6 @@ def test_a_mushroom_ends_at_an_essential_edge_above_its_fraction_of_flat_tops():
     assert abs(means.mean() - edge.value) < 6.0 * means.std(ddof=1) / np.sqrt(8) + edge.error
 
 
-def test_the_focusing_arc_has_an_isolated_eigenvalue_in_both_conventions():
-    """Facts 10: 0.3670253152(3), and in the other convention minus the least, 0.311346443."""
-    law = ker.CircularArcLaw(1.2)
-    for turned, eigenvalue in ((law, 0.3670253152), (law.in_specular_frame(), 0.311346443)):
-        gap = spec.spectral_gap(turned, tolerance=1e-5)
-        assert gap.verdict == "isolated" and gap.error <= 1e-5
-        assert abs(1.0 - float(gap) - eigenvalue) <= gap.error
-
-
 def test_a_curved_wall_without_mirror_symmetry_is_isolated():
     law = ker.WallLaw(geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0)])]))
     gap = spec.spectral_gap(law, tolerance=1e-2)

@@ -27,10 +27,6 @@ def test_gaps_of_mixtures_with_isometries_are_enclosed_to_the_tolerance(law, ver
     found = spec.spectral_gap(law, tolerance=1e-6)
     assert found.verdict == verdict and found.error <= 1e-6
     assert abs(float(found) - gap) <= found.error + 1e-7
-    # Galerkin eigenvalues above the essential spectrum are lower bounds
-    matrix = ker.discretise(law, ker.Legendre(24), tolerance=1e-7)
-    lower = np.sort(np.linalg.eigvalsh(matrix.symmetric))[-2] - float(matrix.error)
-    assert verdict != "isolated" or 1.0 - lower >= float(found) - found.error
 
 
 @pytest.mark.parametrize("basis", [ker.Bins(5), ker.Panels(np.linspace(0.0, np.pi, 4), 3)], ids=repr)

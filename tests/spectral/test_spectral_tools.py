@@ -121,17 +121,10 @@ def test_the_page_on_diffusion_has_the_means_of_cotangents_that_rays_give():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("law", "arrangement"),
-    [
-        (ker.lambertian(), "mirror"),
-        (ker.maxwell(0.5), "mirror"),
-        (ker.maxwell(0.5), "half-turn"),
-        (ker.CircularArcLaw(np.pi / 2), "mirror"),
-    ],
-    ids=str,
+    ("law", "arrangement"), [(ker.maxwell(0.5), "half-turn"), (ker.CircularArcLaw(np.pi / 2), "mirror")], ids=str
 )
 def test_exit_times_agree_with_the_spectral_formula(law, arrangement):
-    lengths = 10.0 * 2.0 ** np.arange(0, 4.5, 0.5)
+    lengths = 10.0 * 2.0 ** np.arange(0, 4.0, 0.5)
     simulated = spec.exit_times(law, lengths, 1000, np.random.default_rng(5), arrangement=arrangement).eta()
     found = spec.diffusivity(law, arrangement=arrangement)
     assert abs(float(simulated) - found.eta) <= simulated.error + found.eta_error
@@ -218,10 +211,10 @@ def test_diffuse_channels_have_the_mean_exit_times_of_an_integral_equation_in_95
 
 
 def test_the_diffusivity_of_channels_grows_by_half_of_the_slope():
-    found = spec.channel_diffusivity(ker.lambertian(), [20.0, 200.0], rng=2)
-    slope = 2.0 * (found.values[1] - found.values[0]) / np.log(10.0)
-    assert abs(slope - float(spec.diffusivity(ker.lambertian()))) < 2.0 * found.errors.sum() / np.log(10.0) + 0.05
-    assert found.onset < 20.0 and "onset     3.1" in repr(found)
+    found = spec.channel_diffusivity(ker.lambertian(), [10.0, 80.0], rng=2)
+    slope = 2.0 * (found.values[1] - found.values[0]) / np.log(8.0)
+    assert abs(slope - float(spec.diffusivity(ker.lambertian()))) < 2.0 * found.errors.sum() / np.log(8.0) + 0.05
+    assert found.onset < 10.0 and "onset     3.1" in repr(found)
 
 
 def test_the_diffusivity_of_one_length_scales_with_radius_and_speed():
@@ -286,7 +279,7 @@ def test_a_diffusivity_that_the_limit_at_grazing_does_not_bound_is_refused():
 
 
 # ---- sampling ---------------------------------------------------------------------------------------------------
-RUNS = 2000
+RUNS = 1000
 LAW = ker.MatrixLaw([[0.5, 0.3, 0.2], [0.3, 0.4, 0.3], [0.2, 0.3, 0.5]])
 
 

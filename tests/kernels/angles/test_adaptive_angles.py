@@ -99,13 +99,6 @@ def test_rows_of_equal_hollows_and_flat_tops_are_those_of_one_hollow() -> None:
     assert both == pytest.approx(0.8 * one + 0.2 * math.cos(np.pi - 1.0), abs=1e-12)
 
 
-def test_discretise_takes_adaptive_rows_for_a_curved_wall_of_few_pieces() -> None:
-    found = ker.discretise(ker.WallLaw(geo.dispersing_arcs(0.5)), ker.Legendre(2), tolerance=1e-5)
-    assert found.method == "quadrature" and found.tolerance_met
-    assert "adaptive angles" in found.error.method
-    assert float(np.linalg.norm(found.symmetric - found.symmetric.T)) <= float(found.error)
-
-
 def test_rays_are_taken_where_rows_have_pieces_without_number():
     law = ker.WallLaw(random_curved_wall(6))
     chosen, rays = (ker.discretise(law, ker.Legendre(4), method=how, tolerance=1e-6) for how in ("auto", "qmc"))
@@ -148,20 +141,17 @@ def test_rows_of_a_wall_with_an_island_agree_with_traced_rays():
 
 
 @pytest.mark.parametrize("depth", [0.5, 3.0])
-@pytest.mark.parametrize("basis", [ker.Bins(8), ker.Legendre(8)], ids=repr)
-def test_near_grazing_in_channels_where_nodes_sample_noise_errors_still_hold(depth: float, basis: ker.Basis) -> None:
+def test_near_grazing_in_channels_where_nodes_sample_noise_errors_still_hold(depth: float) -> None:
     """The law of rectangular teeth has no antisymmetric errors, so only the rules on the panels can show them."""
-    wall = geo.rectangular_teeth(depth)
+    wall, basis = geo.rectangular_teeth(depth), ker.Legendre(8)
     exact = ker.discretise(ker.WallLaw(wall), basis)
     for tolerance in (1e-2, 1e-3):
         matrix, error, _ = traced_matrix(wall, basis, Budget(tolerance, segments=1_000_000))
         assert np.linalg.norm(matrix - exact.symmetric) <= error + float(exact.error)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("floor", [[(0.5, 0.2)], [(0.25, 0.15), (0.5, 0.05), (0.75, 0.15)]])
-def test_matrices_of_crevices_with_straight_floors_are_the_exact_ones(floor):
-    bottom = [(0.2 + 0.5 * x, -0.3 - depth) for x, depth in floor]
+def test_matrices_of_crevices_with_straight_floors_are_the_exact_ones():
+    bottom = [(0.325, -0.45), (0.45, -0.35), (0.575, -0.45)]
     wall = geo.Wall.from_vertices([(0, 0), (0.2, 0), (0.2, -0.3), *bottom, (0.7, -0.3), (0.7, 0), (0.9, 0)])
     exact = ker.discretise(ker.WallLaw(wall), ker.Legendre(4), tolerance=1e-9)
     matrix, error, _ = traced_matrix(wall, ker.Legendre(4), Budget(2e-4))

@@ -77,8 +77,10 @@ REGIONS = {
 }
 
 
-@pytest.mark.parametrize("region", ["circle", *REGIONS])
-@pytest.mark.parametrize("body", [TRIANGLE, SLOT, ker.zero_resistance_body()], ids=["triangle", "slot", "pair"])
+@pytest.mark.parametrize(
+    ("body", "region"),
+    [(SLOT, "circle"), (TRIANGLE, "polygon"), (ker.zero_resistance_body(), "ellipse"), (SLOT, "stadium")],
+)
 def test_scattering_in_a_convex_region_is_an_involution_that_preserves_the_flux(body, region):
     n, centre, radius = 20_000, (0.5, 0.6), 4.0
     if region == "circle":
@@ -102,20 +104,6 @@ def test_scattering_in_a_convex_region_is_an_involution_that_preserves_the_flux(
         (np.cos(place), 0.0), (np.sin(place), 0.0),
     ):  # fmt: skip
         assert abs(values.mean() - exact) < 4.5 * values.std() / np.sqrt(n)
-
-
-def test_the_lines_that_meet_a_body_do_not_depend_on_the_region_around_it():
-    """Crofton: perimeter(C) times the distribution of what a line meets, for a polygon, an ellipse and a circle."""
-    body = np.sum(np.hypot(*(np.roll(TRIANGLE.polygons[0], -1, axis=0) - TRIANGLE.polygons[0]).T))
-    n = 40_000
-    for region in REGIONS.values():
-        around = region.closed()
-        before, _ = TRIANGLE.scatter_in(region, n, RNG)
-        _, free = ker.PolygonalBody([[(0.5, 0.5), (0.5 + 1e-7, 0.5), (0.5, 0.5 + 1e-7)]]).scatter_in(region, n, RNG)
-        after = TRIANGLE._through_region(before, around)
-        met = np.abs(after - free).max(axis=1) > 1e-6
-        fraction = body / around.perimeter
-        assert abs(met.mean() - fraction) < 4.5 * np.sqrt(fraction * (1 - fraction) / n)
 
 
 def test_the_fraction_of_lines_that_meet_a_convex_body_is_its_perimeter_over_that_of_the_circle():

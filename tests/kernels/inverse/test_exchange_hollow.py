@@ -7,7 +7,6 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
 from asperity.kernels.inverse.aplanats import MirrorPair
-from asperity.kernels.inverse.mirror_layout import CLEARANCE, arranged, mirror_groups
 
 
 def exchange_of(law, cells):
@@ -68,49 +67,16 @@ def test_the_ratio_of_the_distances_is_that_asked_for():
     assert min(float(pair.distance(which, t)) for which in (0, 1) for t in pair.ends) == pytest.approx(1.0)
 
 
-def test_no_beam_meets_a_third_mirror():
-    exchange = exchange_of(ker.lambertian(), 5)
-    ends = np.concatenate([[0.0], ker.SINE.quantile(exchange.starts[1:]), [np.pi]])
-    groups = mirror_groups(ends, exchange.partner.tolist(), 1e-3, 1e-6)
-    factors = arranged(groups)
-    assert factors.min() == 1.0
-    beams = 0
-    for beam, scale in zip(groups, factors, strict=True):
-        if beam.pair is None:
-            continue
-        t = np.linspace(*beam.pair.ends, 50)
-        near, far = (scale * beam.pair.curve(which, t).position for which in (0, 1))
-        theta, image = beam.pair.angles(t)
-        for other, factor in zip(groups, factors, strict=True):
-            for angles, distance in () if other is beam else other.points:
-                between = (angles[0] >= theta.max() - 1e-12) & (angles[-1] <= image.min() + 1e-12)
-                if not between:
-                    assert angles[-1] <= theta.max() + 1e-12 or angles[0] >= image.min() - 1e-12
-                    continue
-                # where the line from near to far crosses the ray at each angle
-                ray = -np.stack([np.cos(angles), np.sin(angles)], axis=1)
-                join = far - near
-                numerator = near[:, 0] * join[:, 1] - near[:, 1] * join[:, 0]
-                crossing = numerator[:, None] / (ray[:, 0] * join[:, 1:] - ray[:, 1] * join[:, :1])
-                quotient = crossing / (factor * distance)
-                assert quotient.max() < 1.0 / (1.0 + 0.9 * CLEARANCE) or quotient.min() > 1.0 + 0.9 * CLEARANCE
-                beams += 1
-    assert beams > 20
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(("law", "cells"), [(ker.lambertian(), 2), (ker.henyey_greenstein(0.5), 3)])
-def test_the_loss_falls_in_proportion_to_the_opening(law, cells):
-    exchange = exchange_of(law, cells)
-    openings = np.array([1e-2, 1e-3, 1e-4])
-    found = [
-        ker.exchange_hollow(exchange, opening).loss(2**size)
-        for opening, size in zip(openings, (16, 16, 19), strict=True)
-    ]
-    value, error = np.array([float(one) for one in found]), np.array([one.error for one in found])
-    order, spread = np.log10(value[0] / value[2]) / 2.0, np.hypot(*(error / value)[[0, 2]]) / np.log(100.0)
+def test_the_loss_falls_in_proportion_to_the_opening():
+    exchange = exchange_of(ker.henyey_greenstein(0.5), 3)
+    wide, narrow = (
+        ker.exchange_hollow(exchange, opening).loss(rays) for opening, rays in ((1e-2, 2**14), (1e-4, 2**19))
+    )
+    order = np.log10(wide.value / narrow.value) / 2.0
+    spread = np.hypot(wide.error / wide.value, narrow.error / narrow.value) / np.log(100.0)
     assert abs(order - 1.0) < 0.15 and spread < 0.1
-    assert value[0] < 0.05 and value[2] < 5e-4
+    assert wide.value < 0.05 and narrow.value < 5e-4
 
 
 def test_rays_leave_where_the_exchange_sends_them():
@@ -134,17 +100,14 @@ def test_rays_leave_where_the_exchange_sends_them():
 def random_exchanges():
     """Exchanges of neighbours by different fractions of cells, and mixtures of permutations and their inverses."""
     rng = np.random.default_rng(3)
-    for cells in (3, 5):
-        matrix = np.diag(rng.uniform(0.1, 0.45, cells - 1), 1)
-        matrix += matrix.T
-        yield matrix + np.diag(1.0 - matrix.sum(axis=1))
-    for cells in (4, 8):
-        matrix = np.mean([np.eye(cells)[rng.permutation(cells)] for _ in range(2)], axis=0)
-        yield 0.5 * (matrix + matrix.T)
-    yield np.eye(6)[[1, 0, 3, 2, 5, 4]]
+    matrix = np.diag(rng.uniform(0.1, 0.45, 2), 1)
+    matrix += matrix.T
+    yield matrix + np.diag(1.0 - matrix.sum(axis=1))
+    matrix = np.mean([np.eye(5)[rng.permutation(5)] for _ in range(2)], axis=0)
+    yield 0.5 * (matrix + matrix.T)
+    yield np.eye(4)[[1, 0, 3, 2]]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("matrix", list(random_exchanges()), ids=lambda matrix: f"{len(matrix)} cells")
 def test_every_symmetric_matrix_has_its_chamber(matrix):
     nothing = Estimate(0.0, 0.0, "bound", "given")
@@ -160,7 +123,7 @@ def test_every_symmetric_matrix_has_its_chamber(matrix):
 def test_a_chamber_for_the_least_resistance_has_one_below_0_990():
     exchange = exchange_of(ker.LeastResistanceLaw(), 16)
     hollow = ker.exchange_hollow(exchange, 1e-4)
-    found = hollow.mean(air_resistance, 1.5, 2**16)
+    found = hollow.mean(air_resistance, 1.5, 2**14)
     assert float(ker.resistance(exchange)) < float(found)
     # also with the flat necks of many generations, whose resistance is 1
     limit = hollow.generations(1, neck=1e-3, samples=2).limit

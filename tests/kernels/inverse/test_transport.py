@@ -60,7 +60,7 @@ def test_rectangular_teeth_have_half_their_flat_tops_resistance_and_half_of_the_
 
 
 def test_the_parabola_pair_nearly_sends_everything_back():
-    found = ker.resistance(ker.WallLaw(geo.double_parabola()), tolerance=1e-5)
+    found = ker.resistance(ker.WallLaw(geo.double_parabola()), tolerance=5e-5)
     # published 1.4965, by an independent tracer 1.4964998
     assert abs(found.value - 1.4964998) <= found.error + 5e-8 and found.error < 1e-4
 
@@ -170,11 +170,6 @@ def test_any_potential_gives_a_bound_of_the_continuum():
     assert hat_masses(nodes).sum() == pytest.approx(1.0, abs=1e-14)
 
 
-def test_nothing_known_lies_outside_the_extremes():
-    for law in (ker.specular(), ker.CircularArcLaw(1.3), ker.TriangularTeethLaw(1.46), ker.henyey_greenstein(-0.5)):
-        assert LEAST < float(ker.resistance(law)) < 1.5
-
-
 # ---- from a law to a wall ----------------------------------------------------------------------------------------
 def random_symmetric_flux(rng, n):
     """A symmetric doubly stochastic matrix: an average of permutations and their transposes."""
@@ -208,28 +203,6 @@ def test_involutions_converge_to_the_least_law():
     weak = [float(ker.distance(member, law, kind="pseudometric", tolerance=1e-6)) for member in members]
     rows = [float(ker.distance(member, law, tolerance=5e-2)) for member in members]
     assert rows[1] < 0.6 * rows[0] < 0.06 and weak[1] < 0.3 * weak[0]
-
-
-def test_two_mirrors_swap_narrow_intervals_and_lose_in_proportion_to_the_opening():
-    near = np.array([1.18, 1.22])
-    # of the same measure, about 2.0
-    far = np.arccos(np.cos(near) + np.cos(2.0) - np.cos(1.2))
-    swap = np.eye(5)[[0, 3, 2, 1, 4]]
-    cells = ker.Bins(np.array([0.0, *near, *far, np.pi]))
-    exchange = ker.IntervalExchangeLaw(ker.KernelMatrix(swap, cells, Estimate(0.0, 0.0, "bound", "given")))
-    losses = []
-    for opening in (4e-3, 1e-3):
-        hollow = ker.exchange_hollow(exchange, opening)
-        losses.append(hollow.loss(2**18))
-    assert losses[0].value - losses[0].error > 0.0
-    ratio = losses[0].value / losses[1].value
-    assert 3.0 < ratio < 5.5
-    # through the focus the map is the exchange, which moves the cosine by a constant
-    focus = 0.5 * sum(hollow.opening)
-    theta = np.array([1.19, 1.2, 1.21])
-    traced = geo.trace(hollow.wall, np.full(3, focus), theta)
-    np.testing.assert_allclose(np.cos(traced.theta) - np.cos(theta), np.cos(2.0) - np.cos(1.2), atol=1e-7)
-    assert traced.collisions.tolist() == [2, 2, 2]
 
 
 # ---- bodies and families -----------------------------------------------------------------------------------------
@@ -287,21 +260,6 @@ def test_the_best_isosceles_triangle_is_stationary_and_better_than_its_neighbour
     assert len(best.tried) >= 12 and best.tried[:, 1].max() <= best.value.value + 1e-12
 
 
-def parabola_pair(focal_length):
-    """Two parabolas with their vertices at the tips; with 1 the focus of each is the other's tip."""
-    depth = np.sqrt(2 * focal_length)
-    sides = [(0, 0), (0, -depth / 2), (0.5, -depth)], [(0.5, -depth), (1, -depth / 2), (1, 0)]
-    return geo.Wall([geo.Bezier(side) for side in sides], period=1.0)
-
-
-def test_the_best_pair_of_parabolas_has_each_focus_in_the_others_tip():
-    # a search of the whole family takes a minute; the resistance has a corner at 1
-    found = [ker.resistance(ker.WallLaw(parabola_pair(focal)), 1e-3) for focal in (0.9, 1.0, 1.1)]
-    below, best, above = (value.value for value in found)
-    assert best == pytest.approx(1.4965, abs=1e-3)
-    assert best - below > 0.08 and best - above > 0.08
-
-
 def test_two_parameters_are_searched_together():
     # a mixture of three laws whose resistance is quadratic in the fractions, with the maximum 1.5 at (0.3, 0.6)
     def member(a, b):
@@ -319,15 +277,6 @@ def test_blunt_teeth_converge_to_a_mirror_with_order_1():
     assert np.all(np.abs(np.log2(found[:-1] / found[1:]) - 1.0) < 0.05)
 
 
-def test_a_profile_converges_as_its_resolution_grows():
-    laws = []
-    for samples in (4, 8, 16):
-        x = np.linspace(0.0, 1.0, samples + 1)
-        laws.append(ker.WallLaw(geo.Wall.from_profile(x, 0.1 * np.cos(2 * np.pi * x))))
-    first, second = (float(ker.distance(one, other, tolerance=3e-2)) for one, other in itertools.pairwise(laws))
-    assert second < 0.75 * first
-
-
 def test_deep_crevices_converge_weakly_but_not_row_by_row():
     laws = [ker.RectangularTeethLaw(2.0**k) for k in (1, 3)]
     limit = 0.75 * ker.specular() + 0.25 * ker.retroreflection()
@@ -337,19 +286,18 @@ def test_deep_crevices_converge_weakly_but_not_row_by_row():
     assert rows[-1] > 0.5 * rows[0]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("kind", "least"), [("zigzag", 1e-5), ("bottle", 1e-4)])
-def test_the_resistance_of_a_wall_without_closed_form_meets_its_tolerance(kind, least):
+@pytest.mark.parametrize(
+    ("points", "tolerance"),
+    [
+        ([(0, 0), (0.2, -0.4), (0.5, -0.1), (0.7, -0.6), (1, 0)], 1e-5),
+        ([(0, 0), (0.35, -0.3), (0.15, -0.8), (0.9, -0.7), (0.7, -0.3), (1, 0)], 1e-3),
+    ],
+    ids=["zigzag", "bottle"],
+)
+def test_the_resistance_of_a_wall_without_closed_form_meets_its_tolerance(points, tolerance):
     # straight Bezier pieces are traced; the same polygon is known exactly by its beams
-    points = {
-        "zigzag": [(0, 0), (0.2, -0.4), (0.5, -0.1), (0.7, -0.6), (1, 0)],
-        "bottle": [(0, 0), (0.35, -0.3), (0.15, -0.8), (0.9, -0.7), (0.7, -0.3), (1, 0)],
-    }[kind]
     ends = np.array(points, dtype=float)
     pieces = [geo.Bezier([a, 0.5 * (a + b), b]) for a, b in itertools.pairwise(ends)]
     exact = ker.resistance(ker.PolygonLaw(geo.Wall.from_vertices(points)))
-    law = ker.WallLaw(geo.Wall(pieces))
-    coarse, fine = (ker.resistance(law, tolerance, time_limit=120.0) for tolerance in (1e-3, least))
-    for found in (coarse, fine):
-        assert abs(found.value - exact.value) <= found.error + exact.error
-    assert coarse.error <= 1e-3 and fine.error <= least
+    found = ker.resistance(ker.WallLaw(geo.Wall(pieces)), tolerance, time_limit=120.0)
+    assert abs(found.value - exact.value) <= found.error + exact.error and found.error <= tolerance

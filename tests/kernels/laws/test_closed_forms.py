@@ -61,14 +61,6 @@ def test_triangular_branches_are_the_fractions_of_entry_points(angle: float, the
     assert abs(sum(expected.values()) - 1.0) < 8 * EPS
 
 
-def test_rectangular_law_is_the_corrected_formula_of_the_ledger() -> None:
-    ratio, theta = 1.7, np.linspace(0.05, 3.1, 400)
-    d = 2.0 * ratio * np.abs(np.cos(theta) / np.sin(theta))
-    part, even = d % 1.0, np.floor(d) % 2.0 == 0.0
-    found = ker.RectangularTeethLaw(ratio).branches(theta)[0][:, 0]
-    assert np.allclose(found, np.where(even, 1 - part / 2, 0.5 + part / 2), atol=1e-13)
-
-
 def test_shallow_incidence_on_triangles_has_the_two_outcomes_of_the_ledger() -> None:
     psi = 0.7
     theta = np.linspace(0.01, 0.5 * (math.pi - psi) - 1e-6, 300)
@@ -77,17 +69,6 @@ def test_shallow_incidence_on_triangles_has_the_two_outcomes_of_the_ledger() -> 
     probability, _ = ker.TriangularTeethLaw(psi).branches(theta)
     assert np.allclose(probability[:, 0], p, atol=1e-13)
     assert np.allclose(probability[:, :2].sum(axis=1), 1.0, atol=1e-15)
-
-
-def test_right_angled_teeth_are_corner_reflectors_or_mirrors() -> None:
-    law = ker.TriangularTeethLaw(math.pi / 2)
-    theta = np.linspace(0.1, 3.0, 50)
-    probability, outgoing = law.branches(theta)
-    retro = np.abs(outgoing - theta[:, None]) < 1e-14
-    turned = [np.abs(outgoing - (quarters * math.pi / 2 - theta)[:, None]) < 1e-14 for quarters in (1, 3)]
-    assert np.all(retro | turned[0] | turned[1] | (probability == 0.0))
-    # straight down, every ray hits both sides
-    assert np.allclose(law.apply(lambda angle: np.abs(angle - math.pi / 2), math.pi / 2), 0.0, atol=1e-15)
 
 
 def test_equal_isometries_left_and_right_are_merged_where_the_apex_angle_divides_two_pi() -> None:
@@ -246,17 +227,6 @@ def test_sawteeth_keep_the_harmonics_of_their_base_angle() -> None:
         for k in (1, 2, 3):
             image = law.apply(lambda angle, k=k, parts=parts: np.cos(parts * k * angle), theta)
             assert np.allclose(image, (-1) ** (parts * k) * np.cos(parts * k * theta), atol=1e-12)
-
-
-def test_shallow_arcs_relax_at_four_times_their_mean_squared_slope() -> None:
-    # <u, P_F u>/<u, u> = 1 - 4h (1 + O(h)) with h = [ln(sec xi + tan xi) - sin xi]/sin xi
-    for xi, allowance in ((0.1, 0.01), (0.02, 0.0005)):
-        paper = ker.CircularArcLaw(xi)
-        law = paper.in_specular_frame()
-        angle, weight = ker.SINE.quadrature(np.concatenate([[0.0], paper.breakpoints(100)[0], [math.pi]]), 16)
-        decay = 1.0 - 3.0 * float(weight @ (np.cos(angle) * law.apply(np.cos, angle)))
-        h = (math.log(1.0 / math.cos(xi) + math.tan(xi)) - math.sin(xi)) / math.sin(xi)
-        assert abs(decay / (4.0 * h) - 1.0) < allowance
 
 
 def test_arc_rows_by_formula_equal_the_mean_over_entry_points() -> None:

@@ -134,7 +134,7 @@ def test_rays_that_all_go_to_one_cell_leave_the_error_of_events_that_none_met() 
         assert float(found.error) == pytest.approx(2.0 * missed, rel=1e-9)
 
 
-REPEATS = 120
+REPEATS = 60
 # A coverage of 95 % gives a smaller p-value once in two thousand cases.
 RARE = 5e-4
 TEETH = "TriangularTeethLaw(angle=1.1)"

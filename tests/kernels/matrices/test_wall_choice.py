@@ -19,17 +19,17 @@ PROFILE = geo.Wall.from_vertices(
 KOCH = geo.koch(4)
 MUSHROOMS = ker.WallLaw(geo.mushrooms(0.3, 0.5))
 FORESHORTENED = geo.focusing_arcs(1.2).foreshorten(geo.Disk(1.0, 0.5))
-TOLERANCES = (1e-2, 2e-3, 1e-3, 1e-4, 2e-5, 1e-8)
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-8)
 
 
-@pytest.mark.parametrize("basis", [ker.Legendre(2), ker.Legendre(12), ker.Bins(16)], ids=repr)
 @pytest.mark.parametrize(
-    "wall",
+    ("wall", "basis"),
     [
-        FORESHORTENED, geo.double_parabola(), geo.dispersing_arcs(1.0), geo.dispersing_arcs(2.0),
-        geo.mushrooms(0.3, 0.5), wall_of("mixed"), random_curved_wall(6), geo.koch(3),
+        (FORESHORTENED, ker.Legendre(2)), (geo.dispersing_arcs(1.0), ker.Legendre(12)),
+        (geo.dispersing_arcs(2.0), ker.Bins(16)), (geo.mushrooms(0.3, 0.5), ker.Legendre(2)),
+        (wall_of("mixed"), ker.Legendre(2)), (random_curved_wall(6), ker.Bins(16)), (geo.koch(3), ker.Legendre(2)),
     ],
-    ids=["flat arc", "double parabola", "dispersing", "cusps", "mushrooms", "mixed", "random", "koch"],
+    ids=["flat arc", "dispersing", "cusps", "mushrooms", "mixed", "random", "koch"],
 )  # fmt: skip
 def test_the_reported_error_never_grows_when_the_tolerance_falls(wall, basis):
     law = ker.WallLaw(wall)
@@ -106,16 +106,6 @@ def test_few_pieces_are_done_by_isometries_whatever_the_tolerance():
     assert ker.discretise(ker.WallLaw(wall), ker.Bins(8), tolerance=0.1).method == "exact"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("wall", [geo.dispersing_arcs(1.0), geo.mushrooms(0.3)], ids=["dispersing", "mushrooms"])
-def test_curved_walls_in_bins_are_left_to_quadrature_where_it_is_far_more_exact(wall):
-    law, basis = ker.WallLaw(wall), ker.Bins(32)
-    chosen, rays = (ker.discretise(law, basis, method=how) for how in ("auto", "qmc"))
-    assert chosen.method == "quadrature" and float(chosen.error) <= 0.01 * float(rays.error)
-    # Student's distribution, as above
-    assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= 2.5 * float(rays.error)
-
-
 @pytest.mark.parametrize(("name", "bins"), [("cusps", 64), ("random-15", 128)])
 def test_quadrature_is_not_begun_where_its_first_panels_would_take_too_long(name, bins, monkeypatch):
     monkeypatch.setattr(
@@ -124,11 +114,12 @@ def test_quadrature_is_not_begun_where_its_first_panels_would_take_too_long(name
     assert ker.discretise(ker.WallLaw(wall_of(name)), ker.Bins(bins)).method == "qmc"
 
 
-@pytest.mark.parametrize("name", ["mushroom", "random-17"])
-def test_cells_of_few_pieces_are_more_exact_by_quadrature(name):
-    law, basis = ker.WallLaw(wall_of(name)), ker.Bins(16)
+@pytest.mark.parametrize(("wall", "most"), [(geo.mushrooms(0.3), 0.01), (wall_of("random-17"), 0.5)], ids=repr)
+def test_cells_of_few_pieces_are_more_exact_by_quadrature(wall, most):
+    law, basis = ker.WallLaw(wall), ker.Bins(16)
     chosen, rays = (ker.discretise(law, basis, method=how) for how in ("auto", "qmc"))
-    assert chosen.method == "quadrature" and float(chosen.error) <= 0.5 * float(rays.error)
+    assert chosen.method == "quadrature" and float(chosen.error) <= most * float(rays.error)
+    # Student's distribution, as above
     assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= 2.5 * float(rays.error)
 
 

@@ -16,8 +16,6 @@ from asperity.geometry.polygons.compiled import division
 from asperity.kernels.discretisation.isometry_tables import table_matrix
 from asperity.kernels.walls.polygon import table_of_beams
 
-RANDOM = 50
-
 
 def row(beams, theta):
     """Probabilities by isometry at one angle, straight from the pieces."""
@@ -29,19 +27,6 @@ def row(beams, theta):
 def mean_cosine(beams, theta):
     probability, sign, offset = row(beams, theta)
     return probability @ np.cos(sign * theta + offset), probability.sum()
-
-
-@pytest.mark.parametrize("angle", [0.1, 0.7, np.pi / 2, 2.0, 3.0])
-def test_triangular_teeth_have_their_closed_law(angle):
-    wall = geo.triangular_teeth(angle)
-    beams = beams_of(wall.vertices)
-    law = ker.TriangularTeethLaw(angle)
-    assert beams.unresolved == 0.0
-    for theta in np.linspace(0.01, np.pi - 0.01, 23):
-        probability, outgoing = law.branches(theta)
-        mean, total = mean_cosine(beams, theta)
-        assert abs(total - 1.0) < 1e-13 / np.sin(theta)
-        assert abs(mean - probability @ np.cos(outgoing)) < 1e-13 / np.sin(theta)
 
 
 @pytest.mark.parametrize("ratio", [0.2, 1.0, 2.5])
@@ -58,19 +43,12 @@ def test_a_rectangular_crevice_reflects_by_the_fractional_part_of_its_depth(rati
         assert np.abs(offset[sign < 0] - np.pi).max(initial=0.0) == 0.0
 
 
-@pytest.mark.parametrize("seed", range(RANDOM))
-def test_the_pieces_of_a_random_hollow_have_mass_one(seed):
+@pytest.mark.parametrize("seed", range(25))
+def test_the_pieces_of_a_random_hollow_have_mass_one_and_isometries_are_as_likely_as_their_inverses(seed):
     beams = beams_of(random_hollow(seed), max_beams=20_000)
     assert beams.defect < 1e-13
     assert abs(beams.resolved() + beams.unresolved - 1.0) < 1e-13
-    assert beams.rounding < 1e-10
-    if seed % 2 == 0:
-        assert beams.unresolved <= 1e-12
-
-
-@pytest.mark.parametrize("seed", range(RANDOM))
-def test_every_isometry_is_as_likely_as_its_inverse(seed):
-    beams = beams_of(random_hollow(seed), max_beams=20_000)
+    assert beams.rounding < 1e-10 and (seed % 2 == 1 or beams.unresolved <= 1e-12)
     theta = np.random.default_rng(seed).uniform(0.1, np.pi - 0.1, 4)
     for angle in theta:
         probability, sign, offset = row(beams, angle)
@@ -113,7 +91,7 @@ def test_half_of_the_rays_into_a_mirror_symmetric_hollow_tell_the_other_half(see
         assert np.abs(np.subtract(mean_cosine(half, theta), mean_cosine(whole, theta))).max() < 1e-12
 
 
-@pytest.mark.parametrize("seed", range(0, RANDOM, 3))
+@pytest.mark.parametrize("seed", range(0, 50, 3))
 def test_a_ray_in_the_middle_of_a_piece_is_traced_to_its_isometry(seed):
     hollow = random_hollow(seed)
     beams = beams_of(hollow, max_beams=20_000)
@@ -206,7 +184,7 @@ def test_a_hollow_symmetric_within_rounding_is_off_by_no_more_than_its_leaves_sa
     beams = beams_of(given, max_beams=20_000, mirror_symmetric=True)
     worst = 0.0
     long = np.flatnonzero((beams.bounces > 600) & (beams.flux() > 1e-12) & (beams.low > 0.5 * np.pi))
-    for k in np.random.default_rng(1).choice(long, 12, replace=False):
+    for k in np.random.default_rng(1).choice(long, 4, replace=False):
         theta = 0.5 * (beams.low[k] + beams.high[k])
         found = exact_row(given, theta, max_bounces=100_000)
         apart = np.abs(found.offset - beams.offset[k])
