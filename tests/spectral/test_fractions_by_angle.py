@@ -201,3 +201,23 @@ def test_laws_of_which_the_fraction_is_not_known_are_refused(law):
 def test_degrees_of_the_specular_fraction_are_checked():
     with pytest.raises(InputError, match=r"^incidence_deg: "):
         spec.specular_share(ker.specular(), [0.0, 90.0])
+
+
+@pytest.mark.parametrize("angle", [1.2, 2.0, 2.6])
+@pytest.mark.parametrize("degrees", [0.0, 10.0, 25.0])
+def test_single_bounces_of_grooves_are_torrance_and_sparrows_attenuation(angle, degrees):
+    """Of a lit side the fraction min(1, 2 (n h)(n v)/(v h)) reflects once: h its normal, v outgoing, n the border's."""
+    incidence, seen = np.radians(degrees), 0.0
+    opening = 2.0 * np.sin(0.5 * angle) * np.cos(incidence)
+    toward = np.array([np.sin(incidence), -np.cos(incidence)])
+    for side in (-1.0, 1.0):
+        normal = np.array([-side * np.cos(0.5 * angle), np.sin(0.5 * angle)])
+        facing = -float(toward @ normal)
+        leaving = toward + 2.0 * facing * normal
+        assert facing > 0.0
+        masked = 1.0 if leaving[1] <= 0.0 else 2.0 * normal[1] * leaving[1] / facing
+        # a ray that moves on downwards, or outwards over the same side, meets no other
+        outward = leaving[1] > 0.0 and side * leaving[0] > 0.0
+        seen += facing / opening * (0.0 if leaving[1] <= 0.0 else 1.0 if outward else min(1.0, masked))
+    (row,) = spec.bounce_shares(geo.triangular_teeth(angle), degrees)
+    assert row[0].value == pytest.approx(seen, abs=1e-13)

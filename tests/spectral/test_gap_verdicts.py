@@ -134,3 +134,12 @@ def test_a_tolerance_below_the_rounding_asks_for_what_there_is():
     law, theta = ker.LeastResistanceLaw(), np.array([0.5, 1.0])
     rough, fine = (expectations(law, ker.Legendre(3))(theta, tolerance)[0] for tolerance in (1e-6, 1e-20))
     assert fine == pytest.approx(rough, abs=1e-6)
+
+
+def test_the_focusing_arc_has_an_isolated_eigenvalue_in_both_conventions():
+    """Facts 10: 0.3670253152(3), and in the other convention minus the least, 0.311346443."""
+    law = ker.CircularArcLaw(1.2)
+    for turned, eigenvalue in ((law, 0.3670253152), (law.in_specular_frame(), 0.311346443)):
+        gap = spec.spectral_gap(turned, tolerance=1e-5)
+        assert gap.verdict == "isolated" and gap.error <= 1e-5
+        assert abs(1.0 - float(gap) - eigenvalue) <= gap.error

@@ -78,3 +78,16 @@ def test_the_error_of_an_eigenvalue_holds_in_small_bases(degree):
     found = spec.spectrum(ker.CircularArcLaw(1.2), k=2, basis=ker.Legendre(degree))
     low, high = found.intervals[1]
     assert low <= 0.3670253152 <= high
+
+
+@pytest.mark.parametrize(("half_angle", "ratio"), [(0.1, 0.996971), (0.2, 0.987607)])
+def test_gap_of_shallow_arcs_is_four_times_the_mean_squared_slope(half_angle, ratio):
+    """h = [ln(sec xi + tan xi) - sin xi]/sin xi is the mean squared slope; gap/(4h) tends to 1 like 1 - 0.3 xi^2.
+
+    The ratios are Rayleigh quotients of 2^21 traced rays (test_an_eigenvalue_is_the_rayleigh_quotient_of_traced_rays).
+    """
+    h = (np.log(1 / np.cos(half_angle) + np.tan(half_angle)) - np.sin(half_angle)) / np.sin(half_angle)
+    law = ker.WallLaw(geo.focusing_arcs(half_angle)).in_specular_frame()
+    gap = spec.spectral_gap(law, tolerance=1e-6)
+    assert abs(float(gap) / (4 * h) - ratio) < 1e-6 + gap.error / (4 * h)
+    assert gap.error / (4 * h) < 2e-3

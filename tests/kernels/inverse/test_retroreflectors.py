@@ -94,3 +94,10 @@ def test_the_tube_agrees_with_rotations_of_the_circle():
     expected = np.array([unfolded(a, b, 6, 0.2) for a, b in zip(x, theta, strict=True)])
     assert found.escaped.all()
     assert np.mean(np.abs(found.theta - expected) > 1e-9) < 0.02
+
+
+def test_deep_tubes_with_short_plates_are_nearer_to_retroreflection():
+    near, far = (
+        ker.retroreflection_distance(geo.tube(plates, height), 2000, rng=0) for plates, height in ((30, 0.1), (3, 0.4))
+    )
+    assert float(near) + near.error < float(far) - far.error

@@ -265,9 +265,8 @@ def number(text):
 CHEAP = ("flat", "triangular-teeth", "rectangular-teeth", "focusing-arcs")
 
 
-# Koch's row takes as long as three others together.
 @pytest.mark.parametrize("name", [
-    name if name in CHEAP else pytest.param(name, marks=pytest.mark.slow) for name in geo.WALLS if name != "koch"
+    name if name in CHEAP else pytest.param(name, marks=pytest.mark.slow) for name in geo.WALLS
 ])  # fmt: skip
 def test_the_table_of_named_walls_is_that_of_its_snippet(name):
     rows = table_of_named_walls()

@@ -100,3 +100,14 @@ def test_a_distance_has_the_errors_of_walls_with_many_pieces() -> None:
         ker.MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 3)), ker.WallLaw(geo.mushrooms(0.25, 0.5, 3))
     )
     assert 0.0 < found.value <= found.error < 1e-4
+
+
+def test_many_generations_of_narrow_mushrooms_approach_retroreflection():
+    x, theta = rays(20_000, seed=8)
+    reached = []
+    for s, a, generations in ((0.1, 0.02, 40), (0.04, 0.01, 120), (0.02, 0.005, 250)):
+        law = ker.MushroomLaw(geo.MushroomGenerations(s, a, generations))
+        reached.append(np.abs(law.reflect(x, theta) - theta).mean())
+    # the mean deflection bounds the distance of the laws from above
+    assert reached[0] > reached[1] > reached[2]
+    assert reached[2] < 0.06
