@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checkpoints import Stored
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
 from ...core.errors import InputError
-from ...core.long_runs import Engine, all_parts
+from ...core.long_runs import Engine, all_parts, reported
 from ...core.version import __version__
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.satellite_law import SatelliteLaw
@@ -40,6 +40,7 @@ class Reflector(Protocol):
         ...
 
 
+@reported("billiard")
 def play(
     container: Container,
     laws: Reflector | CollisionAlongWall | Sequence[Reflector | CollisionAlongWall],

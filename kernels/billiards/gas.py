@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, Rng, check_memory, generator, instance, number_between, shaped, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
+from ...core.long_runs import reported
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.collision_law import smooth
 from .billiard import Reflector, check_inside, laws_of_walls, reflected
@@ -100,6 +101,7 @@ def _batch_error(duration: Floats, deviation: Floats, batches: int) -> float:
     return student_95(batches) * float(np.std(sums, ddof=1)) * math.sqrt(batches) / float(duration.sum())
 
 
+@reported("gas")
 def play_gas(
     container: Container,
     pair: PairLaw,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, Rng, check_memory, generator, instance, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
+from ...core.long_runs import reported
 from ...geometry import Container
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.collision_law import CollisionLaw
@@ -35,6 +36,7 @@ DRIFT = 0.5
 LEAST_COLLISIONS, LEAST_TRAJECTORIES = 64, 8
 
 
+@reported("Lyapunov exponent")
 def lyapunov_exponent(
     container: Container,
     laws: Reflector | Sequence[Reflector],

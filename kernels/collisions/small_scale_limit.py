@@ -27,7 +27,7 @@ from ...core.checks import (
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_errors
 from ...core.frames import data_frame
-from ...core.long_runs import Engine, all_parts
+from ...core.long_runs import Engine, all_parts, reported
 from ...core.rounding import EPS
 from ...core.version import __version__
 
@@ -149,6 +149,7 @@ class LimitStudy(Summary):
         return Estimate(float(slope), error, "estimate", f"slope of {len(x)} scales")
 
 
+@reported("limit study")
 def limit_study(
     disk: Disk,
     wall: Wall,

@@ -25,6 +25,7 @@ from ...core.checks import (
 from ...core.errors import InputError
 from ...core.estimates import Estimate, Summary, student_95
 from ...core.frames import data_frame
+from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ..bases.measure import SINE, SINE_SQUARED
 from .collision_law import StateFunction
@@ -124,6 +125,7 @@ PAIRS: dict[str, Pair] = {
 }
 
 
+@reported("weak limit")
 def weak_limit(
     disk: Disk,
     wall: Wall,

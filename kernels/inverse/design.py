@@ -12,6 +12,7 @@ import numpy as np
 from ...core.checks import Floats, finite_array, finite_number, frozen, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, Summary
+from ...core.long_runs import reported
 from ..laws.law import Law
 from ..walls.wall_law import WallLaw
 
@@ -54,6 +55,7 @@ class WallDesign(Summary):
     tried: Floats
 
 
+@reported("wall design")
 def design_wall(
     objective: Objective,
     family: Callable[..., Wall | Law],

@@ -22,6 +22,7 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
+from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...geometry.cells.miniature import wall_miniature
 from ..bases.bins import Bins
@@ -136,6 +137,7 @@ class WallForLaw(Summary):
         return wall_miniature(self.wall)
 
 
+@reported("wall for a law")
 def wall_for(
     law: Law | KernelMatrix,
     moments: int = 10,

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.rounding import EPS
 from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
 from ...kernels.expectations.arcs import ArcMeans
@@ -98,7 +99,7 @@ def _of_nodes(law: Law, basis: Basis) -> Means:
         for start in range(0, theta.size, ANGLES_AT_ONCE):
             some = theta[start : start + ANGLES_AT_ONCE]
             if shared is None:
-                found = law.conditionals(some, tolerance, degree, edges)
+                found = law.conditionals(some, max(tolerance, EPS), degree, edges)
             else:
                 found, _ = shared(some, tolerance)
             images.append(found.in_basis(basis))

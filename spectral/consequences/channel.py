@@ -24,7 +24,7 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, with_errors
-from ...core.long_runs import Engine, all_parts
+from ...core.long_runs import Engine, all_parts, reported
 from ...core.version import __version__
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.bases.measure import SINE
@@ -101,6 +101,7 @@ def _slope_weights(log: Floats) -> Floats:
     return np.asarray(deviation / np.sum(deviation**2))
 
 
+@reported("exit times")
 def exit_times(
     law: Law,
     lengths: ArrayLike,

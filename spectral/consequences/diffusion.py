@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, choice, frozen, positive_number
 from ...core.errors import AccuracyError, AsperityError, InputError
 from ...core.estimates import NORMAL_95, ErrorKind, Estimate, Summary
+from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...kernels import Law
 from ..essential.edge import grazing_symbol
@@ -178,6 +179,7 @@ class ChannelDiffusivity(Summary):
         return np.asarray(self.values * self.time_errors / self.times)
 
 
+@reported("channel diffusivity")
 def channel_diffusivity(
     law: Law,
     lengths: ArrayLike,

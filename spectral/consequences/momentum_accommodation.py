@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, Rng, angles, finite_array, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import FEW, NORMAL_95, ErrorKind, Estimate, Summary, with_error
+from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...kernels import SINE, Law, Panels, discretise
 from ...kernels.bases.basis import Basis
@@ -128,6 +129,7 @@ def accommodation(
 def accommodation(
     law: DirectionLaw, tolerance: float = 1e-8, theta: None = None, rng: Rng = None, incidence_deg: None = None
 ) -> SpaceAccommodation: ...
+@reported("accommodation")
 def accommodation(
     law: Law | DirectionLaw,
     tolerance: float = 1e-8,

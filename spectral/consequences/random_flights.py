@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, student_95
+from ...core.long_runs import reported
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from .channel import MOST_FLIGHTS, SMALLEST, Arrangement, checked, passed, reflected
@@ -144,6 +145,7 @@ class ChannelPaths(Summary):
         return np.stack(found, axis=1)
 
 
+@reported("channel paths")
 def channel_paths(
     law: Law,
     times: ArrayLike,

@@ -8,6 +8,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.kernels.laws.structure import lists_branches
 from asperity.kernels.walls.wall_law import made_of_isometries
+from asperity.spectral.bounds.images import expectations
 from asperity.spectral.essential.edge import essential_edge, grazing_symbol
 
 SEMICIRCLE = ker.CircularArcLaw(np.pi / 2)
@@ -135,3 +136,10 @@ def test_a_curved_wall_without_mirror_symmetry_is_isolated():
 def test_a_coarse_tolerance_does_not_turn_the_edge_into_a_gap(law, tolerance, expected):
     gap = spec.spectral_gap(law, tolerance=tolerance)
     assert abs(float(gap) - expected) <= gap.error <= tolerance
+
+
+def test_a_tolerance_below_the_rounding_asks_for_what_there_is():
+    """Gaps ask for means more exactly than for themselves."""
+    law, theta = ker.LeastResistanceLaw(), np.array([0.5, 1.0])
+    rough, fine = (expectations(law, ker.Legendre(3))(theta, tolerance)[0] for tolerance in (1e-6, 1e-20))
+    assert fine == pytest.approx(rough, abs=1e-6)
