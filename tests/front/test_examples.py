@@ -144,12 +144,15 @@ def test_the_least_resistance_is_bracketed_and_no_triangle_is_as_good_as_retrore
 def test_the_moving_picture_ends_with_the_law_and_is_small(tmp_path):
     from PIL import Image
 
-    found = load("front_picture").main(tmp_path / "front.gif")
+    example = load("front_picture")
+    # as many rays as in the committed picture, in fewer frames: 3 rays by 2 steps, and 3 bursts
+    example.STEPS, example.BURSTS = 2, (1, 29, sum(example.BURSTS) - 30)
+    found = example.main(tmp_path / "front.gif")
     # 8193 rays in 48 bins: the largest of the normal deviations
-    assert found["frames"] > 40 and found["difference"] < 4 * np.sqrt(0.6 * 48 / np.pi / 8193)
-    for path in (tmp_path / "front.gif", EXAMPLES.parent / "gallery" / "front.gif"):
+    assert found["difference"] < 4 * np.sqrt(0.6 * 48 / np.pi / 8193)
+    for path, least in ((tmp_path / "front.gif", 9), (EXAMPLES.parent / "gallery" / "front.gif", 41)):
         with Image.open(path) as picture:
-            assert path.stat().st_size < 1_000_000 and picture.n_frames > 40 and picture.info["loop"] == 0
+            assert path.stat().st_size < 1_000_000 and picture.n_frames >= least and picture.info["loop"] == 0
 
 
 def test_the_gallery_draws_what_pages_show(tmp_path, monkeypatch):

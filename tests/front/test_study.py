@@ -153,10 +153,10 @@ def test_a_law_without_mirror_axis_is_said_not_to_be_self_adjoint_and_contracts_
     assert "P_F is not known to be self-adjoint" in report.summary(
         verbose=True
     ) and "mean 0 is 1 (no gap)" in report.summary(verbose=True)
-    curved = geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0)])])
-    report = study_wall(curved, bins=8, tolerance=0.05)
+    curved = geo.Wall([geo.Bezier([(0, 0), (0.1, -0.3), (0.7, -0.25), (1, 0)])])
+    report = study_wall(curved, bins=8, tolerance=0.1)
     assert report.consequences.slem.value == 1.0 - report.specular_gap.value
-    assert "a step shrinks functions of mean 0 by the factor 0.62" in report.summary(verbose=True)
+    assert "a step shrinks functions of mean 0 by the factor 0.40" in report.summary(verbose=True)
 
 
 def test_the_summary_lists_all_eigenvalues_by_modulus(arcs):
