@@ -256,10 +256,10 @@ def mutants_of(entry: Entry) -> list[Mutant]:
     formula = entry.right
     entry.check(watched)
     functions = {id(formula): formula} if isinstance(formula, FunctionType) else {}
+    # one search for all, which looks through everything that Python holds
+    owners = [owner for owner in gc.get_referrers(*called) if isinstance(owner, FunctionType)]
     for code in called:
-        for owner in gc.get_referrers(code):
-            if isinstance(owner, FunctionType) and owner.__code__ is code:
-                functions.setdefault(id(owner), owner)
+        functions.update({id(owner): owner for owner in owners if owner.__code__ is code})
     found = [
         Mutant(change.label, _within(formula, change))
         for function in functions.values()

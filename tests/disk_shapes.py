@@ -1,4 +1,4 @@
-"""Disks, walls under them, and states of their invariant measures, for all tests of collisions."""
+"""Disks, walls under them, tables around them, and states of their invariant measures, for all tests of collisions."""
 
 import math
 
@@ -32,6 +32,12 @@ WALLS = {
     "open": geo.Wall.from_vertices([(0, -0.1), (0.3, -0.4), (0.6, -0.15), (1, -0.1)]),
     "islands": geo.Wall([geo.Segment((0, -0.5), (1, -0.5))], islands=[[geo.Arc((0.4, -0.2), 0.1, 0.0, -2 * math.pi)]]),
 }
+
+
+NAMED_TABLES = {
+    "circle": geo.Container.circle(1.5), "ellipse": geo.Container.ellipse(1.0, 2.0),
+    "stadium": geo.Container.stadium(1.0, 0.5), "sinai": geo.Container.sinai(2.0, 0.7),
+}  # fmt: skip
 
 
 def states(wall, scale, n, seed=0, disk=DISK, spacing=None):

@@ -186,6 +186,6 @@ def judge(case: tuple[str, int]) -> Iterator[Judged]:
 CAMPAIGNS = (
     Campaign(
         "coverage", "Do errors from rays hold in 95 % of repetitions?", draw, judge, BLOCKS * len(ESTIMATES),
-        range(0, len(ESTIMATES), 8), level=0.95,
+        range(0, len(ESTIMATES), 16), level=0.95,
     ),
 )  # fmt: skip

@@ -121,4 +121,4 @@ def judge(case: Case) -> Iterator[Judged]:
     yield Judged(f"{case.kind}, {found.method.split()[0]}", found.error, abs(float(found) - fraction), error)
 
 
-CAMPAIGNS = (Campaign("transmission", "Do errors of transmissions hold?", draw, judge, 32, [0], level=0.95),)
+CAMPAIGNS = (Campaign("transmission", "Do errors of transmissions hold?", draw, judge, 32, [25], level=0.95),)

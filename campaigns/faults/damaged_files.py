@@ -356,5 +356,5 @@ def kinds() -> tuple[Kind, Kind, Kind]:
 
 
 CAMPAIGNS = (
-    Campaign("damaged-files", "Is a damaged file refused, or read as it stands?", draw, judge, 7000, range(240)),
+    Campaign("damaged-files", "Is a damaged file refused, or read as it stands?", draw, judge, 7000, range(121)),
 )

@@ -202,6 +202,8 @@ def draw(number: int) -> tuple[str, Family]:
     return list(LAWS)[number % 2], families(FLIGHTS, number // 14)[number // 2 % 7]
 
 
+# Each family once, over smooth and no-slip walls in turn.
+SMALL = (0, 3, 4, 7, 8, 11, 12)
 CAMPAIGNS = (
-    Campaign("grazing-flights", "Are flights decided rightly that rounding can decide?", draw, judge, 350, range(14)),
+    Campaign("grazing-flights", "Are flights decided rightly that rounding can decide?", draw, judge, 350, SMALL),
 )

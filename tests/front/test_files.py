@@ -140,14 +140,17 @@ def test_members_that_no_matrix_has_are_never_inflated(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["symmetric", "counts", "basis", "record", "none"])
-@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA])
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [(name, zipfile.ZIP_DEFLATED) for name in ("symmetric", "counts", "basis", "record", "none")]
+    + [("record", zipfile.ZIP_LZMA)],
+)
 def test_no_member_is_inflated_before_its_header_is_checked(tmp_path, name, method):
     path = ker.discretise(ker.lambertian(), ker.Bins([0.0, 1.0, np.pi])).save(tmp_path / "kernel.npz")
     with zipfile.ZipFile(path) as archive:
         members = {one: archive.read(one) for one in archive.namelist()}
     bomb = BytesIO()
-    np.save(bomb, np.zeros((2000, 2000)) if name != "record" else np.array("a" * 2 * 10**7))
+    np.save(bomb, np.zeros((1800, 1800)) if name != "record" else np.array("a" * 2 * 10**7))
     members[f"{name}.npy"] = bomb.getvalue()
     with zipfile.ZipFile(path, "w", method) as archive:
         for one, data in members.items():
@@ -349,24 +352,7 @@ def test_the_array_of_a_matrix_is_one_read_only_array_also_from_a_pickle():
     assert not again.symmetric.flags.writeable and not again.array.flags.writeable
 
 
-# random numbers
-
-SAMPLERS = {
-    "Law.sample": lambda rng: ker.lambertian().sample(np.full(4, 1.0), rng=rng),
-    "CollisionLaw.sample": lambda rng: ker.CollisionLaw(ker.lambertian(), geo.Disk()).sample(
-        [[0.1, -1.0, 0.2]], rng=rng
-    ),
-    "discretise": lambda rng: ker.discretise(ker.lambertian(), ker.Bins(2), "monte-carlo", samples=64, rng=rng).array,
-    "discretise, qmc": lambda rng: (
-        ker.discretise(ker.CircularArcLaw(0.5), ker.Bins(4), "qmc", samples=64, rng=rng).array
-    ),
-    "exit_times": lambda rng: spec.exit_times(ker.lambertian(), [1.0, 2.0, 4.0], 8, rng).times,
-}
-
-
-@pytest.mark.parametrize("name", SAMPLERS)
-def test_a_seed_and_its_generator_give_the_same_numbers(name):
-    sample = SAMPLERS[name]
-    assert np.array_equal(sample(5), sample(np.random.default_rng(5)))
-    assert not np.array_equal(sample(5), sample(6))
-    assert np.array_equal(sample(None), sample(None)) == name.startswith("discretise")
+def test_sampled_matrices_are_the_same_without_a_seed():
+    for method in ("monte-carlo", "qmc"):
+        one, two = (ker.discretise(ker.CircularArcLaw(0.5), ker.Bins(4), method, samples=64) for _ in range(2))
+        assert np.array_equal(one.array, two.array)

@@ -57,6 +57,7 @@ def modules() -> dict[str, Path]:
 
 
 MODULES = modules()
+TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
 
 
 def is_package(name: str) -> bool:
@@ -70,7 +71,7 @@ def folder_of(name: str) -> str:
 def imports(name: str) -> Iterator[str]:
     """The modules of asperity that a module imports, also inside functions and for types alone."""
     package = folder_of(name).split(".") if folder_of(name) else []
-    for node in ast.walk(ast.parse(MODULES[name].read_text(encoding="utf-8"))):
+    for node in ast.walk(TREES[name]):
         if not isinstance(node, ast.ImportFrom) or not node.level:
             continue
         start = package[: len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
@@ -105,23 +106,21 @@ def test_every_folder_has_a_floor_and_at_most_fourteen_modules():
 
 def test_no_file_has_the_name_of_a_function_or_class_in_it():
     # a name imported from the file would take the file's place in its package
-    for name, path in MODULES.items():
-        defined = (ast.FunctionDef, ast.ClassDef)
-        own = {node.name for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, defined)}
+    for name, tree in TREES.items():
+        own = {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
         assert name.rpartition(".")[2] not in own, name
 
 
 def test_inner_folders_begin_with_their_docstring_and_nothing_else():
-    for name, path in MODULES.items():
+    for name, tree in TREES.items():
         if is_package(name) and name.count("."):
-            (docstring,) = ast.parse(path.read_text(encoding="utf-8")).body
+            (docstring,) = tree.body
             assert isinstance(docstring, ast.Expr), name
 
 
 def test_numba_stands_in_the_compiled_folders_only():
-    for name, path in MODULES.items():
-        at_top = [node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.ImportFrom)]
-        if any(node.module == "numba" for node in at_top):
+    for name, tree in TREES.items():
+        if any(isinstance(node, ast.ImportFrom) and node.module == "numba" for node in tree.body):
             assert set(name.split(".")) & set(COMPILED) or name == "core.compilation", name
 
 

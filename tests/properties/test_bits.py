@@ -172,8 +172,8 @@ def discretised(method, basis):
 # Those that store all sums in one piece, in place of the earlier ones.
 IN_ONE_PIECE = {
     **{f"estimate_stream {basis!r}": streamed(basis) for basis in (ker.Bins(40), ker.Legendre(5), PANELS)},
-    **{f"{method} {basis!r}": discretised(method, basis) for method in ("monte-carlo", "qmc")
-       for basis in (ker.Bins(40), ker.Legendre(5), PANELS)},
+    **{f"{method} {basis!r}": discretised(method, basis)
+       for method, basis in (("monte-carlo", ker.Bins(40)), ("qmc", ker.Legendre(5)), ("qmc", PANELS))},
 }  # fmt: skip
 RUNS = {
     "exit_times": exits, "play": played, "limit_study": studied, "mean_law": averaged, "sweep": swept, **IN_ONE_PIECE,
@@ -252,7 +252,7 @@ own.RUNS[sys.argv[1]](checkpoint="a")
 
 @pytest.mark.skipif(os.name != "posix", reason="processes are ended differently here")
 @pytest.mark.usefixtures("small_parts")
-@pytest.mark.parametrize("name", ["play", "sweep", "qmc Legendre(5)", "estimate_stream Legendre(5)"])
+@pytest.mark.parametrize("name", ["play", "qmc Legendre(5)"])
 def test_what_a_killed_process_stored_is_gone_on_with_to_the_same_bits(name, tmp_path, stored):
     keys, _ = stored
     whole = RUNS[name](checkpoint=tmp_path / "whole")

@@ -29,10 +29,8 @@ CURVES = [
     (lambda: Segment((0, 0), (0, 0)), "two different points"),
     (lambda: Segment((0, 0), 3), r"point \(x, y\)"),
     (lambda: Arc((0, 0), -1, 0, 1), "semi_axes"),
-    (lambda: Arc((0, 0), (1, 0), 0, 1), "semi_axes"),
     (lambda: Arc((0, inf), 1, 0, 1), "center"),
     (lambda: Arc((0, 0), 1, 1, 1), "2 pi"),
-    (lambda: Arc((0, 0), 1, 0, 7), "2 pi"),
     (lambda: Arc((0, 0), 1, 0, nan), "start and end"),
     (lambda: Bezier([(0, 0), (1, 1)]), "3 or 4 points"),
     (lambda: Bezier([(0, 0), (1, nan), (1, 0)]), "control point 1"),
@@ -49,7 +47,6 @@ WALLS = [
     (lambda: islands(square(0.2, -1.5, 0.2)), "wrong side"),
     (lambda: islands(square(0.9, -0.5, 0.2)), "piece 1 of island 0 leaves the cell .* roll"),
     (lambda: islands(square(0.2, -0.1, 0.2)), "of island 0 rises to y = 0.1"),
-    (lambda: islands(square(0.2, -0.5, 0.2)[:3]), "pieces 2 and 0 of island 0 do not join"),
     (lambda: Wall.from_vertices([(0, 0), (0.2, nan), (1, 0)]), r"nan\) at vertex 1"),
     (lambda: Wall.from_vertices([(0, 0), (0.2, -1), (0.2, -1), (1, 0)]), "vertices 1 and 2 coincide"),
     (lambda: Wall.from_vertices([(0, 0), (0.5, 0.1), (1, 0)]), "piece 0 rises to y = 0.1 at x = 0.5"),
@@ -61,7 +58,6 @@ WALLS = [
     (lambda: Wall(polygon((1, 0), (0.5, -1), (0, 0))), "right to left"),
     (lambda: Wall(polygon((0, 0), (0.5, -1), (0.9, 0))), "end at x = period = 1"),
     (lambda: Wall([Segment((0, 0), (0.5, -1)), Segment((0.5, -1.1), (1, 0))]), "pieces 0 and 1 do not join"),
-    (lambda: Wall([Segment((0, 0), (0.5, -1)), Segment((0.5, -1 + 1e-7), (1, 0))]), "do not join"),
     (lambda: Wall([Arc((0.5, 0), 0.5, pi, 0)]), "piece 0 rises to y = 0.[45]"),
     (lambda: Wall([Bezier([(0, 0), (0.5, 0), (1, 0)])]), "piece 0: expected a Segment"),
     (lambda: Wall([]), "at least one piece"),
@@ -78,14 +74,12 @@ WALLS = [
 NAMED = [
     (lambda: ARC.split(1e308), "s: expected a number in"), (lambda: ARC.split(-0.1), "s: expected a number in"),
     (lambda: geo.triangular_teeth(0.0), "expected"), (lambda: geo.triangular_teeth(pi), "expected"),
-    (lambda: geo.triangular_teeth(nan), "expected"), (lambda: geo.rectangular_teeth(-1.0), "expected"),
-    (lambda: geo.focusing_arcs(1.6), "expected"), (lambda: geo.focusing_arcs(0.0), "expected"),
-    (lambda: geo.dispersing_arcs(2.1), "expected"), (lambda: geo.dispersing_arcs(0.0), "expected"),
-    (lambda: geo.elliptical_arcs(0.5, 3), "expected"), (lambda: geo.mushrooms(1.0), "expected"),
-    (lambda: geo.mushrooms(0.0), "expected"), (lambda: geo.mushrooms(0.5, -1.0), "expected"),
+    (lambda: geo.rectangular_teeth(-1.0), "expected"), (lambda: geo.focusing_arcs(1.6), "expected"),
+    (lambda: geo.dispersing_arcs(2.1), "expected"), (lambda: geo.elliptical_arcs(0.5, 3), "expected"),
+    (lambda: geo.mushrooms(1.0), "expected"), (lambda: geo.mushrooms(0.5, -1.0), "expected"),
     (lambda: geo.mushrooms(0.5, 1.0, 0), "expected"), (lambda: geo.mushrooms(0.5, 0.0, 2), "larger stem_aspect"),
-    (lambda: geo.mushrooms(0.001, 0.01, 4), "expected"), (lambda: geo.koch(-1), "expected"),
-    (lambda: geo.koch(1.5), "expected"), (lambda: geo.koch(11), "expected"),
+    (lambda: geo.mushrooms(0.001, 0.01, 4), "expected"), (lambda: geo.koch(1.5), "expected"),
+    (lambda: geo.koch(11), "expected"),
 ]  # fmt: skip
 
 
@@ -105,12 +99,10 @@ PROFILES = [
     (vertices([0], [0]), "at least 2"),
     (vertices([0, 1], ["a", "b"]), "height"),
     (vertices([0, 1], [0, nan]), r"height: .* index \(1,\)"),
-    (vertices([0, inf], [0, 1]), "x: "),
     (vertices([0, 1], [0, 1], "glue"), "seam: expected 'mirror', 'step' or 'wrap', got 'glue'"),
     (vertices([0, 1, 3], [0, -1, -2], "wrap"), "'wrap' expects equal steps"),
     (lambda: Wall.from_profile([0, 1, 2], np.ma.array([1, 7, 2], mask=[0, 1, 0])), "1 of 3 heights are undefined"),
     (random_wall(), "expected one of rms_slope and rms_height"),
-    (random_wall(rms_slope=0.1, rms_height=0.1), "expected one of rms_slope and rms_height"),
     (random_wall(rms_slope=-1.0), "rms_slope: expected"),
     (random_wall(rms_slope=0.1, spectrum=geo.SelfAffine(0.5, shortest=2.0)), "expected power at one frequency"),
     (random_wall(rms_slope=0.1, spectrum=lambda q: -q), "powers of at least 0"),
@@ -310,7 +302,7 @@ def rays(count):
     return {"x": rng.random(count), "theta": np.arccos(1.0 - 2.0 * rng.random(count))}
 
 
-@pytest.mark.parametrize("wall", ["triangular-teeth", "mushrooms", "elliptical-arcs", "low teeth"], indirect=True)
+@pytest.mark.parametrize("wall", ["triangular-teeth", "elliptical-arcs"], indirect=True)
 @pytest.mark.parametrize(
     ("what", "bad"), [("x", nan), ("x", -inf), ("theta", nan), ("theta", 0.0), ("theta", pi), ("theta", -0.1)]
 )
@@ -330,7 +322,6 @@ FILES = [
     ("wall.toml", "period = 1\nvertices = [[0, 0], [1, 0]]\n" + SEGMENT, "exactly one"),
     ("wall.toml", "period = 1\nvertices = [[0, 0], [1, 0]]\ndepth = 2", "unknown key 'depth'"),
     ("wall.toml", 'period = "1"\nvertices = [[0, 0], [1, 0]]', "key 'period': expected a number"),
-    ("wall.toml", "period = true\nvertices = [[0, 0], [1, 0]]", "key 'period'"),
     ("wall.toml", "period = 1\nvertices = [[0, 0], [1]]", r"key 'vertices\[1\]': expected two numbers"),
     ("wall.toml", "period = 1\nvertices = 3", "key 'vertices': expected a list of points"),
     ("wall.toml", "period = 1\nvertices = [[0, 0], [0.5, nan], [1, 0]]", "finite"),
@@ -357,17 +348,14 @@ FILES = [
     ("wall.toml", b"\xff\xfe\x00", "cannot read it .*utf-8.*; expected a file of text"),
     ("scan.csv", "0 1\n1 2 3\n", "line 2: expected two numbers"),
     ("scan.csv", "x y\nfoo bar\n0 1\n1 2\n", "line 2"),
-    ("scan.csv", "0 1\nx y\n", "line 2"),
     ("scan.csv", "0 1\n", "at least two rows"),
     ("scan.csv", "", "cannot read a file of 0 bytes"),
     ("scan.csv", "\n", "at least two rows of x and height, got 0"),
     ("scan.csv", "x y\n0 1\n", "at least two rows of x and height, got 1"),
     ("scan.csv", "# a\n0 1\n1 2\nx y\n3 4", "line 4: expected two numbers, x and height, got 'x y'"),
-    ("scan.csv", "x y\nz w\n0 1\n1 2", "line 2"),
     ("scan.csv", "x 1\n0 1\n1 2", "line 1"),
     ("scan.csv", "x [um], height\n0 1\n1 2\n", r"header: expected two units((?!of heights).)*$"),
     ("scan.csv", "x [um], height [V]\n0 1\n1 2\n", r"header: expected two units((?!of heights).)*$"),
-    ("scan.csv", "x, height [nm]\n0 1\n1 2\n", r"header: expected two units((?!of heights).)*$"),
 ]  # fmt: skip
 
 

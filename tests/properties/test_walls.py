@@ -158,7 +158,7 @@ def test_no_ray_is_lost_and_none_is_wrong_but_for_conditioning(wall, make):
     """Against the tracer in double-doubles, which flags the rays whose last half ulp decides; it against 50 digits."""
     if wall.islands and make is not spread_rays:
         pytest.skip("a grazing ray passes a million cells of an open wall")
-    count = 600 if len(wall.pieces) < MANY_PIECES else 60
+    count = 200 if len(wall.pieces) < MANY_PIECES else 40
     cell = wall.cell
     found = list(judge(AimedRays("rays", cell, *make(cell, count, np.random.default_rng(5)))))
     assert [one.fault for one in found if one.verdict == "fails"] == []
@@ -199,7 +199,7 @@ def test_closed_forms_and_runs_of_hits_in_one_step_change_nothing_but_the_time(c
     if scene.closed is None and scene.pairs is None and scene.circles is None:
         pytest.skip("it is traced hit by hit")
     rng = np.random.default_rng(3)
-    count = RAYS if len(closed_wall.pieces) < MANY_PIECES else 100
+    count = FEW if len(closed_wall.pieces) < MANY_PIECES else 100
     x, theta = np.concatenate([make(closed_wall, count, rng) for make in (spread_rays, aimed_rays)], axis=1)
     most = 4 * MOST_HITS
     fast, slow = (geo.trace(one, x, theta, max_collisions=most) for one in (closed_wall, hit_by_hit(closed_wall)))

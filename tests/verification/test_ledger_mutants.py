@@ -1,9 +1,12 @@
 """The ledger's checks refuse wrong formulas: a sample of the mutants of `python -m campaigns.ledger_mutants`."""
 
+from functools import cache
+
 import numpy as np
 import pytest
+from campaigns import ledger_mutants
 from campaigns.cases.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
-from campaigns.ledger_mutants import Mutant, changes, judged, library, mutants_of, noticed
+from campaigns.ledger_mutants import Mutant, changes, judged, library, noticed
 
 from asperity.geometry.disk import disk, rolling
 from asperity.ledger import index as ledger
@@ -11,15 +14,14 @@ from asperity.ledger import row
 from asperity.verification import agreement
 
 ROWS = {entry.id: entry for entry in ledger.entries() if entry.check is not None}
-# How many mutants of a row are tried here; proofs take longer than numbers.
-SAMPLE = {"symbolic": 1, "numeric": 3}
+mutants_of = cache(ledger_mutants.mutants_of)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("entry", ROWS.values(), ids=ROWS)
-def test_a_check_refuses_wrong_formulas(entry):
+def test_a_check_refuses_a_wrong_formula(entry):
     mutants = [mutant for mutant in mutants_of(entry) if (entry.id, mutant.label) not in EQUIVALENT]
-    for mutant in mutants[:: max(1, len(mutants) // SAMPLE[entry.kind])]:
+    for mutant in mutants[len(mutants) // 2 :][:1]:
         outcome = judged(entry, mutant)
         assert outcome.answer in ("refuted", "undecided", "raised"), outcome
 

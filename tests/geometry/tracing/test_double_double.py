@@ -3,6 +3,7 @@
 import math
 import operator
 from fractions import Fraction
+from functools import cache
 
 import mpmath as mp
 import numpy as np
@@ -50,8 +51,9 @@ def exact(pair):
     return Fraction(float(pair[0])) + Fraction(float(pair[1]))
 
 
-def apply(operation, a, b):
-    """Pairs of double-doubles, of double-doubles and doubles, and of doubles and double-doubles: (3, NUMBERS, 2)."""
+@cache
+def pairwise(operation):
+    """The operation on pairs of double-doubles, of double-doubles and doubles, and of doubles and double-doubles."""
 
     @compiled
     def run(a, b, found):
@@ -67,8 +69,13 @@ def apply(operation, a, b):
                     value = extended(operation(a[k, 0], right))
                 found[mixed, k, 0], found[mixed, k, 1] = value.high, value.low
 
+    return run
+
+
+def apply(operation, a, b):
+    """Its results, shape (3, NUMBERS, 2)."""
     found = np.empty((3, len(a), 2))
-    run(a, b, found)
+    pairwise(operation)(a, b, found)
     return found
 
 
@@ -110,17 +117,18 @@ def test_comparisons_with_infinity_and_no_number():
         assert np.array_equal(apply(comparison, a, b)[0, :, 0], comparison(a[:, 0], b[:, 0]))
 
 
-def test_roots_and_powers_of_two(pairs):
-    @compiled
-    def run(a, found):
-        for k in range(a.shape[0]):
-            x = double_double(a[k, 0], a[k, 1])
-            y, z = root(x), scaled(-0.5, -x)
-            found[k] = y.high, y.low, z.high, z.low
+@compiled
+def roots_and_halves(a, found):
+    for k in range(a.shape[0]):
+        x = double_double(a[k, 0], a[k, 1])
+        y, z = root(x), scaled(-0.5, -x)
+        found[k] = y.high, y.low, z.high, z.low
 
+
+def test_roots_and_powers_of_two(pairs):
     a = np.abs(pairs[0][:, :1]) * [1.0, 0.0] + pairs[0] * [0.0, 1.0]
     found = np.empty((NUMBERS, 4))
-    run(a, found)
+    roots_and_halves(a, found)
     with mp.workdps(50):
         for pair, row in zip(a, found, strict=True):
             expected = mp.sqrt(mp.mpf(pair[0]) + mp.mpf(pair[1]))

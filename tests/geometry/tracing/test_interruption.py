@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import pytest
+
+from commands import started
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="a signal to another process is sent differently here")
 
@@ -51,13 +50,9 @@ def test_an_interrupt_ends_long_work_soon(name):
     program += f"{OPEN_WALL}\ntry:\n    {easy.format(angle='1.0')}\nexcept ValueError:\n    pass\n"
     program += "import time\nprint('ready', flush=True)\n"
     program += f"try:\n    {call.format(angle=hard)}\nexcept KeyboardInterrupt:\n    print(time.time())\n    raise\n"
-    source = Path(__file__).resolve().parents[3] / "src"
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(source), os.environ.get("PYTHONPATH", "")])}
-    command = [sys.executable, "-c", program]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment) as process:
+    with started("-c", program) as process:
         try:
-            assert process.stdout is not None and process.stdout.readline() == "ready\n"
+            assert process.stdout.readline() == "ready\n"
             time.sleep(0.3)
             process.send_signal(signal.SIGINT)
             sent = time.time()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import mpmath as mp
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from campaigns.judges.precise_tracer import trace_precisely
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry.scene.columns import PARTNER, TREE_LEVELS
+from asperity.geometry.scene.columns import PARTNER
 from asperity.geometry.tracing.compiled.pieces import is_ahead
 from asperity.geometry.tracing.refinement import REFINED_SEGMENTS, refined_trace
 
@@ -157,21 +155,3 @@ def test_the_plan_tells_channels_wedges_and_trees():
     assert geo.koch(3).plan().hollows_with_grid == 0 and geo.koch(4).plan().hollows_with_grid == 1
     two = geo.Wall.from_vertices([(0, 0), (0.25, -0.5), (0.5, 0), (0.75, -0.5), (1, 0)]).plan()
     assert two.hollows == 2 and two.distinct_hollows == 1
-
-
-def test_of_two_lines_at_a_joint_a_tree_of_boxes_finds_the_same_as_the_plain_list():
-    along = np.arange(1, 100) / 100
-    left = np.column_stack([0.5 * along, -0.37 * along])
-    right = np.column_stack([1.0 - 0.5 * along, -0.37 * along])[::-1]
-    wall = geo.Wall.from_vertices([(0, 0), *left.tolist(), (0.5, -0.37), *right.tolist(), (1, 0)])
-    assert wall.plan().hollows_with_grid == 1
-    plain = geo.Wall(wall.pieces, wall.period)
-    hollows = plain.scene.hollows.copy()
-    hollows[:, TREE_LEVELS] = 0.0
-    plain.__dict__["scene"] = replace(plain.scene, hollows=hollows, boxes=None)
-    rng = np.random.default_rng(1)
-    joint, x = wall.vertices[1:-1][rng.integers(199, size=3_000)], rng.random(3_000)
-    theta = np.arctan2(-joint[:, 1], x - joint[:, 0])
-    found, plain = geo.trace(wall, x, theta), geo.trace(plain, x, theta)
-    for field in ("x", "theta", "collisions", "status"):
-        assert np.array_equal(getattr(found, field), getattr(plain, field))

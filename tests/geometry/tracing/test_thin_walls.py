@@ -125,7 +125,7 @@ def test_rays_next_to_the_tip_of_a_peak_are_reflected_at_it():
         wall = geo.Wall.from_vertices(
             [(0, 0), (0, -0.9), (0.5 - half, -0.9), (0.5, -0.4), (0.5 + half, -0.9), (1, -0.9), (1, 0)]
         )
-        x, below = rng.random(500), 10.0 ** rng.uniform(-15.0, -13.0, 500)
+        x, below = rng.random(150), 10.0 ** rng.uniform(-15.0, -13.0, 150)
         side = np.where(x < 0.5, -1.0, 1.0)
         theta = np.arctan2(0.4 + below, x - 0.5 - side * below * math.tan(0.5 * angle))
         assert not any(each.fault for each in judged(wall, x, theta))

@@ -172,10 +172,3 @@ def test_a_function_without_arguments_returns_the_wall_of_the_command_line(name)
     assert wall == geo.WALLS[name].build() == geo.wall_from_text(name)
     written = ",".join(f"{key}={value!r}" for key, value in geo.WALLS[name].defaults.items())
     assert geo.wall_from_text(f"{name}:{written}") == wall
-
-
-def test_every_parameter_of_a_named_wall_has_a_default_that_is_a_number():
-    defaults = {name: dict(entry.defaults) for name, entry in geo.WALLS.items()}
-    assert defaults["mushrooms"] == {"stem_to_cap": 0.2, "stem_aspect": 0.0, "generations": 1}
-    assert defaults["elliptical-arcs"] == {"half_angle": 1.2, "mass": 1.0, "inertia": 0.5}
-    assert {type(value) for known in defaults.values() for value in known.values()} == {int, float}

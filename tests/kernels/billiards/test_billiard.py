@@ -105,19 +105,6 @@ def test_every_law_keeps_the_energy_and_the_momentum_along_its_wall():
     np.testing.assert_allclose(after, first, atol=1e-12)
 
 
-def test_a_real_rough_wall_sets_the_disk_free_in_the_strip():
-    disk, rng, n = geo.Disk(1.0, 0.5), np.random.default_rng(4), 300
-    velocity = disk.from_angles(rng.uniform(0.5, 2.6, n), rng.uniform(0.5, 2.6, n))
-    bound = np.sqrt(1 / (disk.mass * velocity[:, 1] ** 2) - 1) * math.sqrt(1 + 2.0)
-    rough = ker.CollisionLaw.from_wall(geo.focusing_arcs(1.2), disk)
-    record = ker.play(geo.Container.strip(), rough, np.zeros((n, 2)), velocity, 400, rng)
-    assert np.mean(record.extent() > bound) > 0.9
-    # it spreads like a diffusion: the squares of displacements grow with the time, up to logarithms; medians, because
-    # grazing flights give the squares no variance, and their mean depends on the seed
-    early, late = (np.median(record.position[k, :, 0] ** 2) for k in (100, 400))
-    assert 2.5 < late / early < 8.0
-
-
 def test_the_true_disk_in_a_strip_does_what_its_limit_law_does():
     disk, n = geo.Disk(1.0, 0.5), 200
     wall = geo.triangular_teeth(1.2)

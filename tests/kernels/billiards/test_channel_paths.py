@@ -44,17 +44,6 @@ def test_positions_in_a_bent_channel_over_their_scale_are_normal():
     assert kstest(1.15 * scaled, "norm").pvalue < 1e-3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("law", [ker.lambertian(), ker.maxwell(0.5)])
-def test_the_variance_of_the_limit_in_a_straight_channel_is_half_of_the_diffusivity(law):
-    exact = 0.5 * float(spec.diffusivity(law))
-    found = [spec.channel_paths(law, np.geomspace(50, 1000, 5), 640, seed).limit_variance() for seed in range(16)]
-    assert sum(abs(float(one) - exact) <= one.error for one in found) >= 13
-    values = np.array([float(one) for one in found])
-    assert abs(values.mean() - exact) < 0.15 * exact
-    assert np.mean([one.error for one in found]) < 0.7 * exact
-
-
 def test_the_error_holds_where_flights_under_way_matter_more_than_sampling():
     exact, rows = 2.0 / math.pi, []
     for seed in range(12):

@@ -14,7 +14,6 @@ from asperity.kernels.collisions.velocity_matrices import no_slip_matrix, smooth
 
 DISK = geo.Disk(1.0, 0.6)
 SMOOTH, NO_SLIP = ker.smooth(DISK), ker.no_slip(DISK)
-STARTS = {"smooth": (SMOOTH, False), "no-slip": (NO_SLIP, True)}
 
 
 @pytest.mark.slow
@@ -22,13 +21,13 @@ def test_small_scatterers_have_the_exponent_that_dahlqvist_derived():
     # P. Dahlqvist (arXiv chao-dyn/9601007): -2 ln R + 1 - 4 ln 2 + 27 zeta(3)/(2 pi^2) + O(R ln^2 R) per return to
     # the disk of radius R in the unit square; such returns are (1 - pi R^2)/(2 R) apart on average
     constant = 1.0 - 4.0 * math.log(2.0) + 27.0 * float(mp.zeta(3)) / (2.0 * math.pi**2)
-    for radius, seed in ((0.02, 0), (0.01, 1)):
-        found = ker.lyapunov_exponent(geo.Container.sinai(1.0, radius), SMOOTH, 800, 200, rng=seed)
-        returns = (1.0 - math.pi * radius**2) / (2.0 * radius)
-        remainder = radius * math.log(radius) ** 2
-        difference = found.value * returns - (-2.0 * math.log(radius) + constant)
-        assert found.error * returns < 1.0
-        assert abs(difference) < remainder + found.error * returns
+    radius = 0.01
+    found = ker.lyapunov_exponent(geo.Container.sinai(1.0, radius), SMOOTH, 800, 200, rng=1)
+    returns = (1.0 - math.pi * radius**2) / (2.0 * radius)
+    remainder = radius * math.log(radius) ** 2
+    difference = found.value * returns - (-2.0 * math.log(radius) + constant)
+    assert found.error * returns < 1.0
+    assert abs(difference) < remainder + found.error * returns
 
 
 @pytest.mark.slow
@@ -51,19 +50,17 @@ def test_the_triangular_lorentz_gas_has_the_exponent_of_published_runs():
     [
         (geo.Container.circle(2.0), NO_SLIP), (geo.Container.ellipse(2.0, 1.0), SMOOTH),
         (geo.Container.polygon([(0, 0), (3, 0), (1, 2)]), SMOOTH),
-        (geo.Container.polygon([(0, 0), (1, 0), (1, 1), (0, 1)]), NO_SLIP),
-        (geo.Container.from_curves([geo.Segment((0, 0), (2, 0)), geo.Segment((2, 0), (2, 1)),
-                                    geo.Segment((2, 1), (0, 1)), geo.Segment((0, 1), (0, 0))]), SMOOTH),
+        (geo.Container.polygon([(0, 0), (2, 0), (2, 1), (0, 1)]).closed(), NO_SLIP),
     ],
 )  # fmt: skip
 def test_integrable_tables_and_polygons_have_exponent_zero_within_the_error(table, law):
     errors = []
-    for collisions in (75, 200, 600):
+    for collisions in (75, 300):
         found = ker.lyapunov_exponent(table, law, collisions, 20, rng=1)
         assert abs(found.value) < found.error
         errors.append(found.error)
     # growth by powers: ln(t)/t
-    assert np.all(np.diff(np.log(errors)) / math.log(4.0) < -0.5)
+    assert math.log(errors[1] / errors[0]) / math.log(4.0) < -0.5
 
 
 def mp_circle_time(position, velocity, radius):
@@ -98,9 +95,8 @@ def mp_collide(position, velocity, half, radius, rough):
     return position, [*plane, velocity[2] + impulse / mp.mpf("0.6")]
 
 
-@pytest.mark.parametrize("name", STARTS)
-def test_two_close_trajectories_in_sixty_digits_separate_as_the_derivative_says(name):
-    spinning = STARTS[name][1]
+@pytest.mark.parametrize("spinning", [False, True])
+def test_two_close_trajectories_in_sixty_digits_separate_as_the_derivative_says(spinning):
     table, matrix = geo.Container.sinai(1.0, 0.3), (no_slip_matrix if spinning else smooth_matrix)(DISK)
     rng = np.random.default_rng(3)
     position, velocity, wall = equilibrium_starts(table, DISK, 3, spinning, rng)
@@ -136,14 +132,6 @@ def test_two_close_trajectories_in_sixty_digits_separate_as_the_derivative_says(
 
 
 @pytest.mark.slow
-def test_the_exponent_scales_like_one_over_the_table():
-    small, large = (ker.lyapunov_exponent(geo.Container.stadium(c, c), SMOOTH, 250, 40, rng=2) for c in (1.0, 7.0))
-    assert abs(small.value - 7.0 * large.value) < small.error + 7.0 * large.error
-    # L. A. Bunimovich: the stadium is hyperbolic
-    assert large.value > 5.0 * large.error
-
-
-@pytest.mark.slow
 def test_a_stadium_of_bezier_curves_has_the_exponent_of_the_stadium():
     # quarter circles by cubic curves, with radii right to 3e-4
     k = 4.0 / 3.0 * math.tan(math.pi / 8.0)
@@ -168,10 +156,8 @@ def test_no_slip_reduces_the_exponent_of_chaotic_tables_but_does_not_end_it():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "table"), [("smooth", geo.Container.sinai(1.0, 0.3)),
-                                             ("no-slip", geo.Container.sinai(1.0, 0.45))])  # fmt: skip
-def test_the_errors_cover(name, table):
-    law = STARTS[name][0]
+def test_the_errors_cover():
+    table, law = geo.Container.sinai(1.0, 0.45), NO_SLIP
     # 16 small runs against a long one, whose own error is a fifth of one of them
     runs = [ker.lyapunov_exponent(table, law, 96, 16, rng=seed) for seed in range(16)]
     reference = ker.lyapunov_exponent(table, law, 512, 75, rng=1000)
