@@ -177,7 +177,7 @@ low, high = proof.interval
 assert float(low) < float(gap) < float(high) < 1.01 * float(low)
 
 # %%
-# The proof is a file. It can be checked by anyone with python-flint and the 330 lines of the checker, without asperity.
+# The proof is a file. It can be checked by anyone with python-flint and the 340 lines of the checker, without asperity.
 # The page on :doc:`proved gaps </theory/proved-gaps>` has the lemmas with their proofs.
 
 path = proof.save(Path(tempfile.mkdtemp()) / "gap.json")

@@ -272,7 +272,7 @@ class Bumps(Wall):
     def reflected(self, v, theta, sides, analytic, bits):
         """P v (lemma 5); the sides of the kinks say which of its formulas holds."""
         steep, above, left = sides
-        bits, turn = 0 if analytic or theta.rad() > ONE / 2**44 else bits, unit(self.steepest)
+        bits, turn = 0 if analytic or theta.rad() > ONE / 2**49 else bits, unit(self.steepest)
         size, total = self.K * theta.sin(), ZERO
         first = unit(theta) / turn if steep else acb(1)
         half = root(1 - size / 2, analytic) + UNIT * root(size / 2, analytic)
