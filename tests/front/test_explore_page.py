@@ -501,7 +501,7 @@ def test_ctrl_c_ends_it_while_it_prepares(tmp_path):
 
 def test_a_port_in_use_and_a_wrong_wall_end_in_one_line(server):
     for arguments, words in (
-        (["--port", server.port], f"asperity: port {server.port} is in use"),
+        (["--port", server.port], f"asperity: port {server.port} is in use; choose another with --port N"),
         (["no-such-wall"], "asperity: 'no-such-wall' is neither"),
     ):
         done = run("explore", "--no-browser", *arguments)
