@@ -14,7 +14,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 
 # %%
-# The width is relative to the gap. Ten to thirty seconds give 1e-5.
+# The width is relative to the gap. Five to forty seconds give 1e-5.
 
 law = ker.WallLaw(geo.dispersing_arcs(curvature=1 / 3)).in_specular_frame()
 proof = spec.prove_gap(law, width=1e-4)

@@ -269,7 +269,8 @@ class HemisphereLaw(DirectionLaw):
     Raises
     ------
     InputError
-        If the law is none or its weights do not sum to 1, or the orientation is no finite number and not "random".
+        If the law is none or its weights do not sum to 1, or the orientation is neither an angle up to 2 pi nor
+        "random".
 
     Notes
     -----
@@ -296,7 +297,10 @@ class HemisphereLaw(DirectionLaw):
             if self.orientation != "random":
                 raise InputError(f"orientation: expected an angle in radians or 'random', got {self.orientation!r}")
         else:
-            object.__setattr__(self, "orientation", finite_number("orientation", self.orientation))
+            turn = finite_number("orientation", self.orientation)
+            if abs(turn) > 2.0 * np.pi:
+                raise InputError(f"orientation: expected an angle in radians, at most 2 pi, got {turn!r}")
+            object.__setattr__(self, "orientation", turn)
 
     def products(self) -> tuple[Term, ...]:
         """The only term, the law itself."""

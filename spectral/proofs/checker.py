@@ -124,7 +124,10 @@ class Trial:
         if not odd:
             self.waves[0] -= integral(lambda t, _: self(t) * t.sin(), 0, PI / 2, 60).real
         self.norm = integral(lambda t, _: self(t) * self(t) * t.sin(), 0, PI / 2, 60).real
-        self.largest = sum(abs(c) for c in self.waves.values())
+        # by the mean value theorem, because the coefficients may be far larger than v
+        slopes, step = {m: UNIT * m * c for m, c in self.waves.items()}, PI / 2048
+        parts = [(step * (2 * i + 1) / 2, ball(step * i, step * (i + 1))) for i in range(1024)]
+        self.largest = max(abs(self(t) + at(slopes, unit(part)) * (part - t)).upper() for t, part in parts)
 
     def __call__(self, t):
         return at(self.waves, unit(t))

@@ -89,7 +89,7 @@ def prove_gap(law: Law, width: float = 1e-4) -> Proof:
         Lambert's law. Weights, curvatures, half angles and mean cosines are known to 2^-52 of themselves: the theorem
         holds of 1/3 as of the double beside it.
     width : float
-        The width of the interval relative to the gap, at most. One core takes ten to thirty
+        The width of the interval relative to the gap, at most. One core takes five to forty
         seconds for 1e-5.
 
     Returns

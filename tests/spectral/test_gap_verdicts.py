@@ -143,3 +143,8 @@ def test_the_focusing_arc_has_an_isolated_eigenvalue_in_both_conventions():
         gap = spec.spectral_gap(turned, tolerance=1e-5)
         assert gap.verdict == "isolated" and gap.error <= 1e-5
         assert abs(1.0 - float(gap) - eigenvalue) <= gap.error
+
+
+@pytest.mark.slow
+def test_a_tolerance_that_is_too_small_for_the_time_does_not_cost_the_enclosures():
+    assert spec.spectral_gap(ker.WallLaw(geo.dispersing_arcs(1.0)), tolerance=1e-13).error < 1e-9

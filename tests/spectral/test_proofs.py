@@ -90,6 +90,13 @@ def test_specular_reflection_scales_the_gap_and_other_laws_add_to_it(proof, monk
         assert found[1] >= gap(high) * (1.0 - 1e-12)
 
 
+@pytest.mark.slow
+def test_the_width_of_the_page_is_reached():
+    """With twelve cosines, which are nearly dependent, so that their coefficients are large."""
+    low, high = map(float, spec.prove_gap(bumps(2 / 3), width=1e-5).interval)
+    assert low < 0.1519123 < high
+
+
 @pytest.mark.parametrize("curvature", ["1/3", "1", "1.4"])
 def test_no_ray_is_reflected_three_times_and_some_are_twice(curvature):
     rng = np.random.default_rng(4)

@@ -259,6 +259,12 @@ def test_no_proof_relies_on_the_search(name, blind):
     assert verify(*(FALSE | REFUTED)[name], time_limit=None).answer == "undecided"
 
 
+def test_what_python_has_made_of_a_formula_is_refused():
+    with pytest.raises(InputError, match=r"Python has made False of this formula; .* sympy\.Eq"):
+        verify((x + 1) ** 2 == x**2 + 2 * x + 1)
+    assert verify(sp.Eq((x + 1) ** 2, x**2 + 2 * x + 1)).answer == "proved"
+
+
 def test_no_verdict_depends_on_luck(monkeypatch):
     """Points that sympy draws to factor polynomials of several symbols can cost minutes where they are unlucky."""
     monkeypatch.delattr("sympy.polys.factortools._randint")

@@ -37,8 +37,11 @@ def _related(given: Any) -> list[Claim]:
         return [claim for part in given for claim in _related(part)]
     if isinstance(given, sp.And):
         return [claim for part in given.args for claim in _related(part)]
-    if given in (True, False, sp.true, sp.false):
-        # sympy or Python has already decided it
+    if isinstance(given, bool):
+        # of expressions that are written differently == is False, whatever they are
+        raise InputError(f"lhs: Python has made {given} of this formula; pass both sides, or sympy.Eq(lhs, rhs)")
+    if given in (sp.true, sp.false):
+        # sympy has already decided it
         return [(sp.Integer(0), sp.Integer(0 if given else 1), "==")]
     if type(given) not in _RELATIONS:
         raise InputError(f"lhs: expected two sides, or a relation such as a <= b, got {given!r} alone")

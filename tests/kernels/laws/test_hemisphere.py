@@ -370,6 +370,7 @@ def test_the_matrix_of_a_law_of_directions_is_saved_and_has_a_spectrum(tmp_path)
         (lambda: ker.HemisphereLaw(0.5 * ker.lambertian()), "weights: expected a sum of 1"),
         (lambda: ker.HemisphereLaw(ker.lambertian(), "along"), "orientation: expected an angle in radians or 'random'"),
         (lambda: ker.HemisphereLaw(ker.lambertian(), np.nan), "orientation: expected finite"),
+        (lambda: ker.HemisphereLaw(ker.lambertian(), 90), "orientation: expected an angle in radians, at most 2 pi"),
         (lambda: ROUGH.sample([[0.0, 0.0, 1.0]]), r"incoming ones.*got \[0.0, 0.0, 1.0\] at row \[0\]"),
         (lambda: ROUGH.sample([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0]]), r"at row \[1\]"),
         (lambda: ROUGH.sample([[0.0, np.inf, -1.0]]), "velocity: expected finite"),
