@@ -158,3 +158,24 @@ def test_disks_that_miss_or_are_not_settled_have_names():
     two = geo.SatelliteDisk(PAIR[0], 4, 0.1), geo.SatelliteDisk(PAIR[0], 4, 0.1)
     both = geo.collide_pair(*two, [[[0, 4, math.pi / 4], [0, 0, math.pi / 4]]], [[[0, -1, 0], [0, 0, 0]]])
     assert both.counts()["corner"] == 1
+
+
+def test_unequal_spacing_has_the_same_limit_law():
+    # the angles of the limit do not depend on which satellite touches
+    scale, n = 1e-5, 300
+    rng = np.random.default_rng(5)
+    gaps = rng.uniform(0.5, 1.5, 500)
+    turns = 2.0 * np.pi * np.concatenate([[0.0], np.cumsum(gaps)[:-1]]) / gaps.sum()
+    body = geo.SatelliteDisk(DISK, 500, 0.0, 1.0, turns)
+    velocity = -DISK.from_angles(1.1, 1.2)
+    position = np.stack([rng.uniform(0.0, scale, n), rng.uniform(0.0, 2.0 * np.pi, n)], axis=1)
+    found = geo.collide_rim(body, WALLS["triangular"], scale, position, np.tile(velocity, (n, 1)))
+    good = found.status == geo.Status.ESCAPED
+    assert good.mean() > 0.99
+    limit = ker.CollisionLaw.from_wall(WALLS["triangular"], DISK).sample(np.tile(velocity, (20_000, 1)), rng)
+    angles = [DISK.to_angles(w) for w in (found.velocity[good], limit)]
+    # the atoms of the limit are spread by rho; bins wider than that
+    counts = [np.histogram(theta, np.linspace(0, np.pi, 13))[0] / len(theta) for theta, _ in angles]
+    assert np.abs(counts[0] - counts[1]).sum() < 0.2
+    assert abs(np.median(angles[0][1]) - (math.pi - 1.2)) < 0.01
+    assert ks_2samp(angles[0][0], math.pi - angles[0][0]).pvalue < 1e-6

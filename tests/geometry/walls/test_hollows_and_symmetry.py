@@ -163,3 +163,22 @@ def test_tangential_contacts_raise_no_alarm():
             ]
             left += 2 * r
         assert len(Wall(pieces).hollows) == 2
+
+
+@given(
+    st.lists(st.tuples(st.floats(1e-3, 10.0), st.integers(-3, 3)), min_size=2, max_size=15),
+    st.sampled_from(["mirror", "step"]),
+    st.sampled_from([1e-9, 1.0, 1e4]),
+)
+@pytest.mark.filterwarnings("ignore:the profile.s")
+def test_every_profile_makes_a_closed_wall(rows, seam, unit):
+    x = np.cumsum([dx for dx, _ in rows])
+    height = unit * np.array([h for _, h in rows], dtype=float)
+    wall = Wall.from_profile(x, height, seam)
+    assert wall.closes
+    assert wall.period == pytest.approx((1 + (seam == "mirror")) * (x[-1] - x[0]), rel=1e-14)
+    assert wall.depth == pytest.approx(np.ptp(height), rel=1e-14)
+    length = np.sum(np.hypot(np.diff(x), np.diff(height)))
+    whole = 2 * length if seam == "mirror" else length + abs(height[-1] - height[0])
+    assert wall.arc_length == pytest.approx(whole, rel=1e-13)
+    assert wall.flat_top + sum(h.width for h in wall.hollows) == pytest.approx(wall.period, rel=1e-13)
