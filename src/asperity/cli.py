@@ -140,9 +140,9 @@ def study(
         if out is not None:
             # refuse before the work, not after it
             prepare_folder(out, overwrite=force, picture_format=picture_format)
-        report = study_wall(
-            found_wall, Path(wall).name, disk, rng=seed, progress=not quiet, incidence_deg=degrees, **asked
-        )
+        file, *how = wall.partition(":")
+        name = "".join((Path(file).name, *how))
+        report = study_wall(found_wall, name, disk, rng=seed, progress=not quiet, incidence_deg=degrees, **asked)
         if not quiet:
             text = report.to_json() if as_json else report.summary(verbose=verbose, by_angle=degrees is not None)
             click.echo(text)

@@ -117,7 +117,7 @@ def test_walls_of_every_kind_of_file_are_studied(tmp_path):
     for text, period, mirror in (
         ("wall.toml", 1.0, True),
         ("profile.txt", 4.0, True),
-        ("profile.txt:seam=step", 2.0, False),
+        ("profile.txt:seam=step,units=um/um", 2.0, False),
     ):
         result = run("study", tmp_path / text, "--bins", 8, "--json")
         assert result.exit_code == 0, result.output

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import asperity
 from asperity import geometry as geo
@@ -22,10 +23,14 @@ DOORS = {"instance", "sequence"}
 ADVICE = re.compile(r"\b(pass|use|take|give|call|write|for example|such as)\b", re.IGNORECASE)
 X, H = np.linspace(0.0, 1.0, 5), np.array([0.0, 0.2, 0.1, 0.3, 0.0])
 DISK, LAW, WALL, P = geo.Disk(), ker.lambertian(), geo.koch(1), ker.discretise(ker.lambertian(), ker.Bins(4))
-SPECULAR = LAW.in_specular_frame()
+SPECULAR, Z = LAW.in_specular_frame(), sp.Symbol("z")
 
 # A part of the message, the call that it refuses, and the one that it advises.
 REMEDIES = {
+    "pass both sides, or sympy.Eq": (
+        lambda: asperity.verify((Z + 1) ** 2 == Z**2 + 2 * Z + 1),
+        lambda: (asperity.verify(Z * Z, Z**2), asperity.verify(sp.Eq((Z + 1) ** 2, Z**2 + 2 * Z + 1))),
+    ),
     "use Profile.interpolated()": (
         lambda: geo.Wall.from_profile([0, 1, 2], [0, np.nan, 0.5]),
         lambda: geo.Wall.from_profile(geo.Profile([0, 1, 2], [0, np.nan, 0.5]).interpolated()),

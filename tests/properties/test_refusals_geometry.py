@@ -74,7 +74,7 @@ WALLS = [
 NAMED = [
     (lambda: ARC.split(1e308), "s: expected a number in"), (lambda: ARC.split(-0.1), "s: expected a number in"),
     (lambda: geo.triangular_teeth(0.0), "expected"), (lambda: geo.triangular_teeth(pi), "expected"),
-    (lambda: geo.rectangular_teeth(-1.0), "expected"), (lambda: geo.focusing_arcs(1.6), "expected"),
+    (lambda: geo.rectangular_teeth(-1.0), "expected"), (lambda: geo.focusing_arcs(70), "angles are in radians"),
     (lambda: geo.dispersing_arcs(2.1), "expected"), (lambda: geo.elliptical_arcs(0.5, 3), "expected"),
     (lambda: geo.mushrooms(1.0), "expected"), (lambda: geo.mushrooms(0.5, -1.0), "expected"),
     (lambda: geo.mushrooms(0.5, 1.0, 0), "expected"), (lambda: geo.mushrooms(0.5, 0.0, 2), "larger stem_aspect"),

@@ -217,7 +217,8 @@ def number_between(name: str, value: Any, low: float, high: float, *, closed: st
     inside_high = number <= high if "high" in closed else number < high
     if not (inside_low and inside_high):
         left, right = "[" if "low" in closed else "(", "]" if "high" in closed else ")"
-        raise InputError(f"{name}: expected a number in {left}{low:g}, {high:g}{right}, got {number!r}")
+        radians = "; angles are in radians" if high in (np.pi, 0.5 * np.pi) else ""
+        raise InputError(f"{name}: expected a number in {left}{low:g}, {high:g}{right}, got {number!r}{radians}")
     return number
 
 

@@ -76,11 +76,12 @@ def _momentum_lines(study: StudyResult, verbose: bool) -> dict[str, str]:
     if found is None:
         return {"momentum": _refused(study.refusals["accommodation"])}
     method = f" ({found.tangential.kind}: {found.tangential.method})" if verbose else ""
+    best = "has" if 0.0 < found.maxwell_fraction.value < 1.0 else "has, of those from 0 to 1,"
     slope = f"; mean squared slope {flatness:.6g}" if math.isfinite(flatness) else ""
     return {
         "momentum": f"accommodation tangential {found.tangential}, normal {found.normal}{method}",
         "resistance": f"{study.resistance} times that of a smooth tumbling body{slope}",
-        "Maxwell": f"fraction {found.maxwell_fraction} has the nearest mean velocities, misfit {found.misfit}",
+        "Maxwell": f"fraction {found.maxwell_fraction} {best} the nearest mean velocities, misfit {found.misfit}",
     }
 
 
