@@ -106,7 +106,7 @@ class Refinement:
 
 def refined(law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge) -> Refinement:
     """Refine until the changes decrease and the error is below the tolerance, or the largest basis is reached."""
-    with progress_bar(None, "basis", "gap") as bar:
+    with progress_bar(None, "step", "gap") as bar:
         return _refined(law, tolerance, rng, seconds, edge, bar)
 
 

@@ -125,7 +125,7 @@ def _cells(report: WorkReport, row: WorkRow, in_front: bool) -> list[str]:
     name = f"**{row.method}**" if row.method == report.auto else row.method
     if not row.is_done:
         return [name, f"{row.budget:g}", *["-"] * (len(report.norms) + 3), f"{row.status}: {row.note}"]
-    errors = [f"{row.errors[norm]:.1e}" for norm in report.norms]
+    errors = [report.methods[row.method].in_words(row.errors[norm]) for norm in report.norms]
     reported = "-" if row.reported is None else f"{row.reported:.1e}"
     marks = [mark for mark, holds in (("front", in_front), (row.note, bool(row.note))) if holds]
     return [name, f"{row.budget:g}", *errors, reported, f"{row.least:.2g}", f"{row.spread:.0%}", ", ".join(marks)]
@@ -149,6 +149,10 @@ class MethodFacts:
     is_random: bool
     reference: str
     floor: float
+
+    def in_words(self, error: float) -> str:
+        """An error, or a bound of it where the reference is not known so well."""
+        return f"{error:.1e}" if error > self.floor else f"< {self.floor:.1e}"
 
 
 @dataclass(frozen=True, repr=False)

@@ -201,7 +201,7 @@ def _cells(report: WorkReport) -> tuple[str, ...]:
         (report.choice(known=True), ".2g"),
     )
     cells = ("-" if number is None else format(number, digits) for number, digits in numbers)
-    return report.problem, best.note, f"{report.error(best):.1e}", *cells, front
+    return report.problem, best.note, report.methods[best.method].in_words(report.error(best)), *cells, front
 
 
 def _draw(reports: Sequence[WorkReport]) -> Figure:
