@@ -20,6 +20,7 @@ from asperity.geometry.disk import symbolic as sym
 from asperity.verification import agreement, every, holds, no_excess
 from asperity.verification.balls import Unclear, evaluate
 from asperity.verification.domain import Domain, Interval
+from asperity.verification.normal_form import product
 from asperity.verification.refutation import Search
 from asperity.verification.resolution import Part
 from commands import ended
@@ -270,6 +271,13 @@ def test_no_verdict_depends_on_luck(monkeypatch):
     monkeypatch.delattr("sympy.polys.factortools._randint")
     a, b, c = x * y + y + 1, x * y**2 + 2, x**2 * y + y + 3
     assert verify(sp.sqrt(sp.expand(a * b * c) ** 2), a * b * c, [x > 0, y > 0], time_limit=None).answer == "proved"
+
+
+def test_factors_multiply_to_the_expression():
+    a = (x + sp.Rational(1, 3) * y) * (x * y - 2) ** 2
+    for e in (sp.expand(a), sp.expand(a) / sp.expand(x**2 - y**2), x + sp.I * y, x + 1.5, x + sp.sqrt(2) + sp.sqrt(x)):
+        assert sp.expand(sp.numer(sp.together(product(e) - e))) == 0
+    assert sp.Mul.make_args(product(sp.expand(a))) == sp.Mul.make_args(product(a))
 
 
 def test_a_proof_on_the_open_domain_says_nothing_of_a_closed_end(blind):

@@ -321,10 +321,11 @@ def _irreducible(e: Any) -> Iterable[tuple[Any, Any]]:
     found: dict[Any, Any] = defaultdict(lambda: sp.Integer(0))
     for factor in sp.Mul.make_args(sp.together(e)):
         base, times = factor.as_base_exp()
-        if not (base.is_Add and times.is_Integer):
+        polynomial = sp.Poly(base) if base.is_Add and times.is_Integer else None
+        if polynomial is None or not (polynomial.domain.is_ZZ or polynomial.domain.is_QQ):
             found[base] += times
             continue
-        shared, polynomial = sp.Poly(base).clear_denoms(convert=True)
+        shared, polynomial = polynomial.clear_denoms(convert=True)
         ring = fmpz_mpoly_ctx.get(("x", len(polynomial.gens)), Ordering.lex)
         content, parts = ring.from_dict({powers: int(c) for powers, c in polynomial.terms()}).factor()
         found[sp.Integer(int(content)) / shared] += times
