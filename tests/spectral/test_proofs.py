@@ -130,7 +130,8 @@ def test_the_form_is_that_of_traced_rays_and_the_residual_that_of_quadrature(cur
     theta = np.arccos(1.0 - 2.0 * rng.random(rays))
     ray = geo.trace(wall, rng.random(rays), theta)
     each = 0.5 * (values(TRIAL, theta) - sign * values(TRIAL, np.pi - ray.theta)) ** 2
-    form, square = Bumps(exact(repr(size)), EFFORT).form_and_residual(Trial(TRIAL, True), sign, arb("0.34"))
+    with checker.ctx.workprec(search.BITS):
+        form, square = Bumps(exact(repr(size)), EFFORT).form_and_residual(Trial(TRIAL, True), sign, arb("0.34"))
     deviation = 5.0 * each.std() / np.sqrt(rays)
     assert float(form.lower()) - deviation < each.mean() < float(form.upper()) + deviation
     assert float(form.rad()) < 1e-3
