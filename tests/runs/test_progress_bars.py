@@ -84,7 +84,7 @@ def pocket():
     [
         (
             lambda: spec.spectral_gap(0.5 * ker.CircularArcLaw(1.2) + 0.5 * ker.henyey_greenstein(0.3), 1e-2),
-            ("gap", "basis"),
+            ("gap", "step"),
         ),
         (lambda: ker.distance(ker.henyey_greenstein(0.3), ker.henyey_greenstein(0.5)), ("distance", "angle")),
         (lambda: ker.distance(*sampled(), kind="joint"), ("distance", "transport")),
