@@ -288,6 +288,8 @@ def _by_matrices(
             enclosed = enclosed_gap(law, wanted, edge)
             if enclosed is not None:
                 return enclosed
+            # in time, but not exact enough: a larger tolerance does not help
+            break
     steps = refined(law, tolerance, rng, seconds, edge)
     found, error = steps.finest, steps.error
     evidence = (*steps.evidence, *_lower_bound(law))
