@@ -11,6 +11,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import ProofError
+from asperity.kernels.laws.law import sum_of
 from campaigns.engine import Campaign, Judged
 
 
@@ -30,15 +31,10 @@ def draw(number: int) -> Case:
     wall = geo.dispersing_arcs(rng.uniform(0.1, 1.4)) if bumps else geo.focusing_arcs(rng.uniform(0.2, 1.5))
     law: ker.Law = ker.WallLaw(wall)
     if mixed:
-        law = sum_of(rng.dirichlet(np.ones(4)), law, ker.specular(), ker.retroreflection(), ker.lambertian())
+        laws = law, ker.specular(), ker.retroreflection(), ker.lambertian()
+        law = sum_of(tuple(zip(rng.dirichlet(np.ones(4)).tolist(), laws, strict=True)))
     words = "bumps" if bumps else "focusing arcs", "specular" if turned else "paper", "mixed" if mixed else "pure"
     return Case(", ".join(words), law.in_specular_frame() if turned else law, float(10.0 ** rng.uniform(-4.0, -2.0)))
-
-
-def sum_of(weights: np.ndarray, *laws: ker.Law) -> ker.Law:
-    """The mixture with these weights."""
-    first, *rest = (float(weight) * law for weight, law in zip(weights, laws, strict=True))
-    return sum(rest, start=first)
 
 
 def judge(case: Case) -> Iterator[Judged]:
