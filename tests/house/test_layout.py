@@ -125,7 +125,7 @@ def test_numba_stands_in_the_compiled_folders_only():
 
 
 def literal_columns(function: ast.AST) -> Iterator[str]:
-    """The subscripts with a literal column, `t[k, 10]`, `row[7]`, `row[n - 6]`, but of shapes and constants in capitals."""
+    """The subscripts with a literal column, `t[k, 10]`, `row[7]`, `row[n - 6]`; of shapes and constants they may."""
     for node in ast.walk(function):
         if isinstance(node, ast.Subscript):
             base, place, least = ast.unparse(node.value), node.slice, 2
