@@ -228,7 +228,8 @@ def test_options_that_numba_does_not_have_are_left_out(monkeypatch, tmp_path):
 # Modules, and names of others, that numba's manual has: its interface, that for extensions with its data models, and
 # the events of its compiler.
 DOCUMENTED = {
-    "numba.extending", "numba.core.errors", "numba.core.types", "numba:carray", "numba:njit", "numba:typeof", "numba:types",
+    "numba.extending", "numba.core.errors", "numba.core.types",
+    *(f"numba:{name}" for name in ("carray", "njit", "typeof", "types")),
     *(f"numba.core:{name}" for name in ("cgutils", "config", "errors", "event", "types")),
 }  # fmt: skip
 
