@@ -21,7 +21,7 @@ from asperity.kernels.billiards import billiard
 from asperity.kernels.sampling import chunks, streams
 from asperity.kernels.sampling.rays import RaySums
 from asperity.spectral.consequences import channel
-from commands import environment, started
+from commands import environment, parts_in, started
 
 ENOUGH = 2_000
 RAYS = 1_000
@@ -274,13 +274,6 @@ def test_what_a_killed_process_stored_is_gone_on_with_to_the_same_bits(name, tmp
     assert RUNS[name](checkpoint=tmp_path / "a").tobytes() == whole.tobytes() and len(keys) <= parts - 4
 
 
-def parts_in(path):
-    with sqlite3.connect(path) as file:
-        (number,) = file.execute("SELECT COUNT(*) FROM parts").fetchone()
-    file.close()
-    return number
-
-
 @pytest.mark.usefixtures("small_parts")
 @pytest.mark.parametrize("name", FILLING)
 def test_a_full_disk_stops_with_a_message_and_what_was_written_is_gone_on_with(name, tmp_path, monkeypatch):
@@ -296,7 +289,7 @@ def test_a_full_disk_stops_with_a_message_and_what_was_written_is_gone_on_with(n
     monkeypatch.setattr(checkpoints.Checkpoint, "_begin", limited)
     with pytest.raises(InputError, match=r"disk is full.*what was written before is safe. Free space"):
         RUNS[name](checkpoint=path)
-    assert (parts_in(path) > 0) == (name not in IN_ONE_PIECE)
+    assert bool(parts_in(path)) == (name not in IN_ONE_PIECE)
     monkeypatch.setattr(checkpoints.Checkpoint, "_begin", original)
     assert RUNS[name](checkpoint=path).tobytes() == whole.tobytes()
 

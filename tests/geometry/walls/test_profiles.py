@@ -75,14 +75,6 @@ def test_a_period_has_the_heights_of_the_profile_and_of_its_mirror_image(rows):
 
 
 # ---- files of instruments ----------------------------------------------------------------------------------------
-def test_instrument_files_ask_for_the_extra(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
-    file = tmp_path / "scan.opd"
-    file.write_bytes(b"\xff\xfe\x00\x01" * 20)
-    with pytest.raises(InputError, match=r"asperity\[profiles\]"):
-        geo.read_profile(file)
-
-
 @pytest.fixture
 def reads(monkeypatch, tmp_path):
     """Put a stand-in in the place of SurfaceTopography, which opens files by this function; and a file."""
