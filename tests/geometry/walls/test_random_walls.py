@@ -1,6 +1,5 @@
 """Random walls: their heights are normal, with the given correlations, heights and slopes."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
