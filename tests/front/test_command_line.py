@@ -11,6 +11,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.cli import main
 from asperity.study import DATA, PICTURES
 from commands import ended, run
 
@@ -208,7 +209,7 @@ def test_wrong_usage_ends_with_exit_code_two(arguments):
     assert "Usage:" in result.stderr and result.stdout == ""
 
 
-@pytest.mark.parametrize("command", [[], ["study"], ["gap"], ["walls"]])
+@pytest.mark.parametrize("command", [[], *([name] for name in main.commands)])
 def test_every_command_has_help(command):
     result = run(*command, "--help")
     assert result.exit_code == 0 and "Usage:" in result.stdout
