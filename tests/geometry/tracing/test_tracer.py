@@ -117,18 +117,6 @@ def test_shapes_broadcast_and_results_are_read_only():
         traced.x[0, 0] = 1.0
 
 
-def test_foreshortened_ellipses_are_circles():
-    disk = geo.Disk(2.0, 0.7)
-    found = geo.elliptical_arcs(0.8, disk).foreshorten(disk)
-    assert all(piece.is_circular for piece in found.pieces)
-    x, theta = rays(12, 20_000)
-    circle = geo.trace(geo.focusing_arcs(0.8), x, theta)
-    traced = geo.trace(found, x, theta)
-    same = traced.collisions == circle.collisions
-    assert same.mean() > 0.9999
-    assert np.max(np.abs(traced.theta - circle.theta)[same]) < 1e-10
-
-
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="processes cannot be pinned here")
 def test_a_process_that_is_pinned_to_one_core_traces_on_one_thread():
     before = os.sched_getaffinity(0)
