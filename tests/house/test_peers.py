@@ -26,30 +26,24 @@ def commands(monkeypatch, **codes):
     return asked
 
 
-def test_the_environment_is_made_once_and_each_package_installed_once(tmp_path, data, monkeypatch):
-    asked = commands(monkeypatch)
+@pytest.mark.parametrize(
+    ("codes", "found", "steps"),
+    [
+        ({}, {"gap": 0.5}, "venv install ask ask"),
+        ({"install": (1, "", "WARNING: retrying\nERROR: No matching | distribution\n")},
+         "cannot be installed: ERROR: No matching / distribution", "venv install"),
+        ({"peer_worker": (1, "", "IndexError: index -1\n")}, "fails: IndexError: index -1", "venv install ask ask"),
+        ({"venv": (1, "ensurepip is not available\n", "")}, "no environment: ensurepip is not available", "venv"),
+    ],
+)  # fmt: skip
+def test_the_environment_is_made_and_filled_once_and_what_fails_is_the_row(
+    codes, found, steps, tmp_path, data, monkeypatch
+):
+    asked = commands(monkeypatch, **codes)
     environment = peers.PeerEnvironment(tmp_path / "environment")
-    assert environment.run("deeptime", "deeptime", data) == {"gap": 0.5}
-    assert environment.run("deeptime", "deeptime", data) == {"gap": 0.5}
-    assert ["venv" in command for command in asked] == [True, False, False, False]
-    assert ["install" in command for command in asked] == [False, True, False, False]
-
-
-def test_without_an_index_the_row_says_so_and_the_others_go_on(tmp_path, data, monkeypatch):
-    asked = commands(monkeypatch, install=(1, "", "WARNING: retrying\nERROR: No matching | distribution\n"))
-    environment = peers.PeerEnvironment(tmp_path / "environment")
-    refusal = environment.run("deeptime", "deeptime", data)
-    assert refusal == "cannot be installed: ERROR: No matching / distribution"
-    assert environment.run("deeptime", "deeptime", data) == refusal
-    assert len(asked) == 2
-
-
-def test_a_peer_that_fails_or_an_environment_that_cannot_be_made_is_a_row(tmp_path, data, monkeypatch):
-    commands(monkeypatch, peer_worker=(1, "", "IndexError: index -1\n"))
-    assert peers.PeerEnvironment(tmp_path / "a").run("pydtmc", "PyDTMC", data) == "fails: IndexError: index -1"
-    commands(monkeypatch, venv=(1, "ensurepip is not available\n", ""))
-    found = peers.PeerEnvironment(tmp_path / "b").run("pydtmc", "PyDTMC", data)
-    assert found == "no environment: ensurepip is not available"
+    assert [environment.run("deeptime", "deeptime", data) for _ in range(2)] == [found] * 2
+    taken = [next((word for word in ("venv", "install") if word in command), "ask") for command in asked]
+    assert " ".join(taken) == steps
 
 
 def test_the_limits_hold(tmp_path, data, monkeypatch):
