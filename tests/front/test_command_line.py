@@ -12,20 +12,10 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.cli import main
 from asperity.study import DATA, PICTURES
-from commands import ended, run
+from commands import ended, refused, run
 from wall_shapes import over_floor, square
 
 FILES = sorted((*PICTURES, *DATA))
-
-
-def refused(*arguments):
-    """The single line on standard error of a run that must end with exit code 1 and print no result."""
-    result = run(*arguments)
-    assert result.exit_code == 1, result.output
-    assert result.stdout == ""
-    lines = result.stderr.splitlines()
-    assert len(lines) == 1 and lines[0].startswith("asperity: ")
-    return lines[0]
 
 
 @pytest.fixture(scope="module")
