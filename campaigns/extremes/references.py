@@ -20,9 +20,9 @@ import mpmath as mp
 import numpy as np
 
 from asperity.geometry.disk.satellites import Satellites
-from campaigns.judges import precise_collision
+from campaigns.judges.precise_collision import PreciseCollision
 from campaigns.judges.precise_rays import arc, cap, cap_clearance, crevice, tooth
-from campaigns.judges.precise_tracer import DIGITS, trace_precisely
+from campaigns.judges.precise_tracer import DIGITS, GUARD, trace_precisely
 
 from . import disks, walls
 from .rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
@@ -181,19 +181,20 @@ def _nearest(figure, values):
 def judged_disk(scale, position, velocity):
     """One disk, as a row of the file: state in, velocity out rounded once, contacts, condition."""
     spacing = Satellites.around(scale, scale * disks.WALL.depth).spacing
-    with mp.workdps(precise_collision.DIGITS + precise_collision.GUARD):
-        place, speed = [mp.mpf(float(p)) for p in position], [mp.mpf(float(v)) for v in velocity]
-        _, out, contacts = precise_collision.Flight(disks.WALL, disks.DISK, scale, spacing, place, speed).collide()
+
+    def judged(state):
+        one = PreciseCollision(disks.DISK, disks.WALL, scale, spacing, state[:2], state[2:])
+        return one.collide()[2:], one.contacts
+
+    with mp.workdps(DIGITS + GUARD):
+        state = [mp.mpf(float(number)) for number in (*position, *velocity)]
+        out, contacts = judged(state)
         condition = mp.mpf(1)
         # positions matter on the scale of the wall's cell and of the satellites' distance
-        for k, size in ((0, scale), (1, spacing), (2, 1), (3, 1), (4, 1)):
-            moved = [*place, *speed]
-            moved[k] += DISK_STEP * size
-            _, other, _ = precise_collision.Flight(
-                disks.WALL, disks.DISK, scale, spacing, moved[:2], moved[2:]
-            ).collide()
-            condition += max(abs(a - b) for a, b in zip(out, other, strict=True)) / DISK_STEP
-        start = [float(number).hex() for number in (*position, *velocity)]
+        for k, size in enumerate((scale, spacing, 1, 1, 1)):
+            moved = [number + (k == at) * DISK_STEP * size for at, number in enumerate(state)]
+            condition += max(abs(a - b) for a, b in zip(out, judged(moved)[0], strict=True)) / DISK_STEP
+        start = [float(number).hex() for number in state]
         return [start, [float(v).hex() for v in out], contacts, float(f"{float(condition):.4g}")]
 
 
