@@ -119,7 +119,7 @@ def judge_plates(number: int) -> Iterator[Judged]:
     spacing = Satellites.around(scale, scale * wall.depth).spacing
     _, expected, contacts = collide_precisely(DISK, wall, scale, spacing, position, velocity)
     judged = ~np.isnan(expected[:, 0])
-    apart = np.abs(expected - out.velocity).max(axis=1) > 1e-6
+    apart = np.abs(expected - out.velocity).max(axis=1) > 1e-9
     wrong = judged & (~out.escaped | apart | (contacts != out.contacts))
     for number, fault in ((int(wrong.sum()), "lost or wrong"), (int((judged & ~wrong).sum()), "")):
         if number:
