@@ -232,7 +232,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "spectral_gap": (spec.spectral_gap, {"law": LAW, "tolerance": 0.1, "rng": 0}),
     "spectrum": (spec.spectrum, {"kernel": LAW, "k": 2, "tolerance": 0.1, "rng": 0}),
     "work_precision": (spec.work_precision, {"problem": PROBLEM, "methods": [METHOD], "budgets": [1.0], "repeats": 1,
-                                             "seconds": 0.1, "warm_up": False, "threads": 1, "path": None}),
+                                             "seconds": 0.1, "warm_up": False, "path": None}),
     "Estimate": (Estimate, {"value": 1.0, "error": 0.1, "kind": "bound", "method": "by hand"}),
     "study_wall": (study_wall, {"wall": geo.flat(), "name": "a", "disk": None, "tolerance": 0.1, "bins": 2, "rng": 0}),
 }  # fmt: skip
