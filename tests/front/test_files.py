@@ -20,9 +20,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench import standard_set
-from asperity.bench.run import BenchRun
 from asperity.errors import AccuracyError, FileExistsRefusal, InputError, WallError
-from asperity.spectral.work_diagrams.machine import Machine
 from asperity.study import study_wall
 from commands import run
 
@@ -294,11 +292,7 @@ def test_bench_replaces_no_file_that_it_did_not_write(tmp_path, name):
 def test_bench_goes_on_where_it_was_and_keeps_a_larger_run(tmp_path):
     assert run("bench", "koch/law", "--out", tmp_path).exit_code == 0
     assert run("bench", "koch/law", "--out", tmp_path).exit_code == 0
-    report = spec.WorkReport.of(
-        spec.WorkProblem("koch/moment", spec.ReferenceValue(0.0, 0.0, "by hand")),
-        [spec.WorkMethod("a", float)], Machine.here(),
-    )  # fmt: skip
-    (tmp_path / "bench.json").write_text(BenchRun((report,)).to_json())
+    (tmp_path / "bench.json").write_text('{"reports": [{"problem": "koch/moment"}]}')
     assert run("bench", "koch/law", "--out", tmp_path).exit_code == 1
     assert run("bench", "koch", "--out", tmp_path).exit_code == 0
 
