@@ -260,10 +260,13 @@ def law_of(made: object) -> Law:
     return made
 
 
+def in_words(reason: Exception) -> str:
+    """Why a computation failed: our own messages say what to do, others need the name of their class."""
+    return str(reason) if isinstance(reason, AsperityError) else f"{type(reason).__name__}: {reason}"
+
+
 def _refused(point: Point, quantity: str, reason: Exception, seconds: float) -> SweepRow:
-    # our own messages say what to do; others need the name of their class
-    own = str(reason) if isinstance(reason, AsperityError) else f"{type(reason).__name__}: {reason}"
-    return SweepRow(point, quantity, None, None, "", "", "", seconds, __version__, own)
+    return SweepRow(point, quantity, None, None, "", "", "", seconds, __version__, in_words(reason))
 
 
 def _check_names(family: Family, point: Point) -> None:
