@@ -98,7 +98,7 @@ def mp_collide(position, velocity, half, radius, rough):
 @pytest.mark.parametrize("spinning", [False, True])
 def test_two_close_trajectories_in_sixty_digits_separate_as_the_derivative_says(spinning):
     table, matrix = geo.Container.sinai(1.0, 0.3), (no_slip_matrix if spinning else smooth_matrix)(DISK)
-    rng = np.random.default_rng(3)
+    rng = np.random.default_rng(7)
     position, velocity, wall = equilibrium_starts(table, DISK, 3, spinning, rng)
     # inside, where the plain version needs no wall to start from
     flight, _, _ = table.next_wall(position, velocity, wall)
