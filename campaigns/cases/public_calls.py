@@ -218,7 +218,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "laplacian_comparison": (spec.laplacian_comparison, {"law": LAW, "degrees": 2, "tolerance": 0.1}),
     "mean_squared_slope": (spec.mean_squared_slope, {"wall": TEETH}),
     "mixing_time": (spec.mixing_time, {"kernel": MATRIX, "within": 0.25, "distance": "total variation",
-                                       "density": None, "start": None, "initial": 1.0}),
+                                       "initial": 1.0}),
     "accommodation": (spec.accommodation, {"law": LAW, "theta": [1.0], "tolerance": 0.1, "rng": 0}),
     "bounce_shares": (spec.bounce_shares, {"wall": TEETH, "incidence_deg": [30.0], "most": 2, "rng": 0}),
     "specular_share": (spec.specular_share, {"law": LAW, "incidence_deg": [30.0], "rng": 0}),
