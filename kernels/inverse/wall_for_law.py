@@ -24,6 +24,7 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.long_runs import reported
 from ...core.rounding import EPS
+from ...geometry import join_walls
 from ...geometry.cells.miniature import wall_miniature
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ...geometry import Disk, Wall
-    from ...geometry.curves.curve import Curve
 
 # The search draws this many polygons at a time, with one vertex more every second time up to the most, ...
 DRAWN, MOST_VERTICES, ROUNDS = 60, 6, 14
@@ -214,7 +214,9 @@ def wall_for(
     )
     least = search.defect - gain
     chosen, weights = search.result(most_hollows, smallest_opening)
-    wall = side_by_side(chosen, weights)
+    # the last opening ends where the period does
+    weights[-1] = 1.0 - float(np.cumsum([0.0, *weights])[-2])
+    wall = join_walls([hollow.wall.cell.scaled(width) for hollow, width in zip(chosen, weights.tolist(), strict=True)])
     finished = discretise(WallLaw(wall), basis, tolerance=0.1 * tolerance)
     value = float(np.linalg.norm(finished.symmetric - target))
     kind: ErrorKind = "bound" if {finished.error.kind, target_error.kind} == {"bound"} else "estimate"
@@ -273,20 +275,6 @@ def collision_for(
     instance("disk", felt, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
     found = wall_for(collision.law, moments, tolerance, **search)
     return replace(found, wall=found.wall.unforeshorten(felt), disk=felt)
-
-
-def side_by_side(hollows: Sequence[UnitHollow], weights: Floats) -> Wall:
-    """The wall of period 1 with the hollows from left to right below openings of the given widths."""
-    from ...geometry import Wall
-
-    ends = np.concatenate([[0.0], np.cumsum(weights)])
-    ends[-1] = 1.0
-    pieces: list[Curve] = []
-    for hollow, left, right in zip(hollows, ends[:-1].tolist(), ends[1:].tolist(), strict=True):
-        path = [piece.stretched(right - left, right - left).moved(left, 0.0) for piece in hollow.wall.cell.pieces]
-        joints = [(left, 0.0), *(piece.end for piece in path[:-1]), (right, 0.0)]
-        pieces += [piece.pinned(joints[k], joints[k + 1]) for k, piece in enumerate(path)]
-    return Wall(pieces, period=1.0)
 
 
 def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[Law | None, Floats, Estimate]:
