@@ -120,8 +120,7 @@ class LimitStudy(Summary):
         ----------
         column : str
             One of the measured columns.
-        against : {"scales", "spacings", "ratio"}
-            ``"ratio"`` is scale/spacing^2.
+        against : {"scales", "spacings"}
 
         Raises
         ------
@@ -129,7 +128,7 @@ class LimitStudy(Summary):
             If a name is unknown, there are fewer than three scales, or an entry is not positive.
         """
         choice("column", column, COLUMNS)
-        bases = {"scales": self.scales, "spacings": self.spacings, "ratio": self.scales / self.spacings**2}
+        bases = {"scales": self.scales, "spacings": self.spacings}
         choice("against", against, bases)
         values = getattr(self, column)
         if len(values) < FEWEST_SCALES or not np.all(values > 0.0):
@@ -138,12 +137,10 @@ class LimitStudy(Summary):
             )
         spread = np.maximum(self.errors[column] / values, EPS)
         x, y = np.log(bases[against]), np.log(values)
-        design = np.stack([x, np.ones_like(x)], axis=1) / spread[:, None]
-        inverse = np.linalg.inv(design.T @ design)
-        slope, offset = inverse @ design.T @ (y / spread)
+        (slope, offset), covariance = np.polyfit(x, y, 1, w=1.0 / spread, cov="unscaled")
         # scatter about the line, in units of the sampling errors
         excess = np.sum(((y - slope * x - offset) / spread) ** 2) / (len(x) - 2)
-        standard_error = math.sqrt(float(inverse[0, 0]))
+        standard_error = math.sqrt(float(covariance[0, 0]))
         by_scatter = student_95(len(x) - 1) * math.sqrt(float(excess)) if excess > 1.0 else 0.0
         error = standard_error * max(NORMAL_95, by_scatter)
         return Estimate(float(slope), error, "estimate", f"slope of {len(x)} scales")
