@@ -27,9 +27,8 @@ from ...core.checks import (
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_errors
 from ...core.frames import data_frame
-from ...core.long_runs import Engine, all_parts, reported
+from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...core.rounding import EPS
-from ...core.version import __version__
 
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall
@@ -226,7 +225,9 @@ def limit_study(
     target = (wall if limit is None else limit).foreshorten(disk)
     sizes = tuple((space.scale, space.spacing) for space in spaces)
     job = _Repetitions(disk, wall, target, sizes, tuple(map(float, rolls)), samples, repetitions, root)
-    parts = all_parts(job.measured, len(eps) * repetitions, job.identity(), engine, job.stored)
+    parts = all_parts(
+        job.measured, len(eps) * repetitions, identity_of("limit of small scales", job), engine, job.stored
+    )
     each = np.reshape([part["columns"] for part in parts], (len(eps), repetitions, len(rolls), len(COLUMNS)))
     seconds = np.reshape([part["seconds"] for part in parts], (len(eps), repetitions)).sum(axis=1)
     runs = each.mean(axis=2)
@@ -251,20 +252,12 @@ class _Repetitions:
 
     disk: Disk
     wall: Wall
-    target: Wall
+    limit: Wall
     sizes: tuple[tuple[float, float], ...]
     psi: tuple[float, ...]
     samples: tuple[int, int, int]
     repetitions: int
-    root: tuple[int, ...]
-
-    def identity(self) -> dict[str, Any]:
-        """What tells this study from others."""
-        return {
-            "computation": "limit of small scales", "version": __version__, "disk": self.disk,
-            "wall": self.wall, "limit": self.target, "sizes": self.sizes, "psi": self.psi, "samples": self.samples,
-            "repetitions": self.repetitions, "seed": self.root,
-        }  # fmt: skip
+    seed: tuple[int, ...]
 
     def stored(self, _: int) -> dict[str, Stored]:
         """What the arrays of a part must be."""
@@ -272,7 +265,7 @@ class _Repetitions:
 
     def measured(self, part: int) -> dict[str, Any]:
         """Columns and processor seconds of one repetition, whose random numbers depend on its number alone."""
-        rng = np.random.default_rng([*self.root, part])
+        rng = np.random.default_rng([*self.seed, part])
         scale, spacing = self.sizes[part // self.repetitions]
         each = [self._measured(scale, spacing, psi, rng) for psi in self.psi]
         return {"columns": [columns for columns, _ in each], "seconds": sum(seconds for _, seconds in each)}
@@ -283,7 +276,7 @@ class _Repetitions:
         """The columns of one repetition in the order of COLUMNS, and the processor seconds."""
         from ...geometry import collide, collide_cylinder, collide_modified, trace
 
-        disk, wall, target = self.disk, self.wall, self.target
+        disk, wall, target = self.disk, self.wall, self.limit
         directions, turns, starts = self.samples
         per_angle = turns * starts
         u = -1.0 + 2.0 * _strata(directions, rng)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, Unpack, get_args
+from typing import Literal, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,8 +25,7 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, with_errors
-from ...core.long_runs import Engine, all_parts, reported
-from ...core.version import __version__
+from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.law import IsometryLaw
@@ -172,7 +171,7 @@ def simulated_times(
     half, pace = number_between("radius", radius, 0.0, LARGEST), number_between("speed", speed, 0.0, LARGEST)
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     job = _Particles(paper, levels, particles, root, half, pace, arrangement)
-    parts = all_parts(job.times, -(-particles // TOGETHER), job.identity(), engine, job.stored)
+    parts = all_parts(job.times, -(-particles // TOGETHER), identity_of("exit times", job), engine, job.stored)
     return ExitTimes(frozen(levels), frozen(np.concatenate([part["times"] for part in parts])), half, pace)
 
 
@@ -309,20 +308,12 @@ class _Particles:
     """Particles in a channel, ``TOGETHER`` of them at a time; what a worker is sent."""
 
     law: Law
-    levels: Floats
+    lengths: Floats
     particles: int
-    root: tuple[int, ...]
+    seed: tuple[int, ...]
     radius: float
     speed: float
     arrangement: Arrangement
-
-    def identity(self) -> dict[str, Any]:
-        """What tells these particles from others."""
-        return {
-            "computation": "exit times", "version": __version__, "law": self.law,
-            "lengths": self.levels, "particles": self.particles, "seed": self.root,
-            "radius": self.radius, "speed": self.speed, "arrangement": self.arrangement,
-        }  # fmt: skip
 
     def count(self, part: int) -> int:
         """The particles of a part."""
@@ -330,10 +321,10 @@ class _Particles:
 
     def stored(self, part: int) -> dict[str, Stored]:
         """What the arrays of a part must be."""
-        return {"times": Stored("f", (self.count(part), self.levels.size), 0.0)}
+        return {"times": Stored("f", (self.count(part), self.lengths.size), 0.0)}
 
     def times(self, part: int) -> dict[str, Floats]:
         """Exit times of the particles of one part, which depend on its number alone."""
         channel = Channel(self.radius, math.inf, self.arrangement == "half-turn")
-        wall, rng = np.zeros(self.count(part)), np.random.default_rng([*self.root, part])
-        return {"times": channel.crossings(self.law, self.levels, wall, rng, of_x=True) / self.speed}
+        wall, rng = np.zeros(self.count(part)), np.random.default_rng([*self.seed, part])
+        return {"times": channel.crossings(self.law, self.lengths, wall, rng, of_x=True) / self.speed}

@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checkpoints import Stored
 from ...core.checks import Rng, check_memory, generator, instance, positive_number, whole_number
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate, Summary
 from ...core.frames import data_frame
-from ...core.long_runs import Engine, all_parts
-from ...core.version import __version__
+from ...core.long_runs import Engine, all_parts, identity_of
 from ...kernels import Basis, KernelMatrix, discretise
 from ...kernels.sampling.counts import half_width
 from .quantities import UserQuantity, name_of
@@ -215,14 +215,7 @@ class _Matrices:
     family: Family
     basis: Basis
     tolerance: float
-    seeds: tuple[int, ...]
-
-    def identity(self) -> dict[str, Any]:
-        """What tells this mean from others."""
-        return {
-            "computation": "mean law", "version": __version__, "family": self.family, "basis": self.basis,
-            "tolerance": self.tolerance, "realisations": len(self.seeds), "seeds": np.array(self.seeds),
-        }  # fmt: skip
+    seeds: NDArray[np.int64]
 
     def stored(self, _: int) -> dict[str, Stored]:
         """What the arrays of a part must be."""
@@ -236,7 +229,9 @@ class _Matrices:
         """The matrix of one realisation with what is known of it; or 0 and the reason why there is none."""
         refused = ""
         try:
-            found = discretise(law_of(self.family(**{SEED: self.seeds[part]})), self.basis, tolerance=self.tolerance)
+            found = discretise(
+                law_of(self.family(**{SEED: int(self.seeds[part])})), self.basis, tolerance=self.tolerance
+            )
         except Exception as reason:  # a realisation must not stop the others
             refused = in_words(reason)
             nothing = Estimate(0.0, 0.0, "bound", refused)
@@ -306,9 +301,9 @@ def mean_law(
     instance("basis", basis, Basis, "ker.Bins(64)")
     check_memory("realisations", f"{number} matrices in {basis!r}", 2 * number * basis.size**2)
     seeds = _seeds(rng, number)
-    job = _Matrices(family, basis, positive_number("tolerance", tolerance), tuple(seeds))
+    job = _Matrices(family, basis, positive_number("tolerance", tolerance), np.array(seeds))
     engine: Engine = {"checkpoint": checkpoint, "key": key, "client": client}
-    parts = all_parts(job.arrays, number, job.identity(), engine, job.stored)
+    parts = all_parts(job.arrays, number, identity_of("mean law", job), engine, job.stored)
     known = [part for part in parts if not part["refused"]]
     refused = number - len(known)
     first = next((k for k, part in enumerate(parts) if part["refused"]), 0)

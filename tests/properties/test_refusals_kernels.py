@@ -269,7 +269,6 @@ REFUSED = {
         (lambda: ker.weak_limit(DISK, FLAT, [1e-2], {}), "pairs"),
         (lambda: ker.weak_limit(DISK, FLAT, [[1e-2]]), "scales"),
         *((lambda e=e: ker.weak_limit(DISK, FLAT, e, rng=0, samples=8), "scales: .*at least") for e in (1e-20, 5e-324)),
-        (lambda: ker.weak_limit(DISK, FLAT, 1e-2, rng=0, samples=8).estimate(0, 0, of="disk"), "of: expected"),
         (lambda: ker.limit_study(DISK, FLAT, [1e-3], rng=0, psi=[[1.0]]), "psi"),
     ],
     "billiards": [
