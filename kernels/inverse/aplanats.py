@@ -46,6 +46,8 @@ class MirrorPair:
     ----------
     first, second : (float, float)
         Disjoint intervals of angles of equal flux, the first below the second, radians.
+    ratio : float
+        Distance of the first mirror over that of the second, in the middle of the intervals.
     least_angle : float
         Rays within this angle of 0 and pi have no mirror.
 
@@ -72,6 +74,7 @@ class MirrorPair:
 
     first: Interval
     second: Interval
+    ratio: float = 1.0
     least_angle: float = 0.0
 
     @cached_property
@@ -123,26 +126,27 @@ class MirrorPair:
         return np.asarray(chebyshev.chebint(0.5 * (high - low) * series, lbnd=0.0), dtype=np.float64)
 
     @cached_property
+    def _factor(self) -> float:
+        """g in the middle: the positive root of (g sin(delta/2))^2 + (1 - ratio) g = ratio."""
+        theta, image = self.angles(0.5 * sum(self.ends))
+        square, slope = float(np.sin(0.5 * (image - theta)) ** 2), 1.0 - self.ratio
+        return float((-slope + np.sqrt(slope * slope + 4.0 * square * self.ratio)) / (2.0 * square))
+
+    @cached_property
     def _half_length(self) -> float:
         """Half the length of the paths."""
         low, high = self.ends
         return 1.0 / min(float(self._polar(which, t)[1]) for which in (0, 1) for t in (low, high))
 
     def _polar(self, which: int, t: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Angle, distance over half the length of the path, and d log(distance)/d angle.
-
-        In the middle of the intervals both mirrors are equally far: there g = g'.
-        """
+        """Angle, distance over half the length of the path, and d log(distance)/d angle."""
         from numpy.polynomial import chebyshev
 
         t = np.asarray(t, dtype=np.float64)
         low, high = self.ends
         theta, image = self.angles(t)
         half = 0.5 * (image - theta)
-        middle, opposite = self.angles(0.5 * (low + high))
-        g = np.exp(chebyshev.chebval((2.0 * t - low - high) / (high - low), self._series)) / np.sin(
-            0.5 * (opposite - middle)
-        )
+        g = self._factor * np.exp(chebyshev.chebval((2.0 * t - low - high) / (high - low), self._series))
         if which == 0:
             return theta, g / (1.0 + g), 1.0 / (np.tan(half) * (1.0 + g))
         g = 1.0 / (g * np.sin(half) ** 2)
