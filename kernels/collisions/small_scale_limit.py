@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
@@ -68,8 +67,6 @@ class LimitStudy(Summary):
         disk's correlation is <u, P~ u>/<u, u> plus ``shift``.
     errors : dict of arrays
         Standard errors of the eight columns above, from independent repetitions.
-    seconds : array
-        Processor time of the collisions.
     collisions : int
         Number of collisions at each scale.
     psi : array, shape (k,)
@@ -90,7 +87,6 @@ class LimitStudy(Summary):
     drift: Floats
     shift: Floats
     errors: dict[str, Floats]
-    seconds: Floats
     collisions: int
     psi: Floats
     by_psi: dict[str, Floats]
@@ -107,7 +103,7 @@ class LimitStudy(Summary):
         for name in COLUMNS:
             # names of fields of this class
             columns |= {name: getattr(self, name), f"{name}_error": self.errors[name]}
-        return data_frame({**columns, "seconds": self.seconds})
+        return data_frame(columns)
 
     def order(self, column: str, against: str = "scales") -> Estimate:
         """The exponent p of column ~ against^p, by weighted least squares.
@@ -182,8 +178,7 @@ def limit_study(
     checkpoint : path, optional
         A file to which every repetition at a scale is added; the same call goes on with it.
     client : int, str or distributed.Client, optional
-        As of `asperity.spectral.sweep`. But for its ``seconds`` the study is the same to the last bit without
-        checkpoint and workers.
+        As of `asperity.spectral.sweep`. The study is the same to the last bit without checkpoint and workers.
     key : str, optional
         As of `asperity.spectral.sweep`.
 
@@ -229,7 +224,6 @@ def limit_study(
         job.measured, len(eps) * repetitions, identity_of("limit of small scales", job), engine, job.stored
     )
     each = np.reshape([part["columns"] for part in parts], (len(eps), repetitions, len(rolls), len(COLUMNS)))
-    seconds = np.reshape([part["seconds"] for part in parts], (len(eps), repetitions)).sum(axis=1)
     runs = each.mean(axis=2)
     means, errors = runs.mean(axis=1), runs.std(axis=1, ddof=1) / math.sqrt(repetitions)
     columns = {name: frozen(means[:, j]) for j, name in enumerate(COLUMNS)}
@@ -238,7 +232,6 @@ def limit_study(
         spacings=frozen([space.spacing for space in spaces]),
         gap_fraction=frozen([2.0 * space.gap_radius / space.spacing for space in spaces]),
         errors={name: frozen(errors[:, j]) for j, name in enumerate(COLUMNS)},
-        seconds=frozen(seconds),
         collisions=repetitions * len(rolls) * math.prod(samples),
         psi=frozen(rolls),
         by_psi={name: frozen(each.mean(axis=1)[:, :, j]) for j, name in enumerate(COLUMNS)},
@@ -261,19 +254,16 @@ class _Repetitions:
 
     def stored(self, _: int) -> dict[str, Stored]:
         """What the arrays of a part must be."""
-        return {"columns": Stored("f", (len(self.psi), len(COLUMNS))), "seconds": Stored("f", (), 0.0)}
+        return {"columns": Stored("f", (len(self.psi), len(COLUMNS)))}
 
     def measured(self, part: int) -> dict[str, Any]:
-        """Columns and processor seconds of one repetition, whose random numbers depend on its number alone."""
+        """The columns of one repetition, whose random numbers depend on its number alone."""
         rng = np.random.default_rng([*self.seed, part])
         scale, spacing = self.sizes[part // self.repetitions]
-        each = [self._measured(scale, spacing, psi, rng) for psi in self.psi]
-        return {"columns": [columns for columns, _ in each], "seconds": sum(seconds for _, seconds in each)}
+        return {"columns": [self._measured(scale, spacing, psi, rng) for psi in self.psi]}
 
-    def _measured(
-        self, scale: float, spacing: float, psi: float, rng: np.random.Generator
-    ) -> tuple[list[float], float]:
-        """The columns of one repetition in the order of COLUMNS, and the processor seconds."""
+    def _measured(self, scale: float, spacing: float, psi: float, rng: np.random.Generator) -> list[float]:
+        """The columns of one repetition in the order of COLUMNS."""
         from ...geometry import collide, collide_cylinder, collide_modified, trace
 
         disk, wall, target = self.disk, self.wall, self.limit
@@ -285,9 +275,7 @@ class _Repetitions:
         x1 = scale * wall.period * _strata(starts, rng, (directions, turns))
         position = np.stack([x1, np.broadcast_to(alpha[..., None], x1.shape)], axis=-1).reshape(-1, 2)
         velocity = -np.repeat(disk.from_angles(theta, psi), per_angle, axis=0)
-        begin = time.process_time()
         true = collide(disk, wall, scale, position, velocity, spacing)
-        spent = time.process_time() - begin
         outgoing, rolled = disk.to_angles(true.velocity)
         limit_wall = target.unforeshorten(disk)
         straight, _ = disk.to_angles(collide_cylinder(disk, limit_wall, scale, position, velocity).velocity)
@@ -304,7 +292,7 @@ class _Repetitions:
         differ = np.abs(modified.velocity - cylinder.velocity).max(axis=1) > 0.1
         # E[u^2] = 1/3 under sin(theta)/2 d theta
         shift = 3.0 * float(np.mean(u[:, None] * (np.cos(limit) - np.cos(outgoing.reshape(shape)))))
-        columns = [
+        return [
             away + psi_defect,
             away + psi_defect + float(moved.sum(axis=1).mean()),
             float(np.mean(np.abs(np.sort(straight.reshape(shape), axis=1) - limit))),
@@ -314,7 +302,6 @@ class _Repetitions:
             float(moved.max(axis=1).mean()),
             shift,
         ]
-        return columns, spent
 
 
 def _strata(n: int, rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Floats:
