@@ -36,7 +36,7 @@ from ..laws.law import Law
 from ..laws.matrix_law import MatrixLaw, not_a_law
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
-from .hollows import UnitHollow, flat, random_polygons, retroreflector, simple_hollows
+from .hollows import UnitHollow, random_polygons, retroreflector, simple_hollows
 from .hull import few_weights, nearest_weights, possible_gain
 
 if TYPE_CHECKING:
@@ -329,7 +329,7 @@ def _given(walls: Sequence[Wall]) -> list[UnitHollow]:
     for k, wall in enumerate(sequence("hollows", walls, Wall, "geo.focusing_arcs(1.0)")):
         if not wall.closes:
             raise InputError(f"hollows[{k}]: expected a Wall without islands, got {wall!r}")
-        found.append(UnitHollow(wall.scaled(1.0 / wall.period), f"wall {k}"))
+        found.append(UnitHollow(wall.scaled(1.0 / wall.period)))
     if not found:
         raise InputError("hollows: expected at least one wall, got none")
     return found
@@ -393,7 +393,7 @@ class _Search:
 
     def run(self, rng: np.random.Generator) -> None:
         """Random polygons of more and more vertices, then moved ones."""
-        self.add([flat(), *simple_hollows()])
+        self.add(simple_hollows())
         for step in range(ROUNDS):
             self.add(random_polygons(DRAWN, min(2 + step // 2, MOST_VERTICES), rng))
             if self.is_done:
