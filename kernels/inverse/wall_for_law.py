@@ -26,7 +26,6 @@ from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...geometry import join_walls
 from ...geometry.cells.miniature import wall_miniature
-from ..bases.bins import Bins
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE
 from ..collisions.collision_law import CollisionLaw
@@ -62,6 +61,7 @@ TRACED_FROM, RETROREFLECTED = 0.1, 0.5
 LEAST_PROGRESS = 1e-3
 # Joint distances are of interest to two digits.
 DISTANCE_TOLERANCE = 1e-2
+UNSYMMETRIC = "law: expected one that is symmetric for sin(theta) d theta, as every wall's is"
 # Rounding of a moment, for each of them.
 ROUNDED = 64.0 * EPS
 
@@ -287,16 +287,20 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
                 f"law: expected at least 2 moments for the weight sin(theta), got a matrix in {law.basis!r}"
             )
     else:
-        wanted = _wanted_law(law)
+        # a matrix in bins stands for its law
+        wanted = MatrixLaw(law) if isinstance(law, KernelMatrix) else law
+        if not isinstance(wanted, Law):
+            raise not_a_law("law", "a Law such as ker.lambertian() or a KernelMatrix", wanted)
+        if wanted.reversible is False:
+            raise InputError(f"{UNSYMMETRIC}, got {law!r}")
+        # the change is its own inverse
+        wanted = wanted if wanted.frame == "paper" else wanted.in_specular_frame()
         matrix = discretise(wanted, Legendre(moments), tolerance=TARGET_FRACTION * tolerance)
     symmetric = matrix.symmetric[:moments, :moments]
     allowed = 4.0 * float(matrix.error) + ROUNDED * len(symmetric)
     defect = float(np.linalg.norm(symmetric - symmetric.T))
     if defect > allowed:
-        raise InputError(
-            f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}; "
-            f"its moments differ from their transpose by {defect:.2g}"
-        )
+        raise InputError(f"{UNSYMMETRIC}, got {law!r}; its moments differ from their transpose by {defect:.2g}")
     missing = float(np.linalg.norm(symmetric[0] - np.eye(len(symmetric))[0]))
     if missing > allowed:
         raise InputError(
@@ -304,22 +308,6 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
             f"{missing:.2g}"
         )
     return wanted, 0.5 * (symmetric + symmetric.T), matrix.error
-
-
-def _wanted_law(law: Law | KernelMatrix) -> Law:
-    """The law in the paper's convention; a matrix in bins stands for its `MatrixLaw`."""
-    if isinstance(law, KernelMatrix):
-        if not isinstance(law.basis, Bins):
-            raise InputError(
-                f"law: expected a Law, or a matrix in Bins or Legendre polynomials, got one in {law.basis!r}"
-            )
-        law = MatrixLaw(law)
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a Law such as ker.lambertian() or a KernelMatrix", law)
-    if law.reversible is False:
-        raise InputError(f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}")
-    # the change is its own inverse
-    return law if law.frame == "paper" else law.in_specular_frame()
 
 
 def _given(walls: Sequence[Wall]) -> list[UnitHollow]:
