@@ -160,12 +160,10 @@ def _on_same_bins(
 
 def _between_matrices(first: KernelMatrix, second: KernelMatrix, order: float, kind: Kind) -> Distance:
     sup = kind == "sup"
-    if kind == "joint":
-        found = joint_matrix_distance(first, second, order)
-    else:
-        found = matrix_distance(first, second, order, sup)
-    return Distance(found.value, found.error, found.kind, found.method, noise_floor(first, second, order, sup))
+    joint = kind == "joint"
+    found = joint_matrix_distance(first, second, order) if joint else matrix_distance(first, second, order, sup)
+    return _labelled(found, noise_floor(first, second, order, sup))
 
 
-def _labelled(found: Estimate) -> Distance:
-    return Distance(found.value, found.error, found.kind, found.method)
+def _labelled(found: Estimate, floor: float | None = None) -> Distance:
+    return Distance(found.value, found.error, found.kind, found.method, floor)

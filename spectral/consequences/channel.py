@@ -290,7 +290,8 @@ class Channel:
             stays = reached < levels.size
             if not stays.any():
                 return found
-            x, run, going, reached, wall = (one[stays] for one in (x_end, run_end, going, reached, after))
+            x, run, wall = x_end[stays], run_end[stays], after[stays]
+            going, reached = going[stays], reached[stays]
             incoming = math.pi - self.framed(arriving[stays], wall)
             direction = self.framed(reflected(law, incoming, rng), wall)
         raise InputError(f"law: {law!r} keeps {len(x)} particles below {levels[-1]:g} after {MOST_FLIGHTS} flights")
