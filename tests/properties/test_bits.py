@@ -318,7 +318,7 @@ CHANGED = [
     (exits, {"speed": 2.0}, "speed: "),
     (exits, {"arrangement": "half-turn"}, "arrangement: "),
     (played, {"laws": ker.CollisionLaw.from_wall(geo.focusing_arcs(0.8), DISK)}, "laws: "),
-    (played, {"position": np.full((200, 2), 0.25)}, "start: "),
+    (played, {"position": np.full((200, 2), 0.25)}, "position: "),
     (played, {"collisions": 6}, "collisions: "),
     (played, {"container": geo.Container.strip(2.0)}, "container: "),
     (studied, {"scales": [1e-3, 1e-4, 1e-6]}, "sizes: "),

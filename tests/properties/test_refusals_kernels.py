@@ -149,7 +149,7 @@ REFUSED = {
         (lambda: ker.PositionLaw([0.0, 1.0], [MIRROR.in_specular_frame()]), "convention"),
         (lambda: PLACES.sample(1.5, 1.0), "positions from 0 to 1"),
         (lambda: ker.position_distance(PLACES, ker.PositionLaw([0.0, 2.0], [MIRROR])), "length"),
-        (lambda: ker.displacements(FLOOR, 200, rng=0).tail_exponent(100), "largest"),
+        (lambda: ker.displacements(FLOOR, 200, rng=0).tail_exponent(), "more rays"),
         (lambda: ker.displacements(geo.mushrooms(0.4), 200, rng=0).tail_exponent(), "closes"),
     ],
     "walls on springs": [
@@ -158,7 +158,6 @@ REFUSED = {
         (lambda: ker.SpringWall(1.0, 1.0).sample([[0.0, 1.0]]), "v2 < 0"),
         (lambda: ker.SpringWall(1.0, 1.0).sample([0.0, -1.0]), "shape"),
         (lambda: ker.SpringWall(1.0, 1.0).energy_accommodation(1.0), "differs"),
-        (lambda: ker.SpringWall(1.0, 1.0).sample_polar(0.0, 1.0), "greater than 0"),
         (lambda: ker.SpringWall(1e308, 1e308), "acceleration is finite"),
         (lambda: ker.SpringWall(1.0, 1.0, 1e308), "acceleration is finite"),
         (lambda: ker.SpringWall(1.0, 1e308, 1e-308), "acceleration is finite"),
@@ -280,7 +279,6 @@ REFUSED = {
         (lambda: ker.weak_limit(DISK, FLAT, [1e-2], {}), "pairs"),
         (lambda: ker.weak_limit(DISK, FLAT, [[1e-2]]), "scales"),
         *((lambda e=e: ker.weak_limit(DISK, FLAT, e, rng=0, samples=8), "scales: .*at least") for e in (1e-20, 5e-324)),
-        (lambda: ker.weak_limit(DISK, FLAT, 1e-2, rng=0, samples=8).estimate(0, 0, of="disk"), "of: expected"),
         (lambda: ker.limit_study(DISK, FLAT, [1e-3], rng=0, psi=[[1.0]]), "psi"),
     ],
     "billiards": [
@@ -341,7 +339,7 @@ REFUSED = {
         (lambda: ker.distance(SMOOTH, MIRROR), "two collision laws"),
         (lambda: ker.distance(matrix(np.eye(2), ker.Bins(2)), SMOOTH), "two collision laws"),
         (lambda: ker.distance(SMOOTH, NO_SLIP, kind="pseudometric"), "expected 'rows', 'sup' or 'joint'"),
-        (lambda: ker.distance(SMOOTH, SMOOTH @ SMOOTH, kind="joint"), "'rows' is an upper bound"),
+        (lambda: ker.distance(SMOOTH, SMOOTH @ SMOOTH), "both turn psi into pi - psi, or both keep it"),
         (lambda: ker.retroreflection_distance(MIRROR.in_specular_frame()), "Wall, or a law"),
         (lambda: ker.retroreflection_distance(FLAT, 10), "rays"),
     ],
@@ -358,8 +356,6 @@ REFUSED = {
         (lambda: hollow().generations(2, neck=1e6), "neck"),
         (design(wanted="most"), "wanted"),
         (design(bounds=[(1.0, 0.5)]), "bounds"),
-        (design(most_depth=1e-9), "no member"),
-        (design(family=ker.TriangularTeethLaw, most_depth=1.0), "expected walls"),
         (lambda: ker.wall_for("lambert"), "law: expected a Law"),
         (lambda: ker.wall_for(DIFFUSE, moments=1), "moments"),
         (lambda: ker.wall_for(DIFFUSE, tolerance=0.0), "tolerance"),
@@ -401,7 +397,6 @@ REFUSED = {
         *((lambda angle=angle: spec.accommodation(DIFFUSE, theta=[1.0, angle]), "take one beside it")
           for angle in (np.pi / 2, np.arcsin(np.pi / 4), np.pi - np.arcsin(np.pi / 4))),
         (lambda: spec.accommodation(FLAT), r"law: expected a Law such as ker\.WallLaw.*; take ker\.WallLaw\(wall\)"),
-        (lambda: spec.mixing_time(ker.maxwell(0.5), start=1.0), "start: expected a law with a density"),
         (lambda: spec.diffusivity(MIRROR), "infinite"),
         (lambda: spec.diffusivity(DIFFUSE, arrangement="glide"), "arrangement"),
         *((lambda lengths=lengths: spec.channel_diffusivity(DIFFUSE, lengths), "^lengths: expected ")
