@@ -196,17 +196,6 @@ class Spectrum(Summary):
         """Values at the angles theta of the eigenfunction of ``values[index]``, normalised to the mean square 1."""
         return np.asarray(self.basis.evaluate(theta) @ self.vectors[:, index])
 
-    def implied_time_scales(self) -> tuple[Floats, Floats]:
-        """Time scales -1/ln|lambda| in steps, without the constants, and their intervals, shape (k - 1, 2).
-
-        An interval is unbounded if the interval of the eigenvalue reaches modulus 1.
-        """
-        modulus, width = np.abs(self.values[1:]), self.errors.total()[1:]
-        ends = np.stack([np.maximum(modulus - width, 0.0), np.minimum(modulus + width, 1.0)], axis=1)
-        with np.errstate(divide="ignore"):
-            scales, intervals = (-1.0 / np.log(np.minimum(part, 1.0)) for part in (modulus, ends))
-        return scales, np.asarray(intervals)
-
     def plot_eigenfunctions(self, ax: Axes | None = None) -> Axes:
         """Draw up to five eigenfunctions, without the constants, against the incoming angle."""
         theta = np.linspace(0.0, np.pi, ANGLES + 2)[1:-1]

@@ -44,12 +44,6 @@ def test_a_point_needs_a_law_with_a_density():
     assert found.steps > 1
 
 
-def test_implied_time_scales_are_those_of_the_eigenvalues():
-    scales, intervals = spec.spectrum(ker.henyey_greenstein(0.5), k=4).implied_time_scales()
-    assert np.allclose(scales, 1 / (np.log(2) * np.arange(1, 4)))
-    assert np.all(intervals[:, 0] <= scales) and np.all(scales <= intervals[:, 1])
-
-
 def test_the_eigenfunctions_that_are_drawn_are_the_legendre_polynomials():
     ax = Figure().subplots()
     spec.spectrum(ker.henyey_greenstein(0.5), k=3).plot_eigenfunctions(ax)
