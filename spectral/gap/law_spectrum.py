@@ -15,7 +15,7 @@ from ...core.rounding import EPS
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import not_a_law
 from ..bounds.contraction import refuse_unless_self_adjoint
-from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
+from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..essential.edge import essential_edge
 from .gap import spectral_gap
 from .methods import DEGREES, discretisation_only, law_eigenvalues
@@ -145,18 +145,4 @@ def _both_signs(half: Spectrum, k: int) -> Spectrum:
     values = np.concatenate([half.values, -half.values])
     order = np.argsort(-np.abs(values), kind="stable")[:k]
     order = order[np.argsort(-values[order], kind="stable")]
-    pick = index[order]
-    errors = half.errors
-    return replace(
-        half,
-        values=frozen(values[order]),
-        vectors=frozen(half.vectors[:, pick]),
-        residuals=frozen(half.residuals[pick]),
-        parity=tuple(half.parity[i] for i in pick),
-        errors=SpectrumErrors(
-            frozen(errors.algebraic[pick]),
-            frozen(errors.discretisation[pick]),
-            frozen(errors.sampling[pick]),
-            errors.quantile,
-        ),
-    )
+    return replace(half.at(index[order]), values=frozen(values[order]))
