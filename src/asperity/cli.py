@@ -494,8 +494,7 @@ def bench(problems: tuple[str, ...], quick: bool, out: Path, force: bool) -> Non
     names = known.problem_names(problems)
     run.prepare_folder(out, names, force=force)
     effort = standard_set.QUICK if quick else standard_set.FULL
-    reports = standard_set.run_problems(names, effort, out, lambda line: click.echo(line, err=True))
-    found = run.BenchRun(tuple(reports))
-    click.echo(found.summary())
-    for path in found.save(out):
+    found = list(standard_set.run_problems(names, effort, out, lambda line: click.echo(line, err=True)))
+    click.echo(run.summary(found))
+    for path in run.save(found, out):
         click.echo(f"wrote {path}", err=True)
