@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -62,37 +62,25 @@ class Budget:
     engine: Engine | None = None
 
 
-class Method(Protocol):
+class Method(NamedTuple):
     """A method that computes the matrices of some laws; each is listed in `methods.METHODS` or `methods.SAMPLED`.
 
     Walls are replaced by their `parts` beforehand. The law may be a sum, a chain, or in the specular frame.
+
+    Attributes
+    ----------
+    name : str
+        The kind of the method.
+    accepts : callable
+        Whether the method can compute the matrix of a law in a basis.
+    matrix : callable
+        From law, basis and budget to the matrix, with its error and the evidence for it; `discretise` adds the
+        properties of the law.
     """
 
     name: MethodName
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        """Whether the method can compute the matrix of this law in this basis."""
-        ...
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        """The symmetric array, its error and the evidence for it; `discretise` adds the properties of the law."""
-        ...
-
-
-class Recipe(Protocol):
-    """The computation of the matrix of a law, by one method or from the matrices of its parts."""
-
-    def has(self, wanted: MethodName, basis: Basis) -> bool:
-        """Whether the matrix can be computed by this kind of method."""
-        ...
-
-    def without_rays(self, basis: Basis) -> bool:
-        """Whether no part needs rays."""
-        ...
-
-    def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        """The matrix; valid only if `has` is True."""
-        ...
+    accepts: Callable[[Law, Basis], bool]
+    matrix: Callable[[Any, Any, Budget], KernelMatrix]
 
 
 def computed(

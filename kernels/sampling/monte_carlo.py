@@ -7,8 +7,9 @@ import numpy as np
 from ...core.long_runs import Engine
 from ..bases.basis import Basis
 from ..laws.law import Law
+from ..matrices.matrix import KernelMatrix
 from .chunks import IndependentRays, count_long
-from .counts import BATCHES, LARGEST_REPLICATES, SampledArray
+from .counts import BATCHES, LARGEST_REPLICATES
 from .rays import RaySums
 from .sobol import PARTS
 
@@ -23,8 +24,8 @@ def independent_rays(
     rng: np.random.Generator,
     symmetrise: bool,
     engine: Engine | None = None,
-) -> tuple[SampledArray, int, float]:
-    """The matrix of a law from independent rays with incoming angles from the invariant measure; see `RaySums.array`.
+) -> KernelMatrix:
+    """The matrix of a law from independent rays with incoming angles from the invariant measure; see `RaySums.matrix`.
 
     In bases without cells the error comes from the spread of 32 parts, or of 8 if 32 matrices are too large to store.
     A chunk of rays depends only on numbers drawn from ``rng``, its part and its own index. With an ``engine`` its
@@ -36,4 +37,4 @@ def independent_rays(
     sums = RaySums(law, basis, parts)
     sums.each = max(-(-samples // parts), 1)
     count_long(sums, IndependentRays(law, basis, root, sums.each, parts), engine or {})
-    return sums.array(symmetrise=symmetrise)
+    return sums.matrix(symmetrise=symmetrise)

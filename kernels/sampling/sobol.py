@@ -17,9 +17,9 @@ from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..bases.mirror import is_mirror_symmetric
 from ..laws.law import Law, entry_inside
+from ..matrices.matrix import KernelMatrix
 from . import chunks
 from .chunks import count_long
-from .counts import SampledArray
 from .rays import RaySums
 
 if TYPE_CHECKING:
@@ -164,10 +164,8 @@ class SobolSampler:
         self.shifts = source.integers(0, 2**SOBOL_BITS, size=(PARTS, 2), dtype=np.uint64)
         self.beyond = source.random((PARTS, 2)) * 2.0**-SOBOL_BITS
 
-    def sampled(
-        self, samples: int, *, symmetrise: bool, engine: Engine | None = None
-    ) -> tuple[SampledArray, int, float]:
-        """The matrix from at least ``samples`` rays, rounded up to 8 times a power of two; see `RaySums.array`.
+    def sampled(self, samples: int, *, symmetrise: bool, engine: Engine | None = None) -> KernelMatrix:
+        """The matrix from at least ``samples`` rays, rounded up to 8 times a power of two; see `RaySums.matrix`.
 
         With an ``engine`` its workers trace the rays and its checkpoint stores the sums, which are the same to the last
         bit: the points of a task depend only on its number.
@@ -192,4 +190,4 @@ class SobolSampler:
             self.sums.tables = self.sums.tables.copy() if self.sums.each else self.sums.tables
             count_long(self.sums, rays, engine or {})
             self.sums.each = each
-        return self.sums.array(symmetrise=symmetrise, mirrored=self.halved)
+        return self.sums.matrix(symmetrise=symmetrise, mirrored=self.halved)
