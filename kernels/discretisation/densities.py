@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE
@@ -117,7 +116,8 @@ def _conditional_rule(law: DensityLaw, basis: Basis, edges: Floats, outer: Float
     step = max(1, CONDITIONAL_CHUNK // (FRACTION_NODES[0] * edges.size))
     for start in range(0, angle.size, step):
         part = slice(start, start + step)
-        row, low, high, nodes = conditional_intervals(law, edges, angle[part])
+        row, low, high, fraction = cut_by_edges(law.panels(angle[part]), edges)
+        nodes = np.asarray(FRACTION_NODES)[np.searchsorted(FRACTIONS, fraction)]
         target = basis.index(0.5 * (low + high))
         for count in FRACTION_NODES:
             chosen = nodes == count
@@ -127,15 +127,6 @@ def _conditional_rule(law: DensityLaw, basis: Basis, edges: Floats, outer: Float
             cell = source[part][row[chosen]] * basis.size + target[chosen]
             flux += np.bincount(cell, weights=mass[part][row[chosen]] * value.sum(axis=1), minlength=flux.size)
     return basis.normalisation[:, None] * flux.reshape(basis.size, basis.size) * basis.normalisation
-
-
-def conditional_intervals(
-    law: DensityLaw, edges: Floats, theta: Floats
-) -> tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]:
-    """The intervals into which cells and panels cut (0, pi): index of the angle, ends and number of Gauss nodes."""
-    row, low, high, fraction = cut_by_edges(law.panels(theta), edges)
-    nodes = np.asarray(FRACTION_NODES)[np.searchsorted(FRACTIONS, fraction)]
-    return row, low, high, nodes
 
 
 def _density_levels(law: DensityLaw, basis: Basis, edges: Floats) -> Iterator[Floats]:
@@ -187,15 +178,11 @@ def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floa
         if basis.is_partition:
             angle, _ = gauss_rule(fine, 1)
             mass = SINE.mass(fine[:-1], fine[1:])
-            total = np.zeros((basis.size, basis.size))
-            add_products(total, basis, angle, np.asarray(map_angle(angle), dtype=np.float64), mass)
-            yield total
         else:
             angle, mass = SINE.quadrature(fine, basis.nodes_per_interval)
-            total = np.zeros((basis.size, basis.size))
-            image = np.asarray(map_angle(angle), dtype=np.float64)
-            add_products(total, basis, angle, image, mass)
-            yield total
+        total = np.zeros((basis.size, basis.size))
+        add_products(total, basis, angle, np.asarray(map_angle(angle), dtype=np.float64), mass)
+        yield total
         pieces *= 2
 
 

@@ -24,9 +24,17 @@ from ..laws.matrix_law import MatrixLaw, finite_matrix
 from ..laws.structure import Rules, fold, holds_of_all
 from ..laws.tensor_law import SpatialLaw
 from ..matrices.matrix import KernelMatrix
-from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
-from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SAMPLING, SEED_WITHOUT_RNG, SEGMENTS_A_RAY, Budget, MethodName
+from .method import (
+    DEFAULT_SAMPLES,
+    MOST_SEGMENTS,
+    QUICK_SEGMENTS,
+    SAMPLING,
+    SEED_WITHOUT_RNG,
+    SEGMENTS_A_RAY,
+    Budget,
+    MethodName,
+)
 from .methods import matrix_by
 
 # Memory in which a matrix is computed, in matrices, and least time of an entry.

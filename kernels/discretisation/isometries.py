@@ -93,13 +93,8 @@ def _add_pieces(law: Law, basis: Basis, low: Floats, high: Floats, order: int, t
     step = max(pieces, 1)
     for start in range(0, low.size, step):
         angle, weight = gauss_on_intervals(low[start : start + step], high[start : start + step], order)
-        _add_nodes(law, basis, angle, weight, total)
-
-
-def _add_nodes(law: Law, basis: Basis, angle: Floats, weight: Floats, total: Floats) -> None:
-    mass = weight * basis.measure.density(angle)
-    probability, outgoing = law.branches(angle)
-    for slot in range(outgoing.shape[-1]):
-        used = probability[:, slot] > 0.0
-        fraction = (mass * probability[:, slot])[used]
-        add_products(total, basis, angle[used], outgoing[used, slot], fraction)
+        mass = weight * basis.measure.density(angle)
+        probability, outgoing = law.branches(angle)
+        for slot in range(outgoing.shape[-1]):
+            used = probability[:, slot] > 0.0
+            add_products(total, basis, angle[used], outgoing[used, slot], (mass * probability[:, slot])[used])

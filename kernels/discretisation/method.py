@@ -16,7 +16,6 @@ from ..bases.basis import Basis
 from ..bases.displacement import node_rounding
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from ..sampling.monte_carlo import DEFAULT_SAMPLES
 
 MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
 # The methods whose rays can be stored on the way and traced by workers.
@@ -26,13 +25,11 @@ SAMPLING: tuple[MethodName, ...] = ("qmc", "monte-carlo")
 # an explicit request for quadrature, the time of two million rays, or of the largest number of rays.
 MOST_SEGMENTS, QUICK_SEGMENTS, SEGMENTS_A_RAY = 140_000_000, 4_000_000, 4
 SEED_WITHOUT_RNG = 0
+# Tracing this number of rays takes about a second.
+DEFAULT_SAMPLES = 2**20
 # Rounding error of a matrix with n functions, divided by n. Each edge of n cells has a rounding error that moves a
 # fraction of about n eps of a cell's measure; an error of 1.2e-13 was measured for n eps = 1.1e-13.
 ROUNDING = 8.0 * EPS
-
-
-def _fixed_source() -> np.random.Generator:
-    return np.random.default_rng(SEED_WITHOUT_RNG)
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,7 @@ class Budget:
     tolerance: float
     rays: int = DEFAULT_SAMPLES
     segments: int = MOST_SEGMENTS
-    rng: np.random.Generator = field(default_factory=_fixed_source)
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(SEED_WITHOUT_RNG))
     symmetrise: bool = False
     engine: Engine | None = None
 

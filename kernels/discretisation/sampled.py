@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from ..bases.basis import Basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from ..sampling.monte_carlo import independent_rays
-from ..sampling.sobol import SobolSampler
+from ..sampling.chunks import IndependentRays, count_long
+from ..sampling.counts import BATCHES, LARGEST_REPLICATES
+from ..sampling.rays import RaySums
+from ..sampling.sobol import PARTS, SobolSampler
 from .method import Budget, MethodName, rounding
 
 
@@ -18,9 +22,19 @@ def by_sobol_rays(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
 
 
 def by_independent_rays(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-    """The matrix of any law by independent rays."""
-    found = independent_rays(law, basis, budget.rays, budget.rng, budget.symmetrise, budget.engine)
-    return _sampled("monte-carlo", found)
+    """The matrix of any law from independent rays with incoming angles from the invariant measure.
+
+    In bases without cells the error comes from the spread of 32 parts, or of 8 if 32 matrices are too large to store.
+    A chunk of rays depends only on numbers drawn from ``budget.rng``, its part and its own index. Workers count or add
+    up the rays and a checkpoint stores the sums, which are the same to the last bit.
+    """
+    root = tuple(int(word) for word in budget.rng.integers(0, 2**63, size=2))
+    most = LARGEST_REPLICATES // (np.dtype(np.float64).itemsize * basis.size**2)
+    parts = 1 if basis.is_partition else BATCHES if most >= BATCHES else PARTS
+    sums = RaySums(law, basis, parts)
+    sums.each = max(-(-budget.rays // parts), 1)
+    count_long(sums, IndependentRays(law, basis, root, sums.each, parts), budget.engine or {})
+    return _sampled("monte-carlo", sums.matrix(symmetrise=budget.symmetrise))
 
 
 def sobol_matrix(sampler: SobolSampler, budget: Budget) -> KernelMatrix:

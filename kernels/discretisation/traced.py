@@ -158,7 +158,7 @@ class _Integrator:
         self._add_panels(self.edges[:-1], self.edges[1:])
         stage = FIRST_STAGE
         while True:
-            self._begin(stage)
+            self._renew(stage)
             self._meet(stage)
             if self._is_done() or stage <= self.tolerance:
                 return *self.best, self.conditionals.spent()[0]
@@ -185,12 +185,8 @@ class _Integrator:
         """The largest tolerance of an expectation."""
         return COARSEST_MEAN * float(np.median(self.sizes))
 
-    def _begin(self, tolerance: float) -> None:
-        """Begin a stage: recompute the expectations on panels where their error is too large for its tolerance."""
-        self._renew(tolerance, np.ones(len(self.panels.low), dtype=np.bool_))
-
-    def _renew(self, tolerance: float, among: NDArray[np.bool_]) -> None:
-        """Recompute the expectations on some of the panels, where their error is too large for this tolerance."""
+    def _renew(self, tolerance: float, among: NDArray[np.bool_] | bool = True) -> None:
+        """Recompute the expectations on some or all panels, where their error is too large for this tolerance."""
         self.mean_tolerance = max(MEAN_FRACTION * tolerance, SMALLEST_MEAN_TOLERANCE)
         mass = np.maximum(self.panels.mass, FAIR_FRACTION)
         coarse = self.panels.mean_errors(self.basis) > 2.0 * self.mean_tolerance * mass
@@ -219,7 +215,7 @@ class _Integrator:
             if self.cells is not None and conditionals > MOST_MEANS * tolerance and means > 0.01 * tolerance:
                 # gaps where a change hardly changes the angle may count more in cells
                 means *= TIGHTENING
-                self._begin(means)
+                self._renew(means)
                 continue
             if self.cells is not None and panels + conditionals <= tolerance and pieces > 0.01 * tolerance:
                 pieces *= TIGHTENING

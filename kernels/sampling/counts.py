@@ -16,7 +16,6 @@ from ...core.estimates import LEVEL
 from ...core.rounding import EPS
 from ..bases.assembly import add_products
 from ..bases.basis import Basis
-from ..bases.panels import Panels
 from ..matrices.defects import (
     SymmetryDefect,
     occupied_pairs,
@@ -37,8 +36,6 @@ LARGEST_REPLICATES = 2**28
 # estimate is too large if a few dimensions dominate. For simulated normal parts with eleven spectra, the coverage is
 # 93.6 to 96.4 % with 8 parts and 94.6 to 95.8 % with 32.
 UNSURE_DIMENSIONS = 1.5
-# Pairs times functions of all rows that are added together.
-MOST_TOGETHER = 2**18
 # Entries of a part that are compared with those of the other parts; larger arrays are compared in some rows only.
 MOST_COMPARED = 2**20
 WORST_NAMED = 8
@@ -81,19 +78,9 @@ def sum_products(basis: Basis, incoming: Floats, outgoing: Floats, weight: Float
 
 
 def sums_of_rows(basis: Basis, incoming: Floats, outgoing: Floats) -> NDArray[Any]:
-    """Of each row of pairs the numbers from cell to cell, or the sums of e_i(theta) e_j(theta'), shape (rows, n, n).
-
-    Rows of few pairs are done together, because every call of numpy takes some microseconds.
-    """
-    rows, n = len(incoming), basis.size
-    if incoming.size * n > MOST_TOGETHER or isinstance(basis, Panels):
-        each = count_pairs if basis.is_partition else sum_products
-        return np.array([each(basis, *row) for row in zip(incoming, outgoing, strict=True)])
-    if basis.is_partition:
-        cell = (np.arange(rows)[:, None] * n + basis.index(incoming)) * n + basis.index(outgoing)
-        return np.bincount(cell.ravel(), minlength=rows * n * n).reshape(rows, n, n)
-    values, images = basis.evaluate(incoming), basis.evaluate(outgoing)
-    return np.array([value.T @ image for value, image in zip(values, images, strict=True)])
+    """Of each row of pairs the numbers from cell to cell, or the sums of e_i(theta) e_j(theta'), shape (rows, n, n)."""
+    each = count_pairs if basis.is_partition else sum_products
+    return np.array([each(basis, *row) for row in zip(incoming, outgoing, strict=True)])
 
 
 def matrix_from_counts(parts: Sequence[Any], basis: Basis, *, symmetrise: bool, independent: bool) -> KernelMatrix:

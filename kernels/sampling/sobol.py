@@ -19,7 +19,7 @@ from ..bases.mirror import is_mirror_symmetric
 from ..laws.law import Law, entry_inside
 from ..matrices.matrix import KernelMatrix
 from . import chunks
-from .chunks import count_long
+from .chunks import Job, count_long
 from .rays import RaySums
 
 if TYPE_CHECKING:
@@ -34,13 +34,11 @@ SOBOL_BITS = 32
 
 
 @dataclass(frozen=True, eq=False)
-class SobolRays:
+class SobolRays(Job):
     """Rays ``start`` to ``end - 1`` of each of eight shifted Sobol sequences, in tasks.
 
     Attributes
     ----------
-    law : Law
-    basis : Basis
     shifts, beyond : ndarray of shape (PARTS, 2)
         Of the digits of each part, and of the digits beyond.
     seed : tuple of int
@@ -53,8 +51,6 @@ class SobolRays:
         Rounded to whole chunks.
     """
 
-    law: Law
-    basis: Basis
     shifts: NDArray[np.uint64]
     beyond: Floats
     seed: tuple[int, ...]
@@ -76,10 +72,6 @@ class SobolRays:
     @property
     def tasks(self) -> int:
         return -(-self.end // self.points_a_task) - self.start // self.points_a_task
-
-    @property
-    def total(self) -> int:
-        return PARTS * (self.end - self.start)
 
     def range_of(self, task: int) -> tuple[int, int]:
         """The first point of a task, and the one after its last."""

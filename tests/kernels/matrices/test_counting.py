@@ -365,10 +365,3 @@ def test_missed_events_have_a_twentieth_of_a_chance_and_change_a_matrix_by_at_mo
         matrices = [KernelMatrix(before, Bins(5), frobenius_error(error, "estimate", "given")) for error in (0.0, 9.0)]
         small, large = (float(with_missed_events(matrix, rays).error) for matrix in matrices)
         assert small == pytest.approx(p * np.linalg.norm(given - before), rel=1e-12) and large == 9.0
-
-
-def test_short_rows_evaluate_the_basis_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls, evaluate = [], Legendre.evaluate
-    monkeypatch.setattr(Legendre, "evaluate", lambda basis, angle: calls.append(angle) or evaluate(basis, angle))
-    sums_of_rows(Legendre(3), *np.random.default_rng(2).uniform(0.0, np.pi, (2, 8, 10)))
-    assert len(calls) == 2 and 2**16 <= counting.MOST_TOGETHER <= 2**20
