@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +19,7 @@ from ..bases.directions import Directions
 from ..bases.measure import SINE, gauss_rule
 from ..bases.panels import Panels
 from ..discretisation.method import Budget
-from ..discretisation.methods import recipe
+from ..discretisation.methods import matrix_by
 from ..laws.law import Law
 from ..laws.structure import has_chain
 from ..matrices.matrix import KernelMatrix
@@ -123,7 +122,7 @@ def resistance(
         basis, coefficients, missed = _represented(checked, finite_array("breakpoints", breakpoints), 0.1 * wanted)
     size = float(np.linalg.norm(coefficients))
     budget = Budget(MATRIX_FRACTION * wanted / max(size, 1.0), segments=int(seconds / SEGMENT_TIME))
-    matrix = recipe(law, "auto")(basis, budget)
+    matrix = matrix_by(law, "auto", basis, budget)
     value = float(np.sum(coefficients * matrix.symmetric))
     error = _error(matrix, coefficients) + missed
     how = f"{matrix.method} on {basis!r} ({matrix.error.method})"
@@ -140,7 +139,7 @@ def _error(matrix: KernelMatrix, coefficients: Floats) -> float:
     size, parts = float(np.linalg.norm(coefficients)), len(matrix.replicates)
     if parts < 2:
         return size * float(matrix.error)
-    each = [float(cast(Any, part * coefficients).sum()) for part in matrix.replicates]
+    each = [float((part * coefficients).sum()) for part in matrix.replicates]
     other = max(float(matrix.error) - half_width(matrix.symmetric, matrix.replicates), 0.0)
     return student_95(parts) * float(np.std(each, ddof=1)) / math.sqrt(parts) + size * other
 

@@ -39,7 +39,6 @@ for call in (
     lambda: ker.discretise(ker.lambertian(), ker.Bins(2), "monte-carlo", samples=64, rng=MATRIX),
     lambda: ker.CollisionLaw(ker.lambertian(), geo.Disk()).sample([[0.0, -1.0, 0.0]], MATRIX),
     lambda: ker.CircularArcLaw(1.2).apply(np.cos, MATRIX),
-    lambda: ker.CircularArcLaw(1.2).pieces(MATRIX),
     lambda: ker.RectangularTeethLaw(1.0).conditionals(MATRIX, degree=0, edges=[1.0]),
     lambda: ker.WallLaw(geo.elliptical_arcs(1.0)).conditionals(MATRIX, degree=0, edges=[1.0]),
 ):

@@ -222,7 +222,7 @@ def stored(monkeypatch):
 
 
 @pytest.mark.usefixtures("small_parts")
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", [name for name in RUNS if not name.startswith("estimate_stream")])
 def test_a_run_has_the_same_bits_on_workers(name, workers):
     assert RUNS[name](client=workers).tobytes() == RUNS[name]().tobytes()
 
