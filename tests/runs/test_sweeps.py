@@ -201,7 +201,7 @@ def test_a_wall_in_the_middle_that_has_changed_is_noticed(tmp_path):
     asked = {"text": names}
     spec.sweep(geo.wall_from_text, asked, checkpoint=tmp_path / "a")
     geo.triangular_teeth(0.9).save(names[1], overwrite=True)
-    with pytest.raises(InputError, match="Differences: walls between"):
+    with pytest.raises(InputError, match="Differences: walls: "):
         spec.sweep(geo.wall_from_text, asked, checkpoint=tmp_path / "a")
 
 

@@ -37,11 +37,6 @@ def test_mixing_times_bound_the_distance_that_powers_of_the_matrix_have():
         assert found.earliest <= found.steps
 
 
-def test_a_point_needs_a_law_with_a_density():
-    found = spec.mixing_time(ker.henyey_greenstein(0.5), 0.01, start=1.0)
-    assert found.steps > 1
-
-
 def test_the_eigenfunctions_that_are_drawn_are_the_legendre_polynomials():
     ax = Figure().subplots()
     spec.spectrum(ker.henyey_greenstein(0.5), k=3).plot_eigenfunctions(ax)
