@@ -145,7 +145,7 @@ def spectral_gap(
     >>> round(float(semicircle), 6), semicircle.verdict
     (0.176041, 'essential edge')
     """
-    positive_number("tolerance", tolerance)
+    tolerance = positive_number("tolerance", tolerance)
     seconds, rng = positive_number("time_limit", time_limit), generator(rng, 0)
     if isinstance(law, CollisionLaw):
         law = law.law

@@ -4,11 +4,9 @@ import dataclasses
 import json
 import os
 import time
-from copy import copy
 
 import numpy as np
 import pytest
-from campaigns.cases.shortcuts import ablations
 from campaigns.speed.exact_rows import ArcRow
 from matplotlib.figure import Figure
 from scipy.stats import norm, t
@@ -369,32 +367,6 @@ def test_a_wall_of_a_file_is_measured_and_goes_on_until_it_is_another(notches, t
     geo.Wall.from_vertices([(x, 0.9 * y) for x, y in NOTCHES]).save(notches, overwrite=True)
     (other,) = run_problems([name], SHORT, tmp_path, lambda line: None)
     assert not {row.seconds for row in other.rows if row.is_done} & {row.seconds for row in report.rows}
-
-
-# what the tracer leaves out
-
-
-@pytest.mark.parametrize("name", ["rectangular-teeth", "focusing-arc", "mushroom", "profile", "mixed"])
-def test_the_result_is_the_same_with_what_is_left_out(name):
-    wall = wall_of(name)
-    rng = np.random.default_rng(9)
-    # rays on flat tops are never traced
-    left, right = np.array([(hollow.left, hollow.right) for hollow in wall.hollows])[
-        rng.integers(len(wall.hollows), size=RAYS)
-    ].T
-    x, theta = left + (right - left) * rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
-    found = list(ablations(wall))
-    assert found
-    for what, *pair in found:
-        traces = []
-        for scene in pair:
-            other = copy(wall)
-            vars(other)["scene"] = scene
-            traces.append(geo.trace(other, x, theta))
-        gone = traces[0].escaped & traces[1].escaped
-        difference = np.sort(np.abs(traces[0].theta - traces[1].theta)[gone])
-        # rounding, if a run of hits is computed in one step, but for one ray in a thousand
-        assert gone.mean() > 0.999 and difference[len(difference) - 1 - len(difference) // 1000] <= 1e-9, what
 
 
 # the command

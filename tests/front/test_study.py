@@ -4,7 +4,6 @@ import json
 import math
 import re
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,10 +14,9 @@ from asperity import spectral as spec
 from asperity.errors import AccuracyError, FileExistsRefusal, InputError
 from asperity.study import DATA, PICTURES, check_tracer, pictures, study_wall
 from asperity.study.pictures import draw_study_wall
+from wall_shapes import over_floor, square
 
 TOLERANCE = 1e-2
-POST = [(0.4, -0.4), (0.4, -0.2), (0.6, -0.2), (0.6, -0.4), (0.4, -0.4)]
-ISLAND = [geo.Segment(p, q) for p, q in pairwise(POST)]
 
 
 @pytest.fixture(scope="module")
@@ -250,7 +248,7 @@ def test_the_summary_of_a_profile_begins_with_momentum_and_any_with_a_disk_that_
 
 
 def test_no_line_of_a_report_says_none(arcs, teeth):
-    open_wall = study_wall(geo.Wall([geo.Segment((0, -0.5), (1, -0.5))], 1.0, [ISLAND]), bins=4, tolerance=0.1)
+    open_wall = study_wall(over_floor(square(0.4, -0.4, 0.2)), bins=4, tolerance=0.1)
     skew = study_wall(geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (0.7, -0.1), (1, 0)]), bins=8, tolerance=0.1)
     refused = replace(teeth, accommodation=None, refusals={**teeth.refusals, "accommodation": "too rough"})
     for report in (arcs, teeth, open_wall, skew, refused):
