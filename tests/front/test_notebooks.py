@@ -103,7 +103,7 @@ def test_an_estimate_has_no_arithmetic():
             lambda: ker.limit_study(
                 geo.Disk(), geo.triangular_teeth(1.0), [0.1, 0.05, 0.02], np.random.default_rng(0), samples=(4, 4, 4)
             ),
-            ["scale", "spacing", "distance", "distance_error", "seconds"], 3,
+            ["scale", "spacing", "distance", "distance_error", "shift"], 3,
         ),
     ],
     ids=["spectrum", "enclosures", "work", "limit"],

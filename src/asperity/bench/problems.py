@@ -66,7 +66,7 @@ def prepare(scene: str) -> None:
     from ..geometry import trace
     from ..geometry.polygons.beams import beams_of
     from ..kernels import Legendre, WallLaw, discretise
-    from ..kernels.walls.conditionals import adaptive_conditionals
+    from ..kernels.walls.conditionals import WallConditionals
 
     if scene in DIFFUSE:
         return
@@ -76,7 +76,7 @@ def prepare(scene: str) -> None:
         trace(one, [0.3, 0.6], [1.0, 2.0])
         # rays towards corners require more than double precision
         trace(one, np.clip(one.vertices[:, 0], 0.0, np.nextafter(one.period, 0.0)), 0.5 * np.pi)
-        adaptive_conditionals(one, [1.0], 1e-2)
+        WallConditionals(one, 1, np.empty(0))(np.array([1.0]), 1e-2)
     if wall.is_polygonal:
         beams_of([(0.0, 0.0), (0.3, -0.5), (0.6, -0.4), (1.0, 0.0)])
     if scene in TRUE_DISK.scenes:
