@@ -113,7 +113,7 @@ def test_the_parts_of_a_split_curve_lie_on_it(curve, s):
 @pytest.mark.parametrize("s", [np.zeros((2, 2)), 10**400, 1.5])
 def test_a_curve_is_split_at_one_place_on_it(s):
     # an array of two rows went on for ever
-    with pytest.raises(InputError, match="^s: expected"):
+    with pytest.raises(InputError, match=r"^s: expected"):
         geo.Bezier([(0, 0), (0.5, -1), (1, 0)]).split(s)
 
 
