@@ -154,7 +154,7 @@ ARGUMENTS: dict[str, Any] = {
     "PolygonalBody.position": [[3.0, 0.1]], "PolygonalBody.velocity": [[-1.0, 0.0]], "Displacements.scale": 1.0,
     "SpringWall.gas_temperature": 2.0, "Composition.first": LAW, "Composition.second": LAW,
     "Segment.vertices": TRIANGLE, "SpringWall.speed": [1.0, 2.0],
-    "Panels.moments": np.ones((2, 2, 3)), "PositionLaw.family": lambda x: LAW,
+    "Panels.moments": np.ones((2, 2, 3)),
 }  # fmt: skip
 # Other arguments of single calls.
 SPECIAL: dict[str, dict[str, Any]] = {
@@ -208,7 +208,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "fit_order": {"size": [1, 2, 4], "error": [1.0, 0.5, 0.25], "repeats": None},
     "good_fraction": {"samples": 10},
     "limit_study": {"scales": [0.1, 0.05, 0.02], "psi": 1.2, "limit": None, "samples": (2, 2, 2)},
-    "mixing_time": {"distance": "total variation", "start": None},
+    "mixing_time": {"distance": "total variation"},
     "notched_angle": {"angle": 0.5},
     "play": {"laws": COLLISION, "container": STRIP, "position": [[0.0, 0.0]], "velocity": [[1.0, 1.0, 0.0]],
              "collisions": 2},
