@@ -52,7 +52,6 @@ def inflections(control):
     """Parameters in (0, 1) where b' x b'' changes its sign."""
     s, d = Polynomial([0.0, 1.0]), np.diff(control, axis=0)
     x, y = ((1 - s) ** 2 * d[0, i] + 2 * s * (1 - s) * d[1, i] + s * s * d[2, i] for i in (0, 1))
-    # terms that cancel but for rounding have no roots
     # of terms that cancel rounding remains
     roots = (x * y.deriv() - y * x.deriv()).trim(1e-12).roots()
     return sorted(root.real for root in roots if abs(root.imag) < 1e-9 and 0.0 < root.real < 1.0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from mpmath import mp, mpf
@@ -30,26 +30,17 @@ SIDE, PILLAR = 4.0, 0.625
 TRIPLES = ((16, 63), (25, 60), (33, 56), (39, 52))
 
 
-@dataclass
 class Family:
-    """Flights of one kind: the table, starts (n, 2) and velocities (n, 3).
+    """Flights of one kind: the table, starts (n, 2) and velocities (n, 3), with spin 1.
 
     ``may_stop`` tells which of the flights may end with a status, ``first`` the time to the first collision, nan where
     it is not judged, with the tolerance ``room``.
     """
 
-    name: str
-    table: geo.Container
-    start: np.ndarray
-    velocity: np.ndarray
-    first: np.ndarray
-    room: np.ndarray
-    may_stop: np.ndarray
-
-
-def with_spin(plane: np.ndarray) -> np.ndarray:
-    """Velocities (n, 3) with spin 1 of velocities (n, 2)."""
-    return np.column_stack([plane, np.ones(len(plane))])
+    def __init__(self, name, table, start, plane, may_stop=False, first=math.nan, room=0.0):
+        self.name, self.table, self.start, self.room = name, table, start, room
+        self.velocity = np.column_stack([plane, np.ones(len(plane))])
+        self.may_stop, self.first = (np.broadcast_to(one, len(plane)) for one in (may_stop, first))
 
 
 def room_with_pillar(radius: float) -> geo.Container:
@@ -93,10 +84,7 @@ def tangents(n: int, rng: np.random.Generator, exact: bool) -> Family:
     point = rng.choice([-1.0, 1.0], (n, 1)) * np.column_stack([along[:, 1], -along[:, 0]])
     point *= 1.0 / 128.0 if exact else radius
     name, start = "exact tangents" if exact else "rounded tangents", point - along * back[:, None]
-    nowhere = np.zeros(n, dtype=bool)
-    return Family(
-        name, room_with_pillar(radius), start, with_spin(along), np.full(n, np.nan), np.full(n, 1e-6), nowhere
-    )
+    return Family(name, room_with_pillar(radius), start, along, room=1e-6)
 
 
 def along_sides(n: int, rng: np.random.Generator) -> Family:
@@ -104,8 +92,7 @@ def along_sides(n: int, rng: np.random.Generator) -> Family:
     side, way = rng.choice([-1.0, 1.0], n), rng.choice([-1.0, 1.0], n)
     start = np.column_stack([rng.uniform(-1.0, 1.0, n), side])
     plane = np.column_stack([way * rng.uniform(0.5, 2.0, n), np.zeros(n)])
-    table, none = geo.Container.stadium(2.0, 1.0), np.full(n, np.nan)
-    return Family("along the flat sides of a stadium", table, start, with_spin(plane), none, none, np.ones(n, bool))
+    return Family("along the flat sides of a stadium", geo.Container.stadium(2.0, 1.0), start, plane, may_stop=True)
 
 
 def whispers(n: int, rng: np.random.Generator, stadium: bool) -> Family:
@@ -125,7 +112,7 @@ def whispers(n: int, rng: np.random.Generator, stadium: bool) -> Family:
         first[k] = float(-2 * (x * u + y * v) / (u * u + v * v))
     inner = first > 4.0 * SMALLEST_ANGLE
     name = "whispering in a stadium" if stadium else "whispering in a circle"
-    return Family(name, table, start, with_spin(plane), np.where(inner, first, np.nan), np.full(n, 1e-14), ~inner)
+    return Family(name, table, start, plane, ~inner, np.where(inner, first, np.nan), 1e-14)
 
 
 def aims(n: int, rng: np.random.Generator, joints: bool) -> Family:
@@ -140,10 +127,9 @@ def aims(n: int, rng: np.random.Generator, joints: bool) -> Family:
         table = geo.Container.polygon(corners)
         target = corners[rng.integers(6, size=n)]
         start = np.where(rng.random((n, 1)) < 0.3, 0.0, rng.uniform(-0.5, 0.5, (n, 2)))
-    plane = target - start
-    first = np.ones(n) if joints else np.full(n, np.nan)
-    name = "aims at joints of a stadium" if joints else "aims at corners of a hexagon"
-    return Family(name, table, start, with_spin(plane), first, np.full(n, 1e-7), np.full(n, not joints))
+    if joints:
+        return Family("aims at joints of a stadium", table, start, target - start, first=1.0, room=1e-7)
+    return Family("aims at corners of a hexagon", table, start, target - start, may_stop=True)
 
 
 def outside(family: Family, position: np.ndarray) -> float:
@@ -171,9 +157,9 @@ def judge(case: tuple[str, Family]) -> Iterator[Judged]:
     for k in range(len(stopped)):
         if "tangents" in family.name:
             times = first_times(family.start[k], family.velocity[k, :2], family.table.curves[-1].semi_axes[0])
-            wrong[k] = min(abs(float(t) - time[k]) for t in times) > family.room[k]
+            wrong[k] = min(abs(float(t) - time[k]) for t in times) > family.room
         elif math.isfinite(family.first[k]):
-            wrong[k] = abs(family.first[k] - time[k]) > family.room[k]
+            wrong[k] = abs(family.first[k] - time[k]) > family.room
     energy = np.abs(record.energy / record.energy[0] - 1.0).max(axis=0)
     wrong |= ~(energy < DRIFT) | ~np.isfinite(record.position).all(axis=(0, 2))
     wrong |= np.array([outside(family, record.position[:, k]) > DEPTH for k in range(len(stopped))])
@@ -187,19 +173,17 @@ def judge(case: tuple[str, Family]) -> Iterator[Judged]:
         yield Judged(f"{family.name}, {name}", fault=fault, outcome="stopped" if stopped[k] else "")
 
 
-def families(n: int, seed: int) -> list[Family]:
-    """All families, of n flights each."""
-    rng = np.random.default_rng(seed)
-    with mp.workdps(DIGITS):
-        return [
-            tangents(n, rng, True), tangents(n, rng, False), along_sides(n, rng), whispers(n, rng, False),
-            whispers(n, rng, True), aims(n, rng, False), aims(n, rng, True),
-        ]  # fmt: skip
+FAMILIES = (
+    partial(tangents, exact=True), partial(tangents, exact=False), along_sides, partial(whispers, stadium=False),
+    partial(whispers, stadium=True), partial(aims, joints=False), partial(aims, joints=True),
+)  # fmt: skip
 
 
+@mp.workdps(DIGITS)
 def draw(number: int) -> tuple[str, Family]:
     """Smooth and no-slip walls in turn, and the families in turn."""
-    return list(LAWS)[number % 2], families(FLIGHTS, number // 14)[number // 2 % 7]
+    rng = np.random.default_rng([number // 14, number // 2 % 7])
+    return list(LAWS)[number % 2], FAMILIES[number // 2 % 7](FLIGHTS, rng)
 
 
 # Each family once, over smooth and no-slip walls in turn.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, sequence
+from ...core.checks import Floats, finite_array, number_between, sequence
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
@@ -140,6 +140,7 @@ class Bezier(Curve):
 
     def split(self, s: float) -> tuple[Bezier, Bezier]:
         """Return the parts before and after the parameter ``s`` in (0, 1) (de Casteljau)."""
+        s = number_between("s", s, 0.0, 1.0, closed="low high")
         level = np.array(self.control_points)
         first, last = [level[0]], [level[-1]]
         while len(level) > 1:

@@ -77,6 +77,10 @@ def test_the_gap_refuses_a_wrong_source_also_where_it_needs_none(law):
         spec.spectral_gap(law, rng=[1])
 
 
+def test_the_gap_takes_a_tolerance_in_an_array_of_no_dimension():
+    assert spec.spectral_gap(LAWS[1], tolerance=np.array(0.1)) == spec.spectral_gap(LAWS[1], tolerance=0.1)
+
+
 def test_the_door_of_sources_takes_what_numpy_recommends():
     wanted = np.random.default_rng(3).random()
     for source in (

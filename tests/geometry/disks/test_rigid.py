@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from campaigns.judges.precise_collision import collide_precisely
+from campaigns.rays.true_disks import standing_plate
 
 from asperity import geometry as geo
 from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, Path, Span, flight, next_root
@@ -52,17 +53,10 @@ def test_no_contact_is_missed_by_comparison_with_steps_of_the_distance(name, sca
     assert np.count_nonzero(out.two_satellites) > least
 
 
-def plate_in_a_hollow(thickness, lean):
-    foot, tip = 0.5 - 0.5 * thickness, 0.5 - 0.5 * thickness + lean
-    points = [(foot, -0.9), (tip, -0.2), (tip + thickness, -0.2), (foot + thickness, -0.9)]
-    points = [p for k, p in enumerate(points) if k == 0 or p != points[k - 1]]
-    return geo.Wall.from_vertices([(0, 0), (0, -0.9), *points, (1, -0.9), (1, 0)])
-
-
 ARC = geo.Arc((0.5, -0.6), 0.3, 2.5, 0.6)
 PLATES = {
-    "standing, no thickness": plate_in_a_hollow(0.0, 0.0),
-    "leaning, 3e-16 thick": plate_in_a_hollow(3e-16, 0.04),
+    "standing, no thickness": standing_plate(0.0, 0.0),
+    "leaning, 3e-16 thick": standing_plate(3e-16, 0.04),
     "floating": geo.Wall(
         [geo.Segment((0, -0.9), (1, -0.9))],
         islands=[[geo.Segment((0.2, -0.6), (0.8, -0.4)), geo.Segment((0.8, -0.4), (0.2, -0.6))]],

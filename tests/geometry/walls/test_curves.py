@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity import geometry as geo
+from asperity.errors import InputError
 
 EPS = np.finfo(float).eps
 pi = math.pi
@@ -107,6 +108,13 @@ def test_the_parts_of_a_split_curve_lie_on_it(curve, s):
     t = np.linspace(0.0, 1.0, 9)
     assert np.allclose(before.point(t), curve.point(s * t), rtol=0, atol=1e-12)
     assert np.allclose(after.point(t), curve.point(s + (1 - s) * t), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("s", [np.zeros((2, 2)), 10**400, 1.5])
+def test_a_curve_is_split_at_one_place_on_it(s):
+    # an array of two rows went on for ever
+    with pytest.raises(InputError, match=r"^s: expected"):
+        geo.Bezier([(0, 0), (0.5, -1), (1, 0)]).split(s)
 
 
 @given(curves, st.sampled_from([1e-1, 1e-2, 1e-3]))
