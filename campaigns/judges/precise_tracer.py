@@ -184,11 +184,10 @@ def trace_precisely(scene, x, theta, limit=2000):
                 (scene.circles, FIRST_CIRCLE, CIRCLES_END),
                 (scene.ellipses, FIRST_ELLIPSE, ELLIPSES_END),
             )
-            if table is not None
             for row in table[int(hollow[k]) : int(hollow[end])]
         ]
         own = slice(int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END]))
-        curves = [] if scene.beziers is None else [_bezier(row) for row in scene.beziers[own]]
+        curves = [_bezier(row) for row in scene.beziers[own]]
         # a focusing arc lies beyond its chord; other curves may reach between two sides
         clear = not scene.is_open and not curves and all(focusing for _, _, focusing, *_ in arcs)
         bounces, itinerary, enters = 0, [], True
