@@ -66,7 +66,7 @@ def largest_curvature(piece: Curve) -> tuple[float, float]:
 
 def _polynomials(piece: Bezier) -> tuple[Floats, Floats, Floats]:
     """Return b', b' x b'' and |b'|^2 as polynomials, lowest power first; b' has shape (degree, 2)."""
-    velocity = (piece.powers[1:] * [[1.0], [2.0], [3.0]])[: piece.degree]
+    velocity: Floats = (piece.powers[1:] * [[1.0], [2.0], [3.0]])[: piece.degree]
     vx, vy = velocity.T
     product = np.polynomial.polynomial.polymul
     bend = np.polynomial.polynomial.polyder(velocity)
