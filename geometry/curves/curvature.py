@@ -70,7 +70,7 @@ def _polynomials(piece: Bezier) -> tuple[Floats, Floats, Floats]:
     vx, vy = velocity.T
     product = np.polynomial.polynomial.polymul
     bend = np.polynomial.polynomial.polyder(velocity)
-    cross = np.polynomial.polynomial.polysub(product(vx, bend[:, 1]), product(vy, bend[:, 0]))
+    cross: Floats = np.polynomial.polynomial.polysub(product(vx, bend[:, 1]), product(vy, bend[:, 0]))
     return velocity, cross, np.polynomial.polynomial.polyadd(product(vx, vx), product(vy, vy))
 
 
