@@ -14,7 +14,6 @@ from asperity.geometry.polygons.compiled.columns import FIRST_WALL, OPENING
 from asperity.geometry.polygons.compiled.polygon import offset_of
 from asperity.geometry.polygons.compiled.unfolding import reduced, sine_and_cosine
 from asperity.geometry.polygons.triangulation import triangulated
-from asperity.geometry.tracing.compiled.growing import longer, taller
 from asperity.geometry.tracing.double_double.numbers import double_double, extended, scaled
 
 # Triangles that a ray may pass for every bounce that it is allowed.
@@ -32,6 +31,12 @@ def wall_lines(x, y, turn_high):
         k = e if abs(x[e]) + abs(y[e]) <= abs(x[e + 1]) + abs(y[e + 1]) else e + 1
         lines[e, 2] = lines[e, 0] * x[k] + lines[e, 1] * y[k]
     return lines
+
+
+@_compile
+def longer(array):
+    """A copy with twice as many rows."""
+    return np.concatenate((array, np.empty_like(array)))
 
 
 @_compile
@@ -77,7 +82,7 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
         if used + 1 >= max_intervals:
             high = stop
         if used == ends.shape[0]:
-            ends, offsets, tags = longer(ends, 2 * used), longer(offsets, 2 * used), taller(tags, 2 * used)
+            ends, offsets, tags = longer(ends), longer(offsets), longer(tags)
         ends[used] = high / stop
         offsets[used] = offset_of(float(sign), turn, theta) if out else 0.0
         tags[used, 0], tags[used, 1] = sign if out else 0, bounces

@@ -166,7 +166,7 @@ def table_pieces(scene):
     """The pieces that the tables of a scene define."""
     for j in np.flatnonzero(scene.joints[:-1, STARTS_LINE] > 0):
         yield Line(*(tuple(end) for end in scene.joints[j : j + 2, :2].tolist()))
-    for row in (row for table in (scene.circles, scene.ellipses) if table is not None for row in table):
+    for row in (row for table in (scene.circles, scene.ellipses) for row in table):
         stretch, half = mp.mpf(row[STRETCH]), mp.mpf(row[SPAN]) / 2
         x0, y0, x1, y1 = (mp.mpf(row[column]) for column in (START_X, START_Y, END_X, END_Y))
         ex, ey, direction = x1 - x0, stretch * (y1 - y0), 1 if row[CURVATURE] > 0 else -1
@@ -175,7 +175,7 @@ def table_pieces(scene):
         height = direction * radius * mp.cos(half) / chord
         center = (x0 + x1) / 2 - height * ey, (y0 + y1) / 2 + height * ex / stretch
         yield Arc(center, (radius, radius / stretch), direction, mp.atan2(-direction * ex, direction * ey), half)
-    for row in () if scene.beziers is None else scene.beziers:
+    for row in scene.beziers:
         c = [(mp.mpf(row[x]), mp.mpf(row[y])) for x, y in ((START_X, START_Y), (X1, Y1), (X2, Y2), (X3, Y3))]
         top = 2 if row[X3] == 0 and row[Y3] == 0 else 3
         end = row[END_X], row[END_Y]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Callable
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ...core.errors import InputError
 from ...core.files import ending_in, text_of, write_whole
@@ -23,6 +24,7 @@ FORMAT = "asperity wall 1"
 DOTTED = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){64}")
 
 Table = dict[str, Any]
+Result = TypeVar("Result")
 
 
 def save_wall(wall: Cell, path: str | PathLike[str], overwrite: bool = False) -> None:
@@ -41,8 +43,8 @@ def save_wall(wall: Cell, path: str | PathLike[str], overwrite: bool = False) ->
     write_whole(ending_in(".toml", path), tomli_w.dumps(document), overwrite=overwrite)
 
 
-def read_wall(path: str | PathLike[str]) -> tuple[list[Curve], float, list[list[Curve]], str]:
-    """Pieces, period, islands and unit of a wall file, not yet validated as a wall; see ``load_wall``."""
+def read_wall(path: str | PathLike[str], make: Callable[..., Result]) -> Result:
+    """What ``make`` makes of the pieces, period, islands and unit of a wall file; see ``load_wall``."""
     file = Path(path)
     text = text_of(file)
     try:
@@ -54,7 +56,7 @@ def read_wall(path: str | PathLike[str]) -> tuple[list[Curve], float, list[list[
     except ValueError as reason:
         raise InputError(f"{file}: not a TOML file ({reason})") from reason
     try:
-        return _parts(document)
+        return make(*_parts(document))
     except InputError as reason:
         raise type(reason)(f"{file}: {reason}") from reason
 

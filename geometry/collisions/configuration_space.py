@@ -17,7 +17,7 @@ from ..disk.charts import RollingCharts
 from ..disk.disk import Disk, contact_normal
 from ..disk.inner_disk import InnerDisk
 from ..disk.satellites import Satellites
-from ..plotting.walls import LEVEL, RAY_COLOURS, SOLID
+from ..plotting.walls import LEVEL, RAY_COLOURS, SOLID, axes_or_new, draw_solid
 from ..walls.interior import in_solid
 from ..walls.wall import Wall
 from .paths import collision_path
@@ -219,20 +219,14 @@ class ConfigurationSpace:
         """
         wall, eps = self.wall, self.scale
         path = collision_path(self.disk, wall, eps, position, velocity, self.spacing)
-        if ax is None:
-            from matplotlib import pyplot
-
-            ax = pyplot.figure(layout="constrained").subplots()
+        ax = axes_or_new(ax)
         lowest = -self.charts.nearest(path[:, 2])
         numbers = np.arange(lowest.min() - 1, lowest.max() + 2)
         low = self.zoomed.satellite(path / eps, lowest)
         cells = np.array([low[:, 0].min(), low[:, 0].max()]) / wall.period
         left, right = np.floor(cells[0] - MARGIN), np.ceil(cells[1] + MARGIN)
         top = FREE * max(wall.depth, 0.3 * wall.period)
-        outline = wall.outline(1e-3 * wall.period)
-        for k in range(int(left) - 1, int(right) + 1):
-            ax.fill_between(outline[:, 0] + k * wall.period, outline[:, 1], -2.0 * top, color=SOLID, linewidth=0)
-            ax.plot(outline[:, 0] + k * wall.period, outline[:, 1], color="black", linewidth=1.2)
+        draw_solid(ax, wall, range(int(left) - 1, int(right) + 1), -2.0 * top)
         for j, number in enumerate(numbers):
             colour = RAY_COLOURS[j % len(RAY_COLOURS)]
             for before, after in pairwise(path):
@@ -285,10 +279,7 @@ class ConfigurationSpace:
         [0.0, 2.0, -1.0, 1.0]
         """
         height = number_between("height", height, -1.0, 0.0)
-        if ax is None:
-            from matplotlib import pyplot
-
-            ax = pyplot.figure(layout="constrained").subplots()
+        ax = axes_or_new(ax)
         width, rho = self.scale * self.wall.period, self.spacing
         x1 = width * (np.arange(SECTION) + 0.5) / SECTION * 2.0
         alpha = rho * (2.0 * (np.arange(SECTION) + 0.5) / SECTION - 1.0)

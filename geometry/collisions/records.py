@@ -84,10 +84,7 @@ class DiskResults(NamedTuple):
 
     def part(self, block: slice) -> DiskResults:
         """Return the results of the disks in ``block``."""
-        return DiskResults(
-            self.position[block], self.velocity[block], self.time[block],
-            self.contacts[block], self.two_satellites[block], self.status[block],
-        )  # fmt: skip
+        return DiskResults._make(array[block] for array in self)
 
 
 def results_for(count: int) -> DiskResults:
@@ -102,19 +99,14 @@ def ground_of(scene: Scene) -> Ground:
     """Return the tables of a wall, with circles and ellipses, which have the same columns, in one table."""
     from ..tracing.double_double.arcs import refined_arcs
 
-    none = np.empty((0, c.ARC_COLUMNS))
-    circles, ellipses = (none if table is None else table for table in (scene.circles, scene.ellipses))
     hollows = scene.hollows.copy()
-    hollows[:, (c.FIRST_ELLIPSE, c.ELLIPSES_END)] += len(circles)
-    lines = np.zeros((len(scene.joints), c.LINE_COLUMNS)) if scene.lines is None else scene.lines
-    arcs = [table for table in (circles, ellipses) if len(table)]
-    table = np.concatenate(arcs) if arcs else none
-    exact_arcs = refined_arcs(table)
-    beziers = np.empty((0, c.BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
-    graphs = graphs_of(beziers, hollows)
+    hollows[:, (c.FIRST_ELLIPSE, c.ELLIPSES_END)] += len(scene.circles)
+    arcs = np.concatenate([scene.circles, scene.ellipses])
+    graphs = graphs_of(scene.beziers, hollows)
     return Ground(
-        scene.cell, scene.is_open, hollows, scene.joints, lines, table, exact_arcs, beziers, graphs, new_flag()
-    )
+        scene.cell, scene.is_open, hollows, scene.joints, scene.lines, arcs, refined_arcs(arcs), scene.beziers, graphs,
+        new_flag(),
+    )  # fmt: skip
 
 
 def largest_bend(ground: Ground) -> float:
@@ -122,28 +114,6 @@ def largest_bend(ground: Ground) -> float:
     arcs = np.abs(ground.arcs[:, c.CURVATURE]) * np.maximum(ground.arcs[:, c.STRETCH], 1.0) ** 2
     bends = np.abs(ground.graphs[:, [LEAST_BEND, MOST_BEND]])
     return float(max(arcs.max(initial=0.0), bends.max(initial=0.0)))
-
-
-def is_convex(ground: Ground) -> bool:
-    """Return whether the cell is one convex hollow: a focusing arc, or lines.
-
-    The joints of lines must be well in front of all other lines.
-    """
-    hollows, joints, lines = ground.hollows, ground.joints, ground.lines
-    if ground.is_open or len(hollows) != 1 or len(ground.graphs):
-        return False
-    hollow, ends = hollows[0], joints[:, [c.JOINT_X, c.JOINT_Y]]
-    if hollow[c.LEFT] != 0.0 or hollow[c.RIGHT] != ground.cell:
-        return False
-    starts = np.flatnonzero(joints[:, c.STARTS_LINE] > 0.0)
-    if len(ground.arcs):
-        is_arc = len(joints) == 2 and not len(starts) and not ends[:, 1].any()
-        return bool(is_arc and ground.arcs[0, c.CURVATURE] > 0.0)
-    if len(starts) != len(joints) - 1:
-        return False
-    away = (ends - ends[starts, np.newaxis]) @ lines[starts][:, [c.LINE_NORMAL_X, c.LINE_NORMAL_Y], np.newaxis]
-    others = np.arange(len(joints)) - starts[:, np.newaxis]
-    return bool(np.all(away[..., 0][(others != 0) & (others != 1)] > ROOM * hollow[c.SIZE]))
 
 
 def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:

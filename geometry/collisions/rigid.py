@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,10 +16,8 @@ from ..tracing.threads import in_blocks
 from ..tracing.tracing import MAX_COLLISIONS, Status
 from ..walls.wall import Wall
 from .amplification import DiskCounts, fewest_contacts, mark_amplified
-from .records import DiskResults, Ground, Ring, ground_of, is_convex, largest_bend, mass_fractions, results_for, ring_of
+from .records import DiskResults, Ground, ground_of, largest_bend, mass_fractions, results_for, ring_of
 
-# Mass fractions, satellites, limit on contacts, wall.
-Constants = tuple[tuple[float, float], Ring, int, Ground]
 # Functions of positions and velocities.
 Block = Callable[[Floats, Floats, DiskResults], None]
 Collide = Callable[[Floats, Floats], DiskResults]
@@ -109,9 +106,7 @@ def collide(
     -----
     Positions are computed in units of the wall, relative to its cell. So small scales lose no accuracy except by the
     rounding of x1 and alpha. The first contact is found by safe steps, which pass no root (see `compiled.contact`).
-    Cost: 0.2 to 0.5 microseconds per contact on a wall of few pieces; every piece of a hollow is tested. Where the
-    cell is one convex hollow, as of triangular teeth or focusing arcs, 16 disks at once take 0.1 microseconds per
-    contact.
+    Cost: 0.2 to 0.5 microseconds per contact on a wall of few pieces; every piece of a hollow is tested.
 
     Disks with many contacts, the fewer the larger m/J and the curvature of the wall, collide again from incoming states
     that differ by rounding; where the outgoing states differ by more than 1e-8 the status is ``AMPLIFIED``. The state
@@ -130,17 +125,18 @@ def collide(
     >>> hit.velocity.round(12).tolist(), hit.contacts.tolist(), hit.counts()["escaped"]
     ([[0.0, 1.0, 0.0]], [1], 1)
     """
+    from .compiled.rigid import collide_disks
+
     check_kinds(disk, wall)
     eps = positive_number("scale", scale)
     ring = ring_of(Satellites.around(eps, eps * wall.depth, spacing), eps, wall.scene)
     at, moving = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
     ground = ground_of(wall.scene)
-    constants = mass_fractions(disk), ring, max_contacts, ground
-    collide_block = _in_waves if is_convex(ground) else _one_by_one
+    masses = mass_fractions(disk)
 
     def run(start: Floats, moving: Floats, results: DiskResults) -> None:
-        collide_block(start, moving, constants, results)
+        collide_disks(start, moving, masses, ring, max_contacts, ground, results)
 
     collided = from_height_0(run, wall, eps, ground, threads)
     bend = (largest_bend(ground) + eps) * (wall.period + wall.depth)
@@ -183,28 +179,6 @@ def marked(
     for array in results:
         array.setflags(write=False)
     return results
-
-
-def _one_by_one(start: Floats, moving: Floats, constants: Constants, results: DiskResults) -> None:
-    """Collide a block of disks with any wall."""
-    from .compiled.rigid import collide_disks
-
-    collide_disks(start, moving, *constants, results)
-
-
-def _in_waves(start: Floats, moving: Floats, constants: Constants, results: DiskResults) -> None:
-    """Collide a block of disks with a wall whose cell is one convex hollow."""
-    from .compiled.waves import UNDECIDED, WORK, collide_in_waves
-
-    *_, ground = constants
-    collide_in_waves(start, moving, *constants, results, *np.zeros((2, WORK)))
-    rest = np.flatnonzero(results.status == UNDECIDED)
-    if len(rest) and not ground.stop[0]:
-        found = results_for(len(rest))
-        _one_by_one(start[rest], moving[rest], constants, found)
-        arrays: tuple[NDArray[Any], ...] = results
-        for result, some in zip(arrays, found, strict=True):
-            result[rest] = some
 
 
 def at_the_tops(wall: Wall, scale: float, position: Floats, velocity: Floats) -> Floats:

@@ -17,7 +17,7 @@ from ..curves.curvature import largest_curvature
 from ..curves.segment import Segment
 from ..disk import rolling
 from ..disk.disk import Disk
-from ..plotting.walls import LEVEL, OUTLINE_TOLERANCE, RAY_COLOURS, SOLID
+from ..plotting.walls import LEVEL, RAY_COLOURS, axes_or_new, draw_solid
 from ..tracing.tracing import trace, trajectory
 from ..walls.wall import Wall
 from .configuration_space import FLIGHT_POINTS, ConfigurationSpace
@@ -153,26 +153,19 @@ class Shadow(Summary):
         """
         space = self.space
         path = collision_path(space.disk, space.wall, space.scale, *self.state, space.spacing) / space.scale
-        if ax is None:
-            from matplotlib import pyplot
-
-            ax = pyplot.figure(layout="constrained").subplots()
+        ax = axes_or_new(ax)
         wall = space.wall
         # the hollow is drawn in the cell that begins at 0
         shift = np.array([np.floor(self.points[-2, 0] / wall.period) * wall.period, 0.0])
         points = self.points - shift + np.array(wall.origin)
         left, right = np.floor(points[1:, 0].min() / wall.period), np.ceil(points[1:, 0].max() / wall.period)
-        cells = np.arange(left - 1, right + 1) * wall.period
-        line = wall.outline(OUTLINE_TOLERANCE * wall.period)[:-1]
-        outline = np.concatenate([line + np.array([cell, 0.0]) for cell in cells])
         floor = wall.origin[1] - 1.4 * wall.depth - 0.05 * wall.period
-        ax.fill_between(outline[:, 0], outline[:, 1], floor, color=SOLID, linewidth=0, zorder=1.2)
-        ax.plot(outline[:, 0], outline[:, 1], color="black", linewidth=1.2, zorder=2)
+        draw_solid(ax, wall, range(int(left) - 1, int(right) + 1), floor)
         for (first, last), radius in zip(pairwise(points), self.radii, strict=True):
             along = (last - first) / max(float(np.hypot(*(last - first))), np.finfo(float).tiny)
             side = radius * np.array([-along[1], along[0]])
             corners = np.array([first + side, last + side, last - side, first - side])
-            ax.fill(*corners.T, color=RAY_COLOURS[0], alpha=0.15, linewidth=0, zorder=1.0)
+            ax.fill(*corners.T, color=RAY_COLOURS[0], alpha=0.15, linewidth=0, zorder=0.9)
         ax.plot(*points.T, color=RAY_COLOURS[0], linewidth=1.2, zorder=3, label="on the cylinder")
         number = -space.charts.nearest(path[0, 2] * space.scale)
         fraction = np.linspace(0.0, 1.0, FLIGHT_POINTS)[:, np.newaxis]

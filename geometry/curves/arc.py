@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -94,16 +95,12 @@ class Arc(Curve):
             )
         points = [(middle[0] + axes[0] * math.cos(t), middle[1] + axes[1] * math.sin(t)) for t in angles]
         rounding = END_ROUNDING * max(abs(middle[0]) + axes[0], abs(middle[1]) + axes[1])
-        self._fill(middle, axes, angles, points[0], points[1], rounding)
+        values = (middle, axes, *angles, *points, rounding)
+        vars(self).update(zip(self.__dataclass_fields__, values, strict=True))
 
-    def _fill(self, center: Point, axes: Point, angles: Point, start: Point, end: Point, rounding: float) -> None:
-        values = (center, axes, *angles, start, end, rounding)
-        for name, value in zip(self.__dataclass_fields__, values, strict=True):
-            object.__setattr__(self, name, value)
-
-    def _with(self, center: Point, axes: Point, angles: Point, start: Point, end: Point, rounding: float) -> Arc:
+    def _with(self, **changes: Any) -> Arc:
         arc = object.__new__(Arc)
-        arc._fill(center, axes, angles, start, end, rounding)
+        vars(arc).update(vars(self) | changes)
         return arc
 
     def __repr__(self) -> str:
@@ -222,33 +219,35 @@ class Arc(Curve):
 
     def reversed(self) -> Arc:
         """Return the arc in the opposite direction."""
-        angles = (self.end_angle, self.start_angle)
-        return self._with(self.center, self.semi_axes, angles, self.end, self.start, self.rounding)
+        return self._with(start_angle=self.end_angle, end_angle=self.start_angle, start=self.end, end=self.start)
 
     def stretched(self, x_factor: float, y_factor: float) -> Arc:
         """Return the image under (x, y) -> (x_factor x, y_factor y); semi-axes equal to rounding become equal."""
         fx, fy = stretch_factors(x_factor, y_factor)
-        angles = (self.start_angle, self.end_angle)
+        first, last = self.start_angle, self.end_angle
         if fx < 0.0:
-            angles = (math.pi - angles[0], math.pi - angles[1])
+            first, last = math.pi - first, math.pi - last
         if fy < 0.0:
-            angles = (-angles[0], -angles[1])
+            first, last = -first, -last
         axes = (self.semi_axes[0] * abs(fx), self.semi_axes[1] * abs(fy))
         if abs(axes[0] - axes[1]) <= CIRCLE_TOLERANCE * axes[0]:
             axes = (axes[0], axes[0])
         center, start, end = ((fx * x, fy * y) for x, y in (self.center, self.start, self.end))
-        return self._with(center, axes, angles, start, end, self.rounding * max(abs(fx), abs(fy)))
+        rounding = self.rounding * max(abs(fx), abs(fy))
+        return self._with(
+            center=center, semi_axes=axes, start_angle=first, end_angle=last, start=start, end=end, rounding=rounding
+        )
 
     def moved(self, dx: float, dy: float) -> Arc:
         """Return the arc shifted by (dx, dy)."""
         dx, dy = as_point("moved", (dx, dy))
         center, start, end = ((x + dx, y + dy) for x, y in (self.center, self.start, self.end))
-        return self._with(center, self.semi_axes, (self.start_angle, self.end_angle), start, end, self.rounding)
+        return self._with(center=center, start=start, end=end)
 
     def pinned(self, start: Point, end: Point) -> Arc:
         """Return the arc with its end points set to nearby points that are known exactly."""
         first, last = as_point("Arc start point", start), as_point("Arc end point", end)
-        return self._with(self.center, self.semi_axes, (self.start_angle, self.end_angle), first, last, 0.0)
+        return self._with(start=first, end=last, rounding=0.0)
 
     def split(self, s: float) -> tuple[Arc, Arc]:
         """Return the parts before and after the parameter ``s`` in (0, 1)."""
@@ -256,9 +255,7 @@ class Arc(Curve):
         angle = self.start_angle + s * (self.end_angle - self.start_angle)
         x, y = self.point(s)
         middle = (float(x), float(y))
-        before = self._with(self.center, self.semi_axes, (self.start_angle, angle), self.start, middle, self.rounding)
-        after = self._with(self.center, self.semi_axes, (angle, self.end_angle), middle, self.end, self.rounding)
-        return before, after
+        return self._with(end_angle=angle, end=middle), self._with(start_angle=angle, start=middle)
 
     def flattened(self, tolerance: float) -> Floats:
         """Return points on the arc, uniform in t, whose polyline is within ``tolerance``."""

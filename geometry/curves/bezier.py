@@ -66,6 +66,15 @@ class Bezier(Curve):
         """2 or 3."""
         return len(self.control_points) - 1
 
+    @property
+    def powers(self) -> Floats:
+        """The coefficients of the curve as a cubic, lowest power first, shape (4, 2)."""
+        p = np.array(self.control_points)
+        bend = p[0] - 2.0 * p[1] + p[2]
+        if self.degree == 2:
+            return np.array([p[0], 2.0 * (p[1] - p[0]), bend, [0.0, 0.0]])
+        return np.array([p[0], 3.0 * (p[1] - p[0]), 3.0 * bend, p[3] - p[0] + 3.0 * (p[1] - p[2])])
+
     def point(self, s: ArrayLike) -> Floats:
         """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
         return _bernstein(np.array(self.control_points), finite_array("s", s))

@@ -66,17 +66,11 @@ def largest_curvature(piece: Curve) -> tuple[float, float]:
 
 def _polynomials(piece: Bezier) -> tuple[Floats, Floats, Floats]:
     """Return b', b' x b'' and |b'|^2 as polynomials, lowest power first; b' has shape (degree, 2)."""
-    control = np.array(piece.control_points)
-    if piece.degree == 2:
-        velocity = np.array([2.0 * (control[1] - control[0]), 2.0 * (control[0] - 2.0 * control[1] + control[2])])
-    else:
-        second = control[0] - 2.0 * control[1] + control[2]
-        third = control[3] - control[0] + 3.0 * (control[1] - control[2])
-        velocity = 3.0 * np.array([control[1] - control[0], 2.0 * second, third])
+    velocity: Floats = (piece.powers[1:] * [[1.0], [2.0], [3.0]])[: piece.degree]
     vx, vy = velocity.T
     product = np.polynomial.polynomial.polymul
     bend = np.polynomial.polynomial.polyder(velocity)
-    cross = np.polynomial.polynomial.polysub(product(vx, bend[:, 1]), product(vy, bend[:, 0]))
+    cross: Floats = np.polynomial.polynomial.polysub(product(vx, bend[:, 1]), product(vy, bend[:, 0]))
     return velocity, cross, np.polynomial.polynomial.polyadd(product(vx, vx), product(vy, vy))
 
 

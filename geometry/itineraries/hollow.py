@@ -35,6 +35,18 @@ MANY_CHANGES = 16
 SAMPLE_DISTANCE = 0.1
 # Critical angles per search, and the least width of their pieces as a fraction of the widest piece.
 MOST_CUTS, CUT_FRACTION = 6, 0.1
+# Samples per incoming angle, at irregular positions, so that no symmetry of the wall hides a piece from all samples.
+FIRST_SAMPLES = 32
+GOLDEN = 0.6180339887498949
+# Shift of the positions per radian; any large number without pattern gives neighbouring angles other positions.
+ANGLE_SHIFT = 12345.6789
+# Further samples at each end of the opening, at geometrically decreasing distances from the end.
+END_SAMPLES, END_RATIO = 10, 0.3
+# Distance of the first and last sample from the ends, as a fraction of the tolerance or, times MARGIN, of the opening.
+MARGIN = 1e-3
+
+_NUMBERS = np.arange(FIRST_SAMPLES)
+_ENDS = END_RATIO ** np.arange(1, END_SAMPLES + 1) / FIRST_SAMPLES
 
 
 class Conditional(NamedTuple):
@@ -56,6 +68,19 @@ def _rounds(count: int) -> list[NDArray[np.int64]]:
     """
     number = np.arange(count)
     return [number[::WIDEST_STEP], *(number[step :: 2 * step] for step in STEPS if step < count)]
+
+
+def first_nodes(theta: float, left: float, right: float, goal: float) -> Floats:
+    """Return the positions of the first samples at one incoming angle, in any order.
+
+    The positions differ from angle to angle, so that all angles together leave no large part of the rays unsampled.
+    The positions accumulate at the ends of the opening, where the pieces of a smooth hollow become narrow.
+    """
+    whole = right - left
+    shift = theta * ANGLE_SHIFT % 1.0
+    inside = (_NUMBERS + 0.25 + 0.5 * ((_NUMBERS * GOLDEN + shift) % 1.0)) / FIRST_SAMPLES
+    ends = np.append(_ENDS * whole, MARGIN * min(goal, MARGIN * whole))
+    return np.concatenate((left + whole * inside, left + ends, right - ends))
 
 
 def compiled_result(call: Callable[[], Result]) -> Result:
@@ -102,8 +127,8 @@ class HollowConditionals:
         from .compiled.changes import Limits, setting_of
 
         scene = self.scene
-        has_channels = scene.pairs is not None
-        has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, RUN_SINE] > 0.0)))
+        has_channels = len(scene.pairs) > 0
+        has_runs = has_channels or bool(np.any(scene.circles[:, RUN_SINE] > 0.0))
         most = NO_LIMIT if has_channels else MOST_COLLISIONS
         limits = Limits(most, has_runs, self.most_segments)
         return setting_of(scene, self.hollow, limits, self.degree, self.edges, self.sizes)
@@ -175,7 +200,6 @@ class HollowConditionals:
         on both sides of the changes that are predicted from the neighbouring known angles.
         """
         from .compiled.changes import MOST_SAMPLES
-        from .entry_nodes import first_nodes
 
         left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]].tolist()
         entries = [first_nodes(angle, left, right, least), np.array(self._missed.get(angle, []), dtype=np.float64)]

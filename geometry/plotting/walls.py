@@ -66,10 +66,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     'y, stretched 29.1 times'
     """
     entries, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
-    if ax is None:
-        from matplotlib import pyplot
-
-        ax = pyplot.figure(layout="constrained").subplots()
+    ax = axes_or_new(ax)
     free, floor = heights(wall)
     rays = [
         RayPath(wall, float(place), float(angle), free)
@@ -78,7 +75,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     inside = np.concatenate([[0.0, 1.0], *(ray.points[:, 0] / wall.period for ray in rays)])
     first = max(int(np.floor(inside.min())), -MOST_CELLS)
     last = min(int(np.ceil(inside.max())), 1 + MOST_CELLS)
-    _draw_solid(ax, wall, range(first - 1, last + 1), floor)
+    draw_solid(ax, wall, range(first - 1, last + 1), floor)
     ax.axhline(0.0, color=LEVEL, linewidth=0.8, linestyle=":", zorder=1)
     for i, ray in enumerate(rays):
         _draw_ray(ax, ray, RAY_COLOURS[i % len(RAY_COLOURS)])
@@ -91,6 +88,13 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     ax.set_aspect(vertical_stretch(wall))
     ax.locator_params(axis="both", nbins=6)
     return ax
+
+
+def axes_or_new(ax: Axes | None) -> Axes:
+    """Return the axes, or those of a new figure."""
+    from matplotlib import pyplot
+
+    return pyplot.figure(layout="constrained").subplots() if ax is None else ax
 
 
 def vertical_stretch(wall: Wall) -> float:
@@ -149,7 +153,8 @@ def _up_to(height: float, theta: float, stretch: float) -> Floats:
     return np.asarray(height * direction / max(direction[1], FLATTEST * abs(direction[0]) / stretch))
 
 
-def _draw_solid(ax: Axes, wall: Wall, cells: Sequence[int], floor: float) -> None:
+def draw_solid(ax: Axes, wall: Wall, cells: Sequence[int], floor: float) -> None:
+    """Draw the solid of some cells of a wall down to the height ``floor``."""
     # a tenth of a pixel in each direction
     step = OUTLINE_TOLERANCE * np.array([wall.period, -floor])
     outline = _thinned(wall.outline(float(step.min())), step)

@@ -17,7 +17,7 @@ from .mirror_images import Symmetrised, symmetrised
 from .triangulation import Triangulation, checked_chain, triangulated
 
 if TYPE_CHECKING:
-    from .compiled.store import Store
+    from .compiled.division import Store
     from .compiled.unfolding import Hollow
 
 TOLERANCE = 1e-13
@@ -213,10 +213,11 @@ class _Division(NamedTuple):
 
 
 class _Beams:
-    """The beams of a hollow: those that wait, in tables, with which of them have been taken, and pieces of the others.
+    """The beams of a hollow: a table of those that wait, and pieces of the others.
 
     Attributes
     ----------
+    waiting : Store
     leaves, steps : int
         Number of beams that have left the hollow, and of triangles passed.
     rounding : float
@@ -224,16 +225,15 @@ class _Beams:
     """
 
     def __init__(self, hollow: Hollow, entrance: Store) -> None:
-        self._hollow = hollow
-        self._tables: list[tuple[Store, NDArray[np.bool_]]] = []
+        self._hollow, self.waiting = hollow, entrance
         self._rows: list[Floats] = []
         self._tags: list[NDArray[np.int64]] = []
         self.leaves, self.steps, self.rounding = 0, 0, 0.0
-        self._put(entrance)
 
-    def column(self, number: int) -> Floats:
-        """Return the numbers in a column of ``real`` of all beams that wait."""
-        return np.concatenate([np.empty(0), *(store.real[here, number] for store, here in self._tables)])
+    @property
+    def flux(self) -> Floats:
+        """The flux of all beams that wait."""
+        return self.waiting.real[:, c.FLUX]
 
     def divide(self, threshold: float, most_splits: int, most_steps: int, parts: int, threads: int | None) -> None:
         """Divide the beams above a threshold of priority, in parts.
@@ -242,7 +242,8 @@ class _Beams:
         """
         from .compiled.division import LEAVES, STEPS, divide
 
-        store = _together(self._take(threshold))
+        is_chosen = self.waiting.real[:, c.PRIORITY] > threshold
+        store, others = _selected(self.waiting, is_chosen), _selected(self.waiting, ~is_chosen)
         rule = threshold, most_splits // parts, max(most_steps // parts, 1)
         found: list[Any] = [None] * parts
 
@@ -251,39 +252,24 @@ class _Beams:
                 found[k] = divide(self._hollow, store, k, parts, *rule)
 
         in_blocks(run, parts, threads, block=1)
-        for rest, rows, tags, counts, rounding in found:
+        for _, rows, tags, counts, rounding in found:
             tags[:, c.TAG_LEAF] += self.leaves
             self._rows.append(rows)
             self._tags.append(tags)
             self.leaves, self.steps = self.leaves + counts[LEAVES], self.steps + counts[STEPS]
             self.rounding += rounding
-            self._put(rest)
+        self.waiting = _together([others, *(rest for rest, *_ in found)])
 
     def leaving(self) -> _Pieces:
         """Return the pieces of the beams that have left the hollow."""
         return _columns(self._rows, self._tags)
 
     def rest(self) -> _Pieces:
-        """Remove all beams that wait; return their pieces."""
+        """Return the pieces of all beams that wait."""
         from .compiled.polygon import pieces_of
 
-        rest = [pieces_of(store, self._hollow.width) for store in self._take(-np.inf)]
-        return _columns([row for row, _ in rest], [tag for _, tag in rest])
-
-    def _put(self, store: Store) -> None:
-        if len(store.real):
-            self._tables.append((store, np.ones(len(store.real), bool)))
-
-    def _take(self, threshold: float) -> list[Store]:
-        """Remove and return all beams above a threshold of priority."""
-        taken = []
-        for store, here in self._tables:
-            chosen = np.flatnonzero(here & (store.real[:, c.PRIORITY] > threshold))
-            if chosen.size:
-                here[chosen] = False
-                taken.append(_selected(store, chosen))
-        self._tables = [(store, here) for store, here in self._tables if here.any()]
-        return taken
+        rows, tags = pieces_of(self.waiting, self._hollow.width)
+        return _columns([rows], [tags])
 
 
 def _divided(
@@ -296,20 +282,20 @@ def _divided(
     """
     hollow = _hollow(triangulation)
     beams = _Beams(hollow, _entrance(triangulation.entrance, hollow.width, entrances))
-    wanted = tolerance * float(beams.column(c.FLUX).sum())
+    wanted = tolerance * float(beams.flux.sum())
     splits = min(FIRST_SPLITS, int(FIRST_FRACTION * max_beams))
     if splits and len(triangulation.vertices) <= FEW_VERTICES:
         beams.divide(wanted / FIRST_SPLITS, splits, STEPS_A_BEAM * splits, 1, 1)
-    if float(beams.column(c.FLUX).sum()) > wanted:
+    if float(beams.flux.sum()) > wanted:
         interruptibly(lambda: _in_rounds(beams, wanted, max_beams, threads))
-    complete = float(beams.column(c.FLUX).sum()) <= wanted
+    complete = float(beams.flux.sum()) <= wanted
     return _Division(beams.leaving(), beams.rest(), beams.rounding, complete)
 
 
 def _in_rounds(beams: _Beams, wanted: float, max_beams: int, threads: int | None) -> None:
     """Divide beams in rounds until the flux that is left is as wanted, or a limit is reached."""
     while True:
-        flux, best = beams.column(c.FLUX), beams.column(c.PRIORITY).max(initial=0.0)
+        flux, best = beams.flux, beams.waiting.real[:, c.PRIORITY].max(initial=0.0)
         left, used = float(flux.sum()), beams.leaves + flux.size
         room, spare = max_beams - used, STEPS_A_BEAM * max_beams - beams.steps
         if left <= wanted or room <= 0 or spare <= 0 or best <= 0.0:
@@ -359,7 +345,7 @@ def _hollow(triangulation: Triangulation) -> Hollow:
 
 def _entrance(edge: int, width: float, halves: int) -> Store:
     """Return the beams of rays with theta < pi/2, or, of two halves, of all rays."""
-    from .compiled.store import Store
+    from .compiled.division import Store
 
     vertices, real, whole = (
         np.zeros((6, c.VERTEX_COLUMNS)),
@@ -374,42 +360,27 @@ def _entrance(edge: int, width: float, halves: int) -> Store:
     return Store(vertices[: 3 * halves], real[:halves], whole[:halves])
 
 
-def _selected(store: Store, beams: NDArray[np.int64]) -> Store:
-    """Return some beams of a store."""
-    whole = store.whole[beams]
-    end = np.cumsum(whole[:, c.COUNT])
-    begin = end - whole[:, c.COUNT]
-    vertices = np.arange(end[-1]) + np.repeat(whole[:, c.FIRST] - begin, whole[:, c.COUNT])
+def _selected(store: Store, chosen: NDArray[np.bool_]) -> Store:
+    """Return the beams of a mask."""
+    whole = store.whole[chosen]
+    begin = np.cumsum(whole[:, c.COUNT]) - whole[:, c.COUNT]
+    vertices = store.vertices[np.repeat(chosen, store.whole[:, c.COUNT])]
     whole[:, c.FIRST] = begin
-    return type(store)(store.vertices[vertices], store.real[beams], whole)
+    return type(store)(vertices, store.real[chosen], whole)
 
 
 def _together(stores: list[Store]) -> Store:
     """Return the beams of several stores."""
-    if len(stores) == 1:
-        return stores[0]
-    begin = 0
-    for vertices, _, whole in stores:
-        whole[:, c.FIRST] += begin
-        begin += len(vertices)
-    return type(stores[0])(*(np.concatenate(table) for table in zip(*stores, strict=True)))
+    vertices, real, whole = (np.concatenate(table) for table in zip(*stores, strict=True))
+    whole[:, c.FIRST] = np.cumsum(whole[:, c.COUNT]) - whole[:, c.COUNT]
+    return type(stores[0])(vertices, real, whole)
 
 
 def _columns(rows: list[Floats], tags: list[NDArray[np.int64]]) -> _Pieces:
-    """Return the pieces of several tables."""
-    none = np.empty(0), np.empty(0, np.int64)
-    real = [np.concatenate([none[0], *(table[:, k] for table in rows)]) for k in range(c.PIECE_COLUMNS)]
-    whole = [np.concatenate([none[1], *(table[:, k] for table in tags)]) for k in range(c.TAG_COLUMNS)]
-    return _Pieces(
-        real[c.PIECE_LOW],
-        real[c.PIECE_HIGH],
-        real[c.PIECE_SINE],
-        real[c.PIECE_COSINE],
-        real[c.PIECE_OFFSET],
-        whole[c.TAG_LEAF],
-        whole[c.TAG_SIGN],
-        whole[c.TAG_BOUNCES],
-    )
+    """Return the pieces of several tables, whose columns have the order of the fields."""
+    real = np.concatenate([np.empty((0, c.PIECE_COLUMNS)), *rows])
+    whole = np.concatenate([np.empty((0, c.TAG_COLUMNS), np.int64), *tags])
+    return _Pieces(*real.T, *whole.T)
 
 
 def _flux(low: Floats, high: Floats, sine: Floats, cosine: Floats) -> Floats:

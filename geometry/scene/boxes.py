@@ -55,7 +55,8 @@ def tree_of(starts: Floats, ends: Floats, first: int, base: int, size: float) ->
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     levels = [_rows(leaf, np.nan)]
     while True:
-        low, high = _united(low, np.inf, np.minimum), _united(high, -np.inf, np.maximum)
+        firsts = np.arange(0, len(low), BOXES)
+        low, high = np.minimum.reduceat(low, firsts), np.maximum.reduceat(high, firsts)
         levels.append(_rows(np.concatenate([0.5 * (low + high), 0.5 * (high - low) + BOX_MARGIN * size], axis=1), -1.0))
         if len(levels[-1]) == 1:
             break
@@ -76,12 +77,3 @@ def _rows(entries: Floats, empty: float) -> Floats:
     rows = np.zeros((count, TREE_COLUMNS))
     rows[:, : 4 * BOXES] = padded.reshape(count, BOXES, 4).transpose(0, 2, 1).reshape(count, 4 * BOXES)
     return rows
-
-
-def _united(corners: Floats, empty: float, unite: np.ufunc) -> Floats:
-    """Return the extreme corner of every eight consecutive boxes."""
-    count = -(-len(corners) // BOXES)
-    padded = np.full((count * BOXES, 2), empty)
-    padded[: len(corners)] = corners
-    united: Floats = unite.reduce(padded.reshape(count, BOXES, 2), axis=1)
-    return united

@@ -47,11 +47,9 @@ def closed_form_of(pieces: Sequence[Curve], points: Sequence[Point], size: float
     return row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM})
 
 
-def closed_table(rows: Sequence[Floats]) -> Floats | None:
-    """Return all rows as one table, or None if no hollow has a closed form."""
-    if all(row[c.FORM] == c.NO_FORM for row in rows):
-        return None
-    table = np.zeros((len(rows), max(map(len, rows))))
+def closed_table(rows: Sequence[Floats]) -> Floats:
+    """Return all rows as one table."""
+    table = np.zeros((len(rows), max(map(len, rows), default=c.FORM_COLUMNS)))
     for k, row in enumerate(rows):
         table[k, : len(row)] = row
     return table

@@ -77,9 +77,9 @@ def plan_of(wall: Cell, scene: Scene, is_mirror_symmetric: bool) -> TracePlan:
     """Return the plan of a wall that is its own cell, read from the tables of the tracer."""
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     traced = sum(h.last - h.first for h in wall.hollows) if wall.closes else pieces
-    runs = 0 if scene.circles is None else int((scene.circles[:, c.RUN_SINE] > 0.0).sum())
+    runs = int((scene.circles[:, c.RUN_SINE] > 0.0).sum())
     # every pair has two rows, one for each line
-    parallel = 0 if scene.pairs is None else int((scene.pairs[:, c.PAIR_ANGLE] == 0.0).sum()) // 2
+    parallel = int((scene.pairs[:, c.PAIR_ANGLE] == 0.0).sum()) // 2
     return TracePlan(
         primitives=scene.primitives,
         hollows=len(scene.hollows),
@@ -89,8 +89,8 @@ def plan_of(wall: Cell, scene: Scene, is_mirror_symmetric: bool) -> TracePlan:
         arcs_with_runs=runs,
         wraps=scene.is_open,
         channels=parallel,
-        wedges=0 if scene.pairs is None else len(scene.pairs) // 2 - parallel,
-        closed_forms=0 if scene.closed is None else int((scene.closed[:, c.FORM] != c.NO_FORM).sum()),
+        wedges=len(scene.pairs) // 2 - parallel,
+        closed_forms=int((scene.closed[:, c.FORM] != c.NO_FORM).sum()),
         hollows_with_grid=int((scene.hollows[:, c.TREE_LEVELS] > 0.0).sum()),
         distinct_hollows=len(distinct_hollows(wall)) if wall.closes else 1,
         mirror_symmetric=is_mirror_symmetric,

@@ -1,6 +1,6 @@
 """The tables of a wall for the compiled functions: the pieces that a ray can meet, hollow by hollow.
 
-Flat tops are not in the tables. The table of a primitive that the wall does not have is None. `columns` names the
+Flat tops are not in the tables. The table of a primitive that the wall does not have is empty. `columns` names the
 columns.
 """
 
@@ -25,7 +25,6 @@ from . import columns as c
 from .boxes import TREE_COLUMNS, tree_of
 from .closed_forms import MOST_PIECES, closed_form_of, closed_table
 from .columns import row_of, table_of
-from .escapes import escape_sectors
 from .facing import facing_pairs
 from .structs import Struct
 from .tolerances import NEARBY_MARGIN, SMOOTH_JOINT
@@ -62,17 +61,6 @@ def corners_of(pieces: Sequence[Curve]) -> NDArray[np.bool_]:
     return np.append(corner, corner[0])
 
 
-def line_rows(starts: Floats, ends: Floats) -> Floats:
-    """Return rows of ``lines``; the columns of their pairs are set later."""
-    rows = np.zeros((len(starts), c.LINE_COLUMNS))
-    edges = ends - starts
-    length = np.array(list(map(hypot, *edges.T.tolist())))
-    rows[:, [c.EDGE_X, c.EDGE_Y]] = edges
-    rows[:, c.LINE_NORMAL_X], rows[:, c.LINE_NORMAL_Y] = -edges[:, 1] / length, edges[:, 0] / length
-    rows[:, c.LENGTH] = length
-    return rows
-
-
 def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
     """Return a row of ``circles`` or ``ellipses`` from its first columns ``ends``; RUN_SINE is set later."""
     a, b = arc.semi_axes
@@ -104,24 +92,12 @@ def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
 
 def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
     """Return a row of ``beziers`` from its first columns ``ends``."""
-    inner = list(curve.control_points[1:-1])
-    start, end = (ends[c.START_X], ends[c.START_Y]), (ends[c.END_X], ends[c.END_Y])
-    points = np.array([start, *inner, end], dtype=np.float64)
-    if len(points) == 3:
-        a1, a2 = 2.0 * (points[1] - points[0]), points[0] - 2.0 * points[1] + points[2]
-        a3 = np.zeros(2)
-    else:
-        a1 = 3.0 * (points[1] - points[0])
-        a2 = 3.0 * (points[0] - 2.0 * points[1] + points[2])
-        a3 = points[3] - points[0] + 3.0 * (points[1] - points[2])
+    curve = curve.pinned((ends[c.START_X], ends[c.START_Y]), (ends[c.END_X], ends[c.END_Y]))
+    points, powers = np.array(curve.control_points), curve.powers[1:]
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    size = float(np.abs([a1, a2, a3]).sum())
-    reach = float(np.hypot(*(points - middle).T).max()) + NEARBY_MARGIN * size
-    columns = {
-        c.X1: a1[0], c.Y1: a1[1], c.X2: a2[0], c.Y2: a2[1], c.X3: a3[0], c.Y3: a3[1],
-        c.MIDDLE_X: middle[0], c.MIDDLE_Y: middle[1], c.REACH: reach,
-    }  # fmt: skip
-    return row_of(c.BEZIER_COLUMNS, {**ends, **columns})
+    reach = float(np.hypot(*(points - middle).T).max()) + NEARBY_MARGIN * float(np.abs(powers).sum())
+    columns = {c.MIDDLE_X: middle[0], c.MIDDLE_Y: middle[1], c.REACH: reach}
+    return row_of(c.BEZIER_COLUMNS, {**ends, **dict(enumerate(powers.ravel(), c.X1)), **columns})
 
 
 class Tables(NamedTuple):
@@ -164,46 +140,34 @@ class Scene:
 
     hollows: Floats
     joints: Floats
-    lines: Floats | None
-    circles: Floats | None
-    ellipses: Floats | None
-    beziers: Floats | None
-    pairs: Floats | None
-    boxes: Floats | None
+    lines: Floats
+    circles: Floats
+    ellipses: Floats
+    beziers: Floats
+    pairs: Floats
+    boxes: Floats
     cell: float
     is_open: bool
-    closed: Floats | None = None
+    closed: Floats
 
     @cached_property
     def tables(self) -> Struct:
         """The tables with types equal for all walls, so that each function is compiled once."""
-        return Struct(
-            Tables(
-                hollows=_filled(self.hollows, c.HOLLOW_COLUMNS),
-                joints=_filled(self.joints, c.JOINT_COLUMNS),
-                lines=np.zeros((len(self.joints), c.LINE_COLUMNS))
-                if self.lines is None
-                else _filled(self.lines, c.LINE_COLUMNS),
-                circles=_filled(self.circles, c.ARC_COLUMNS),
-                ellipses=_filled(self.ellipses, c.ARC_COLUMNS),
-                beziers=_filled(self.beziers, c.BEZIER_COLUMNS),
-                pairs=_filled(self.pairs, c.PAIR_COLUMNS),
-                boxes=_filled(self.boxes, TREE_COLUMNS),
-                hollow_count=len(self.hollows),
-                cell=float(self.cell),
-                is_open=bool(self.is_open),
-            )
-        )
+        return Struct(Tables(
+            self.hollows, self.joints, self.lines, self.circles, self.ellipses, self.beziers, self.pairs, self.boxes,
+            len(self.hollows), float(self.cell), bool(self.is_open),
+        ))  # fmt: skip
 
     @property
     def segment_time(self) -> float:
         """Nominal time of a segment of a ray in adaptive quadrature, in seconds; measured as .2 and .8 microseconds."""
-        return SEGMENT_TIME if self.beziers is None else BEZIER_FACTOR * SEGMENT_TIME
+        return BEZIER_FACTOR * SEGMENT_TIME if len(self.beziers) else SEGMENT_TIME
 
     @property
     def primitives(self) -> tuple[str, ...]:
         """The names of the wall's primitives."""
-        return tuple(name for name in ("lines", "circles", "ellipses", "beziers") if getattr(self, name) is not None)
+        curves = [name for name in ("circles", "ellipses", "beziers") if len(getattr(self, name))]
+        return ("lines", *curves) if self.joints[:, c.STARTS_LINE].any() else tuple(curves)
 
 
 def scene_of(wall: Cell) -> Scene:
@@ -316,18 +280,16 @@ class _Tables:
         row = {c.LEFT: left, c.RIGHT: right, c.SIZE: size, c.LEFT_EDGE: edges[0], c.RIGHT_EDGE: edges[1]}
         row |= dict(zip((c.FIRST_JOINT, c.FIRST_CIRCLE, c.FIRST_ELLIPSE, c.FIRST_BEZIER), self._sizes(), strict=True))
         joints = np.concatenate([_joint_rows(chain) for chain in chains])
-        lines = np.concatenate([_chain_lines(chain) for chain in chains])
+        lines = np.concatenate([_line_rows(chain) for chain in chains])
         circles = self._curves(chains)
         self.hollows.append(row_of(c.HOLLOW_COLUMNS, row))
         if len(circles):
             _mark_runs(circles, chains, size)
         inside = bool(np.all((left <= vertices[:, 0]) & (vertices[:, 0] <= right)))
         if inside or edges != (c.NO_EDGE, c.NO_EDGE):
-            self._mark_pairs(lines, chains, size)
+            self._mark_pairs(joints, lines, chains, size)
         if np.count_nonzero(joints[:, c.STARTS_LINE]) >= TREE_LINES:
             self._add_tree(joints, size)
-            if is_closed and chains[0].is_line.all():
-                lines[:-1, [c.ESCAPE_RIGHT, c.ESCAPE_LEFT]] = escape_sectors(chains[0].vertices, size)
         self.joints.append(joints)
         self.lines.append(lines)
         self.circles.append(circles)
@@ -370,21 +332,12 @@ class _Tables:
         self.hollows[-1][[c.TREE_ROOT, c.TREE_LEVELS]] = self.boxes.count, levels
         self.boxes.append(tree)
 
-    def _mark_pairs(self, lines: Floats, chains: list[_Chain], size: float) -> None:
-        """Find the channels and wedges of the last hollow, whose lines are given."""
-        first, numbers, starts, ends, hulls = self.joints.count, [], [], [], []
-        joint = first
-        for chain in chains:
-            numbers.append(joint + np.flatnonzero(chain.is_line))
-            starts.append(chain.vertices[:-1])
-            ends.append(chain.vertices[1:])
-            hulls.append(_hulls(chain))
-            joint += len(chain.vertices)
-        is_line = np.concatenate([chain.is_line for chain in chains])
-        rows = facing_pairs(
-            np.concatenate(numbers), np.concatenate(starts)[is_line], np.concatenate(ends)[is_line],
-            np.concatenate(hulls), size,
-        )  # fmt: skip
+    def _mark_pairs(self, joints: Floats, lines: Floats, chains: list[_Chain], size: float) -> None:
+        """Find the channels and wedges of the last hollow, whose joints and lines are given."""
+        first, numbers = self.joints.count, np.flatnonzero(joints[:, c.STARTS_LINE] > 0.0)
+        places = joints[:, [c.JOINT_X, c.JOINT_Y]]
+        hulls = np.concatenate([_hulls(chain) for chain in chains])
+        rows = facing_pairs(first + numbers, places[numbers], places[numbers + 1], hulls, size)
         table: list[Floats] = []
         for line, row in sorted(rows, key=lambda pair: (pair[0], *pair[1].values())):
             if lines[line - first, c.PAIRS_END] == 0.0:
@@ -394,20 +347,11 @@ class _Tables:
         self.pairs.append(table_of(table, c.PAIR_COLUMNS))
 
     def scene(self, cell: float, is_open: bool) -> Scene:
-        joints, lines = self.joints.whole(), self.lines.whole()
         return Scene(
-            hollows=table_of(self.hollows, c.HOLLOW_COLUMNS),
-            joints=joints,
-            lines=lines if joints[:, c.STARTS_LINE].any() else None,
-            circles=self.circles.table(),
-            ellipses=self.ellipses.table(),
-            beziers=self.beziers.table(),
-            pairs=self.pairs.table(),
-            boxes=self.boxes.table(),
-            cell=cell,
-            is_open=is_open,
-            closed=closed_table(self.closed),
-        )
+            table_of(self.hollows, c.HOLLOW_COLUMNS), self.joints.whole(), self.lines.whole(), self.circles.whole(),
+            self.ellipses.whole(), self.beziers.whole(), self.pairs.whole(), self.boxes.whole(), cell, is_open,
+            closed_table(self.closed),
+        )  # fmt: skip
 
 
 class _Blocks:
@@ -423,9 +367,6 @@ class _Blocks:
     def whole(self) -> Floats:
         return np.concatenate(self._blocks)
 
-    def table(self) -> Floats | None:
-        return self.whole() if self.count else None
-
 
 def _joint_rows(chain: _Chain) -> Floats:
     rows = np.zeros((len(chain.vertices), c.JOINT_COLUMNS))
@@ -434,11 +375,13 @@ def _joint_rows(chain: _Chain) -> Floats:
     return rows
 
 
-def _chain_lines(chain: _Chain) -> Floats:
-    """Return a row of ``lines`` for every joint of a chain, zeros where no segment starts."""
-    rows = np.zeros((len(chain.vertices), c.LINE_COLUMNS))
+def _line_rows(chain: _Chain) -> Floats:
+    """Return a row of ``lines`` for every joint of a chain, zeros where no segment starts; pairs are set later."""
+    rows, edges = np.zeros((len(chain.vertices), c.LINE_COLUMNS)), np.diff(chain.vertices, axis=0)
     numbers = np.flatnonzero(chain.is_line)
-    rows[numbers] = line_rows(chain.vertices[numbers], chain.vertices[numbers + 1])
+    x, y = edges[numbers].T
+    length = np.array(list(map(hypot, x.tolist(), y.tolist())))
+    rows[numbers, c.EDGE_X : c.LENGTH + 1] = np.column_stack([x, y, -y / length, x / length, length])
     return rows
 
 
@@ -470,7 +413,3 @@ def _mark_runs(circles: Floats, chains: list[_Chain], size: float) -> None:
         foreign = (height < -slack) & (np.abs(own - radius) > slack)
         if row[c.CURVATURE] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
             row[c.RUN_SINE] = sin(half / RUN_CHORDS)
-
-
-def _filled(table: Floats | None, columns: int) -> Floats:
-    return np.empty((0, columns)) if table is None else np.require(table, np.float64, ["C", "A", "W"])

@@ -44,8 +44,6 @@ FULL_CIRCLE = 2.0 * math.pi
 # Rounding of the distance of a path from the centre of an arc, relative to the distance of its start.
 TANGENT = 8.0 * EPS
 TINIEST = float(np.finfo(np.float64).tiny)
-# Halvings after which an interval of angles has the width of their rounding.
-BISECTIONS = 56
 
 
 class FlightStatus(IntEnum):
@@ -104,20 +102,14 @@ def loops_of(curves: Sequence[Piece]) -> list[list[int]]:
     starts, ends = (np.array([getattr(curve, end) for curve in curves]) for end in ("start", "end"))
     gaps = np.hypot(*np.moveaxis(ends[:, None] - starts[None, :], -1, 0))
     joined = gaps <= JOIN_TOLERANCE * size
-    open_ends = np.flatnonzero(joined.sum(axis=1) != 1)
+    open_ends = np.flatnonzero((joined.sum(axis=1) != 1) | (joined.sum(axis=0) != 1))
     if len(open_ends):
         index = int(open_ends[0])
         nearest = int(np.argmin(gaps[index]))
         raise InputError(
-            "curves: expected closed loops, each curve ending where exactly one begins; the end of curve "
-            f"{index}, {curves[index].end}, is the start of {int(joined[index].sum())} curves (the nearest start, of "
-            f"curve {nearest}, is {gaps[index, nearest]:.3g} away); the inside is on the left of all curves"
-        )
-    if np.any(joined.sum(axis=0) != 1):
-        index = int(np.argmax(joined.sum(axis=0) != 1))
-        raise InputError(
-            "curves: expected closed loops, each curve beginning where exactly one ends; the start of curve "
-            f"{index}, {curves[index].start}, is the end of {int(joined[:, index].sum())} curves"
+            "curves: expected closed loops, each curve ending where exactly one begins, and beginning where one ends; "
+            f"not so curve {index}, from {curves[index].start} to {curves[index].end} (the nearest start, of curve "
+            f"{nearest}, is {gaps[index, nearest]:.3g} from its end); the inside is on the left of all curves"
         )
     following = joined.argmax(axis=1)
     loops, seen = [], set()
@@ -330,13 +322,8 @@ def point_at_length(curve: Piece, length: Floats) -> Floats:
         return splines.point_at_length(curve, length)
     if isinstance(curve, Segment) or curve.is_circular:
         return curve.point(length / curve.length)
-    low, high = np.zeros_like(length), np.full_like(length, abs(curve.end_angle - curve.start_angle))
-    span = high[:1].sum()
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        short = _length_swept(curve, middle) < length
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
-    return curve.point(np.clip(0.5 * (low + high) / span, 0.0, 1.0)) if len(length) else np.empty((0, 2))
+    span = abs(curve.end_angle - curve.start_angle)
+    return curve.point(splines.inverted(lambda swept: _length_swept(curve, swept), length, span) / span)
 
 
 def _length_swept(curve: Arc, swept: Floats) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,20 +16,11 @@ GRAZE = 64.0 * EPS
 # Limit on steps for a root; every fourth is a bisection, of which 53 suffice.
 ROOT_STEPS = 220
 # Halvings after which an interval of parameters has the width of rounding.
-HALVINGS = 55
+HALVINGS = 56
 # First guesses of a projection onto the curve, and Newton steps from the nearest.
 GUESSES, NEWTON_STEPS = 129, 8
 # Panels and nodes of Gauss quadrature of the speed.
 PANELS, NODES = 32, 12
-
-
-def powers(curve: Bezier) -> Floats:
-    """Return the coefficients (degree + 1, 2) of the curve as a polynomial, lowest power first, padded to a cubic."""
-    p = np.array(curve.control_points)
-    if curve.degree == 2:
-        return np.array([p[0], 2.0 * (p[1] - p[0]), p[0] - 2.0 * p[1] + p[2], [0.0, 0.0]])
-    second = p[0] - 2.0 * p[1] + p[2]
-    return np.array([p[0], 3.0 * (p[1] - p[0]), 3.0 * second, p[3] - p[0] + 3.0 * (p[1] - p[2])])
 
 
 def _values(coefficients: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
@@ -45,7 +38,7 @@ def arrival(
     The line of a flight meets the curve where a cubic of the parameter vanishes. From a point of the same curve the
     known root is divided out. Between its critical points the cubic is monotone, so that no root is missed.
     """
-    a = powers(curve)
+    a = curve.powers
     v = velocity[:, :2]
     cross = a[:, np.newaxis, 0] * v[:, 1] - a[:, np.newaxis, 1] * v[:, 0]
     c = np.array([cross[0] - (position[:, 0] * v[:, 1] - position[:, 1] * v[:, 0]), *cross[1:]])
@@ -77,7 +70,7 @@ def _tangency(curve: Bezier, position: Floats, v: Floats, own: NDArray[np.bool_]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for end in (0.0, 1.0):
             s = np.where(own, parameter_of(curve, position) if np.any(own) else end, end)
-            point, first, second = _values(powers(curve), s)
+            point, first, second = _values(curve.powers, s)
             size = np.hypot(first[:, 0], first[:, 1])
             up = turn * (first[:, 0] * v[:, 1] - first[:, 1] * v[:, 0]) / size
             bends = turn * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) > 0.0
@@ -127,7 +120,7 @@ def _roots(c: Floats, low: float, high: float) -> Floats:
 
 def parameter_of(curve: Bezier, position: Floats) -> Floats:
     """Return the parameters (n,) in [0, 1] of the points of the curve nearest to points (n, 2) next to it."""
-    a = powers(curve)
+    a = curve.powers
     guesses = np.linspace(0.0, 1.0, GUESSES)
     grid = _values(a, guesses)[0]
     s = guesses[np.argmin(np.hypot(*np.moveaxis(position[:, np.newaxis] - grid, -1, 0)), axis=1)]
@@ -142,7 +135,7 @@ def parameter_of(curve: Bezier, position: Floats) -> Floats:
 
 def touch(curve: Bezier, position: Floats) -> tuple[Floats, Floats, Floats]:
     """Return points (n, 2) moved onto the curve, unit tangents (n, 2) and curvatures (n,)."""
-    point, first, second = _values(powers(curve), parameter_of(curve, position))
+    point, first, second = _values(curve.powers, parameter_of(curve, position))
     speed = np.hypot(first[:, 0], first[:, 1])
     bend = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     return point, first / speed[:, np.newaxis], bend / speed**3
@@ -150,7 +143,7 @@ def touch(curve: Bezier, position: Floats) -> tuple[Floats, Floats, Floats]:
 
 def length_to(curve: Bezier, s: Floats) -> Floats:
     """Return the arc lengths (n,) from the start to parameters (n,)."""
-    a = powers(curve)
+    a = curve.powers
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
 
     def integral(low: Floats, high: Floats) -> Floats:
@@ -166,16 +159,21 @@ def length_to(curve: Bezier, s: Floats) -> Floats:
 
 def point_at_length(curve: Bezier, length: Floats) -> Floats:
     """Return the points (n, 2) at arc lengths (n,) from the start."""
-    low, high = np.zeros_like(length), np.ones_like(length)
+    return curve.point(inverted(lambda s: length_to(curve, s), length, 1.0))
+
+
+def inverted(length_to: Callable[[Floats], Floats], length: Floats, most: float) -> Floats:
+    """Return where in [0, ``most``] an increasing function takes these values (n,), to rounding."""
+    low, high = np.zeros_like(length), np.full_like(length, most)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        short = length_to(curve, middle) < length
+        short = length_to(middle) < length
         low, high = np.where(short, middle, low), np.where(short, high, middle)
-    return curve.point(0.5 * (low + high))
+    return np.asarray(0.5 * (low + high))
 
 
 def signed_area(curve: Bezier) -> float:
     """Return (1/2) of the integral of x dy - y dx along the curve, a polynomial of degree 5 at most."""
     nodes, weights = np.polynomial.legendre.leggauss(3)
-    point, first, _ = _values(powers(curve), 0.5 * (1.0 + nodes))
+    point, first, _ = _values(curve.powers, 0.5 * (1.0 + nodes))
     return float(0.25 * weights @ (point[:, 0] * first[:, 1] - point[:, 1] * first[:, 0]))

@@ -10,9 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, broadcast, finite_array, finite_number, number_between, whole_number
-from ...core.errors import InputError
-from ..walls.mushroom import SHORTEST_STEM, mushrooms
+from ...core.checks import Floats, angles, broadcast, finite_array, whole_number
+from ..walls.mushroom import checked_mushrooms, fewest_per_top, mushrooms
 from ..walls.wall import Wall
 from .tracing import MAX_COLLISIONS, Status, Trace, trace
 
@@ -71,19 +70,9 @@ class MushroomGenerations:
     generations: int
 
     def __post_init__(self) -> None:
-        s = number_between("stem_to_cap", self.stem_to_cap, 0.0, 1.0)
-        a = finite_number("stem_aspect", self.stem_aspect)
-        if a < 0.0:
-            raise InputError(f"stem_aspect: expected a number of at least 0, got {a!r}")
-        count = whole_number("generations", self.generations, 1)
-        if count > 1 and a * s < SHORTEST_STEM:
-            raise InputError(
-                f"generations: expected 1 for stems without length (stem_aspect = {a!r}), got {count}: "
-                "the next generation needs room above the caps, pass a larger stem_aspect"
-            )
-        object.__setattr__(self, "stem_to_cap", s)
-        object.__setattr__(self, "stem_aspect", a)
-        object.__setattr__(self, "generations", count)
+        numbers = checked_mushrooms(self.stem_to_cap, self.stem_aspect, self.generations)
+        for name, number in zip(("stem_to_cap", "stem_aspect", "generations"), numbers, strict=True):
+            object.__setattr__(self, name, number)
 
     @cached_property
     def mushroom(self) -> Wall:
@@ -91,10 +80,7 @@ class MushroomGenerations:
 
     @cached_property
     def per_top(self) -> int:
-        s, a = self.stem_to_cap, self.stem_aspect
-        if a * s < SHORTEST_STEM:
-            return 0
-        return math.floor(0.5 * (1.0 - s) * (a * s + 0.5) / (a * s)) + 1
+        return fewest_per_top(self.stem_to_cap, self.stem_aspect)
 
     @property
     def opened(self) -> float:

@@ -65,12 +65,11 @@ def tables_of(scene: Scene) -> Tables:
     """Return the tables of a wall for double-double arithmetic."""
     from .double_double.arcs import refined_arcs
 
-    circles = _rows(scene.circles, c.ARC_COLUMNS)
-    arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, c.ARC_COLUMNS)]))
-    lines, pairs = _rows(scene.lines, c.LINE_COLUMNS), _rows(scene.pairs, c.PAIR_COLUMNS)
-    beziers = np.zeros((1, c.BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
+    arcs = refined_arcs(np.concatenate([scene.circles, scene.ellipses]))
+    # at least one row, as of arcs, because `face_of` passes a row also for a wall without Bezier pieces
+    beziers = scene.beziers if len(scene.beziers) else np.zeros((1, c.BEZIER_COLUMNS))
     return Tables(
-        scene.hollows, scene.joints, lines, pairs, arcs, len(circles), beziers, _free_bands(scene),
+        scene.hollows, scene.joints, scene.lines, scene.pairs, arcs, len(scene.circles), beziers, _free_bands(scene),
         scene.cell, scene.is_open,
     )  # fmt: skip
 
@@ -115,17 +114,13 @@ def retrace(
     collisions[rays], status[rays] = refined.collisions[settled], _SETTLED
 
 
-def _rows(table: Floats | None, columns: int) -> Floats:
-    return np.empty((0, columns)) if table is None else table
-
-
 def _free_bands(scene: Scene) -> Floats:
     """Return the bands of heights (low, high) of an open wall without any piece, shape (n, 2); empty if not open."""
     if not scene.is_open:
         return np.empty((0, 2))
     lines = np.flatnonzero(scene.joints[:, c.STARTS_LINE] > 0.0)
     heights = [np.column_stack([scene.joints[lines, c.JOINT_Y], scene.joints[lines + 1, c.JOINT_Y]])]
-    for arcs in (_rows(scene.circles, c.ARC_COLUMNS), _rows(scene.ellipses, c.ARC_COLUMNS)):
+    for arcs in (scene.circles, scene.ellipses):
         # every point of an arc is within half of the arc length of one of its ends
         half = 0.5 * arcs[:, c.SPAN] / np.abs(arcs[:, c.CURVATURE]) / arcs[:, c.STRETCH]
         heights.append(
@@ -136,7 +131,7 @@ def _free_bands(scene: Scene) -> Floats:
                 ]
             )
         )
-    c0, c1, c2, c3 = _rows(scene.beziers, c.BEZIER_COLUMNS)[:, (c.START_Y, c.Y1, c.Y2, c.Y3)].T
+    c0, c1, c2, c3 = scene.beziers[:, (c.START_Y, c.Y1, c.Y2, c.Y3)].T
     heights.append(np.column_stack([c0, c0 + c1 / 3, c0 + (2 * c1 + c2) / 3, c0 + c1 + c2 + c3]))
     slack = JOINT_ULPS * EPS * float(scene.hollows[0, c.SIZE])
     extents = sorted((float(row.min()) - slack, float(row.max()) + slack) for part in heights for row in part)

@@ -3,21 +3,15 @@
 Python handles signals between its own instructions, in the main thread only. So long compiled functions run on other
 threads, while the main thread waits in short intervals. A function that may take long reads a flag, a one-element
 array, at intervals (`is_raised` in `compiled/pointers`), and ends when the flag is raised.
-
-A thread that has done its work waits for the next call, because a new thread costs .1 ms, as much as 10,000 of the
-cheapest rays.
 """
 
 from __future__ import annotations
 
 import os
 import threading
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, wait
-from functools import partial
-from queue import SimpleQueue
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,14 +26,6 @@ BLOCKS_PER_THREAD = 2
 MOMENT = 0.1
 
 Result = TypeVar("Result")
-Task = tuple[Callable[[], Any], "Future[Any]"]
-
-# The queues of the threads that wait for work, by the processors on which these may run: a thread keeps those of the
-# thread that started it.
-_WAITING: defaultdict[frozenset[int], list[SimpleQueue[Task]]] = defaultdict(list)
-# A process that is forked has none of the threads.
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_WAITING.clear)
 
 
 def new_flag() -> NDArray[np.int64]:
@@ -104,31 +90,17 @@ def interruptibly(call: Callable[[], Result]) -> Result:
 
 
 def _started(call: Callable[[], Result]) -> Future[Result]:
-    """Start a call on a waiting thread, or on a new one, which ends with the process."""
+    """Start a call on a new thread, for which the end of the process does not wait."""
     future: Future[Result] = Future()
-    waiting = _WAITING[_processors()]
-    try:
-        tasks = waiting.pop()
-    except IndexError:
-        tasks = SimpleQueue()
-        threading.Thread(target=_serve, args=(tasks, waiting), daemon=True).start()
-    tasks.put((call, future))
-    return future
 
-
-def _serve(tasks: SimpleQueue[Task], waiting: list[SimpleQueue[Task]]) -> None:
-    """Do the tasks of a queue for ever, and enter the queue among the waiting ones after each."""
-    while True:
-        call, future = tasks.get()
+    def serve() -> None:
         try:
-            finish = partial(future.set_result, call())
+            future.set_result(call())
         except BaseException as reason:
-            finish = partial(future.set_exception, reason)
-        # before the caller is told, so that its next call finds this thread
-        waiting.append(tasks)
-        finish()
-        # a waiting thread holds no arrays of a caller
-        del call, future, finish
+            future.set_exception(reason)
+
+    threading.Thread(target=serve, daemon=True).start()
+    return future
 
 
 def _wait_for(futures: Sequence[Future[Result]], stop: NDArray[np.int64]) -> None:
@@ -146,9 +118,5 @@ def _wait_for(futures: Sequence[Future[Result]], stop: NDArray[np.int64]) -> Non
 
 def usable_processors() -> int:
     """Return the number of processors that this process may use, fewer than all if a batch system restricts it."""
-    return len(_processors()) or os.cpu_count() or 1
-
-
-def _processors() -> frozenset[int]:
-    """Return the processors that the calling thread may use; empty where the operating system does not say."""
-    return frozenset(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else frozenset()
+    # where the operating system does not say, all
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

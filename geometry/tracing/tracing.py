@@ -271,14 +271,14 @@ def _keep_freed_memory(rays: int) -> None:
 
 def _work(scene: Scene) -> int:
     """Return the cost of a ray segment in pieces; a Bezier piece counts as ten."""
-    return len(scene.joints) + (0 if scene.beziers is None else 10 * len(scene.beziers))
+    return len(scene.joints) + 10 * len(scene.beziers)
 
 
 def _goes_in_waves(scene: Scene, rays: int) -> bool:
     """Whether rays are traced in waves, which needs a function that takes a second to compile once on a machine."""
-    if rays < MANY_RAYS or scene.is_open or scene.ellipses is not None:
+    if rays < MANY_RAYS or scene.is_open or len(scene.ellipses) or len(scene.boxes):
         return False
-    if scene.closed is not None and np.all(scene.closed[:, c.FORM] != c.NO_FORM):
+    if np.all(scene.closed[:, c.FORM] != c.NO_FORM):
         return False
     from .compiled.closed_forms import SIMPLE
 
@@ -306,13 +306,14 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
         tables = scene.tables.address
         # of an earlier block, if another thread does not use it
         room = rooms.pop() if rooms else room_for(scene.hollows, MANY_RAYS if in_waves else RAYS)
-        closed = np.empty((0, c.FORM_COLUMNS)) if scene.closed is None else scene.closed
         crossings = CROSSINGS if in_waves else (*CROSSINGS[:2], 0)
         first, size = 0, MANY_RAYS if in_waves else len(x)
         while first < len(x) and not stop[0]:
             part = slice(first, first + size)
             entry, angle, found = x[part], theta[part], tuple(result[part] for result in results)
-            if not checked(partial(trace_closed, entry, angle, tables, closed, max_collisions, found, room, crossings)):
+            if not checked(
+                partial(trace_closed, entry, angle, tables, scene.closed, max_collisions, found, room, crossings)
+            ):
                 raise InvalidRays
             if in_waves and np.count_nonzero(found[-1] == UNDECIDED) > MOST_LEFT * len(entry):
                 crossings = (*CROSSINGS[:2], 0)
@@ -326,7 +327,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
             for result, some in zip(results, followed, strict=True):
                 result[rest] = some
 
-    trace_block = close if in_waves or scene.closed is not None else follow
+    trace_block = close if in_waves or np.any(scene.closed[:, c.FORM] != c.NO_FORM) else follow
 
     def in_order(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         order = np.argsort(x % scene.cell)
@@ -334,7 +335,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
         for result in results:
             result[order] = result.copy()
 
-    return in_order if scene.boxes is not None and len(scene.boxes) >= LARGE_TREE else trace_block
+    return in_order if len(scene.boxes) >= LARGE_TREE else trace_block
 
 
 def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_000) -> Floats:

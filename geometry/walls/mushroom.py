@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from ...core.checks import finite_number, number_between, whole_number
+from ...core.checks import number_between, whole_number
 from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..curves.arc import Arc
@@ -50,28 +50,39 @@ def mushrooms(stem_to_cap: float = 0.2, stem_aspect: float = 0.0, generations: i
     >>> wall.depth
     0.5
     """
-    s = number_between("stem_to_cap", stem_to_cap, 0.0, 1.0)
-    a = finite_number("stem_aspect", stem_aspect)
-    if a < 0.0:
-        raise InputError(f"stem_aspect: expected a number of at least 0, got {a!r}")
-    count = whole_number("generations", generations, 1)
-    if a * s < SHORTEST_STEM:
-        if count > 1:
-            raise InputError(
-                f"generations: expected 1 for stems without length (stem_aspect = {a!r}), got {count}: "
-                "the next generation needs room above the caps, pass a larger stem_aspect"
-            )
-        a = 0.0
+    s, a, count = checked_mushrooms(stem_to_cap, stem_aspect, generations)
     return Wall(_cells(0.0, 1.0, 1, s, a, _cells_per_top(s, a, count)))
+
+
+def checked_mushrooms(stem_to_cap: float, stem_aspect: float, generations: int) -> tuple[float, float, int]:
+    """Return the parameters of `mushrooms` as numbers, the aspect 0 for stems without length; raise its errors."""
+    s = number_between("stem_to_cap", stem_to_cap, 0.0, 1.0)
+    a = number_between("stem_aspect", stem_aspect, 0.0, math.inf, closed="low")
+    count = whole_number("generations", generations, 1)
+    if a * s >= SHORTEST_STEM:
+        return s, a, count
+    if count > 1:
+        raise InputError(
+            f"generations: expected 1 for stems without length (stem_aspect = {a!r}), got {count}: "
+            "the next generation needs room above the caps, pass a larger stem_aspect"
+        )
+    return s, 0.0, count
+
+
+def fewest_per_top(s: float, a: float) -> int:
+    """Return the least number of mushrooms of the next generation that fit into each flat top; 0 without stems.
+
+    In units of the cap's width, flat tops are (1 - s)/2 wide and a s thick, and a mushroom of width d has the depth
+    d (a s + 1/2). So d = (1 - s)/(2 n) fits strictly if n a s > (1 - s)/2 (a s + 1/2), in every generation.
+    """
+    return math.floor(0.5 * (1.0 - s) * (a * s + 0.5) / (a * s)) + 1 if a > 0.0 else 0
 
 
 def _cells_per_top(s: float, a: float, generations: int) -> list[int]:
     """Return for each generation the number of next-generation mushrooms per flat top, 0 for the last."""
     if generations == 1:
         return [0]
-    # In units of the cap's width, flat tops are (1 - s)/2 wide and a s thick, and a mushroom of width d has the depth
-    # d (a s + 1/2). So d = (1 - s)/(2 n) fits strictly if n a s > (1 - s)/2 (a s + 1/2), in every generation.
-    per_top = math.floor(0.5 * (1.0 - s) * (a * s + 0.5) / (a * s)) + 1
+    per_top = fewest_per_top(s, a)
     pieces = 9 * sum((2 * per_top) ** g for g in range(min(generations, 60)))
     if pieces > MOST_PIECES:
         raise InputError(

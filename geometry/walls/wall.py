@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from pathlib import Path
 from typing import Self
 
 import numpy as np
@@ -291,8 +290,4 @@ def load_wall(path: str | PathLike[str]) -> Wall:
     ...     load_wall(file) == Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)])
     True
     """
-    pieces, period, islands, unit = read_wall(path)
-    try:
-        return Wall(pieces, period, islands, unit)
-    except InputError as reason:
-        raise type(reason)(f"{Path(path)}: {reason}") from reason
+    return read_wall(path, Wall)

@@ -11,7 +11,7 @@ from campaigns.judges.plain_tracer import trace_plainly
 from campaigns.rays.aimed_rays import AimedRays, aimed_rays, grazing_rays, judge
 
 from asperity import geometry as geo
-from asperity.geometry.scene.columns import FIRST_PAIR, PAIRS_END, RUN_SINE
+from asperity.geometry.scene.columns import FIRST_PAIR, FORM, NO_FORM, PAIRS_END, RUN_SINE
 
 EPS = np.finfo(float).eps
 # Rays on a wall; between an island of a curve and the floor some are nearly caught.
@@ -185,18 +185,15 @@ def test_the_tracer_agrees_with_a_plain_one(wall, request):
 def hit_by_hit(wall):
     """The same wall without its closed forms, and with the marks that allow runs taken off its tables."""
     plain = geo.Wall(wall.pieces, wall.period, wall.islands)
-    circles, lines = (None if table is None else table.copy() for table in (plain.scene.circles, plain.scene.lines))
-    if circles is not None:
-        circles[:, RUN_SINE] = 0.0
-    if lines is not None:
-        lines[:, [FIRST_PAIR, PAIRS_END]] = 0.0
-    plain.__dict__["scene"] = replace(plain.scene, pairs=None, lines=lines, circles=circles, closed=None)
+    circles, lines, closed = (table.copy() for table in (plain.scene.circles, plain.scene.lines, plain.scene.closed))
+    circles[:, RUN_SINE], lines[:, [FIRST_PAIR, PAIRS_END]], closed[:, FORM] = 0.0, 0.0, NO_FORM
+    plain.__dict__["scene"] = replace(plain.scene, lines=lines, circles=circles, closed=closed)
     return plain
 
 
 def test_closed_forms_and_runs_of_hits_in_one_step_change_nothing_but_the_time(closed_wall):
     scene = closed_wall.scene
-    if scene.closed is None and scene.pairs is None and scene.circles is None:
+    if not (np.any(scene.closed[:, FORM] != NO_FORM) or len(scene.pairs) or len(scene.circles)):
         pytest.skip("it is traced hit by hit")
     rng = np.random.default_rng(3)
     count = FEW if len(closed_wall.pieces) < MANY_PIECES else 100

@@ -325,25 +325,6 @@ def is_in_front(kind, number, own, x, y, slack, ground):
 
 
 @inlined
-def line_form(line, is_own, x, y, turn, motion):
-    """-> line: F of a line along a path from (x, y), see `towards_line`; ``line`` is a point of it and its normal."""
-    x0, y0, g1, g2 = line
-    return towards_line(0.0 if is_own else g1 * (x - x0) + g2 * (y - y0), g1, g2, turn, motion)
-
-
-@inlined
-def conic_form(arc, is_own, x, y):
-    """-> conic: F of an arc along a path from (x, y), (f, g1, g2, curvature, stretch).
-
-    ``arc`` is a point of it, the normal there, curvature and stretch.
-    """
-    x0, y0, n1, n2, curvature, stretch = arc
-    rx, ry = x - x0, stretch * (y - y0)
-    g1, g2 = n1 - curvature * rx, n2 - curvature * ry
-    return 0.0 if is_own else 0.5 * ((n1 + g1) * rx + (n2 + g2) * ry), g1, g2, curvature, stretch
-
-
-@inlined
 def line_of(ground, k):
     """-> line: the start of a line and its normal."""
     joints, lines = ground.joints, ground.lines
@@ -425,12 +406,17 @@ def piece_form(kind, number, own, path, size, ground):
     line, conic, patience, reach = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf, path.slack
     begin = Start(0.0, 0.0, 0.0, 0.0)
     if kind == LINE:
-        line = line_form(line_of(ground, number), is_own, path.x, path.y, path.turn, path.motion)
+        x0, y0, g1, g2 = line_of(ground, number)
+        level = 0.0 if is_own else g1 * (path.x - x0) + g2 * (path.y - y0)
+        line = towards_line(level, g1, g2, path.turn, path.motion)
     else:
         patience = 2.0 * size / path.motion.fastest
         if kind == ARC:
-            conic = conic_form(arc_of(ground, number), is_own, path.x, path.y)
-            reach = path.slack * max(1.0, ground.arcs[number, c.STRETCH])
+            x0, y0, n1, n2, curvature, stretch = arc_of(ground, number)
+            rx, ry = path.x - x0, stretch * (path.y - y0)
+            g1, g2 = n1 - curvature * rx, n2 - curvature * ry
+            conic = 0.0 if is_own else 0.5 * ((n1 + g1) * rx + (n2 + g2) * ry), g1, g2, curvature, stretch
+            reach = path.slack * max(1.0, stretch)
         else:
             begin, is_own = start_on(number, own, path, ground)
             reach = path.slack * ground.graphs[number, g.STEEPNESS]

@@ -13,8 +13,9 @@ import numpy as np
 from ...scene import columns as c
 from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.pointers import is_raised
-from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
+from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
+from ...tracing.double_double.formulas import last_hollow
 from .contact import (
     CLEAR,
     NO,
@@ -186,35 +187,20 @@ def surface(kind, index, x, y, ground):
 
 
 @inlined
-def neighbour_at(x, y, turn, half_sine, half_cosine, scale):
-    """Return the position and (sine, cosine) of the satellite at an angle from the one at (x, y), by its half.
-
-    The position is computed from a chord, without cancellation of numbers of the size of the disk.
-    """
-    sine, cosine = turn
-    across = 2.0 * half_sine * (cosine * half_cosine - sine * half_sine)
-    upward = 2.0 * half_sine * (sine * half_cosine + cosine * half_sine)
-    return x + across / scale, y + upward / scale, (sine + across, cosine - upward)
-
-
-@inlined
 def satellite_at(x, y, turn, j, ring):
     """Return the position and (sine, cosine) of the j-th satellite after the one at (x, y) and ``turn``.
 
-    For neighbours, by far the most frequent case, no sine is computed.
+    The position is computed from a chord, without cancellation of numbers of the size of the disk. For neighbours, by
+    far the most frequent case, no sine is computed.
     """
     half_sine, half_cosine = j * ring.half_sine, ring.half_cosine
     if abs(j) != 1:
         half = 0.5 * j * ring.spacing
         half_sine, half_cosine = math.sin(half), math.cos(half)
-    return neighbour_at(x, y, turn, half_sine, half_cosine, ring.scale)
-
-
-@inlined
-def above_the_wall(angle, spin, until, reach):
-    """Whether a satellite at an angle from the lowest point is out of reach of the wall up to a time."""
-    beyond = abs(angle) - reach
-    return (beyond > 0.0) & ((angle * spin >= 0.0) | (beyond >= abs(spin) * until))
+    sine, cosine = turn
+    across = 2.0 * half_sine * (cosine * half_cosine - sine * half_sine)
+    upward = 2.0 * half_sine * (sine * half_cosine + cosine * half_sine)
+    return x + across / ring.scale, y + upward / ring.scale, (sine + across, cosine - upward)
 
 
 @inlined

@@ -123,7 +123,7 @@ setting_at = reader_of(SETTING)
 def setting_of(scene: Scene, hollow: int, limits: Limits, degree: int, edges: Floats, sizes: Floats) -> Struct:
     """Return the setting of hollow number ``hollow``, for use by one thread at a time."""
     entries, angles = np.empty((2, BLOCK))
-    results, details = results_for(BLOCK), details_for(BLOCK, BLOCK)
+    results, details = results_for(BLOCK), details_for(BLOCK)
     rays, (exits, _, _, status) = Struct(Rays(entries, angles, *results, np.zeros(1, np.int64))), results
     arrays = entries, angles, exits, status, *details.values[:3], np.zeros(1, np.int64)
     tracer = Tracer(TRACE.slot, rays, scene.tables, details, SLOTS, *arrays)

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
-from ....core.compilation import jit
-from ...tracing.compiled.growing import taller
-from ...tracing.compiled.options import inlined, inner, linked_allocating
-from .columns import COUNT, VERTEX_COLUMNS
+from ...tracing.compiled.options import compiled, inlined
+from ...tracing.double_double.numbers import double_double
+from . import columns as c
 from .polygon import (
-    GROUP,
     Frame,
     Pieces,
     clip,
     cut_rounding,
     leaving_offset,
-    new_pieces,
     polygon_flux,
     put_pieces,
     set_angles,
@@ -27,22 +24,10 @@ from .polygon import (
     side_of,
     signs_of,
 )
-from .store import (
-    Rank,
-    Store,
-    course_of,
-    has_room,
-    new_store,
-    put_beam,
-    put_course,
-    rank_of,
-    take_polygon,
-    trimmed,
-    with_room,
-)
 from .unfolding import (
     MEMORY,
     Course,
+    Hollow,
     apex_of,
     crossed,
     lag_of,
@@ -50,10 +35,86 @@ from .unfolding import (
     periods_without_split,
     repeated,
     set_drift,
+    unfolded,
 )
 
 # What becomes of a beam: it is split, has left the hollow, is left for later, or is divided next.
 SPLIT, LEFT, STOPPED, GOES_ON = range(4)
+
+
+class Store(NamedTuple):
+    """Beams: their polygons, one after the other, and their numbers; see `columns`."""
+
+    vertices: Floats
+    real: Floats
+    whole: NDArray[np.int64]
+
+
+class Rank(NamedTuple):
+    """The flux of a beam, its priority, and how often in a row it was the larger part of a split beam."""
+
+    flux: float
+    priority: float
+    cuts: int
+
+
+@inlined
+def end_of(store, used):
+    """Return the number of vertices of the first ``used`` beams."""
+    return store.whole[used - 1, c.FIRST] + store.whole[used - 1, c.COUNT] if used > 0 else 0
+
+
+@inlined
+def put_course(store, beam, course):
+    """Write where a beam is."""
+    real, whole, isometry = store.real, store.whole, course.unfolding
+    whole[beam, c.EDGE], whole[beam, c.SIGN], whole[beam, c.BOUNCES] = course.edge, int(isometry.sign), course.bounces
+    real[beam, c.TURN], real[beam, c.TURN_LOW] = isometry.turn.high, isometry.turn.low
+    real[beam, c.T_X], real[beam, c.T_X_LOW], real[beam, c.ERROR_X] = isometry.x.high, isometry.x.low, isometry.error_x
+    real[beam, c.T_Y], real[beam, c.T_Y_LOW], real[beam, c.ERROR_Y] = isometry.y.high, isometry.y.low, isometry.error_y
+
+
+@inlined
+def put_beam(store, beam, polygon, count, rank, course):
+    """Write a beam behind those before it."""
+    first = end_of(store, beam)
+    for i in range(count):
+        for k in range(c.VERTEX_COLUMNS):
+            store.vertices[first + i, k] = polygon[i, k]
+    store.whole[beam, c.FIRST], store.whole[beam, c.COUNT], store.whole[beam, c.CUTS] = first, count, rank.cuts
+    store.real[beam, c.FLUX], store.real[beam, c.PRIORITY] = rank.flux, rank.priority
+    put_course(store, beam, course)
+
+
+@inlined
+def course_of(store, beam):
+    """-> Course: where a beam is."""
+    real, whole = store.real, store.whole
+    isometry = unfolded(
+        float(whole[beam, c.SIGN]),
+        double_double(real[beam, c.TURN], real[beam, c.TURN_LOW]),
+        double_double(real[beam, c.T_X], real[beam, c.T_X_LOW]),
+        double_double(real[beam, c.T_Y], real[beam, c.T_Y_LOW]),
+        real[beam, c.ERROR_X],
+        real[beam, c.ERROR_Y],
+    )
+    return Course(whole[beam, c.EDGE], whole[beam, c.BOUNCES], isometry)
+
+
+@inlined
+def rank_of(store, beam):
+    """-> Rank: the flux and the priority of a beam."""
+    return Rank(store.real[beam, c.FLUX], store.real[beam, c.PRIORITY], store.whole[beam, c.CUTS])
+
+
+@inlined
+def take_polygon(store, beam, polygon):
+    """Write the polygon of a beam to ``polygon``, which has room for it; return its number of vertices."""
+    first, count = store.whole[beam, c.FIRST], store.whole[beam, c.COUNT]
+    for i in range(count):
+        for k in range(c.VERTEX_COLUMNS):
+            polygon[i, k] = store.vertices[first + i, k]
+    return count
 
 
 class Desk(NamedTuple):
@@ -74,23 +135,6 @@ class Desk(NamedTuple):
     history: Store
 
 
-@linked_allocating
-def new_desk(wide):
-    """-> Desk: for polygons of up to ``wide`` vertices."""
-    frame = Frame(np.empty(wide), np.empty(wide), np.empty(wide), np.empty(wide), np.empty(wide))
-    return Desk(
-        np.empty((wide, VERTEX_COLUMNS)),
-        np.empty((2, wide, VERTEX_COLUMNS)),
-        np.empty(2, np.int64),
-        np.empty(2),
-        np.empty(wide),
-        np.empty(wide),
-        np.empty(wide),
-        frame,
-        new_store(1, MEMORY),
-    )
-
-
 @inlined
 def passed(course, desk, count, flux, hollow, most_steps):
     """-> (Course, fate, steps, rounding): move a beam to the triangle whose apex splits it.
@@ -108,13 +152,13 @@ def passed(course, desk, count, flux, hollow, most_steps):
         edge = course.edge
         side = side_of(frame, count, hollow.apex_x[edge], hollow.apex_y[edge], uncertainty)
         if side == 0:
-            signs = signs_of(polygon, count, apex_of(course, hollow), desk.values)
-            if signs.positive and signs.negative:
+            positive, negative, misplaced = signs_of(polygon, count, apex_of(course, hollow), desk.values)
+            if positive and negative:
                 return course, SPLIT, step + 1, rounding
-            rounding += signs.rounding
-            if not signs.positive and not signs.negative:
+            rounding += misplaced
+            if not positive and not negative:
                 rounding += abs(flux)
-            side = -1 if signs.negative else 1
+            side = -1 if negative else 1
         if most >= 1.0:
             most = min(most, periods_without_split(frame, count, side, uncertainty, period))
         way = 2 * edge + ((side < 0) != (course.unfolding.sign < 0.0))
@@ -142,10 +186,8 @@ def passed(course, desk, count, flux, hollow, most_steps):
     return course, STOPPED, most_steps, rounding
 
 
-_compile = jit()
-_linked = jit(linked=True)
-# Initial number of beams in a table.
-ROOM = 256
+# Initial number of beams in a table, and of vertices on the desk.
+ROOM, WIDE = 256, 16
 # The numbers that a division counts: beams and pieces in the tables, leaves, splits, steps, the next beam of the store,
 # and the largest number of vertices so far.
 RESTING, WAITING, PIECES, LEAVES, SPLITS, STEPS, NEXT, WIDEST = range(8)
@@ -226,7 +268,7 @@ def next_beam(tables, store, stride):
     return count, rank_of(store, beam), course_of(store, beam)
 
 
-@inner
+@compiled
 def work(tables, hollow, store, stride, threshold, limits):
     """Divide beams until none is left, or until there may be no room for the next; return whether none is left."""
     counts, desk = tables.counts, tables.desk
@@ -254,6 +296,12 @@ def work(tables, hollow, store, stride, threshold, limits):
 
 
 @inlined
+def has_room(store, used, vertices):
+    """Whether two more beams of at most ``vertices`` vertices each fit into the tables."""
+    return used + 2 <= store.real.shape[0] and end_of(store, used) + 2 * vertices <= store.vertices.shape[0]
+
+
+@inlined
 def is_roomy(tables):
     """Whether every table has room for what becomes of the next beam."""
     counts, most = tables.counts, tables.counts[WIDEST] + 1
@@ -261,26 +309,53 @@ def is_roomy(tables):
         has_room(tables.rest, counts[RESTING], most)
         and has_room(tables.stack, counts[WAITING], most)
         and counts[PIECES] + 2 * most <= tables.pieces.rows.shape[0]
-        and most + GROUP <= tables.desk.values.shape[0]
+        and most <= tables.desk.values.shape[0]
     )
 
 
-@_linked
-def roomier(tables):
-    """-> Tables: with room for what becomes of the next beam."""
-    counts, most = tables.counts, tables.counts[WIDEST] + 1
-    pieces, desk = tables.pieces, tables.desk
-    size = counts[PIECES] + 2 * most
-    if size > pieces.rows.shape[0]:
-        pieces = Pieces(taller(pieces.rows, 2 * size), taller(pieces.tags, 2 * size))
-    if most + GROUP > desk.values.shape[0]:
-        desk = new_desk(2 * (most + GROUP))
-    rest, stack = with_room(tables.rest, counts[RESTING], most), with_room(tables.stack, counts[WAITING], most)
-    return Tables(rest, stack, pieces, desk, counts, tables.rounding)
+def new_store(vertices: int, beams: int) -> Store:
+    """Return tables with room for so many vertices and beams."""
+    real, whole = np.empty((beams, c.REAL_COLUMNS)), np.empty((beams, c.WHOLE_COLUMNS), np.int64)
+    return Store(np.empty((vertices, c.VERTEX_COLUMNS)), real, whole)
 
 
-@_compile
-def divide(hollow, store, begin, stride, threshold, most_splits, most_steps):
+def new_desk(wide: int) -> Desk:
+    """Return the work space for polygons of up to ``wide`` vertices."""
+    polygon, parts = np.empty((wide, c.VERTEX_COLUMNS)), np.empty((2, wide, c.VERTEX_COLUMNS))
+    frame = Frame(*np.empty((5, wide)))
+    values, angles, cuts = np.empty((3, wide))
+    return Desk(polygon, parts, np.empty(2, np.int64), np.empty(2), values, angles, cuts, frame, new_store(1, MEMORY))
+
+
+def longer(array: NDArray[Any], rows: int) -> NDArray[Any]:
+    """Return a copy with so many further rows, which are not set."""
+    return np.concatenate([array, np.empty((rows, array.shape[1]), array.dtype)])
+
+
+def with_room(store: Store, used: int, vertices: int) -> Store:
+    """Return a store with room for two more beams of at most ``vertices`` vertices each."""
+    rows, beams = int(store.whole[:used, c.COUNT].sum()) + 2 * vertices, used + 2
+    if rows <= len(store.vertices) and beams <= len(store.real):
+        return store
+    return Store(longer(store.vertices, rows), longer(store.real, beams), longer(store.whole, beams))
+
+
+def roomier(tables: Tables) -> Tables:
+    """Return tables with room for what becomes of the next beam."""
+    rest, stack, pieces, desk, counts, rounding = tables
+    most = int(counts[WIDEST]) + 1
+    size = int(counts[PIECES]) + 2 * most
+    if size > len(pieces.rows):
+        pieces = Pieces(longer(pieces.rows, size), longer(pieces.tags, size))
+    if most > len(desk.values):
+        desk = new_desk(2 * most)
+    rest, stack = with_room(rest, counts[RESTING], most), with_room(stack, counts[WAITING], most)
+    return Tables(rest, stack, pieces, desk, counts, rounding)
+
+
+def divide(
+    hollow: Hollow, store: Store, begin: int, stride: int, threshold: float, most_splits: int, most_steps: int
+) -> tuple[Store, Floats, NDArray[np.int64], NDArray[np.int64], float]:
     """-> (Store, rows, tags, counts, rounding): divide every ``stride``-th beam of a store from ``begin`` on.
 
     Beams above the ``threshold`` of priority are divided, and their parts, until the limit of splits or steps is
@@ -288,14 +363,14 @@ def divide(hollow, store, begin, stride, threshold, most_splits, most_steps):
     the hollow. ``rounding`` bounds the flux in wrong leaves.
     """
     counts = np.zeros(COUNTS, np.int64)
-    counts[NEXT] = begin
-    for beam in range(store.whole.shape[0]):
-        counts[WIDEST] = max(counts[WIDEST], store.whole[beam, COUNT])
-    size = ROOM + 2 * (store.whole.shape[0] // stride)
-    rest, stack = new_store(4 * size, size), new_store(4 * ROOM, ROOM)
-    tables = Tables(rest, stack, new_pieces(2 * size), new_desk(4 * GROUP), counts, np.zeros(1))
+    counts[[NEXT, WIDEST]] = begin, store.whole[:, c.COUNT].max(initial=0)
+    size = ROOM + 2 * (len(store.whole) // stride)
+    pieces = Pieces(np.empty((2 * size, c.PIECE_COLUMNS)), np.empty((2 * size, c.TAG_COLUMNS), np.int64))
+    stores = new_store(4 * size, size), new_store(4 * ROOM, ROOM)
+    tables = Tables(*stores, pieces, new_desk(WIDE), counts, np.zeros(1))
     while not work(tables, hollow, store, stride, threshold, (most_splits, most_steps)):
         tables = roomier(tables)
-    used, pieces = counts[PIECES], tables.pieces
-    rest = trimmed(tables.rest, counts[RESTING])
-    return rest, pieces.rows[:used], pieces.tags[:used], counts, tables.rounding[0]
+    (vertices, real, whole), pieces, used = tables.rest, tables.pieces, counts[PIECES]
+    real, whole = real[: counts[RESTING]], whole[: counts[RESTING]]
+    rest = Store(vertices[: whole[:, c.COUNT].sum()], real, whole)
+    return rest, pieces.rows[:used], pieces.tags[:used], counts, float(tables.rounding[0])

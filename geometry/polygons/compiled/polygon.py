@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.compilation import jit
 from ....core.rounding import EPS
-from ...tracing.compiled.options import inlined, linked_allocating
+from ...tracing.compiled.options import inlined
 from ...tracing.compiled.trigonometry import PI, PI_REST
 from ...tracing.double_double.numbers import double_double, scaled
 from . import columns as c
@@ -25,21 +25,13 @@ from .columns import CUT_X, CUT_Y, LINE_C, LINE_P, LINE_S, VERTEX_COLUMNS
 from .unfolding import FUNCTIONAL_ULPS
 
 
-class Signs(NamedTuple):
-    """The signs of an apex's functional on a beam.
-
-    ``positive`` and ``negative`` tell whether each sign occurs. If the apex divides the beam only within rounding,
-    ``rounding`` bounds the flux on the other side.
-    """
-
-    positive: bool
-    negative: bool
-    rounding: float
-
-
 @inlined
 def signs_of(polygon, count, apex, values):
-    """-> Signs: set ``values`` to an apex's functional at the vertices of a beam, 0 within rounding."""
+    """-> (positive, negative, rounding): set ``values`` to an apex's functional at the vertices, 0 within rounding.
+
+    The first two tell whether each sign occurs. If the apex divides the beam only within rounding, ``rounding`` bounds
+    the flux on the other side.
+    """
     uncertain, uncertainty = False, 0.0
     positive, negative = False, False
     low, high = 0, 0
@@ -64,7 +56,7 @@ def signs_of(polygon, count, apex, values):
         # the part on the other side: at most `uncertainty` in p, over at most the beam's range of angles
         spread = polygon[high, LINE_S] * polygon[low, LINE_C] - polygon[high, LINE_C] * polygon[low, LINE_S]
         rounding = 0.5 * math.pi * uncertainty * abs(spread)
-    return Signs(positive, negative, rounding)
+    return positive, negative, rounding
 
 
 @inlined
@@ -137,14 +129,10 @@ def cut_rounding(polygon, count, apex):
     return rounding
 
 
-# Lines are computed in groups, as a register has them.
-GROUP = 4
-
-
 class Frame(NamedTuple):
     """Lines as functionals f = along x + up y + rest of a vertex (x, y), their values at an apex, and their drifts.
 
-    A drift is the change of f from one period to the next, see `unfolding`. The first line fills up the last group.
+    A drift is the change of f from one period to the next, see `unfolding`.
     """
 
     along: Floats
@@ -155,21 +143,14 @@ class Frame(NamedTuple):
 
 
 @inlined
-def padded(count):
-    """Return the number of lines with those that fill up the last group."""
-    return GROUP * ((count + GROUP - 1) // GROUP)
-
-
-@inlined
 def set_frame(frame, polygon, count, unfolding):
     """Compute the functionals of a beam's lines; return a bound on their error at any vertex.
 
     Coordinates of vertices, sines and cosines, and p are at most 1, so the terms besides T have a sum of at most 5.
     """
     sign, sine, cosine = unfolding.sign, unfolding.sine, unfolding.cosine
-    for i in range(padded(count)):
-        j = i if i < count else 0
-        p, s, c = polygon[j, LINE_P], polygon[j, LINE_S], polygon[j, LINE_C]
+    for i in range(count):
+        p, s, c = polygon[i, LINE_P], polygon[i, LINE_S], polygon[i, LINE_C]
         frame.along[i] = cosine * s - sine * c
         frame.up[i] = -sign * (sine * s + cosine * c)
         frame.rest[i] = unfolding.x.high * s - unfolding.y.high * c - p
@@ -180,14 +161,13 @@ def set_frame(frame, polygon, count, unfolding):
 @inlined
 def side_of(frame, count, x, y, uncertainty):
     """Return 1 if a vertex of the hollow lies right of all lines of a beam for certain, -1 if left, and 0 otherwise."""
-    right, left, lines = 0, 0, padded(count)
-    for group in range(0, lines, GROUP):
-        for k in range(GROUP):
-            value = frame.along[group + k] * x + frame.up[group + k] * y + frame.rest[group + k]
-            frame.values[group + k] = value
-            right += value > uncertainty
-            left += value < -uncertainty
-    return 1 if right == lines else (-1 if left == lines else 0)
+    right, left = 0, 0
+    for i in range(count):
+        value = frame.along[i] * x + frame.up[i] * y + frame.rest[i]
+        frame.values[i] = value
+        right += value > uncertainty
+        left += value < -uncertainty
+    return 1 if right == count else (-1 if left == count else 0)
 
 
 _compile = jit()
@@ -258,17 +238,11 @@ def put_pieces(pieces, used, polygon, count, angles, cuts, offset, tag, width):
     return used
 
 
-@linked_allocating
-def new_pieces(size):
-    """-> Pieces: tables with room for so many pieces."""
-    return Pieces(np.empty((size, c.PIECE_COLUMNS)), np.empty((size, c.TAG_COLUMNS), np.int64))
-
-
 @_compile
 def pieces_of(store, width):
     """-> (rows, tags): the pieces of all beams in a store."""
     vertices, beams = store.vertices.shape[0], store.whole.shape[0]
-    pieces, used = new_pieces(vertices), 0
+    pieces, used = Pieces(np.empty((vertices, c.PIECE_COLUMNS)), np.empty((vertices, c.TAG_COLUMNS), np.int64)), 0
     angles, cuts = np.empty(vertices), np.empty(vertices)
     for beam in range(beams):
         first, count = store.whole[beam, c.FIRST], store.whole[beam, c.COUNT]

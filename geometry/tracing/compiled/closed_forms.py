@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...scene import columns as c
+from ..double_double.formulas import TOP_CORNER, last_hollow, opening_at
 from .options import compiled, inlined, inner
 from .pointers import Late, call_late
-from .rays import TABLES, TOP_CORNER, last_hollow, opening_at, tables_at
+from .rays import TABLES, tables_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 from .waves import cross_simple
-from .work import LISTS, NATURAL, WORK
+from .work import NATURAL, ROOM, WORK
 
 # Status of a ray to be traced hit by hit.
 UNDECIDED = 255
@@ -54,7 +55,7 @@ class Room(NamedTuple):
     met: NDArray[np.int64]
     heads: NDArray[np.int64]
     waves: Floats
-    lists: NDArray[np.int64]
+    places: NDArray[np.int64]
 
 
 def _aligned(count: int) -> Floats:
@@ -69,7 +70,7 @@ def room_for(hollows: Floats, block: int) -> Room:
     rays, others, met = np.empty((3, block), np.int64)
     # rays that are gathered have a second part
     heads = np.full(len(hollows) + 1, -1)
-    return Room(np.empty((7, block)), rays, others, met, heads, _aligned(2 * WORK), np.empty(LISTS, np.int64))
+    return Room(np.empty((7, block)), rays, others, met, heads, _aligned(2 * WORK), np.empty(ROOM, np.int64))
 
 
 @inner
@@ -187,37 +188,20 @@ CROSSINGS = WEDGES.slot, ARCS.slot, SIMPLE.slot
 
 
 @inlined
-def cross(form, entry, angle, hits, room, crossings):
-    """Reflect rays by one hollow with a closed form; ``room`` is work space."""
-    count = entry.shape[0]
-    wedge, arc, _ = crossings
-    first, second = room.numbers[0, :count], room.numbers[1, :count]
-    if form[c.FORM] == c.WEDGE:
-        call_late(wedge, None, (form, entry, angle, hits, first, second, room.numbers[2, :count]))
-    else:
-        call_late(arc, None, (form, entry, angle, hits, first, second))
-
-
-@inlined
 def cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings):
-    """Reflect rays by hollow number h: by its closed form if it has one, else in waves."""
-    _, _, simple = crossings
-    if closed.shape[0] > 0 and closed[h, c.FORM] != c.NO_FORM:
-        cross(closed[h], entry, angle, hits, room, crossings)
+    """Reflect rays by hollow number h: by its closed form if it has one, else in waves if these are wanted."""
+    count = entry.shape[0]
+    first, second, third = room.numbers[0, :count], room.numbers[1, :count], room.numbers[2, :count]
+    wedge, arc, simple = crossings
+    if closed[h, c.FORM] == c.WEDGE:
+        call_late(wedge, None, (closed[h], entry, angle, hits, first, second, third))
+    elif closed[h, c.FORM] == c.CIRCULAR:
+        call_late(arc, None, (closed[h], entry, angle, hits, first, second))
     elif simple != 0:
-        call_late(simple, None, (tables, h, limit, entry, angle, hits, room.waves, room.lists))
+        call_late(simple, None, (tables, h, limit, entry, angle, hits, room.waves, room.places))
     else:
-        for j in range(entry.shape[0]):
+        for j in range(count):
             hits[j] = 0.0
-
-
-@inlined
-def is_crossed(hollow, closed, h, crossings):
-    """-> bool: whether rays in hollow number h are not all left undecided."""
-    if closed.shape[0] > 0 and closed[h, c.FORM] != c.NO_FORM:
-        return True
-    _, _, simple = crossings
-    return simple != 0 and hollow[c.ELLIPSES_END] == hollow[c.FIRST_ELLIPSE]
 
 
 @inlined
@@ -285,19 +269,14 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     """-> bool: trace a block of rays by flat tops and closed forms; all other rays get the status `UNDECIDED`.
 
     False if an angle is not in (0, pi) or an entry not finite; the results are then incomplete. ``closed`` are the
-    closed forms, empty if no hollow has one; of the tables the address is given. ``results`` are four arrays to fill:
-    x, theta, collisions, status. ``room`` is `room_for`, ``crossings`` is `CROSSINGS`.
+    closed forms; of the tables the address is given. ``results`` are four arrays to fill: x, theta, collisions, status.
+    ``room`` is `room_for`, ``crossings`` is `CROSSINGS`.
     """
     tables = tables_at(tables)
     hollows, cell = tables.hollows, tables.cell
     out_x, out_theta, bounces, status = results
     numbers, rays, others, met, heads, _, _ = room
-    whole = (
-        tables.hollow_count == 1
-        and is_crossed(hollows[0], closed, FIRST_HOLLOW, crossings)
-        and hollows[0, c.LEFT] == 0.0
-        and hollows[0, c.RIGHT] == cell
-    )
+    whole = tables.hollow_count == 1 and hollows[0, c.LEFT] == 0.0 and hollows[0, c.RIGHT] == cell
     block, flat = numbers.shape[1], tables.hollow_count
     for first in range(0, x.shape[0], block):
         end = min(first + block, x.shape[0])
@@ -331,10 +310,6 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
                 rays[count] = j
                 count += 1
                 j = others[j]
-            if not is_crossed(hollows[h], closed, h, crossings):
-                for j in range(count):
-                    states[rays[j]] = UNDECIDED
-                continue
             entry, angle, hits = numbers[4, :count], numbers[5, :count], numbers[3, :count]
             for j in range(count):
                 i = rays[j] & NATURAL

@@ -25,29 +25,10 @@ from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.scene import NO_TABLES
 from ...scene.structs import Struct
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
-from ..double_double.formulas import arc_normal, mirror, with_length_one
+from ..double_double.formulas import FLAT_TOP, TOP_CORNER, arc_normal, mirror, opening_at, with_length_one
+from . import pieces
 from .nearby import UNCERTAIN, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined, inner
-from .pieces import (
-    LEAST_FRACTION,
-    NO_BEZIER_HIT,
-    arc_form,
-    arc_incidence,
-    arc_point,
-    arc_time,
-    bend_number,
-    bezier_normal,
-    bezier_point,
-    bezier_tangent,
-    line_at,
-    line_point,
-    may_touch_arc,
-    near_end,
-    nearest_bezier,
-    nearest_line,
-    on_arc_after,
-    opening_met,
-)
 from .pointers import Late, call_late, checked, is_raised
 from .records import (
     BEZIER,
@@ -70,8 +51,6 @@ from .runs import skip_chords, skip_crossings
 from .tree import NO_LINE_HIT, nearest_line_in_boxes
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 
-# In place of a hollow's number: a flat top, and a corner at an end of an opening.
-FLAT_TOP, TOP_CORNER = -1, -2
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
 # Limit on the segments of a ray, 20 to 100 ms of work. A run of hits counts as one segment.
 MOST_STEPS = 1_000_000
@@ -81,31 +60,6 @@ HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 NO_RUN = 0.0, 0.0, 0.0, 0.0, 0
 # Shift to bits that the numbers of the pieces do not reach.
 BEND_SHIFT = 40
-
-
-@inlined
-def last_hollow(entry, hollows, count):
-    """-> int: number of the last hollow with left end <= entry, -1 if there is none."""
-    low, high = 0, count
-    while low < high:
-        middle = (low + high) // 2
-        if hollows[middle, c.LEFT] <= entry:
-            low = middle + 1
-        else:
-            high = middle
-    return low - 1
-
-
-@inlined
-def opening_at(entry, hollows, count):
-    """-> int: number of the hollow whose opening contains a position of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
-    h = last_hollow(entry, hollows, count)
-    if h < 0 or entry >= hollows[h, c.RIGHT] or (entry == hollows[h, c.LEFT] and hollows[h, c.LEFT_EDGE] != c.NO_EDGE):
-        # a flat top or its edge; an edge between two hollows is a corner
-        at_left = h >= 0 and entry == hollows[h, c.LEFT] and hollows[h, c.LEFT_EDGE] == c.CORNER_EDGE
-        at_right = h >= 0 and entry == hollows[h, c.RIGHT] and hollows[h, c.RIGHT_EDGE] == c.CORNER_EDGE
-        return TOP_CORNER if at_left or at_right else FLAT_TOP
-    return h
 
 
 @inlined
@@ -151,19 +105,19 @@ def nearest_curve(scope, own, px, py, vx, vy):
         arc = arc_of(tables, of_kind, k)
         stretch = arc[c.STRETCH]
         is_own = own.kind == of_kind and own.number == k
-        t, tangent, _ = arc_time(arc, is_own, px, py, vx, vy, stretch)
+        t, tangent, _ = pieces.arc_time(arc, is_own, px, py, vx, vy, stretch)
         if abs(t) <= close and not is_own:
             nearby = True
         elif tangent != 0:
-            if may_touch_arc(arc, t, px, py, vx, vy, stretch, slack):
+            if pieces.may_touch_arc(arc, t, px, py, vx, vy, stretch, slack):
                 contact = min(contact, t)
-        elif 0.0 <= t < time and on_arc_after(arc, t, px, py, vx, vy, stretch, slack):
+        elif 0.0 <= t < time and pieces.on_arc_after(arc, t, px, py, vx, vy, stretch, slack):
             time, kind, number = t, of_kind, k
     first, end = scope.beziers
     if first < end:
         own_number = own.number if own.kind == BEZIER else -1
         arguments = tables.beziers, first, end, own_number, own.s, px, py, vx, vy, slack, time
-        t, k, s, touch, near_s = call_late(scope.slots.bezier, NO_BEZIER_HIT, arguments)
+        t, k, s, touch, near_s = call_late(scope.slots.bezier, pieces.NO_BEZIER_HIT, arguments)
         contact = min(contact, touch)
         if k >= 0:
             time, kind, number, hit_s = t, BEZIER, k, s
@@ -180,7 +134,7 @@ def nearest_piece(scope, own, px, py, vx, vy):
         arguments = tree, own.number if own.kind == LINE else -1, own.bounces, px, py, vx, vy, hit.time
         t, line, fraction, corner, near = call_late(scope.slots.boxes, NO_LINE_HIT, arguments)
     else:
-        t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
+        t, line, fraction, corner, near = pieces.nearest_line(scope, own, px, py, vx, vy, hit.time)
     if t < hit.time:
         hit = Hit(t, LINE, line, fraction, 0)
     if contact < np.inf and is_beside(scope, hit, contact, px, py, vx, vy):
@@ -213,9 +167,9 @@ def incidence(scope, hit, px, py, vx, vy):
         return abs(vx * lines[hit.number, c.LINE_NORMAL_X] + vy * lines[hit.number, c.LINE_NORMAL_Y])
     if hit.kind == CIRCLE or hit.kind == ELLIPSE:
         arc = arc_of(tables, hit.kind, hit.number)
-        return arc_incidence(arc, hit.time, px, py, vx, vy, arc[c.STRETCH])
+        return pieces.arc_incidence(arc, hit.time, px, py, vx, vy, arc[c.STRETCH])
     if hit.kind == BEZIER:
-        tx, ty = bezier_tangent(tables.beziers[hit.number], hit.s)
+        tx, ty = pieces.bezier_tangent(tables.beziers[hit.number], hit.s)
         return abs(tx * vy - ty * vx) / math.sqrt(tx * tx + ty * ty)
     return abs(vy)
 
@@ -229,7 +183,7 @@ def exit_time(scope, own, px, py, vx, vy, time):
     left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
     kind = NO_PIECE
     if vy > 0.0:
-        t, is_met = opening_met(left, right, px, py, vx, vy)
+        t, is_met = pieces.opening_met(left, right, px, py, vx, vy)
         if (is_met or is_open) and own.kind != OPENING and (time - t) * vy > slack:
             time, kind = t, OPENING
     if is_open and vx != 0.0:
@@ -256,11 +210,11 @@ def meets_corner(scope, hit, corner, px, py, vx, vy):
 @inlined
 def line_reflect(scope, hit, own, vx, vy):
     """-> (px, py, vx, vy, at_corner): the ray after its reflection on a line, and whether it is at a corner."""
-    line = line_at(scope.tables, hit.number)
-    px, py = line_point(line, hit.s)
+    line = pieces.line_at(scope.tables, hit.number)
+    px, py = pieces.line_point(line, hit.s)
     # a first hit near an end of the opening is as accurate as the ray, at any distance from that corner
     at_opening = own.bounces == 0 and (line.y0 if hit.s >= 0.0 else line.y1) == 0.0
-    room = LEAST_FRACTION * line.length if at_opening else scope.slack
+    room = pieces.LEAST_FRACTION * line.length if at_opening else scope.slack
     near = hit.number if hit.s >= 0.0 else hit.number + 1
     at_corner = abs(hit.s) * line.length <= room and scope.tables.joints[near, c.IS_CORNER] > 0.0
     vx, vy = mirror(vx, vy, line.normal_x, line.normal_y)
@@ -279,13 +233,13 @@ def reflect(scope, hit, own, px, py, vx, vy):
     else:
         if hit.kind == BEZIER:
             curve = tables.beziers[hit.number]
-            px, py = bezier_point(curve, hit.s)
-            nx, ny = bezier_normal(curve, hit.s)
+            px, py = pieces.bezier_point(curve, hit.s)
+            nx, ny = pieces.bezier_normal(curve, hit.s)
         else:
             curve = arc_of(tables, hit.kind, hit.number)
-            px, py, nx, ny = arc_point(curve, hit.time, px, py, vx, vy, curve[c.STRETCH])
+            px, py, nx, ny = pieces.arc_point(curve, hit.time, px, py, vx, vy, curve[c.STRETCH])
         wx, wy = mirror(vx, vy, nx, ny)
-        at_corner = near_end(curve, px, py, scope.slack)
+        at_corner = pieces.near_end(curve, px, py, scope.slack)
     if at_corner:
         return px, py, vx, vy, True
     return px, py, wx, wy, False
@@ -297,7 +251,7 @@ def may_run(tables, hit, own, px, py, vx, vy):
     if hit.kind == CIRCLE:
         arc = tables.circles[hit.number]
         qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
-        nx, ny = arc_normal(arc_form(arc), 1.0, qx, qy)
+        nx, ny = arc_normal(pieces.arc_form(arc), 1.0, qx, qy)
         return vx * nx + vy * ny <= arc[c.RUN_SINE]
     # the ray came from this line, hit the other one, and came back
     came_back = hit.kind == LINE and own.kind == LINE and own.before == hit.number
@@ -325,7 +279,7 @@ def piece_label(tables, hit, vx):
     side = 1 if hit.kind == SIDE and vx > 0.0 else 0
     number = 8 * (hit.number + 1 + side) + hit.kind
     if hit.kind == BEZIER:
-        number += bend_number(tables.beziers[hit.number], hit.s) << BEND_SHIFT
+        number += pieces.bend_number(tables.beziers[hit.number], hit.s) << BEND_SHIFT
     return np.uint64(number)
 
 
@@ -421,7 +375,6 @@ def trace_rays(count, rays, tables, limit, details, slots):
         out_theta[i] = min(angle, LAST_ANGLE) if status[i] == ESCAPED else angle
         if labelled:
             details.itinerary[i], details.segments[i] = label, steps
-        if details.with_velocity:
             details.velocity[i, c.POINT_X], details.velocity[i, c.POINT_Y] = vx, vy
 
 
@@ -453,7 +406,7 @@ def _late_functions() -> tuple[Late, ...]:
         Late(line_starts_in_front, Table(c.JOINT_COLUMNS), integer, own, *ray, number),
         Late(nearest_line_in_boxes, named(Tree, TABLES, ROW, number), integer, integer, *ray, number),
         Late(skip_run, scope, hit, own, *ray, integer),
-        Late(nearest_bezier, Table(c.BEZIER_COLUMNS), integer, integer, integer, number, *ray, number, number),
+        Late(pieces.nearest_bezier, Table(c.BEZIER_COLUMNS), integer, integer, integer, number, *ray, number, number),
     )
 
 

@@ -107,25 +107,23 @@ class Details(NamedTuple):
     """Further arrays to fill, empty if they are not wanted.
 
     ``velocity`` is the outgoing velocity, shape (n, 2). ``itinerary`` is a hash of the pieces hit, in order, of the
-    lengths of runs, and of the sides passed; ``segments``, of the same length, counts the segments that were computed,
-    where a run of hits is one segment. ``path``, shape (limit + 2, 2), for a single ray, has the points of the
-    trajectory, with every hit of a run.
+    lengths of runs, and of the sides passed; ``segments`` counts the segments that were computed, where a run of hits
+    is one segment. These three are wanted together. ``path``, shape (limit + 2, 2), for a single ray, has the points of
+    the trajectory, with every hit of a run.
     """
 
     velocity: Floats
     itinerary: NDArray[np.uint64]
     segments: NDArray[np.int64]
     path: Floats
-    with_velocity: bool
     with_itinerary: bool
     with_path: bool
 
 
-def details_for(velocity: int = 0, itinerary: int = 0, path: int = 0) -> Struct:
-    """Return arrays with the given numbers of rows."""
-    labels, segments = np.zeros(itinerary, np.uint64), np.zeros(itinerary, np.int64)
-    arrays = np.empty((velocity, 2)), labels, segments, np.full((path, 2), np.nan)
-    return Struct(Details(*arrays, velocity > 0, itinerary > 0, path > 0))
+def details_for(rays: int = 0, path: int = 0) -> Struct:
+    """Return arrays for so many rays with itineraries, or with so many rows for the path."""
+    labels, segments = np.zeros(rays, np.uint64), np.zeros(rays, np.int64)
+    return Struct(Details(np.empty((rays, 2)), labels, segments, np.full((path, 2), np.nan), rays > 0, path > 0))
 
 
 # The details, if only the ends of the rays are wanted.

@@ -1,4 +1,4 @@
-"""The first hit of a ray on the lines of a hollow with many: a search in a tree of boxes, for one ray and for a wave.
+"""The first hit of a ray on the lines of a hollow with many: a search in a tree of boxes.
 
 Loads numba. A ray is tested against the eight boxes, or the eight lines, in a row of the tree at once, in a vector of
 eight numbers, because the compiler does not vectorise such short loops. Comparisons with NaN, as in an empty place, are
@@ -16,13 +16,9 @@ from numba.extending import intrinsic
 
 from ...scene import columns as c
 from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, OTHER_X, OTHER_Y, PARENT
-from ...scene.escapes import ESCAPE_ROOM, MOST_LINES
 from ...scene.tolerances import NEARBY_SLACKS
-from ..double_double.formulas import where
-from . import work as w
 from .options import inlined, inner
-from .pieces import Line, is_ahead, joint_side, line_at, line_hit, line_sides, side
-from .work import NATURAL, ray_at
+from .pieces import is_ahead, joint_side, line_at, line_hit, line_sides, side
 
 # No hit on a line, for `nearest_line`.
 NO_LINE_HIT = np.inf, -1, 0.0, np.inf, False
@@ -214,124 +210,3 @@ def nearest_line_in_boxes(tree, own_line, bounces, px, py, vx, vy, time):
                     most = min(best, time) + 2.0 * slack
             elif t >= -close:
                 nearby = True
-
-
-@inlined
-def escapes(tables, own, room, px, py, vx, vy):
-    """-> bool: whether a ray that starts on line ``own`` certainly meets no piece; see `scene/escapes`.
-
-    ``room`` is the distance from the ends of the line from which on this is known.
-    """
-    joints, lines, j = tables.joints, tables.lines, own
-    x0, y0 = abs(joints[j, c.JOINT_X] - px), abs(joints[j, c.JOINT_Y] - py)
-    x1, y1 = abs(joints[j + 1, c.JOINT_X] - px), abs(joints[j + 1, c.JOINT_Y] - py)
-    is_inside = (max(x0, y0) > room) & (max(x1, y1) > room)
-    is_free = (vx < lines[j, c.ESCAPE_RIGHT] * vy) & (-vx < lines[j, c.ESCAPE_LEFT] * vy)
-    return is_inside & is_free
-
-
-@inlined
-def begin_searches(scope, work, lists, count):
-    """-> int: the number of rays of a wave that begin at the root of the tree; the other ones meet no line."""
-    root, top, room = int(scope.hollow[c.TREE_ROOT]), int(scope.hollow[c.TREE_LEVELS]) - 1, ESCAPE_ROOM * scope.slack
-    first, end = scope.joints
-    nodes, may_escape = 0, end - first <= MOST_LINES + 1
-    for i in range(count):
-        lists[w.ROW + i], lists[w.LEVEL + i], lists[w.WAITING + i] = root, top, ALL_BOXES << BOXES * top
-        lists[w.AT_NODES + nodes] = i
-        nodes += 1
-        if may_escape and work[w.OWN + i] >= w.LINES:
-            px, py, vx, vy = ray_at(work, i)
-            nodes -= np.int64(escapes(scope.tables, int(work[w.OWN + i] - w.LINES) & NATURAL, room, px, py, vx, vy))
-    return nodes
-
-
-@inlined
-def step_on(boxes, work, lists, i, waiting, nodes, leaves):
-    """-> (nodes, leaves): numbers of rays at nodes and at leaves, with ray i at its next one if there is one.
-
-    The search is that of `next_leaf`, one step at a time, and without branches, which the processor could not predict.
-    ``waiting`` are the boxes still to visit, eight bits for each level.
-    """
-    row, level = lists[w.ROW + i] & NATURAL, lists[w.LEVEL + i]
-    place = BOXES * level
-    mask = waiting >> place & ALL_BOXES
-    up = np.int64(mask == 0)
-    box = first_bit(mask | up) if work[w.VX + i] > 0.0 else last_bit(mask | up)
-    to_leaf = np.int64(level == 1) & ~up
-    down = 1 - up - to_leaf
-    # the node above, or the box; bit 0 stands for no box
-    following = int(boxes[row, PARENT if up != 0 else CONTENT]) + box
-    waiting ^= (1 - up) << (place + box)
-    lists[w.WAITING + i] = waiting | (down * ALL_BOXES) << (place - BOXES)
-    lists[w.LEVEL + i] = level + up - down
-    lists[w.ROW + i] = row if to_leaf != 0 else following
-    lists[w.LEAF + i] = following
-    # written in any case, counted if true
-    lists[w.AT_NODES + nodes] = lists[w.AT_LEAVES + leaves] = i
-    return nodes + (down | (up & np.int64(waiting != 0))), leaves + to_leaf
-
-
-@inlined
-def line_of_leaf(boxes, leaf, place):
-    """-> Line: a line of a leaf, for its time only; the row of the leaf is at hand, those of other tables are not."""
-    x0, y0, x1, y1 = (
-        boxes[leaf, ANCHOR_X + place], boxes[leaf, ANCHOR_Y + place], boxes[leaf, OTHER_X + place],
-        boxes[leaf, OTHER_Y + place],
-    )  # fmt: skip
-    return Line(x0, y0, x1, y1, x1 - x0, y1 - y0, 0.0, 0.0, 0.0)
-
-
-@inlined
-def meet_leaf(scope, work, lists, i):
-    """Find the nearest hit of ray i of a wave on the lines of its leaf, if that is nearer."""
-    tables, slack, leaf = scope.tables, scope.slack, lists[w.LEAF + i] & NATURAL
-    px, py, vx, vy = ray_at(work, i)
-    first, own, close = (
-        int(tables.boxes[leaf, CONTENT]) & NATURAL,
-        int(work[w.OWN + i] - w.LINES),
-        NEARBY_SLACKS * slack,
-    )
-    met = lines_met(tables.boxes[leaf], px, py, vx, vy, slack)
-    at_end, met = met >> BOXES, met & ALL_BOXES
-    if at_end != 0:
-        at_entry = work[w.BOUNCES + i] == 0.0
-        if corner_at_ends(tables.joints, first, at_end, at_entry, px, py, vx, vy, slack) < np.inf:
-            work[w.UNCERTAIN + i] = 1.0
-    while met != 0:
-        place = first_bit(met)
-        met &= met - 1
-        j, line, best = first + place, line_of_leaf(tables.boxes, leaf, place), work[w.TIME + i]
-        before, after = line_sides(line, px, py, vx, vy)
-        t, _, _, _ = line_hit(line, before, after, px, py, vx, vy)
-        is_other = j != own
-        work[w.UNCERTAIN + i] += where(is_other & (abs(t) <= close), 1.0, 0.0)
-        # of two lines at equal distance the first along the wall is hit, as without boxes
-        number, piece = w.LINES + j, work[w.PIECE + i]
-        is_nearer = is_other & (t > close) & ((t < best) | ((t == best) & (number < piece)))
-        work[w.TIME + i], work[w.PIECE + i] = where(is_nearer, t, best), where(is_nearer, number, piece)
-
-
-@inlined
-def search_boxes(scope, work, lists, count):
-    """Find the first lines that all rays of a wave meet, as `nearest_line_in_boxes`, where these are nearer.
-
-    All rays take a step in turn, so that the processor works on some while it waits for the others.
-    """
-    boxes, close = scope.tables.boxes, NEARBY_SLACKS * scope.slack
-    nodes, leaves = begin_searches(scope, work, lists, count), 0
-    while nodes + leaves > 0:
-        rays, leaves = leaves, 0
-        for k in range(rays):
-            i = lists[w.AT_LEAVES + k] & NATURAL
-            meet_leaf(scope, work, lists, i)
-            nodes, leaves = step_on(boxes, work, lists, i, lists[w.WAITING + i], nodes, leaves)
-        rays, nodes = nodes, 0
-        for k in range(rays):
-            i = lists[w.AT_NODES + k] & NATURAL
-            px, py, vx, vy = ray_at(work, i)
-            met = boxes_met(
-                boxes[lists[w.ROW + i] & NATURAL], px, py, vx, vy, -close, work[w.TIME + i] + 2.0 * scope.slack
-            )
-            others = ~((ALL_BOXES ^ met) << BOXES * lists[w.LEVEL + i])
-            nodes, leaves = step_on(boxes, work, lists, i, lists[w.WAITING + i] & others, nodes, leaves)

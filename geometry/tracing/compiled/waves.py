@@ -29,40 +29,11 @@ from ..double_double.formulas import (
     where,
     with_length_one,
 )
+from . import pieces
 from . import work as w
 from .options import inlined, inner, linked
-from .pieces import (
-    ROOT_STEPS,
-    arc_form,
-    arc_point,
-    beyond_end,
-    bezier_coefficients,
-    bezier_normal,
-    bezier_point,
-    bezier_slope,
-    end_side,
-    extrema,
-    is_faced,
-    is_falling,
-    is_nearly_tangent,
-    line_at,
-    line_hit,
-    line_sides,
-    meets_circle,
-    near_end,
-    opening_met,
-    own_hit,
-    own_point,
-    own_terms,
-    quadratic_root,
-    root_start,
-    root_step,
-    side,
-    side_spread,
-)
 from .rays import scope_of
 from .runs import skip_chords, skip_crossings
-from .tree import search_boxes
 from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
 from .work import NATURAL, ray_at
 
@@ -111,10 +82,10 @@ def keep_root(work, i, time, number, s):
 
 
 @linked
-def list_rays(work, lists, count, column, low, high, found):
+def list_rays(work, places, count, column, low, high, found):
     """-> int: list rays that have a number from low to high in a column, after ``found`` others; the new length."""
     # parts, because a place in the whole array could be negative for all that the compiler knows
-    numbers, places, listed = work[column:], lists[w.PLACES + found :], 0
+    numbers, rest, listed = work[column:], places[found:], 0
     for i in range(count):
         listed += np.int64((numbers[i] >= low) & (numbers[i] <= high))
     if listed == 0:
@@ -122,7 +93,7 @@ def list_rays(work, lists, count, column, low, high, found):
     listed = 0
     for i in range(count):
         # written in any case, counted if true
-        places[listed & NATURAL] = i
+        rest[listed & NATURAL] = i
         listed += np.int64((numbers[i] >= low) & (numbers[i] <= high))
     return found + listed
 
@@ -133,7 +104,9 @@ def meet_corner(work, count, x, y, slack):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         at_entry = work[w.OWN + i] == w.OPENING
-        is_met = (abs(side(x, y, px, py, vx, vy)) <= slack) & is_faced(x - px, y - py, at_entry, vx, vy, slack)
+        is_met = (abs(pieces.side(x, y, px, py, vx, vy)) <= slack) & pieces.is_faced(
+            x - px, y - py, at_entry, vx, vy, slack
+        )
         work[w.UNCERTAIN + i] += where(is_met, 1.0, 0.0)
 
 
@@ -146,10 +119,10 @@ def meet_line(work, count, line, number, corner_slack, close):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         own = work[w.OWN + i]
-        before, after = line_sides(line, px, py, vx, vy)
-        is_ahead = is_faced(line.x0 - px, line.y0 - py, own == w.OPENING, vx, vy, corner_slack)
+        before, after = pieces.line_sides(line, px, py, vx, vy)
+        is_ahead = pieces.is_faced(line.x0 - px, line.y0 - py, own == w.OPENING, vx, vy, corner_slack)
         is_met = (before >= 0.0) & (after <= 0.0) & (before > after) & (own != number)
-        t, _, _, _ = line_hit(line, before, after, px, py, vx, vy)
+        t, _, _, _ = pieces.line_hit(line, before, after, px, py, vx, vy)
         is_uncertain = (is_ahead & (abs(before) <= corner_slack)) | (is_met & (abs(t) <= close))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
         keep(work, i, where(is_met & (t > close), t, np.inf), number)
@@ -158,7 +131,7 @@ def meet_line(work, count, line, number, corner_slack, close):
 @linked
 def meet_arc(work, count, arc, number, close):
     """Find the hits of rays on a circular arc that are nearer; a hit before the time ``close`` is uncertain."""
-    form = arc_form(arc)
+    form = pieces.arc_form(arc)
     # bounds of B of rays that meet the front, from elsewhere and from the arc itself
     most, least = where(arc[c.CURVATURE] > 0.0, np.inf, 0.0), where(arc[c.CURVATURE] > 0.0, 0.0, np.inf)
     for i in range(count):
@@ -167,7 +140,7 @@ def meet_arc(work, count, arc, number, close):
         b, f, d, speed2 = arc_terms(form, px - arc[c.START_X], py - arc[c.START_Y], vx, vy)
         from_afar = is_other & (d >= 0.0) & (b < most)
         t = arc_root(form, is_own, b, f, math.sqrt(d), speed2)
-        is_uncertain = (is_other & is_nearly_tangent(arc, b, d, speed2)) | (from_afar & (abs(t) <= close))
+        is_uncertain = (is_other & pieces.is_nearly_tangent(arc, b, d, speed2)) | (from_afar & (abs(t) <= close))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
         is_met = from_afar | (is_own & (b > least))
         work[w.ARC_TIME + i] = where(is_met & (t >= 0.0), t, np.inf)
@@ -175,7 +148,7 @@ def meet_arc(work, count, arc, number, close):
     for i in range(count):
         (px, py, vx, vy), t = ray_at(work, i), work[w.ARC_TIME + i]
         # at grazing incidence rounding moves the point along the arc by more than the slack
-        on_arc = beyond_end(arc, px + t * vx - arc[c.START_X], py + t * vy - arc[c.START_Y]) <= close
+        on_arc = pieces.beyond_end(arc, px + t * vx - arc[c.START_X], py + t * vy - arc[c.START_Y]) <= close
         keep(work, i, where(on_arc, t, np.inf), number)
 
 
@@ -185,18 +158,18 @@ def meet_parabola(work, count, curve, number):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         is_own, is_other = work[w.OWN + i] == number, work[w.OWN + i] != number
-        a0, a1, a2, _ = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
-        spread, last = side_spread(curve, px, py, vx, vy), end_side(curve, px, py, vx, vy)
+        a0, a1, a2, _ = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
+        spread, last = pieces.side_spread(curve, px, py, vx, vy), pieces.end_side(curve, px, py, vx, vy)
         turn, own_s = a1 / (-2.0 * a2), work[w.BEFORE + i]
         value, room = cubic((a0, a1, a2, 0.0), turn), (TANGENT_ULPS * EPS) * spread
         is_inside = (turn > 0.0) & (turn < 1.0)
         touches = (abs(a0) <= room) | (abs(last) <= room) | (is_inside & (abs(value) <= room))
-        falls = is_falling(a0, where(is_inside, value, last)) | (is_inside & is_falling(value, last))
-        sigma = bezier_slope(a1, a2, 0.0, own_s) / -a2
-        own_root, is_front = own_point((a0, a1, a2, 0.0), own_s, sigma)
-        s = where(is_own, own_root, quadratic_root(a0, a1, a2))
-        t = bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
-        is_near = is_other & meets_circle(curve, px, py, vx, vy, work[w.TIME + i])
+        falls = pieces.is_falling(a0, where(is_inside, value, last)) | (is_inside & pieces.is_falling(value, last))
+        sigma = pieces.bezier_slope(a1, a2, 0.0, own_s) / -a2
+        own_root, is_front = pieces.own_point((a0, a1, a2, 0.0), own_s, sigma)
+        s = where(is_own, own_root, pieces.quadratic_root(a0, a1, a2))
+        t = bezier_time(pieces.bezier_coefficients(curve), s, px, py, vx, vy)
+        is_near = is_other & pieces.meets_circle(curve, px, py, vx, vy, work[w.TIME + i])
         is_uncertain = is_near & (touches | (falls & (abs(t) <= NEARBY * spread)))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
         t = where(((is_own & is_front) | (is_near & falls)) & (t > 0.0), t, np.inf)
@@ -208,24 +181,24 @@ def mark_near(work, count, curve, number):
     """Mark rays that meet the circle about a Bezier piece, on which they do not start."""
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
-        is_near = meets_circle(curve, px, py, vx, vy, work[w.TIME + i]) & (work[w.OWN + i] != number)
+        is_near = pieces.meets_circle(curve, px, py, vx, vy, work[w.TIME + i]) & (work[w.OWN + i] != number)
         work[w.NEAR + i] = where(is_near, 1.0, 0.0)
 
 
 @inlined
-def gather(work, lists, count, some, columns):
+def gather(work, places, count, some, columns):
     """Copy columns of the rays that are listed to another work array."""
     for j in range(count):
-        i = lists[w.PLACES + j] & NATURAL
+        i = places[j] & NATURAL
         for column in columns:
             some[column + j] = work[column + i]
 
 
 @inlined
-def keep_roots(work, lists, count, some, number):
+def keep_roots(work, places, count, some, number):
     """Keep the hits of the rays that are listed, on one Bezier piece."""
     for j in range(count):
-        i = lists[w.PLACES + j] & NATURAL
+        i = places[j] & NATURAL
         work[w.UNCERTAIN + i] += some[w.UNCERTAIN + j]
         keep_root(work, i, some[w.TIME + j], number, some[w.ROOT + j])
 
@@ -240,10 +213,13 @@ def find_fall(some, count, curve, turn):
     both = 0
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
+        g = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
         a0, a1, a2, a3 = g
-        last, room = end_side(curve, px, py, vx, vy), (TANGENT_ULPS * EPS) * side_spread(curve, px, py, vx, vy)
-        low, high = extrema(a1, a2, a3)
+        last, room = (
+            pieces.end_side(curve, px, py, vx, vy),
+            (TANGENT_ULPS * EPS) * pieces.side_spread(curve, px, py, vx, vy),
+        )
+        low, high = pieces.extrema(a1, a2, a3)
         value_low, value_high = cubic(g, low), cubic(g, high)
         has_low, has_high = (low > 0.0) & (low < 1.0), (high > 0.0) & (high < 1.0)
         touches = (abs(a0) <= room) | (abs(last) <= room)
@@ -251,8 +227,8 @@ def find_fall(some, count, curve, turn):
         some[w.UNCERTAIN + j] += where(touches, 1.0, 0.0)
         low, value_low = where(has_low, low, 0.0), where(has_low, value_low, a0)
         high, value_high = where(has_high, high, 1.0), where(has_high, value_high, last)
-        first, third = is_falling(a0, value_low), is_falling(value_high, last)
-        middle = is_falling(value_low, value_high)
+        first, third = pieces.is_falling(a0, value_low), pieces.is_falling(value_high, last)
+        middle = pieces.is_falling(value_low, value_high)
         both += np.int64(first & third)
         first, middle = first & (turn == 0), middle & (turn == 0)
         falls = first | middle | third
@@ -269,9 +245,9 @@ def start_roots(some, count, curve):
     """Begin the search of the roots of g."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
+        g = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
         ends = some[w.LOW + j], some[w.HIGH + j], some[w.VALUE_LOW + j], some[w.VALUE_HIGH + j]
-        some[w.ROOT + j] = root_start(g, *ends)
+        some[w.ROOT + j] = pieces.root_start(g, *ends)
 
 
 @linked
@@ -280,9 +256,9 @@ def improve_roots(some, count, curve):
     more = 0
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
+        g = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
         old, low, high = kept(some, w.ROOT + j), kept(some, w.LOW + j), kept(some, w.HIGH + j)
-        s, low, high, is_last = root_step(g, old, low, high)
+        s, low, high, is_last = pieces.root_step(g, old, low, high)
         is_sought = some[w.SOUGHT + j] > 0.0
         some[w.ROOT + j] = where(is_sought, s, old)
         some[w.LOW + j], some[w.HIGH + j] = low, high
@@ -296,11 +272,11 @@ def find_own_root(some, count, curve):
     """Find the front hits of rays that start on a Bezier piece themselves."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g, own_s = bezier_sides(bezier_coefficients(curve), px, py, vx, vy), some[w.BEFORE + j]
-        b0, b1, b2, disc, error = own_terms(curve, g, own_s)
+        g, own_s = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy), some[w.BEFORE + j]
+        b0, b1, b2, disc, error = pieces.own_terms(curve, g, own_s)
         one, other = quadratic_roots(b0, b1, b2, disc)
-        t, s = own_hit(curve, g, own_s, one, px, py, vx, vy)
-        other_t, other_s = own_hit(curve, g, own_s, other, px, py, vx, vy)
+        t, s = pieces.own_hit(curve, g, own_s, one, px, py, vx, vy)
+        other_t, other_s = pieces.own_hit(curve, g, own_s, other, px, py, vx, vy)
         is_uncertain = (abs(disc) <= error) & (b2 != 0.0)
         some[w.UNCERTAIN + j] += where(is_uncertain, 1.0, 0.0)
         some[w.ROOT + j], t = where(other_t < t, other_s, s), where(other_t < t, other_t, t)
@@ -312,32 +288,35 @@ def time_roots(some, count, curve, number):
     """Compute the times of the hits at the roots, inf for those that are none."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        t, is_met = bezier_time(bezier_coefficients(curve), some[w.ROOT + j], px, py, vx, vy), some[w.FALLS + j] > 0.0
-        is_close = (some[w.OWN + j] != number) & (abs(t) <= NEARBY * side_spread(curve, px, py, vx, vy))
+        t, is_met = (
+            bezier_time(pieces.bezier_coefficients(curve), some[w.ROOT + j], px, py, vx, vy),
+            some[w.FALLS + j] > 0.0,
+        )
+        is_close = (some[w.OWN + j] != number) & (abs(t) <= NEARBY * pieces.side_spread(curve, px, py, vx, vy))
         some[w.UNCERTAIN + j] += where(is_met & is_close, 1.0, 0.0)
         some[w.TIME + j] = where(is_met & (t > 0.0), t, np.inf)
 
 
 @linked
-def meet_cubic(work, lists, count, curve, number, some):
+def meet_cubic(work, places, count, curve, number, some):
     """Find the hits of rays on a cubic piece that are nearer; the rays near the piece are gathered in ``some``."""
     mark_near(work, count, curve, number)
-    others = list_rays(work, lists, count, w.NEAR, 1.0, 1.0, 0)
-    end = list_rays(work, lists, count, w.OWN, number, number, others)
+    others = list_rays(work, places, count, w.NEAR, 1.0, 1.0, 0)
+    end = list_rays(work, places, count, w.OWN, number, number, others)
     if end == 0:
         return
-    gather(work, lists, end, some, w.STARTS)
+    gather(work, places, end, some, w.STARTS)
     some[w.UNCERTAIN : w.UNCERTAIN + end] = 0.0
     find_own_root(some[others:], end - others, curve)
     for turn in range(2):
         if find_fall(some, others, curve, turn) == 0 and turn > 0:
             break
         start_roots(some, others, curve)
-        steps = ROOT_STEPS
+        steps = pieces.ROOT_STEPS
         while steps > 0 and improve_roots(some, others, curve) > 0:
             steps -= 1
         time_roots(some, end, curve, number)
-        keep_roots(work, lists, end, some, number)
+        keep_roots(work, places, end, some, number)
 
 
 @inlined
@@ -348,13 +327,13 @@ def meet_lines(scope, work, count):
     for j in range(scope.joints[0], scope.joints[1]):
         corner_slack = slack if joints[j, c.IS_CORNER] > 0.0 else -1.0
         if joints[j, c.STARTS_LINE] > 0.0:
-            meet_line(work, count, line_at(tables, j), w.LINES + j, corner_slack, NEARBY_SLACKS * slack)
+            meet_line(work, count, pieces.line_at(tables, j), w.LINES + j, corner_slack, NEARBY_SLACKS * slack)
         elif corner_slack > 0.0:
             meet_corner(work, count, joints[j, c.JOINT_X], joints[j, c.JOINT_Y], slack)
 
 
 @inlined
-def meet_pieces(scope, work, lists, count):
+def meet_pieces(scope, work, places, count):
     """Find the nearest hits of all rays on the pieces of a hollow."""
     tables, close = scope.tables, NEARBY_SLACKS * scope.slack
     for k in range(scope.circles[0], scope.circles[1]):
@@ -364,11 +343,8 @@ def meet_pieces(scope, work, lists, count):
         if curve[c.X3] == 0.0 and curve[c.Y3] == 0.0:
             meet_parabola(work, count, curve, number)
         else:
-            meet_cubic(work, lists, count, curve, number, work[w.WORK :])
-    if scope.has_tree:
-        search_boxes(scope, work, lists, count)
-    else:
-        meet_lines(scope, work, count)
+            meet_cubic(work, places, count, curve, number, work[w.WORK :])
+    meet_lines(scope, work, count)
 
 
 @inlined
@@ -384,7 +360,7 @@ def place_on_arc(some, count, arc, slack):
     room = 2.0 * NEARBY_SLACKS * slack
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        x, y, nx, ny = arc_point(arc, some[w.TIME + j], px, py, vx, vy, 1.0)
+        x, y, nx, ny = pieces.arc_point(arc, some[w.TIME + j], px, py, vx, vy, 1.0)
         dx, dy, ex, ey = x - arc[c.START_X], y - arc[c.START_Y], x - arc[c.END_X], y - arc[c.END_Y]
         at_end = (dx * dx + dy * dy <= room * room) | (ex * ex + ey * ey <= room * room)
         sine = RUN_MARGIN * arc[c.RUN_SINE]
@@ -392,41 +368,41 @@ def place_on_arc(some, count, arc, slack):
 
 
 @inlined
-def place_on_arcs(scope, work, lists, count):
+def place_on_arcs(scope, work, places, count):
     """Compute the points at which rays meet arcs, for the rays of each arc in vectors."""
     some = work[w.WORK :]
     for k in range(scope.circles[0], scope.circles[1]):
-        hits = list_rays(work, lists, count, w.PIECE, w.CIRCLES + k, w.CIRCLES + k, 0)
-        gather(work, lists, hits, some, w.BEFORE_HIT)
+        hits = list_rays(work, places, count, w.PIECE, w.CIRCLES + k, w.CIRCLES + k, 0)
+        gather(work, places, hits, some, w.BEFORE_HIT)
         place_on_arc(some, hits, numbers_of(scope.tables.circles[k]), scope.slack)
         for j in range(hits):
-            i = lists[w.PLACES + j] & NATURAL
+            i = places[j] & NATURAL
             for column in w.AT_HIT:
                 work[column + i] = some[column + j]
 
 
 @inlined
-def place_hits(scope, work, lists, count):
+def place_hits(scope, work, places, count):
     """Compute the points at which rays meet their pieces, kind by kind, so that the processor guesses no branch."""
     tables, slack = scope.tables, scope.slack
     joints = tables.joints
-    place_on_arcs(scope, work, lists, count)
-    for k in range(list_rays(work, lists, count, w.PIECE, w.LINES, np.inf, 0)):
-        i = lists[w.PLACES + k] & NATURAL
+    place_on_arcs(scope, work, places, count)
+    for k in range(list_rays(work, places, count, w.PIECE, w.LINES, np.inf, 0)):
+        i = places[k] & NATURAL
         j, (px, py, vx, vy) = int(work[w.PIECE + i] - w.LINES) & NATURAL, ray_at(work, i)
-        line = line_at(tables, j)
-        before, after = line_sides(line, px, py, vx, vy)
-        _, fraction, x, y = line_hit(line, before, after, px, py, vx, vy)
+        line = pieces.line_at(tables, j)
+        before, after = pieces.line_sides(line, px, py, vx, vy)
+        _, fraction, x, y = pieces.line_hit(line, before, after, px, py, vx, vy)
         is_corner = where(fraction < 0.0, joints[j + 1, c.IS_CORNER], joints[j, c.IS_CORNER]) > 0.0
         may_run = (work[w.BEFORE + i] == w.LINES + j) & (tables.lines[j, c.PAIRS_END] > 0.0)
         at_corner = is_corner & (abs(fraction) * line.length <= slack)
         keep_point(work, i, x, y, line.normal_x, line.normal_y, at_corner, may_run)
     if scope.beziers[0] < scope.beziers[1]:
-        for k in range(list_rays(work, lists, count, w.PIECE, w.BEZIERS, w.LINES - 1.0, 0)):
-            i = lists[w.PLACES + k] & NATURAL
+        for k in range(list_rays(work, places, count, w.PIECE, w.BEZIERS, w.LINES - 1.0, 0)):
+            i = places[k] & NATURAL
             curve, s = tables.beziers[int(work[w.PIECE + i] - w.BEZIERS) & NATURAL], work[w.HIT_S + i]
-            (x, y), (nx, ny) = bezier_point(curve, s), bezier_normal(curve, s)
-            keep_point(work, i, x, y, nx, ny, near_end(curve, x, y, slack), False)
+            (x, y), (nx, ny) = pieces.bezier_point(curve, s), pieces.bezier_normal(curve, s)
+            keep_point(work, i, x, y, nx, ny, pieces.near_end(curve, x, y, slack), False)
 
 
 @inlined
@@ -459,7 +435,7 @@ def reflect_rays(work, count, opening, slack, limit):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         time, own, piece, bounces = work[w.TIME + i], work[w.OWN + i], work[w.PIECE + i], work[w.BOUNCES + i]
-        t, leaves = opening_met(left, right, px, py, vx, vy)
+        t, leaves = pieces.opening_met(left, right, px, py, vx, vy)
         is_certain = work[w.UNCERTAIN + i] == 0.0
         leaves = leaves & ((time - t) * vy > slack)
         stays = is_certain & (not leaves) & (work[w.NEED + i] == 0.0) & (time < np.inf) & (bounces < limit)
@@ -476,22 +452,22 @@ def reflect_rays(work, count, opening, slack, limit):
 
 
 @linked
-def end_rays(work, lists, count, entry, angle, hits):
+def end_rays(work, places, count, entry, angle, hits):
     """Store the results of the rays in the list: no hits for those that are given up."""
     for k in range(count):
-        i = lists[w.PLACES + k] & NATURAL
+        i = places[k] & NATURAL
         work[w.END_VX + k], work[w.END_VY + k] = work[w.OLD_VX + i], work[w.OLD_VY + i]
     for k in range(count):
         gone = direction_angle(work[w.END_VX + k], work[w.END_VY + k])
         work[w.END_ANGLE + k] = gone if gone < LAST_ANGLE else LAST_ANGLE
     for k in range(count):
-        i = lists[w.PLACES + k] & NATURAL
+        i = places[k] & NATURAL
         j = int(work[w.RAY + i]) & NATURAL
         entry[j], angle[j], hits[j] = work[w.PX + i], work[w.END_ANGLE + k], work[w.BOUNCES + i]
 
 
 @linked
-def begin_rays(work, lists, count, following, entry, angle, opening):
+def begin_rays(work, places, count, following, entry, angle, opening):
     """Put rays, numbered from ``following``, into the places in the list.
 
     A ray at an end of the opening has no result here: it begins with too many hits.
@@ -502,7 +478,7 @@ def begin_rays(work, lists, count, following, entry, angle, opening):
         sine, cosine = sine_cosine(theta[k])
         work[w.END_VX + k], work[w.END_VY + k] = -cosine, -sine
     for k in range(count):
-        i = lists[w.PLACES + k] & NATURAL
+        i = places[k] & NATURAL
         work[w.PX + i], work[w.PY + i] = x[k], 0.0
         work[w.VX + i], work[w.VY + i] = work[w.END_VX + k], work[w.END_VY + k]
         work[w.OWN + i], work[w.RAY + i] = w.OPENING, float(following + k)
@@ -510,10 +486,10 @@ def begin_rays(work, lists, count, following, entry, angle, opening):
 
 
 @inlined
-def close_ranks(work, lists, first, end, count):
+def close_ranks(work, places, first, end, count):
     """-> int: the number of rays of a wave after the last rays have taken the places from ``first`` on in the list."""
     for k in range(end - 1, first - 1, -1):
-        i = lists[w.PLACES + k] & NATURAL
+        i = places[k] & NATURAL
         count -= 1
         for column in w.RAY_COLUMNS:
             work[column + i] = work[column + count]
@@ -521,7 +497,7 @@ def close_ranks(work, lists, first, end, count):
 
 
 @inner
-def cross_simple(tables, h, limit, entry, angle, hits, work, lists):
+def cross_simple(tables, h, limit, entry, angle, hits, work, places):
     """Reflect rays by a hollow of lines, circles and Bezier pieces, with results as in `closed_forms.cross_arc`.
 
     The rays go through the hollow in waves: all rays that are inside hit their next piece. The next rays take the
@@ -535,22 +511,22 @@ def cross_simple(tables, h, limit, entry, angle, hits, work, lists):
         hits[i] = 0.0
     count = following = min(rays, w.WAVE)
     for i in range(count):
-        lists[w.PLACES + i], work[w.BEFORE + i], work[w.HIT_S + i] = i, 0.0, 0.0
+        places[i], work[w.BEFORE + i], work[w.HIT_S + i] = i, 0.0, 0.0
         clear_hit(work, i)
-    begin_rays(work, lists, count, 0, entry, angle, opening)
+    begin_rays(work, places, count, 0, entry, angle, opening)
     waves = 0
     while count > 0 and waves < MOST_WAVES:
         waves += np.int64(following == rays)
-        meet_pieces(scope, work, lists, count)
-        place_hits(scope, work, lists, count)
-        for k in range(list_rays(work, lists, count, w.NEED, w.BEFORE_RUN, w.BEFORE_RUN, 0)):
-            i = lists[w.PLACES + k] & NATURAL
+        meet_pieces(scope, work, places, count)
+        place_hits(scope, work, places, count)
+        for k in range(list_rays(work, places, count, w.NEED, w.BEFORE_RUN, w.BEFORE_RUN, 0)):
+            i = places[k] & NATURAL
             if not begins_run(tables, work, i, slack, limit):
                 work[w.NEED + i] = 0.0
         reflect_rays(work, count, opening, slack, most)
-        done = list_rays(work, lists, count, w.GONE, 1.0, 1.0, 0)
-        end_rays(work, lists, done, entry, angle, hits)
+        done = list_rays(work, places, count, w.GONE, 1.0, 1.0, 0)
+        end_rays(work, places, done, entry, angle, hits)
         fresh = min(done, rays - following)
-        begin_rays(work, lists, fresh, following, entry, angle, opening)
+        begin_rays(work, places, fresh, following, entry, angle, opening)
         following += fresh
-        count = close_ranks(work, lists, fresh, done, count)
+        count = close_ranks(work, places, fresh, done, count)

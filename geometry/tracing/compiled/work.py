@@ -1,4 +1,4 @@
-"""The work space of rays in waves: where the columns of its two arrays begin. Loads numba.
+"""The work space of rays in waves: where the columns of its array begin. Loads numba.
 
 The columns have constant distances, so the compiler knows that they do not overlap, and computes several rays at once.
 """
@@ -28,9 +28,6 @@ WORK = ROOM * 23
 # the root, and whether there is one and it is still sought. In the first array: whether a ray is near.
 LOW, HIGH, VALUE_LOW, VALUE_HIGH, ROOT, FALLS, SOUGHT = (ROOM * k for k in range(12, 19))
 NEAR = ARC_TIME = END_VX
-# Columns of whole numbers: a list of rays; of rays in trees the state of the search, and two lists.
-PLACES, ROW, LEVEL, WAITING, LEAF, AT_NODES, AT_LEAVES = (ROOM * k for k in range(7))
-LISTS = ROOM * 7
 # Values of NEED: the hit may begin a run, or is at a corner.
 BEFORE_RUN, AT_CORNER = 1.0, 2.0
 # Numbers of pieces in OWN, PIECE and BEFORE: of a row of a table that of its kind plus the row; of the opening; and

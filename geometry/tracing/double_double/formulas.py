@@ -1,4 +1,4 @@
-"""The formulas of a ray that serve doubles and double-doubles: reflection, arcs, cubics. Loads numba.
+"""The formulas of a ray that serve doubles and double-doubles: openings, reflection, arcs, cubics. Loads numba.
 
 `compiled/pieces` explains them. Loops over many rays call them, too, so they have choices by `where` in place of
 branches.
@@ -10,8 +10,11 @@ from numba import types
 from numba.extending import intrinsic
 
 from ....core.compilation import jit
+from ...scene import columns as c
 from .numbers import DOUBLE_DOUBLE, cross, dot, root, scaled
 
+# In place of a hollow's number: a flat top, and a corner at an end of an opening.
+FLAT_TOP, TOP_CORNER = -1, -2
 _formula = jit(forceinline=True, _nrt=False)
 
 
@@ -111,3 +114,28 @@ def bezier_sides(coefficients, px, py, vx, vy):
     """-> (a0, a1, a2, a3): the coefficients of g, from those of both coordinates of a curve."""
     (x0, x1, x2, x3), (y0, y1, y2, y3) = coefficients
     return cross(x0 - px, y0 - py, vx, vy), cross(x1, y1, vx, vy), cross(x2, y2, vx, vy), cross(x3, y3, vx, vy)
+
+
+@_formula
+def last_hollow(entry, hollows, count):
+    """-> int: number of the last hollow with left end <= entry, -1 if there is none."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if hollows[middle, c.LEFT] <= entry:
+            low = middle + 1
+        else:
+            high = middle
+    return low - 1
+
+
+@_formula
+def opening_at(entry, hollows, count):
+    """-> int: number of the hollow whose opening contains a position of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
+    h = last_hollow(entry, hollows, count)
+    if h < 0 or entry >= hollows[h, c.RIGHT] or (entry == hollows[h, c.LEFT] and hollows[h, c.LEFT_EDGE] != c.NO_EDGE):
+        # a flat top or its edge; an edge between two hollows is a corner
+        at_left = h >= 0 and entry == hollows[h, c.LEFT] and hollows[h, c.LEFT_EDGE] == c.CORNER_EDGE
+        at_right = h >= 0 and entry == hollows[h, c.RIGHT] and hollows[h, c.RIGHT_EDGE] == c.CORNER_EDGE
+        return TOP_CORNER if at_left or at_right else FLAT_TOP
+    return h

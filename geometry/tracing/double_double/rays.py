@@ -32,7 +32,7 @@ from ...scene import columns as c
 from ...scene.tolerances import JOINT_ULPS
 from .arcs import arc_hit, arc_point
 from .beziers import bezier_hit, bezier_point
-from .formulas import mirror, with_length_one
+from .formulas import TOP_CORNER, mirror, opening_at, with_length_one
 from .numbers import LOCAL_ERROR, cross, direction_angle, dot, extended, sine_cosine, two_product, two_sum
 from .records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit, Scope, Sizes
 from .runs import LAST_HITS, crossings, skip_chords
@@ -382,28 +382,6 @@ def scope_of(tables, h):
     return Scope(tables, tables.hollows[h], tables.cell + size, JOINT_ULPS * EPS * size)
 
 
-@_compile
-def hollow_at(hollows, entry):
-    """-> (h, is_edge): the hollow whose opening contains a double-double position, or -1; whether this is a corner."""
-    low, high = 0, hollows.shape[0]
-    while low < high:
-        middle = (low + high) // 2
-        if entry >= hollows[middle, c.LEFT]:
-            low = middle + 1
-        else:
-            high = middle
-    h = low - 1
-    if h < 0:
-        return -1, False
-    left, right = hollows[h, c.LEFT], hollows[h, c.RIGHT]
-    at_left = entry == left and hollows[h, c.LEFT_EDGE] != c.NO_EDGE
-    if entry >= right or at_left:
-        is_left = at_left and hollows[h, c.LEFT_EDGE] == c.CORNER_EDGE
-        is_right = entry == right and hollows[h, c.RIGHT_EDGE] == c.CORNER_EDGE
-        return -1, is_left or is_right
-    return h, False
-
-
 @jit(_nrt=False)
 def refined_rays(x, theta, tables, limit, most_segments, results):
     """Trace rays into ``results``, as double-doubles."""
@@ -415,7 +393,7 @@ def refined_rays(x, theta, tables, limit, most_segments, results):
             turns -= 1.0
         base = two_product(turns, cell)
         entry = x[i] - base
-        h, is_edge = hollow_at(tables.hollows, entry)
+        h = opening_at(entry, tables.hollows, tables.hollows.shape[0])
         if h < 0:
             angle = two_sum(math.pi, -theta[i]) + PI_REST
             amplification[i], rounding[i], bounces[i], status[i] = 1.0, LOCAL_ERROR, 1, ESCAPED
@@ -427,5 +405,5 @@ def refined_rays(x, theta, tables, limit, most_segments, results):
             end = base + end
             out_x[i, c.HIGH], out_x[i, c.LOW] = end.high, end.low
         out_theta[i, c.HIGH], out_theta[i, c.LOW] = angle.high, angle.low
-        if is_edge:
+        if h == TOP_CORNER:
             out_theta[i, c.HIGH], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER

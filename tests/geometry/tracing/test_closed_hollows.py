@@ -22,7 +22,7 @@ def test_the_largest_number_of_collisions_ends_rays_alike(wall, limit):
     rng = np.random.default_rng(3)
     x, theta = rng.uniform(-2.0, 3.0, 20_000), np.arccos(1.0 - 2.0 * rng.random(20_000))
     plain = geo.Wall(wall.pieces, wall.period)
-    plain.__dict__["scene"] = replace(wall.scene, closed=None)
+    plain.__dict__["scene"] = replace(wall.scene, closed=np.zeros_like(wall.scene.closed))
     closed, loop = (geo.trace(one, x, theta, max_collisions=limit) for one in (wall, plain))
     assert closed.counts() == loop.counts() and closed.counts()["bounce_limit"] > 200
     assert np.array_equal(closed.collisions, loop.collisions)

@@ -113,7 +113,7 @@ def test_a_line_a_slack_away_is_met_without_a_second_test():
 
 
 def test_only_lines_that_face_each_other_freely_make_runs():
-    assert geo.triangular_teeth(0.7).scene.pairs is None
+    assert geo.triangular_teeth(0.7).scene.pairs.size == 0
     assert len(geo.rectangular_teeth(1.0).scene.pairs) == 2
     # a tooth stands between the outer sides of this hollow: only the channels on either side of it make runs
     comb = [(0, 0), (0.1, 0), (0.1, -1), (0.2, -1), (0.2, -0.2), (0.25, -0.2), (0.25, -1), (0.4, -1), (0.4, 0), (1, 0)]
