@@ -11,7 +11,8 @@ import numpy as np
 from ..core.checks import Floats
 from ..core.errors import InputError
 from ..spectral import ReferenceValue, WorkMethod, WorkProblem
-from ..spectral.work_diagrams.machine import on_few_cores
+from ..spectral.work_diagrams.machine import on_one_core
+from ..spectral.work_diagrams.report import WorkRow
 from ..spectral.work_diagrams.runs import measure, parts_of, solve_once
 from .quantities.collision import COLLISION, DISK, TRUE_DISK, by_true_disks
 from .quantities.matrix import DISTANCE, LAW, MOMENT, RESISTANCE
@@ -96,10 +97,10 @@ def _method(problem: str, name: str) -> WorkMethod:
 
 def measured(
     name: str, references: tuple[ReferenceValue, ...], method: str, budget: float, repeats: int, seconds: float
-) -> dict[str, object]:
-    """One row, measured in this process on one core, as a dictionary."""
-    with on_few_cores(1), np.errstate(all="ignore"):
-        return measure(WorkProblem(name, references), _method(name, method), budget, repeats, seconds).as_dict()
+) -> WorkRow:
+    """One row, measured in this process on one core."""
+    with on_one_core(), np.errstate(all="ignore"):
+        return measure(WorkProblem(name, references), _method(name, method), budget, repeats, seconds)
 
 
 def value_of(name: str, method: str, budget: float) -> tuple[Floats, float | None, str]:
