@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Unpack, get_args
@@ -208,25 +207,23 @@ def discretise(
 
 
 def _on_roll_angles(law: Law, basis: Basis) -> KernelMatrix:
-    """The matrix on functions of psi of a law made of specular reflection and retroreflection: 1 - p + p J."""
-    specular = fold(law, Rules(_is_specular, lambda terms: sum(w * p for w, p in terms), _odd, lambda p: 1.0 - p))
-    symmetric = (1.0 - specular) * np.eye(basis.size) + specular * reflection_matrix(basis)
+    """The matrix on functions of psi of a law made of specular reflection and retroreflection.
+
+    It is (1 + r)/2 + (1 - r)/2 J, where r is the eigenvalue of odd functions.
+    """
+    odd = fold(law, Rules(_on_odd_functions, lambda terms: sum(w * r for w, r in terms), math.prod, lambda r: -r))
+    symmetric = 0.5 * (1.0 + odd) * np.eye(basis.size) + 0.5 * (1.0 - odd) * reflection_matrix(basis)
     exact = Estimate(0.0, 0.0, "bound", "closed form")
     return KernelMatrix(
         symmetric, basis, exact, method="exact", law=repr(law), reversible=True, mirror_symmetric=True, frame=law.frame
     )
 
 
-def _is_specular(law: Law) -> float:
-    """1 for specular reflection, 0 for retroreflection; raises InputError for other laws."""
+def _on_odd_functions(law: Law) -> float:
+    """The eigenvalue -1 of specular reflection, 1 of retroreflection; raises InputError for other laws."""
     if isinstance(law, IsometryLaw):
-        return 0.0 if law.retro else 1.0
+        return 1.0 if law.retro else -1.0
     raise InputError(
         f"basis: {law!r} preserves sin(theta) d theta, not sin(psi)^2 d psi; give a basis with weight 'sin', or "
         "compose the law from specular() and retroreflection()"
     )
-
-
-def _odd(probabilities: Sequence[float]) -> float:
-    """The probability of an odd number of successes."""
-    return 0.5 * (1.0 - math.prod(1.0 - 2.0 * p for p in probabilities))

@@ -8,15 +8,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import reduce
 from itertools import chain, product
-from operator import add
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from ...core.errors import InputError
-from .law import Combination, Composition, Law, Power, SpecularFrame, retroreflection, simplified, specular, sum_of
+from .law import (
+    Combination,
+    Composition,
+    Law,
+    Power,
+    SpecularFrame,
+    retroreflection,
+    set_properties,
+    simplified,
+    specular,
+)
 
 Fact = TypeVar("Fact")
 Word = tuple[Law, ...]
@@ -75,10 +83,10 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
         return rules.chain([fold(law.law, rules)] * law.exponent)
     if isinstance(law, SpecularFrame):
         return rules.mirrored(fold(law.law, rules))
-    whole = sum_of(law.parts)
-    if isinstance(whole, Combination):
-        return rules.mixture([(weight, fold(term, rules)) for weight, term in whole.terms])
-    return rules.leaf(law) if whole is law else fold(whole, rules)
+    parts = law.parts
+    if len(parts) > 1:
+        return rules.mixture([(weight, fold(term, rules)) for weight, term in parts])
+    return rules.leaf(law) if parts[0][1] is law else fold(parts[0][1], rules)
 
 
 def is_compound(law: Law) -> bool:
@@ -130,18 +138,32 @@ def multiplied_out(law: Law) -> Law:
     --------
     >>> from asperity.kernels import lambertian
     >>> multiplied_out((0.5 * lambertian() + 0.5 * specular()) ** 2)
-    0.75*lambertian() + 0.25*retroreflection()
+    0.75*lambertian() + 0.25*specular().in_specular_frame()
     """
     words = words_of(law) if has_chain(law) else None
     if words is not None:
-        law = sum_of(tuple((weight, law_of(word)) for word, weight in words.items()))
+        law = _sum_of_words((weight, word) for word, weight in words.items())
     factors: Rules[Word] = Rules(
         lambda leaf: (leaf,),
-        lambda terms: (reduce(add, (weight * law_of(word) for weight, word in terms)),),
+        lambda terms: (_sum_of_words(terms),),
         lambda words: tuple(chain.from_iterable(words)),
         lambda word: (*word, specular()),
     )
     return law_of(fold(law, factors))
+
+
+def _sum_of_words(terms: Iterable[tuple[float, Word]]) -> Law:
+    """The sum in the paper's frame, also of words that `law_of` writes as laws in the other frame."""
+    laws: list[tuple[float, Law]] = []
+    for weight, word in terms:
+        law = law_of(word)
+        inner = law.terms if isinstance(law, Combination) else ((1.0, law),)
+        laws += [(weight * fraction, term) for fraction, term in inner]
+    if len(laws) == 1:
+        return laws[0][1]
+    whole = object.__new__(Combination)
+    set_properties(whole, terms=tuple(laws), frame="paper")
+    return whole
 
 
 def law_of(word: Word) -> Law:
@@ -151,7 +173,9 @@ def law_of(word: Word) -> Law:
     if len(word) == 1:
         return word[0]
     if len(word) == 2 and word[1] == specular():
-        return SpecularFrame(word[0])
+        if isinstance(word[0], Combination):
+            return _sum_of_words((weight, (term, word[1])) for weight, term in word[0].terms)
+        return SpecularFrame.of(word[0])
     return Composition(word)
 
 

@@ -33,7 +33,7 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, html_table
 from ...core.frames import data_array, data_frame
 from ...core.rounding import EPS
-from ..bases.basis import AngleFunction, Basis, Frame
+from ..bases.basis import AngleFunction, Basis, BasisOfPoints, Frame
 from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..bases.tensor import TensorBasis
@@ -526,12 +526,10 @@ class KernelMatrix:
     def _density(self) -> tuple[Floats, Floats]:
         """Edges of cells, and the density with respect to the invariant measure on pairs of them."""
         basis = self.basis
-        try:
-            edges = basis.edges
-        except InputError as reason:
-            raise InputError(f"plot: expected a kernel of one angle, got one in {basis!r}") from reason
+        if isinstance(basis, BasisOfPoints):
+            raise InputError(f"plot: expected a kernel of one angle, got one in {basis!r}")
         if isinstance(basis, Bins):
-            return edges, self.array / basis.weights
+            return basis.edges, self.array / basis.weights
         edges = np.linspace(0.0, np.pi, GRID + 1)
         values = basis.evaluate(0.5 * (edges[1:] + edges[:-1]))
         return edges, values @ self.symmetric @ values.T

@@ -60,8 +60,8 @@ class PolygonLaw(BranchLaw):
 
     Notes
     -----
-    The beams are computed on first use, once for hollows of the same shape, also scaled or mirrored. Rectangles of any
-    depth and isosceles triangles have closed forms.
+    The beams are computed on first use, once for hollows of the same shape, also scaled. Rectangles of any depth and
+    isosceles triangles have closed forms.
 
     Examples
     --------
@@ -94,20 +94,13 @@ class PolygonLaw(BranchLaw):
         object.__setattr__(self, "mirror_symmetric", True if wall.is_mirror_symmetric else None)
 
     @cached_property
-    def _shapes(self) -> list[tuple[HollowShape, list[float]]]:
-        """The shapes of the hollows, and the widths of each and of its mirror image, as fractions of the period."""
+    def _shapes(self) -> list[tuple[HollowShape, float]]:
+        """The shapes of the hollows, and the widths of all hollows of each, as fractions of the period."""
         from ...geometry.cells.hollow_shape import distinct_hollows
 
         wall = self.wall
-        found: list[tuple[HollowShape, list[float]]] = []
-        for shape, hollows in distinct_hollows(wall):
-            width, image = math.fsum(hollow.width for hollow in hollows) / wall.period, shape.mirrored()
-            known = next((widths for other, widths in found if image.same_as(other)), None)
-            if known is None:
-                found.append((shape, [width, 0.0]))
-            else:
-                known[1] += width
-        return found
+        found = distinct_hollows(wall)
+        return [(shape, math.fsum(hollow.width for hollow in hollows) / wall.period) for shape, hollows in found]
 
     @cached_property
     def _known(self) -> dict[int, IsometryTable]:
@@ -121,24 +114,21 @@ class PolygonLaw(BranchLaw):
         """
         if number not in self._known:
             size = sum(len(shape.vertices) for shape, _ in self._shapes)
-            shape, widths = self._shapes[number]
-            self._known[number] = self._of_shape(shape, len(shape.vertices) / size / math.fsum(widths))
+            shape, width = self._shapes[number]
+            self._known[number] = self._of_shape(shape, len(shape.vertices) / size / width)
         return self._known[number]
 
     @cached_property
     def _table(self) -> IsometryTable:
         parts = [IsometryTable.flat(self.wall.flat_top / self.wall.period)]
-        for number, (_, widths) in enumerate(self._shapes):
-            table = self._table_of(number)
-            images = (table, table.mirrored() if widths[1] else table)
-            parts += [part.scaled(width) for part, width in zip(images, widths, strict=True) if width]
+        parts += [self._table_of(number).scaled(width) for number, (_, width) in enumerate(self._shapes)]
         return IsometryTable.joined(parts)
 
     def resolves(self, most: float) -> bool:
         """Whether at most the fraction ``most`` of the flux stays unresolved; shapes of many vertices answer first."""
         left, most = 0.0, finite_number("most", most)
         for number in sorted(range(len(self._shapes)), key=lambda number: -len(self._shapes[number][0].vertices)):
-            left += math.fsum(self._shapes[number][1]) * self._table_of(number).unresolved
+            left += self._shapes[number][1] * self._table_of(number).unresolved
             if left > most:
                 return False
         return True

@@ -58,3 +58,19 @@ def test_sums_with_chains_that_are_too_long_to_be_multiplied_out_have_matrices()
 def test_a_wall_takes_a_tolerance_of_zero_as_one_that_is_out_of_reach():
     found = ker.discretise(ker.WallLaw(geo.dispersing_arcs(0.5)), ker.Legendre(2), tolerance=0.0, samples=2**14)
     assert 0.0 < float(found.error) < 1e-2
+
+
+def test_sums_of_chains_in_both_frames_and_walls_of_parts_in_the_other_frame_have_matrices():
+    square = ker.discretise((0.5 * ker.lambertian() + 0.5 * ker.specular()) ** 2, BASIS)
+    assert np.allclose(
+        square.symmetric,
+        ker.discretise(ker.maxwell(0.5), BASIS).symmetric @ (ker.discretise(ker.maxwell(0.5), BASIS).symmetric),
+    )
+    mixed = ker.discretise(0.5 * TEETH + 0.5 * (ker.TriangularTeethLaw(0.7) @ ker.specular()), BASIS, "exact")
+    parts = ker.discretise(TEETH, BASIS), ker.discretise(ker.TriangularTeethLaw(0.7), BASIS).in_specular_frame()
+    assert np.allclose(mixed.symmetric, 0.5 * parts[0].symmetric + 0.5 * parts[1].symmetric, atol=1e-13)
+    wall = ker.WallLaw(
+        geo.Wall.from_vertices([(0, 0), (1, -1), (2, 0), (3, 0), (3, -1.5), (3.5, -1.5), (3.5, 0), (5, 0)])
+    )
+    exact, rays = (ker.discretise(wall.in_specular_frame(), BASIS, method) for method in ("exact", "qmc"))
+    assert rays.method == "qmc" and np.linalg.norm(rays.symmetric - exact.symmetric) <= 2.0 * float(rays.error)

@@ -111,7 +111,7 @@ def test_different_hollows_add_up_by_their_widths_and_equal_ones_are_computed_on
     wall = geo.Wall.from_vertices([(0.0, 0.0), *skew, *mirrored, *large, *other, (6.0, 0.0)])
     basis = ker.Legendre(12)
     found = ker.discretise(ker.PolygonLaw(wall), basis).symmetric
-    assert calls == [3, 4]
+    assert calls == [3, 3, 4]
     alone = ker.PolygonLaw(geo.Wall.from_vertices(SKEW))
     mirrored_angle = ker.PolygonLaw(geo.Wall.from_vertices(SKEW).mirrored())
     last = ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.2, -0.9), (0.5, -0.1), (1, 0)]))
