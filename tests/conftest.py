@@ -7,85 +7,53 @@ from functools import cache
 import numpy as np
 import pytest
 
+from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.kernels.laws.law import DrivenLaw
 from wall_shapes import CLOSED, OPEN
 
 # ---- walls -------------------------------------------------------------------------------------------------------
-built = cache(lambda name: (CLOSED | OPEN)[name]())
+made = cache(lambda make: make())
 
 
 @pytest.fixture(params=CLOSED | OPEN)
 def wall(request):
     """Each wall by its name."""
-    return built(request.param)
+    return made((CLOSED | OPEN)[request.param])
 
 
 @pytest.fixture(params=CLOSED)
 def closed_wall(request):
     """Each wall without islands."""
-    return built(request.param)
+    return made(CLOSED[request.param])
 
 
 # ---- laws, bases and matrices --------------------------------------------------------------------------------------
 # What is made of the library is made inside functions: a fault that the mutants write into it must fail in tests.
-LAWS = (
-    "specular",
-    "retroreflection",
-    "lambertian",
-    "maxwell",
-    "scattering",
-    "scattering back",
-    "density",
-    "tilted density",
-    "triangles",
-    "narrow triangles",
-    "blunt triangles",
-    "flat triangles",
-    "rectangles",
-    "shallow rectangles",
-    "deep rectangles",
-    "arcs",
-    "shallow arcs",
-    "semicircles",
-    "least resistance",
-    "involution",
-    "exchange",
-    "cycle",
-    "lopsided matrix",
-    "polygon",
-    "wall in closed form",
-    "traced wall",
-    "rays alone",
-    "rays and their mirror images",
-    "mushrooms",
-    "sum",
-    "sum of isometries",
-    "product",
-    "product of isometries",
-    "product of matrices",
-    "power",
-    "other frame",
-    "product in the other frame",
-)
-DIAGONAL = (
-    "lambertian",
-    "maxwell",
-    "maxwell in the other frame",
-    "scattering back",
-    "two scatterings",
-    "three parts",
-    "part of the identity",
-    "product",
-    "mirrored product",
-    "power",
-)
-BASES = (
-    "bins",
-    "uneven bins",
-    "polynomials",
-    "panels",
-)
+def halves_exchanged(theta: np.ndarray) -> np.ndarray:
+    """Exchanges the two halves of (0, pi), keeping the orientation of u = -cos(theta)."""
+    u = -np.cos(theta)
+    return np.arccos(-np.where(u < 0.0, u + 1.0, u - 1.0))
+
+
+def tilted(theta: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """A density that preserves sin(theta) d theta and is neither reversible nor mirror symmetric."""
+    return (1.0 + 0.5 * np.cos(theta) * (1.5 * np.cos(out) ** 2 - 0.5)) * ker.SINE.density(out)
+
+
+def cycle() -> ker.Law:
+    """It preserves the measure, in three equal bins, and is not reversible."""
+    return ker.MatrixLaw([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+
+
+def lopsided() -> ker.Law:
+    """It is reversible and has no mirror symmetry."""
+    return ker.MatrixLaw([[0.5, 0.5, 0.0], [0.5, 0.25, 0.25], [0.0, 0.25, 0.75]])
+
+
+def teeth() -> ker.Law:
+    """Triangular teeth."""
+    return ker.TriangularTeethLaw(0.7)
 
 
 @cache
@@ -104,106 +72,81 @@ def bounced_law() -> type[DrivenLaw]:
     return Bounce
 
 
-@cache
-def laws() -> dict[str, ker.Law]:
-    """Every law of the library, alone and in sums, products, powers and the other frame."""
-    from asperity import geometry as geo
-
-    def halves_exchanged(theta: np.ndarray) -> np.ndarray:
-        """Exchanges the two halves of (0, pi), keeping the orientation of u = -cos(theta)."""
-        u = -np.cos(theta)
-        return np.arccos(-np.where(u < 0.0, u + 1.0, u - 1.0))
-
-    def tilted(theta: np.ndarray, out: np.ndarray) -> np.ndarray:
-        """A density that preserves sin(theta) d theta and is neither reversible nor mirror symmetric."""
-        return (1.0 + 0.5 * np.cos(theta) * (1.5 * np.cos(out) ** 2 - 0.5)) * ker.SINE.density(out)
-
-    # Cycles of three equal bins preserve the measure, but are not reversible; the other matrix is, but has no symmetry.
-    CYCLE = ker.MatrixLaw([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-    LOPSIDED = ker.MatrixLaw([[0.5, 0.5, 0.0], [0.5, 0.25, 0.25], [0.0, 0.25, 0.75]])
-    TEETH, CREVICES, ARCS = ker.TriangularTeethLaw(0.7), ker.RectangularTeethLaw(0.8), ker.CircularArcLaw(1.2)
-    return {
-        "specular": ker.specular(),
-        "retroreflection": ker.retroreflection(),
-        "lambertian": ker.lambertian(),
-        "maxwell": ker.maxwell(0.3),
-        "scattering": ker.henyey_greenstein(0.6),
-        "scattering back": ker.henyey_greenstein(-0.7),
-        "density": ker.DensityLaw(lambda a, b: (1.0 + 0.5 * np.cos(a) * np.cos(b)) * ker.SINE.density(b)),
-        "tilted density": ker.DensityLaw(tilted),
-        "triangles": TEETH,
-        "narrow triangles": ker.TriangularTeethLaw(0.02),
-        "blunt triangles": ker.TriangularTeethLaw(2.0),
-        "flat triangles": ker.TriangularTeethLaw(np.pi - 1e-4),
-        "rectangles": CREVICES,
-        "shallow rectangles": ker.RectangularTeethLaw(1e-6),
-        "deep rectangles": ker.RectangularTeethLaw(2.5),
-        "arcs": ARCS,
-        "shallow arcs": ker.CircularArcLaw(0.02),
-        "semicircles": ker.CircularArcLaw(0.5 * np.pi),
-        "least resistance": ker.LeastResistanceLaw(),
-        "involution": ker.InvolutionLaw(halves_exchanged),
-        "exchange": ker.IntervalExchangeLaw(ker.discretise(ker.lambertian(), ker.Bins(3))),
-        "cycle": CYCLE,
-        "lopsided matrix": LOPSIDED,
-        "polygon": ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.5), (1, 0)])),
-        "wall in closed form": ker.WallLaw(geo.triangular_teeth(0.7)),
-        "traced wall": ker.WallLaw(geo.dispersing_arcs(1.0)),
-        "rays alone": bounced_law()(),
-        "rays and their mirror images": bounced_law()(mirror_symmetric=True),
-        "mushrooms": ker.MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 3)),
-        "sum": 0.2 * ker.specular() + 0.5 * TEETH + 0.3 * ker.lambertian(),
-        "sum of isometries": 0.4 * TEETH + 0.6 * ker.specular() @ TEETH,
-        "product": TEETH @ ker.henyey_greenstein(0.7),
-        "product of isometries": ker.TriangularTeethLaw(2.0 * np.pi / 7.0) @ CREVICES,
-        "product of matrices": CYCLE @ LOPSIDED,
-        "power": CREVICES**4,
-        "other frame": ARCS.in_specular_frame(),
-        "product in the other frame": (TEETH @ TEETH).in_specular_frame(),
-    }
-
-
-@cache
-def bases() -> dict[str, ker.Basis]:
-    """A basis of every kind, with and without the mirror symmetry."""
-    return {
-        "bins": ker.Bins(8),
-        "uneven bins": ker.Bins([0.0, 0.3, 1.1, 2.0, np.pi]),
-        "polynomials": ker.Legendre(6),
-        "panels": ker.Panels([0.0, 0.4, 2.0, np.pi], 2),
-    }
-
-
-@cache
-def diagonal_laws() -> dict[str, tuple[ker.Law, Callable]]:
-    """Laws that polynomials diagonalise, and the eigenvalue that belongs to that of each degree l > 0."""
-    return {
-        "lambertian": (ker.lambertian(), lambda degree: 0.0 * degree),
-        "maxwell": (ker.maxwell(0.3), lambda degree: 0.7 * (-1.0) ** degree),
-        "maxwell in the other frame": (ker.maxwell(0.3).in_specular_frame(), lambda degree: 0.7 + 0.0 * degree),
-        "scattering back": (ker.henyey_greenstein(-0.7), lambda degree: (-0.7) ** degree),
-        "two scatterings": (
-            0.5 * ker.henyey_greenstein(0.9) + 0.5 * ker.henyey_greenstein(-0.5),
-            lambda degree: 0.5 * 0.9**degree + 0.5 * (-0.5) ** degree,
-        ),
-        "three parts": (
-            0.25 * ker.maxwell(0.5) + 0.75 * ker.henyey_greenstein(0.6),
-            lambda degree: 0.125 * (-1.0) ** degree + 0.75 * 0.6**degree,
-        ),
-        "part of the identity": (
-            0.25 * ker.retroreflection() + 0.75 * ker.henyey_greenstein(0.5),
-            lambda degree: 0.25 + 0.75 * 0.5**degree,
-        ),
-        "product": (ker.henyey_greenstein(0.5) @ ker.henyey_greenstein(0.8), lambda degree: 0.4**degree),
-        "mirrored product": (ker.specular() @ ker.henyey_greenstein(0.5), lambda degree: (-0.5) ** degree),
-        "power": (ker.henyey_greenstein(-0.7) ** 3, lambda degree: (-0.343) ** degree),
-    }
+# Every law of the library, alone and in sums, products, powers and the other frame.
+LAWS: dict[str, Callable[[], ker.Law]] = {
+    "specular": lambda: ker.specular(),
+    "retroreflection": lambda: ker.retroreflection(),
+    "lambertian": lambda: ker.lambertian(),
+    "maxwell": lambda: ker.maxwell(0.3),
+    "scattering": lambda: ker.henyey_greenstein(0.6),
+    "scattering back": lambda: ker.henyey_greenstein(-0.7),
+    "density": lambda: ker.DensityLaw(lambda a, b: (1.0 + 0.5 * np.cos(a) * np.cos(b)) * ker.SINE.density(b)),
+    "tilted density": lambda: ker.DensityLaw(tilted),
+    "triangles": teeth,
+    "narrow triangles": lambda: ker.TriangularTeethLaw(0.02),
+    "blunt triangles": lambda: ker.TriangularTeethLaw(2.0),
+    "flat triangles": lambda: ker.TriangularTeethLaw(np.pi - 1e-4),
+    "rectangles": lambda: ker.RectangularTeethLaw(0.8),
+    "shallow rectangles": lambda: ker.RectangularTeethLaw(1e-6),
+    "deep rectangles": lambda: ker.RectangularTeethLaw(2.5),
+    "arcs": lambda: ker.CircularArcLaw(1.2),
+    "shallow arcs": lambda: ker.CircularArcLaw(0.02),
+    "semicircles": lambda: ker.CircularArcLaw(0.5 * np.pi),
+    "least resistance": lambda: ker.LeastResistanceLaw(),
+    "involution": lambda: ker.InvolutionLaw(halves_exchanged),
+    "exchange": lambda: ker.IntervalExchangeLaw(ker.discretise(ker.lambertian(), ker.Bins(3))),
+    "cycle": cycle,
+    "lopsided matrix": lopsided,
+    "polygon": lambda: ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.5), (1, 0)])),
+    "wall in closed form": lambda: ker.WallLaw(geo.triangular_teeth(0.7)),
+    "traced wall": lambda: ker.WallLaw(geo.dispersing_arcs(1.0)),
+    "rays alone": lambda: bounced_law()(),
+    "rays and their mirror images": lambda: bounced_law()(mirror_symmetric=True),
+    "mushrooms": lambda: ker.MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 3)),
+    "sum": lambda: 0.2 * ker.specular() + 0.5 * teeth() + 0.3 * ker.lambertian(),
+    "sum of isometries": lambda: 0.4 * teeth() + 0.6 * ker.specular() @ teeth(),
+    "product": lambda: teeth() @ ker.henyey_greenstein(0.7),
+    "product of isometries": lambda: ker.TriangularTeethLaw(2.0 * np.pi / 7.0) @ ker.RectangularTeethLaw(0.8),
+    "product of matrices": lambda: cycle() @ lopsided(),
+    "power": lambda: ker.RectangularTeethLaw(0.8) ** 4,
+    "other frame": lambda: ker.CircularArcLaw(1.2).in_specular_frame(),
+    "product in the other frame": lambda: (teeth() @ teeth()).in_specular_frame(),
+}
+# A basis of every kind, with and without the mirror symmetry.
+BASES: dict[str, Callable[[], ker.Basis]] = {
+    "bins": lambda: ker.Bins(8),
+    "uneven bins": lambda: ker.Bins([0.0, 0.3, 1.1, 2.0, np.pi]),
+    "polynomials": lambda: ker.Legendre(6),
+    "panels": lambda: ker.Panels([0.0, 0.4, 2.0, np.pi], 2),
+}
+# Laws that polynomials diagonalise, and the eigenvalue that belongs to that of each degree l > 0.
+DIAGONAL: dict[str, tuple[Callable[[], ker.Law], Callable]] = {
+    "lambertian": (lambda: ker.lambertian(), lambda degree: 0.0 * degree),
+    "maxwell": (lambda: ker.maxwell(0.3), lambda degree: 0.7 * (-1.0) ** degree),
+    "maxwell in the other frame": (lambda: ker.maxwell(0.3).in_specular_frame(), lambda degree: 0.7 + 0.0 * degree),
+    "scattering back": (lambda: ker.henyey_greenstein(-0.7), lambda degree: (-0.7) ** degree),
+    "two scatterings": (
+        lambda: 0.5 * ker.henyey_greenstein(0.9) + 0.5 * ker.henyey_greenstein(-0.5),
+        lambda degree: 0.5 * 0.9**degree + 0.5 * (-0.5) ** degree,
+    ),
+    "three parts": (
+        lambda: 0.25 * ker.maxwell(0.5) + 0.75 * ker.henyey_greenstein(0.6),
+        lambda degree: 0.125 * (-1.0) ** degree + 0.75 * 0.6**degree,
+    ),
+    "part of the identity": (
+        lambda: 0.25 * ker.retroreflection() + 0.75 * ker.henyey_greenstein(0.5),
+        lambda degree: 0.25 + 0.75 * 0.5**degree,
+    ),
+    "product": (lambda: ker.henyey_greenstein(0.5) @ ker.henyey_greenstein(0.8), lambda degree: 0.4**degree),
+    "mirrored product": (lambda: ker.specular() @ ker.henyey_greenstein(0.5), lambda degree: (-0.5) ** degree),
+    "power": (lambda: ker.henyey_greenstein(-0.7) ** 3, lambda degree: (-0.343) ** degree),
+}
 
 
 @pytest.fixture(params=LAWS)
 def law(request: pytest.FixtureRequest) -> ker.Law:
     """Every law of the library, alone and in sums, products, powers and the other frame."""
-    return laws()[request.param]
+    return made(LAWS[request.param])
 
 
 @pytest.fixture
@@ -215,14 +158,14 @@ def bounce() -> type[DrivenLaw]:
 @pytest.fixture(params=BASES)
 def basis(request: pytest.FixtureRequest) -> ker.Basis:
     """A basis of every kind, with and without the mirror symmetry."""
-    return bases()[request.param]
+    return made(BASES[request.param])
 
 
 @pytest.fixture(params=DIAGONAL)
 def diagonal(request: pytest.FixtureRequest) -> tuple[ker.Law, np.ndarray]:
     """A law and its eigenvalues, that of the polynomial of degree l in place l."""
-    law, eigenvalue = diagonal_laws()[request.param]
-    return law, np.append(1.0, eigenvalue(np.arange(1.0, 400.0)))
+    make, eigenvalue = DIAGONAL[request.param]
+    return made(make), np.append(1.0, eigenvalue(np.arange(1.0, 400.0)))
 
 
 @pytest.fixture
