@@ -48,14 +48,14 @@ TESTS = {
     "kernels/matrices/defects.py": ("kernels/matrices/test_symmetry.py",),
     "kernels/sampling/counts.py": ("kernels/matrices/test_counting.py",),
     "kernels/bases/assembly.py": ("kernels/matrices/test_bases.py",),
-    "kernels/bases/legendre.py": ("kernels/matrices/test_bases.py",),
-    "kernels/bases/panels.py": ("kernels/matrices/test_bases.py",),
+    "kernels/bases/legendre.py": ("kernels/matrices/test_bases.py", "properties/test_refusals_kernels.py"),
+    "kernels/bases/panels.py": ("kernels/matrices/test_bases.py", "properties/test_refusals_kernels.py"),
     "kernels/collisions/collision_law.py": (
         "kernels/collisions/test_collision.py",
         "kernels/collisions/test_collision_algebra.py",
         "properties/test_refusals_kernels.py",
     ),
-    "kernels/bases/measure.py": ("kernels/matrices/test_bases.py",),
+    "kernels/bases/measure.py": ("kernels/matrices/test_bases.py", "properties/test_refusals_kernels.py"),
     "geometry/disk/disk.py": ("geometry/disks/test_disk.py", "properties/test_refusals_geometry.py"),
     "geometry/cells/profile.py": ("geometry/walls/test_profiles.py", "properties/test_refusals_geometry.py"),
 }

@@ -12,6 +12,7 @@ from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError, WallError
 from asperity.estimates import Estimate
 from asperity.geometry.polygons.beams import beams_of
+from asperity.kernels.bases.measure import measure_by_name
 from asperity.kernels.billiards.record import BilliardRecord
 from asperity.kernels.collisions.collision_law import CollisionCombination
 from asperity.kernels.inverse.exchange_wall import ExchangeHollow
@@ -24,14 +25,17 @@ TEETH, CREVICES, ARC = ker.TriangularTeethLaw(0.9), ker.RectangularTeethLaw(0.8)
 FLAT = geo.flat()
 DISK, STRIP, CIRCLE = geo.Disk(1.0, 0.5), geo.Container.strip(), geo.Container.circle(1.0)
 SMOOTH, NO_SLIP, PAIR = ker.smooth(DISK), ker.no_slip(DISK), ker.PairLaw(BACK, DISK)
-ROUGH = ker.CollisionLaw(TEETH, DISK)
+ROUGH, GROOVES = ker.CollisionLaw(TEETH, DISK), ker.HemisphereLaw(DIFFUSE)
+COIN, BUMPS = 0.5 * MIRROR + 0.5 * BACK, ker.WallLaw(geo.dispersing_arcs(0.8))
+TWO_DEPTHS = geo.Wall.from_vertices([(0, 0), (0, -0.3), (0.4, -0.3), (0.4, -0.7), (0.9, -0.7), (0.9, 0), (1, 0)])
+LEANING = geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)])
 ANGLES = ker.Legendre(5), ker.Legendre(4, weight="sin2")
 FLOOR, PLACES = geo.Wall.from_vertices([(0, -1), (1, -1)]), ker.PositionLaw([0.0, 1.0], [MIRROR])
 ALONG = ker.CollisionAlongWall(PLACES, DISK)
 BODY = ker.PolygonalBody([[(-2.5, -1.5), (-1.0, -1.5), (-2.5, 0.0)]])
 PLATE = [geo.Segment((0.2, -0.1), (0.4, -0.1)), geo.Segment((0.4, -0.1), (0.2, -0.1))]
 ROOM, SEATS = geo.Container.polygon([(0, 0), (9, 0), (9, 6), (0, 6)]), [[2, 3], [6, 3]]
-STEEP = [[1.1, -0.1], [0.0, 1.0]]
+STEEP, ARRAY = [[1.1, -0.1], [0.0, 1.0]], np.array([[0.75, 0.25], [0.25, 0.75]])
 WORK, METHOD = spec.WorkProblem("a", spec.ReferenceValue(1.0, 0.0, "by hand")), spec.WorkMethod("b", float)
 
 
@@ -174,7 +178,15 @@ REFUSED = {
         (lambda: ker.TensorBasis((ker.Bins(2),)), r"as in TensorBasis\(\(Bins\(16\), Bins\(8, weight='sin2'\)\)\)"),
         (lambda: ker.TensorBasis((3, 4)), r"as in TensorBasis\(\(Bins\(16\), Bins\(8, weight='sin2'\)\)\)"),
         (lambda: ker.TensorBasis((ker.Bins(3), ker.Bins(3))).measure, "factors"),
-        (lambda: ker.Panels.for_wall(FLAT, smallest=2.0), "smallest"),
+        *((lambda size=size: ker.Panels.for_wall(FLAT, smallest=size), "smallest") for size in (2.0, 1e-13)),
+        (lambda: ker.Panels.for_arc(1.2, smallest=0.6), "smallest"),
+        (lambda: ker.Panels.for_arc(0.0), "half_angle"),
+        (lambda: ker.Legendre(0), "at least 1"),
+        (lambda: ker.SINE.quantile([0.2, -0.5]), r"probability: expected numbers in \[0, 1\], got -0.5"),
+        (lambda: ker.SINE_SQUARED.quantile([0.2, 1.5]), r"probability: expected numbers in \[0, 1\], got 1.5"),
+        (lambda: ker.SINE.sample(-1), "size: expected a whole number of at least 0"),
+        (lambda: ker.SINE.quadrature([0.0, np.pi], 0), "order: expected a whole number of at least 1"),
+        (lambda: measure_by_name("cos"), "got 'cos'"),
         (lambda: ker.Bins(10**15), "GB of memory"),
         (lambda: ker.Panels([0.0, np.pi], 10**9), "GB of memory"),
     ],
@@ -231,6 +243,7 @@ REFUSED = {
         (estimate([0.5, 1.0], [0.5, 1.0], ker.Bins(2, weight="sin2")), "sin"),
         (estimate([], [], ker.Bins(1)), "at least 1"),
         (estimate([0.5] * 10, [0.5] * 10, ker.Legendre(2)), "at least 16"),
+        (lambda: ker.estimate_stream((np.linspace(0.1, 3.0, 4000),) * 2, ker.Bins(6)), "pass invariant=False"),
         (stream([]), "at least 1 pairs"),
         (stream(np.ones((3, 3))), r"shape \(n, 2\)"),
         (stream("text"), "iterable of chunks"),
@@ -246,6 +259,7 @@ REFUSED = {
         *((lambda wrong=wrong: SMOOTH.sample(wrong), "shape")
           for wrong in (3.0, [1.0, -1.0], [[1.0, -1.0, 0.0, 2.0]])),
         (lambda: ker.CollisionLaw(FLAT, DISK), "law"),
+        (lambda: ker.CollisionLaw(DIFFUSE, DISK).branches(0.5), "isometries"),
         (lambda: ker.CollisionLaw(MIRROR, 3), "disk"),
         (lambda: ker.CollisionLaw(MIRROR.in_specular_frame(), DISK), "paper"),
         (lambda: ker.CollisionLaw(0.5 * DIFFUSE, DISK), "sum of 1"),
@@ -373,15 +387,92 @@ REFUSED = {
         (lambda: spec.enclosures(np.eye(2), 1), "law: expected"),
         (lambda: spec.enclosures(HG(0.5) @ HG(0.8), 2), "no known error"),
         *((lambda width=width: spec.prove_gap(DIFFUSE, width), "width") for width in (0.0, 1.0, math.nan)),
-        *((lambda law=law: spec.prove_gap(law), "law: expected the law of") for law in (ARC @ ARC, ARC @ HG(0.5))),
+        *((lambda law=law: spec.prove_gap(law), "law: expected the law of")
+          for law in (ARC @ ARC, ARC @ HG(0.5), TEETH, BUMPS @ HG(0.5), 0.5 * HG(0.5) + 0.5 * HG(0.2),
+                      (0.5 * BUMPS + 0.5 * HG(0.2)).in_specular_frame())),
+        *((lambda law=law: spec.diffusivity(law), "equally long")
+          for law in (CREVICES, ker.WallLaw(geo.rectangular_teeth(2.0)), CREVICES @ ker.RectangularTeethLaw(0.5), COIN,
+                      BACK.in_specular_frame(), ker.WallLaw(TWO_DEPTHS))),
+        *((lambda law=law, call=call, lengths=lengths: call(law, lengths, 10), "every ray keeps its angle")
+          for law in (CREVICES, COIN)
+          for call, lengths in ((spec.channel_diffusivity, [5.0]), (spec.exit_times, [1.0, 2.0, 4.0]))),
         (lambda: spec.prove_gap(np.eye(2)), "law: expected a Law such as"),
+        # an array that stands for a law is not printed, but what makes a law of it
+        *((call, r"(?s)^(?!.*0\.75).*ker\.MatrixLaw\(array\)") for call in (
+            lambda: ker.KernelMatrix(ARRAY, ker.Bins(2)), lambda: spec.spectral_gap(ARRAY),
+            lambda: spec.spectrum(ARRAY), lambda: spec.enclosures(ARRAY), lambda: spec.diffusivity(ARRAY),
+            lambda: spec.exit_times(ARRAY, [1.0, 2.0, 3.0], 10), lambda: ker.distance(ARRAY, ARRAY),
+            lambda: ker.discretise(ARRAY, ker.Bins(2)))),
         *((lambda angle=angle: spec.accommodation(DIFFUSE, theta=[1.0, angle]), "take one beside it")
           for angle in (np.pi / 2, np.arcsin(np.pi / 4), np.pi - np.arcsin(np.pi / 4))),
         (lambda: spec.accommodation(FLAT), r"law: expected a Law such as ker\.WallLaw.*; take ker\.WallLaw\(wall\)"),
         (lambda: spec.mixing_time(ker.maxwell(0.5), start=1.0), "start: expected a law with a density"),
         (lambda: spec.diffusivity(MIRROR), "infinite"),
         (lambda: spec.diffusivity(DIFFUSE, arrangement="glide"), "arrangement"),
+        *((lambda lengths=lengths: spec.channel_diffusivity(DIFFUSE, lengths), "^lengths: expected ")
+          for lengths in ([], [0.0], [-1.0], [2.0, 1.0], [1.0, np.inf], [np.nan])),
         (lambda: spec.sweep(ker.maxwell, {"diffuse_fraction": [0.5]}, quantities=["diffusivity"]), "eta times 4"),
+    ],
+    "accommodation and fractions by angle": [
+        *((lambda degrees=degrees: spec.accommodation(DIFFUSE, incidence_deg=degrees), "^incidence_deg: .*" + words)
+          for degrees, words in (
+              ([0, 90], "-90, 90"), ([-120.0], "-90, 90"), ([], "at least one angle"), ([np.nan], "finite"),
+              (np.degrees(np.arccos(np.pi / 4)), "take one beside it"))),
+        (lambda: spec.accommodation(DIFFUSE, theta=1.0, incidence_deg=30.0), "either this or theta"),
+        (lambda: spec.accommodation(GROOVES, incidence_deg=30.0), "^incidence_deg: expected none"),
+        (lambda: spec.accommodation(GROOVES, theta=[1.0]), "theta: expected none"),
+        (lambda: spec.accommodation(GROOVES @ GROOVES), r"1 - H.matrix\(1, 1\)"),
+        (lambda: spec.bounce_shares(FLAT, 95.0), "^incidence_deg: "),
+        (lambda: spec.bounce_shares(FLAT, []), "^incidence_deg: "),
+        (lambda: spec.bounce_shares(FLAT, 0.0, 0), "^most: "),
+        (lambda: spec.bounce_shares(DIFFUSE, 0.0), "^wall: "),
+        (lambda: spec.specular_share(MIRROR, [0.0, 90.0]), "^incidence_deg: "),
+        *((lambda law=law: spec.specular_share(law), "^law: expected")
+          for law in (TEETH @ TEETH, ker.LeastResistanceLaw(), BUMPS**2)),
+    ],
+    "transmission": [
+        *((lambda more=more: spec.transmission(**{"law": DIFFUSE, "length": 1.0} | more), words) for more, words in (
+            ({"law": "diffuse"}, "law: expected a Law"),
+            ({"length": 0.0}, r"length: expected a number in \(0, "),
+            ({"length": -1.0}, r"length: expected a number in \(0, "),
+            ({"length": math.inf}, "length: expected finite"),
+            ({"length": [1.0, 2.0]}, "length: expected one number"),
+            ({"section": "square"}, "section: expected 'channel' or 'tube'"),
+            ({"tolerance": 0.0}, "tolerance: expected a number greater than 0"),
+            ({"section": "tube", "law": ARC}, "law: in a tube expected lambertian"),
+            ({"section": "tube", "length": 2.1e5}, r"length: in a tube expected at most 200000 radii"),
+            ({"section": "tube", "law": ker.maxwell(0.001)}, "diffuse fraction of at least 0.01"),
+            ({"law": 2.0 * DIFFUSE}, "weights"),
+            ({"law": 0.5 * ker.HemisphereLaw(ARC), "section": "tube"}, "weights"),
+            ({"law": ker.CollisionLaw(ARC, DISK)}, "law: expected a Law"),
+            ({"rng": -1}, "rng: expected"))),
+    ],
+    "laws of directions": [
+        (lambda: ker.HemisphereLaw(FLAT), "law: expected a Law"),
+        (lambda: ker.HemisphereLaw(0.5 * DIFFUSE), "weights: expected a sum of 1"),
+        (lambda: ker.HemisphereLaw(DIFFUSE, "along"), "orientation: expected an angle in radians or 'random'"),
+        (lambda: ker.HemisphereLaw(DIFFUSE, np.nan), "orientation: expected finite"),
+        (lambda: ker.HemisphereLaw(DIFFUSE, 90), "orientation: expected an angle in radians, at most 2 pi"),
+        (lambda: GROOVES.sample([[0.0, 0.0, 1.0]]), r"incoming ones.*got \[0.0, 0.0, 1.0\] at row \[0\]"),
+        (lambda: GROOVES.sample([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0]]), r"at row \[1\]"),
+        (lambda: GROOVES.sample([[0.0, np.inf, -1.0]]), "velocity: expected finite"),
+        (lambda: GROOVES.sample([[0.0, -1.0]]), r"velocity: expected shape \(..., 3\)"),
+        (lambda: (0.5 * GROOVES).sample([[0.0, 0.0, -1.0]]), "weights: expected a sum of 1"),
+        (lambda: (2.0 * GROOVES + -1.0 * ker.HemisphereLaw(MIRROR)).matrix(2, 0), "weights: expected non-negative"),
+        (lambda: np.inf * GROOVES, "weight"),
+        (lambda: GROOVES.matrix(2, 3), "m: expected a whole number from 0 to 2"),
+        (lambda: GROOVES.matrix(-1, 0), "degree"),
+        (lambda: ker.HemisphereLaw(DIFFUSE, 0.1).matrix(4, 1), r"use ker.discretise\(H, ker.Zernike\(4\)\)"),
+        (lambda: ker.discretise(GROOVES, ker.Legendre(4)), "basis: expected a Zernike"),
+        (lambda: ker.discretise(DIFFUSE, ker.Zernike(4)), r"use it with ker.HemisphereLaw\(law\)"),
+        (lambda: ker.Zernike(-1), "degree"),
+        (lambda: ker.Zernike(2).evaluate([1.0, 0.0, 0.0]), "expected shape"),
+    ],
+    "tables": [
+        *((lambda given=given: DIFFUSE.table(*given), f"^{name}: ") for given, name in (
+            ((1, 5), "n_in"), ((5, 1), "n_out"), ((2.5, 5), "n_in"), ((5, 5, 0.0), "tolerance"),
+            ((10**9, 10**9), "n_in, n_out"))),
+        (lambda: (0.5 * MIRROR + 0.4 * DIFFUSE).table(4, 4), "weights"),
     ],
     "work": [
         (lambda: spec.ReferenceValue(np.nan, 0.0, "?"), "value: expected finite"),
@@ -402,6 +493,10 @@ INACCURATE = [
     (lambda: spec.spectrum(ker.discretise(NOT_SYMMETRIC, ker.Bins(8))), "not symmetric"),
     (lambda: spec.spectral_gap(NOT_SYMMETRIC), "not symmetric"),
     (lambda: spec.enclosures(NOT_SYMMETRIC, 2), "not symmetric"),
+    *(
+        (lambda law=law: spec.spectral_gap(law), "not known to be symmetric")
+        for law in (ker.HemisphereLaw(ARC) @ GROOVES, ker.HemisphereLaw(ker.PolygonLaw(LEANING), 0.2))
+    ),
     (lambda: spec.mixing_time(MIRROR), "not known to have a gap"),
     (lambda: ker.play_gas(ROOM, PAIR, SEATS, np.zeros((2, 3)), 1), "no disk meets"),
     (lambda: ker.estimate([0.5, 1.2], [0.5, 3.0], ker.Bins(4)), r"2 of 4 bins have no incoming pair \(bins 2, 3\)"),
@@ -427,6 +522,7 @@ def test_hollows_that_cross_themselves_are_no_hollows() -> None:
 
 def test_operands_of_another_kind_are_left_to_python() -> None:
     for call in (lambda: "a" * MIRROR, lambda: True * MIRROR, lambda: MIRROR + 1.0, lambda: MIRROR @ 1.0,
-                 lambda: np.ones(2) * MIRROR, lambda: MIRROR * MIRROR, lambda: ROUGH + 1.0):  # fmt: skip
+                 lambda: np.ones(2) * MIRROR, lambda: MIRROR * MIRROR, lambda: ROUGH + 1.0,
+                 lambda: GROOVES + DIFFUSE, lambda: GROOVES @ 1.0, lambda: "a" * GROOVES):  # fmt: skip
         with pytest.raises(TypeError):
             call()

@@ -67,24 +67,12 @@ def test_too_many_words_are_left_as_they_are() -> None:
     assert words_of((0.5 * TEETH + 0.5 * HG(0.4)) ** 6) is None
 
 
-@pytest.mark.parametrize("method", ["auto", "quadrature"])
-def test_scatterings_and_isometries_have_their_eigenvalues(method: str) -> None:
-    matrix = ker.discretise(BACK @ HG(0.6) @ MIRROR @ HG(0.5), ker.Legendre(64), method=method)
-    distance = np.linalg.norm(matrix.symmetric - np.diag((-0.3) ** np.arange(64.0)))
-    assert distance <= float(matrix.error) < 1e-8
-
-
 @pytest.mark.parametrize(
     "law", [HG(0.6) @ TEETH @ HG(0.6), CREVICES @ HG(0.7) @ CREVICES, (BACK @ HG(0.6)) ** 2], ids=repr
 )
 def test_palindromes_are_symmetric_for_spectral_tools(law: ker.Law) -> None:
     found = spec.spectrum(law, basis=ker.Legendre(64))
     assert found.values[0] == pytest.approx(1.0, abs=1e-12) and found.gap > 0.0
-
-
-def test_enclosures_take_a_law_that_is_written_as_a_composition() -> None:
-    found = spec.enclosures(BACK @ HG(0.6), 3)
-    assert all(0.6**degree in found[degree] for degree in range(3))
 
 
 def test_kinks_of_two_crevices_are_followed_far_towards_grazing_or_reported() -> None:

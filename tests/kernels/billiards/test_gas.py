@@ -124,11 +124,8 @@ def test_disks_keep_their_energy_and_their_distance(name):
 
 
 def test_the_same_seed_gives_the_same_bits():
-    for first, second in zip(
-        vars(gas(LAWS["arcs"], 60, 5)).values(), vars(gas(LAWS["arcs"], 60, 5)).values(), strict=True
-    ):
-        if isinstance(first, np.ndarray):
-            assert first.tobytes() == second.tobytes()
+    first, second = (gas(LAWS["arcs"], 60, 5) for _ in range(2))
+    assert np.array_equal(first.velocity, second.velocity) and np.array_equal(first.time, second.time)
 
 
 def test_a_no_slip_gas_goes_back_when_it_is_reversed():

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import InputError
 from asperity.kernels.collisions import collision_law as collision
 
 RNG = 20_260_301
@@ -46,25 +45,10 @@ def test_no_slip_is_twice_the_projection_on_chi_minus_one(mass, inertia):
     assert np.allclose(ker.smooth_matrix(disk), np.diag([1.0, -1.0, 1.0]), atol=1e-9)
 
 
-@pytest.mark.parametrize("wall", [geo.triangular_teeth(0.7), geo.focusing_arcs(1.2), geo.koch(2)], ids=repr)
-def test_energy_and_rolling_momentum_are_conserved(wall):
-    disk = geo.Disk(2.0, 0.3)
-    K = ker.CollisionLaw.from_wall(wall, disk)
-    rng = np.random.default_rng(RNG)
-    before = velocities(2_000, rng)
-    after = K.sample(before, rng)
-    assert np.all(after[:, 1] > 0.0)
-    energy = disk.inner(before, before)
-    assert np.allclose(disk.inner(after, after), energy, rtol=1e-13)
-    scale = np.sqrt((disk.mass + disk.inertia) * energy)
-    assert np.all(np.abs(disk.rolling_momentum(after) - disk.rolling_momentum(before)) <= 1e-14 * scale)
-
-
 OVERHANG = geo.Wall.from_vertices([(0, 0), (0.4, 0), (0.3, -0.4), (0.9, -0.5), (1, 0)])
-POLYGONS = pytest.mark.parametrize("wall", [geo.triangular_teeth(0.9), OVERHANG], ids=["teeth", "overhang"])
 
 
-@POLYGONS
+@pytest.mark.parametrize("wall", [geo.triangular_teeth(0.9), OVERHANG], ids=["teeth", "overhang"])
 def test_branches_of_polygons_are_isometries_that_conserve(wall):
     """S2.28 in the original coordinates: every matrix keeps the metric and the covector -m v1 + J omega."""
     disk = geo.Disk(1.0, 0.5)
@@ -77,44 +61,6 @@ def test_branches_of_polygons_are_isometries_that_conserve(wall):
         for _, matrix in branches:
             assert np.allclose(matrix.T @ metric @ matrix, metric, atol=1e-13)
             assert np.allclose(rolling @ matrix, rolling, atol=1e-13)
-
-
-@POLYGONS
-def test_branches_give_the_sampled_velocities(wall):
-    disk = geo.Disk(1.3, 0.4)
-    K = ker.CollisionLaw.from_wall(wall, disk)
-    theta, psi = 1.1, 0.8
-    before = -disk.from_angles(theta, psi, speed=1.7)
-    expected = np.array([matrix @ before for _, matrix in K.branches(theta)])
-    n = 20_000
-    after = K.sample(np.tile(before, (n, 1)), np.random.default_rng(RNG))
-    which = np.argmin(np.linalg.norm(after[:, None] - expected, axis=2), axis=1)
-    assert np.max(np.linalg.norm(after - expected[which], axis=1)) < 1e-13
-    fraction = np.bincount(which, minlength=len(expected)) / n
-    probability = np.array([p for p, _ in K.branches(theta)])
-    assert np.all(np.abs(fraction - probability) <= 4.5 * np.sqrt(probability * (1 - probability) / n) + 1e-12)
-
-
-@pytest.mark.parametrize("ratio", [0.1, 1.0, 10.0])
-def test_the_law_of_the_foreshortened_wall_is_the_closed_form_with_corrected_parameters(ratio):
-    """r~ = (1 + m/J)^(1/2) r (S2.18, corrected) and psi~ = 2 arctan((1 + m/J)^(-1/2) tan(psi/2)) (S2.21), traced."""
-    disk = geo.Disk(ratio, 1.0)
-    kappa = (1.0 + ratio) ** -0.5
-    rng = np.random.default_rng(RNG)
-    x, theta = rng.random(50_000), np.arccos(1 - 2 * rng.random(50_000))
-    r, psi = 0.8, 1.1
-    teeth = geo.trace(geo.rectangular_teeth(r).foreshorten(disk), x, theta)
-    specular_fraction = ker.RectangularTeethLaw(r / kappa).branches(theta)
-    exact = np.sum(specular_fraction[0] * (np.abs(specular_fraction[1] - (np.pi - theta)[:, None]) < 1e-9), axis=1)
-    hit = np.abs(teeth.theta - (np.pi - theta)) < 1e-9
-    assert teeth.escaped.all()
-    assert abs(np.sum(hit - exact)) < 4.5 * np.sqrt(np.sum(exact * (1 - exact)))
-    teeth = geo.trace(geo.triangular_teeth(psi).foreshorten(disk), x, theta)
-    law = ker.TriangularTeethLaw(2 * np.arctan(kappa * np.tan(psi / 2)))
-    hits = law.hits(x, theta)
-    same = teeth.collisions == hits
-    assert same.mean() > 0.99999
-    assert np.max(np.abs(teeth.theta - law.reflect(x, theta))[same]) < 1e-12
 
 
 def test_spectrum_of_k_is_that_of_the_reflection_law_with_both_signs():
@@ -200,14 +146,13 @@ def test_branches_are_isometries_with_their_probabilities() -> None:
     several = K.branches([0.5, 2.0])
     assert [bool(p[0] > 0.0) for p, _ in several] == [True, True, False]
     assert all(p.shape == (2,) and matrix.shape == (2, 3, 3) for p, matrix in several)
-    # each branch takes minus the velocity of an angle to that of its image
+    # each branch takes minus the velocity of an angle to that of its image, with the probability of this image
     probability, outgoing = law.branches(0.5)
-    images = DISK.from_angles(outgoing[probability > 0], np.pi - 1.1)
-    found = np.array([matrix @ -DISK.from_angles(0.5, 1.1) for _, matrix in shallow])
+    likely = probability > 0
+    images = np.column_stack([DISK.from_angles(outgoing[likely], np.pi - 1.1), probability[likely]])
+    found = np.array([[*matrix @ -DISK.from_angles(0.5, 1.1), p] for p, matrix in shallow])
     order = lambda rows: rows[np.argsort(rows[:, 0])]  # noqa: E731
     assert np.allclose(order(found), order(images), atol=1e-13)
-    with pytest.raises(InputError):
-        ker.CollisionLaw(ker.lambertian(), DISK).branches(0.5)
 
 
 def test_slots_that_are_empty_at_all_angles_are_left_out(monkeypatch) -> None:

@@ -165,26 +165,6 @@ def test_reported_errors_of_spin_forces_hold(law, points):
             assert abs(float(number) - value) <= number.error + 2e-7
 
 
-def test_the_spin_force_of_a_traced_wall_agrees_with_single_particles():
-    wall = geo.dispersing_arcs(1.5)
-    law, spin, n = ker.WallLaw(wall), 0.5, 50_000
-    found = ker.spin_force(law, spin)
-    rng = np.random.default_rng(RNG)
-    height = rng.uniform(-1.0, 1.0, n)
-    phi = np.arcsin(height)
-    normal = np.stack([np.cos(phi), np.sin(phi)], axis=1)
-    tangent = np.stack([-np.sin(phi), np.cos(phi)], axis=1)
-    relative = np.array([-1.0, 0.0]) - spin * tangent
-    theta = np.arctan2(-np.sum(relative * normal, axis=1), np.sum(relative * tangent, axis=1))
-    out = geo.trace(wall, rng.random(n), theta).theta
-    speed = np.hypot(*relative.T)[:, None]
-    push = relative - speed * (-np.cos(out)[:, None] * tangent + np.sin(out)[:, None] * normal)
-    samples = {"along": -2.0 * push[:, 0], "across": -2.0 * push[:, 1], "torque": 2.0 * np.sum(push * tangent, axis=1)}
-    for name, values in samples.items():
-        number = getattr(found, name)
-        assert abs(values.mean() - float(number)) < 4.5 * values.std() / np.sqrt(n) + number.error
-
-
 def test_laws_that_differ_along_a_body_add_their_parts():
     rough, smooth = ker.retroreflection(), ker.specular()
     body = ker.RoughBody.disk(lambda normal: rough if normal < np.pi else smooth)

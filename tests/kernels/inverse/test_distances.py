@@ -185,18 +185,6 @@ def test_distances_at_an_angle_are_those_of_sorted_samples_of_the_map(order, cel
     np.testing.assert_allclose(found, expected, rtol=0, atol=wrong)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kind", "order", "other"),
-    [("rows", 1, ker.maxwell(0.5)), ("rows", 2, ker.TriangularTeethLaw(0.7)), ("sup", 1, ker.maxwell(0.5))],
-)
-def test_errors_of_distances_from_arcs_hold_at_every_tolerance(kind, order, other):
-    arc, least = ker.CircularArcLaw(1.1), 1e-3 if kind == "sup" else 3e-5
-    rough, fine = (ker.distance(arc, other, order, kind, tolerance=tolerance) for tolerance in (1e-2, least))
-    assert abs(rough.value - fine.value) <= rough.error + fine.error
-    assert fine.error <= (0.02 if kind == "sup" else 3e-5 if order == 1 else 1e-3)
-
-
 @settings(max_examples=50, deadline=None)
 @given(values=st.tuples(*[st.floats(-2.0, 2.0)] * 3))
 def test_areas_under_quadratic_pieces_are_integrals(values):
@@ -266,13 +254,6 @@ def test_plans_on_merged_cells_bound_the_linear_programme_from_above(seed):
     assert level.upper == pytest.approx(exact, rel=1e-9)
 
 
-@pytest.mark.parametrize(("weights", "tolerance"), [((1.0, 0.0), 1e-2), ((1.0, 0.0), 1e-3), ((0.3, 0.7), 1e-3)])
-def test_the_joint_distance_of_mirrors_and_retroreflectors_is_the_mean_of_their_distances(weights, tolerance):
-    pair = [a * ker.specular() + (1.0 - a) * ker.retroreflection() for a in weights]
-    found = ker.distance(*pair, kind="joint", tolerance=tolerance)
-    assert abs(found.value - abs(weights[0] - weights[1]) * (np.pi - 2)) <= found.error < max(tolerance, 1.1e-3)
-
-
 @pytest.mark.parametrize("law", [ker.specular(), ker.maxwell(0.4)])
 def test_the_joint_distance_of_a_law_from_itself_is_nothing(law):
     found = ker.distance(law, law, kind="joint", tolerance=1e-2)
@@ -338,23 +319,8 @@ def test_distances_of_low_and_high_order_are_numbers_with_errors_that_hold(order
     assert abs(found.value - precise_mean_turn(order)) <= found.error < (1e-10 if order <= 2 else 1e-3)
 
 
-@pytest.mark.parametrize("order", [1.0, 2.0, 7.5, 60.0, 1000.0, 1e6])
-def test_rows_of_high_order_agree_with_sums_in_many_digits(order):
-    rng = np.random.default_rng(4)
-    x, y = np.sort(rng.uniform(0.0, np.pi, (5, 6)), axis=1), np.sort(rng.uniform(0.0, np.pi, (5, 6)), axis=1)
-    equal = np.full((5, 6), 1 / 6)
-    found = wasserstein(Distributions.of_atoms(x, equal), Distributions.of_atoms(y, equal), order)
-    with mpmath.workdps(40):
-        sums = [
-            sum(mpmath.mpf(abs(a - b)) ** order for a, b in zip(*pair, strict=True)) / 6
-            for pair in zip(x, y, strict=True)
-        ]
-        expected = [float(whole ** (1 / mpmath.mpf(order))) for whole in sums]
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
-
-
 @pytest.mark.parametrize("rise", [1e-9, 1e-6, 1e-4, 1e-3, 0.1])
-@pytest.mark.parametrize("order", [1.5, 2.0, 30.0, 1000.0])
+@pytest.mark.parametrize("order", [1.5, 2.0, 30.0, 1000.0, 1e6])
 def test_slanted_pieces_of_high_order_are_integrated_in_full(order, rise):
     # a uniform distribution on (1, 1 + rise) is moved to 0
     mass = Distributions(np.array([[1.0, 1.0 + rise]]), np.array([[0.0, 1.0]]))

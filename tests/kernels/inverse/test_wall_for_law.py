@@ -29,15 +29,6 @@ def test_the_wall_for_lamberts_law_has_its_moments_to_rounding(lambert):
     assert lambert.wall.closes and lambert.wall.period == 1.0
 
 
-def test_the_same_moments_come_from_rays(lambert):
-    matrix = ker.discretise(
-        ker.WallLaw(lambert.wall), ker.Legendre(MOMENTS), "qmc", samples=2**16, rng=np.random.default_rng(3)
-    )
-    wanted = np.zeros((MOMENTS, MOMENTS))
-    wanted[0, 0] = 1.0
-    assert np.linalg.norm(matrix.symmetric - wanted) < 2.0 * float(matrix.error)
-
-
 def test_the_same_call_gives_the_same_wall_to_the_bit(lambert):
     assert ker.wall_for(ker.lambertian(), moments=MOMENTS).wall == lambert.wall
 

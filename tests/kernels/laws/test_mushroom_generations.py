@@ -57,29 +57,6 @@ def test_the_fraction_of_rays_that_enter_is_the_opened_fraction():
     assert np.all(wall.trace(x, theta).theta[on_top] == np.pi - theta[on_top])
 
 
-def test_a_ray_traced_back_returns_where_doubles_resolve_its_mushroom():
-    x, theta = rays(3000, seed=5)
-    wall = geo.MushroomGenerations(0.3, 0.4, 60)
-    out = wall.trace(x, theta)
-    wide = wall.generation(x) <= 4
-    back = wall.trace(out.x[wide], out.theta[wide])
-    assert np.quantile(np.abs(back.theta - theta[wide]), 0.999) < 1e-7
-
-
-def test_the_law_is_that_of_traced_positions_and_of_the_listed_wall():
-    wall = geo.MushroomGenerations(0.25, 0.5, 3)
-    law, listed = ker.MushroomLaw(wall), geo.mushrooms(0.25, 0.5, 3)
-    entries = np.random.default_rng(9).random(60_000)
-    for angle in (0.3, 1.1, 2.5):
-        values = np.cos(geo.trace(listed, entries, angle).theta)
-        assert abs(values.mean() - law.apply(np.cos, angle)) < 4.5 * values.std() / np.sqrt(len(entries))
-    x, theta = rays(40_000, seed=6)
-    drawn, traced = law.sample(theta, np.random.default_rng(1)), wall.trace(x, theta).theta
-    for function in (np.cos, lambda angle: np.cos(angle) ** 2, lambda angle: np.sin(3 * angle)):
-        gap = function(drawn) * np.cos(theta) - function(traced) * np.cos(theta)
-        assert abs(gap.mean()) < 4.5 * gap.std() / np.sqrt(len(gap))
-
-
 def test_one_generation_has_the_law_of_its_wall_and_more_generations_a_mixture():
     single = ker.WallLaw(geo.mushrooms(0.25, 0.5))
     angle, edges = np.array([0.3, 1.1, 2.5]), np.linspace(0.0, np.pi, 9)

@@ -18,25 +18,16 @@ def asteroids():
     return geo.Wall([geo.Segment((0, -1), (1, -1))], 1.0, [loop])
 
 
-def test_a_joined_wall_reflects_as_its_cells():
+def test_a_joined_wall_consists_of_its_cells():
     parts = [geo.focusing_arcs(1.1).scaled(0.5), geo.mushrooms(0.4), geo.triangular_teeth(0.8).scaled(0.25)]
-    repeats = [2, 1, 3]
-    whole = geo.join_walls(parts, repeats)
+    whole = geo.join_walls(parts, [2, 1, 3])
     assert whole.period == 2.75 and whole.closes
-    rng = np.random.default_rng(RNG)
-    x, theta = rng.random(3_000) * whole.period, np.arccos(1 - 2 * rng.random(3_000))
-    ray = geo.trace(whole, x, theta)
-    left = 0.0
-    for part, count in zip(parts, repeats, strict=True):
-        here = (x > left) & (x < left + count * part.period)
-        own = geo.trace(part, x[here] - left, theta[here])
-        both = own.escaped & ray.escaped[here]
-        assert both.mean() > 0.999
-        # a ray near a corner may be resolved on one wall and take the other side on the other
-        same = np.abs(own.theta - ray.theta[here]) < 1e-9
-        assert np.mean(same[both]) > 0.999
-        assert np.mean(np.abs(own.x + left - ray.x[here])[both & same] < 1e-9) > 0.999
-        left += count * part.period
+    pieces = iter(whole.pieces)
+    for k, left in ((0, 0.0), (0, 0.5), (1, 1.0), (2, 2.0), (2, 2.25), (2, 2.5)):
+        for own in parts[k].pieces:
+            at = np.linspace(0.0, 1.0, 9)
+            np.testing.assert_allclose(next(pieces).point(at), np.add(own.point(at), [left, 0.0]), atol=1e-14)
+    assert next(pieces, None) is None
 
 
 def test_a_joined_wall_tends_to_its_position_law():
@@ -83,20 +74,10 @@ def test_the_distance_of_states_is_the_sum_of_its_definition():
 
 
 def test_a_position_law_is_symmetric_and_keeps_the_position():
-    law = ker.PositionLaw([0.0, 0.5, 2.0], [ker.TriangularTeethLaw(0.9), ker.maxwell(0.3)])
-    theta, weight = ker.SINE.quadrature(np.linspace(0.0, np.pi, 61), 5)
-    x = np.array([0.1, 0.4, 0.9, 1.9])
-
-    def f(x, t):
-        return x * np.cos(t) ** 3
-
-    def g(x, t):
-        return np.sin(x + t)
-
-    for at in x:
-        forth = weight @ (f(at, theta) * law.apply(g, at, theta))
-        back = weight @ (g(at, theta) * law.apply(f, at, theta))
-        assert forth == pytest.approx(back, abs=3e-5)
+    law, theta = ker.PositionLaw([0.0, 0.5, 2.0], [ker.TriangularTeethLaw(0.9), ker.maxwell(0.3)]), np.array([0.4, 2.0])
+    for at in (0.1, 0.4, 0.9, 1.9):
+        own = law.at(at).apply(lambda t, at=at: np.sin(at + t), theta)
+        np.testing.assert_allclose(law.apply(lambda x, t: np.sin(x + t), at, theta), own, rtol=1e-14)
     assert law.reversible and law.at(0.4) == ker.TriangularTeethLaw(0.9)
     assert law.weights.tolist() == [0.25, 0.75]
     incoming = np.full(20_000, 1.0)
@@ -146,8 +127,6 @@ def test_an_asteroid_field_displaces_rays_without_bound_and_closed_walls_do_not(
     field = ker.displacements(asteroids(), 60_000, rng=RNG)
     assert not asteroids().closes and field.longest_possible == np.inf
     assert float(field.exceeds(5.0)) > 0.0
-    small = [float(field.exceeds(0.5, scale)) for scale in (1.0, 0.1, 0.01)]
-    assert small[0] > small[1] > small[2]
     closed = ker.displacements(geo.mushrooms(0.4), 20_000, rng=RNG)
     assert np.max(np.abs(closed.values)) <= closed.longest_possible <= 1.0
     assert closed.exceeds(1.0).kind == "bound"

@@ -41,14 +41,6 @@ def test_ideal_laws_do_what_their_names_say() -> None:
 
 
 # ---- Henyey-Greenstein --------------------------------------------------------------------------------------------
-@settings(max_examples=40, deadline=None)
-@given(g=st.floats(-0.95, 0.95), degree=st.integers(0, 12))
-def test_henyey_greenstein_has_the_eigenvalues_of_its_definition(g: float, degree: int) -> None:
-    law = ker.henyey_greenstein(g)
-    expected = g**degree * polynomial(degree)(THETA)
-    assert np.allclose(law.apply(polynomial(degree), THETA), expected, rtol=0.0, atol=2e-13)
-
-
 @pytest.mark.parametrize("g", [-0.7, -0.2, 0.0, 0.4, 0.8])
 def test_henyey_greenstein_density_is_its_legendre_series(g: float) -> None:
     theta, out = np.array([0.05, 1.0, 2.5])[:, None], np.linspace(0.01, 3.1, 40)
@@ -94,15 +86,6 @@ def test_a_density_law_measures_its_symmetries() -> None:
     law = ker.DensityLaw(tilted)
     assert (law.reversible, law.mirror_symmetric) == (False, False)
     assert law.sampling_error < 1e-5
-
-
-def test_the_adjoint_of_a_density_law_is_its_reversal() -> None:
-    law = ker.DensityLaw(tilted)
-    # <P_1, P P_2> = 1/2 |P_1|^2 |P_2|^2 and <P_2, P P_1> = 0
-    theta = np.array([0.4, 1.7])
-    assert np.allclose(law.apply(polynomial(2), theta), 0.5 * polynomial(1)(theta) / 5.0, atol=1e-13)
-    assert np.allclose(law.adjoint().apply(polynomial(1), theta), 0.5 * polynomial(2)(theta) / 3.0, atol=1e-13)
-    assert np.allclose(law.adjoint().apply(polynomial(2), theta), 0.0, atol=1e-13)
 
 
 def stepped(theta: np.ndarray, out: np.ndarray) -> np.ndarray:

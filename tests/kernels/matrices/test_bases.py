@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from numpy.polynomial import legendre
 
 from asperity import geometry as geo
-from asperity.errors import InputError
 from asperity.kernels import SINE, SINE_SQUARED, Basis, Bins, Legendre, Panels, TensorBasis
 from asperity.kernels.bases import assembly as products_module
 from asperity.kernels.bases import measure as weights_module
@@ -29,8 +28,8 @@ UNEVEN = [0.0, 0.4, 1.1, 2.0, np.pi]
 
 
 def exact_mass(name: str, low: float, high: float) -> mpmath.mpf:
-    """The antiderivative in 40 digits."""
-    with mpmath.workdps(40):
+    """The antiderivative in 150 digits, of which 60 are left for angles of 1e-30."""
+    with mpmath.workdps(150):
         low, high = mpmath.mpf(low), mpmath.mpf(high)
         if name == "sin":
             return (mpmath.cos(low) - mpmath.cos(high)) / 2
@@ -39,10 +38,7 @@ def exact_mass(name: str, low: float, high: float) -> mpmath.mpf:
 
 def relative_errors(measure, intervals) -> np.ndarray:
     with mpmath.workdps(40):
-        exact = [exact_mass(measure.name, low, high) for low, high in intervals]
-        return np.array(
-            [float(float(measure.mass(*pair)) / value - 1) for pair, value in zip(intervals, exact, strict=True)]
-        )
+        return np.array([float(float(measure.mass(*pair)) / exact_mass(measure.name, *pair) - 1) for pair in intervals])
 
 
 @pytest.mark.parametrize("measure", [SINE, SINE_SQUARED], ids=["sin", "sin2"])
@@ -69,30 +65,16 @@ def test_densities_at_angles_whose_sines_are_known() -> None:
 @pytest.mark.parametrize("measure", [SINE, SINE_SQUARED], ids=["sin", "sin2"])
 def test_quantiles_are_accurate_at_both_ends(measure) -> None:
     small = np.concatenate((np.logspace(-60, -1, 119), [0.2, 0.3, 0.45, 0.499, 0.5]))
-    with mpmath.workdps(90):
-        for fraction, angle in zip(small, measure.quantile(small), strict=True):
-            slope = float(measure.density(angle))
-            miss = float(exact_mass_fine(measure.name, angle) - mpmath.mpf(fraction))
-            assert abs(miss) < 1.2e-15 * slope * angle
+    for fraction, angle in zip(small, measure.quantile(small), strict=True):
+        miss = float(exact_mass(measure.name, 0.0, angle) - mpmath.mpf(fraction))
+        assert abs(miss) < 1.2e-15 * float(measure.density(angle)) * angle
     for fraction in (1e-9, 0.01, 0.2, 0.45):
-        alone = float(measure.quantile(fraction))
-        with mpmath.workdps(90):
-            found = float(exact_mass_fine(measure.name, alone))
+        found = float(exact_mass(measure.name, 0.0, float(measure.quantile(fraction))))
         assert found == pytest.approx(fraction, rel=2e-15, abs=0.0)
     # 1 - fraction is exact: the upper half is the mirror image of the lower one
     upper = 1.0 - np.array([2.0**-50, 2.0**-40, 2.0**-20, 0.125, 0.25, 0.4375])
     assert np.abs(np.pi - measure.quantile(upper) - measure.quantile(1.0 - upper)).max() < 9e-16
     assert measure.quantile([0.0, 1.0]).tolist() == [0.0, np.pi]
-    with pytest.raises(InputError, match=r"probability: expected numbers in \[0, 1\], got -0.5"):
-        measure.quantile([0.2, -0.5])
-
-
-def exact_mass_fine(name: str, angle: float) -> mpmath.mpf:
-    """Measure of (0, angle) by formulas in 90 digits."""
-    angle = mpmath.mpf(angle)
-    if name == "sin":
-        return mpmath.sin(angle / 2) ** 2
-    return (angle - mpmath.sin(2 * angle) / 2) / mpmath.pi
 
 
 class Draws(np.random.Generator):
@@ -109,8 +91,6 @@ def test_samples_stay_inside_the_open_interval(measure) -> None:
     assert measure.cdf(sample) == pytest.approx([1.0, 0.75, 0.5, 0.25, 2.0**-53], rel=1e-14, abs=0.0)
     assert sample[0] == np.nextafter(np.pi, 0.0)
     assert measure.sample(0).shape == (0,)
-    with pytest.raises(InputError, match="size: expected a whole number of at least 0"):
-        measure.sample(-1)
 
 
 def test_rules_integrate_polynomials_and_keep_their_nodes_inside() -> None:
@@ -129,16 +109,12 @@ def test_rules_integrate_polynomials_and_keep_their_nodes_inside() -> None:
     angle, _ = gauss_on_intervals(np.array([0.0, np.pi]), np.array([0.0, np.pi]), 3)
     assert np.all(angle > 0.0) and np.all(angle < np.pi) and angle[:3].max() < 1e-290 and angle[3:].min() > 3.14
     assert SINE.quadrature([0.0, np.pi], 1)[0] == pytest.approx([0.5 * np.pi])
-    with pytest.raises(InputError, match="order: expected a whole number of at least 1"):
-        SINE.quadrature(edges, 0)
     nodes = weights_module._gauss_on_unit_interval(3)
     assert not nodes[0].flags.writeable and not nodes[1].flags.writeable
 
 
 def test_measures_have_names() -> None:
     assert measure_by_name("sin") is SINE and measure_by_name("sin2") is SINE_SQUARED
-    with pytest.raises(InputError, match="got 'cos'"):
-        measure_by_name("cos")
 
 
 def exact_polynomials(n: int, angle: float, weight: str) -> list[float]:
@@ -190,8 +166,6 @@ def test_polynomials_know_their_names_and_their_halves() -> None:
     for n, half in ((2, 1), (3, 2), (8, 4)):
         coarse, table = Legendre(n, "sin2").coarsened()
         assert coarse == Legendre(half, "sin2") and np.array_equal(table, np.eye(n)[:half])
-    with pytest.raises(InputError, match="at least 1"):
-        Legendre(0)
 
 
 @pytest.mark.parametrize("weight", ["sin", "sin2"])
@@ -248,8 +222,6 @@ def test_panels_know_their_names_and_their_halves() -> None:
     assert coarse.edges.tolist() == [0.0, 1.1, np.pi] and coarse.degree == 0 and coarse.measure is SINE_SQUARED
     assert np.abs(table @ table.T - np.eye(2)).max() < 1e-15
     assert Panels([0.0, np.pi], 0).coarsened() is None
-    with pytest.raises(InputError, match="at least 0"):
-        Panels(UNEVEN, -1)
 
 
 def test_panels_ask_for_the_memory_of_their_coefficients(monkeypatch) -> None:
@@ -314,12 +286,6 @@ def test_angles_that_nearly_coincide_are_one_edge() -> None:
     )
     for wall in (geo.elliptical_arcs(1.0, geo.Disk(1.0, 0.5)), two):
         assert Panels.for_wall(wall) == plain
-    with pytest.raises(InputError, match="smallest"):
-        Panels.for_arc(1.2, smallest=0.6)
-    with pytest.raises(InputError, match="half_angle"):
-        Panels.for_arc(0.0)
-    with pytest.raises(InputError, match="smallest"):
-        Panels.for_wall(geo.flat(), smallest=1e-13)
 
 
 @pytest.mark.parametrize(

@@ -168,14 +168,6 @@ def test_a_single_pair_has_a_large_spread() -> None:
     assert mean[0] == 5.0 and variance[0] == 0.0
 
 
-def test_the_variance_of_the_squared_error_is_that_of_poisson_counts_in_small_cells() -> None:
-    # (C - m)^2 of a Poisson C has variance m + 2 m^2; c + 2 c (c - 1) estimates it without bias
-    counts, weight = np.array([[10**12, 1, 3, 7]]), np.array([0.0, 1.0, 2.0, 0.5])
-    mean, variance = counting._squared_norms([(counts, weight)], counts.sum(axis=1))
-    assert mean[0] == pytest.approx(1.0 + 6.0 + 3.5, rel=1e-9)
-    assert variance[0] == pytest.approx(1.0 + 4.0 * (3 + 12) + 0.25 * (7 + 84), rel=1e-9)
-
-
 def test_the_variance_of_four_draws_is_counted_by_hand() -> None:
     # two and two: squares of fractions are estimated as 1/6 each, so E k^2 = (1/3)^2, for 12 ordered pairs of draws,
     # twice

@@ -79,11 +79,6 @@ def test_eigenvalues_converge_with_the_declared_order(make: object, sizes: tuple
     assert slope == pytest.approx(order, abs=0.15)
 
 
-def test_a_matrix_law_gives_its_matrix_back() -> None:
-    array = [[0.5, 0.3, 0.2], [0.3, 0.4, 0.3], [0.2, 0.3, 0.5]]
-    assert np.abs(ker.discretise(ker.MatrixLaw(array), ker.Bins(3)).array - array).max() < 1e-9
-
-
 def test_products_of_densities_are_the_galerkin_matrices_of_the_product() -> None:
     product = ker.henyey_greenstein(0.5) @ ker.henyey_greenstein(0.8)
     smooth = ker.discretise(product, ker.Legendre(12))
@@ -94,9 +89,3 @@ def test_products_of_densities_are_the_galerkin_matrices_of_the_product() -> Non
     # which the product of the two Galerkin matrices is not
     factors = [ker.discretise(ker.henyey_greenstein(g), ker.Bins(12)) for g in (0.5, 0.8)]
     assert np.linalg.norm((factors[0] @ factors[1]).symmetric - exact.symmetric) > float(bins.error)
-
-
-def test_the_zeroth_power_is_the_identity() -> None:
-    for basis in (ker.Bins(5), ker.Legendre(5)):
-        matrix = ker.discretise(ker.henyey_greenstein(0.5) ** 0, basis)
-        assert np.abs(matrix.symmetric - np.eye(5)).max() < 1e-13

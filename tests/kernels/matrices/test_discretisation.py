@@ -1,12 +1,9 @@
 """Matrices of laws of isometries, of involutions and of arcs: the numbers of closed forms, frames."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
 from asperity import kernels as ker
-from asperity.kernels.laws.law import BranchLaw
 
 # <u, P u>/<u, u> with u = cos theta, from independent tracers and high-precision quadrature.
 TRIANGULAR_07 = 0.134541971359171
@@ -29,77 +26,6 @@ def test_triangular_teeth_have_the_known_number_in_smooth_bases(basis: ker.Basis
     matrix = ker.discretise(ker.TriangularTeethLaw(0.7), basis)
     assert rayleigh(matrix) == pytest.approx(TRIANGULAR_07, abs=1e-13)
     assert matrix.symmetry_defect() < 1e-13 and matrix.stochastic_defect() < 1e-13
-
-
-def test_rectangular_teeth_are_exact_up_to_grazing() -> None:
-    # <u, P u> = -<u, (1 - 2 p) u> with p the probability of retroreflection, |d - nearest even number|/2 of
-    # d = 2 r |cot theta|: in c = cot theta, the integral of (1 - |d - even|) c^2 (1 + c^2)^(-5/2) over c > 0, which is
-    # summed here piece by piece up to d = 4000; beyond, 1 - |d - even| is replaced by its mean 1/2, which leaves less
-    # than a quarter of the last integrand.
-    r = 1.0
-    steps = np.arange(0.0, 4000.0)
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    c = (steps[:, None] + 0.5 * (1.0 + nodes)) / (2.0 * r)
-    d = 2.0 * r * c
-    retro = 0.5 * np.abs(d - 2.0 * np.rint(0.5 * d))
-    total = 3.0 * np.sum(0.25 * weights * (2.0 * retro - 1.0) * c**2 * (1.0 + c**2) ** -2.5)
-    matrix = ker.discretise(ker.RectangularTeethLaw(r), ker.Legendre(16))
-    total -= 3.0 * 0.5 * 0.5 * (4000.0 / (2.0 * r)) ** -2.0
-    assert abs(rayleigh(matrix) - total) <= float(matrix.error) + 1e-9
-    assert matrix.error.kind == "bound"
-
-
-@dataclass(frozen=True)
-class Swap(BranchLaw):
-    """Specular reflection for steep angles, retroreflection for others: two breakpoints."""
-
-    steep: float
-
-    def _branches(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        specular = (np.abs(theta - np.pi / 2) < self.steep).astype(np.float64)
-        return np.stack([specular, 1.0 - specular], -1), np.stack([np.pi - theta, theta], -1)
-
-    def breakpoints(self, limit: int) -> tuple[np.ndarray, float]:
-        return np.array([np.pi / 2 - self.steep, np.pi / 2 + self.steep]), 0.0
-
-
-@pytest.mark.parametrize("edges", [[0.0, 0.3, 1.0, 2.0, 2.9, np.pi], [0.0, np.pi / 2, np.pi]])
-def test_masses_between_bins_are_exact_for_a_law_with_known_masses(edges: list[float]) -> None:
-    steep = 0.5
-    basis = ker.Bins(edges)
-
-    def mass(low: float, high: float) -> float:
-        return 0.5 * (np.cos(low) - np.cos(high)) if high > low else 0.0
-
-    expected = np.zeros((basis.size, basis.size))
-    inner = (np.pi / 2 - steep, np.pi / 2 + steep)
-    for i in range(basis.size):
-        low, high = basis.edges[i : i + 2]
-        expected[i, i] += mass(low, min(high, inner[0])) + mass(max(low, inner[1]), high)
-        for j in range(basis.size):
-            # the mirror image of bin j, cut by bin i and the steep angles
-            back, ahead = np.pi - basis.edges[j + 1], np.pi - basis.edges[j]
-            expected[i, j] += mass(max(low, inner[0], back), min(high, inner[1], ahead))
-    flux = ker.discretise(Swap(steep), basis).flux
-    assert np.abs(flux - expected).max() < 1e-15
-
-
-def test_chains_of_isometries_are_exact_too() -> None:
-    law = ker.TriangularTeethLaw(1.7)
-    matrix = ker.discretise(law @ law, ker.Legendre(40))
-    assert matrix.method == "exact"
-    # in an infinite basis the square of the Galerkin matrix; column 0 and the constant are exact in any
-    assert matrix.stochastic_defect() < 1e-13 and matrix.symmetry_defect() < 1e-13
-    nodes, weights = ker.SINE.quadrature(np.linspace(0.0, np.pi, 4001), 2)
-    u_image = law.apply(np.cos, nodes)
-    assert rayleigh(matrix) == pytest.approx(float(3.0 * np.sum(weights * u_image**2)), abs=1e-6)
-
-
-def test_sums_are_done_term_by_term() -> None:
-    matrix = ker.discretise(ker.maxwell(0.25), ker.Legendre(6))
-    assert matrix.method == "quadrature + exact"
-    expected = np.diag(0.75 * (-1.0) ** np.arange(6)) + 0.25 * np.eye(6)[:, :1] @ np.eye(6)[:1]
-    assert np.abs(matrix.symmetric - expected).max() < 1e-13
 
 
 # ---- deterministic laws ------------------------------------------------------------------------------------------

@@ -36,18 +36,6 @@ def test_matrices_from_half_of_the_rays_are_mirror_symmetric_markov_and_right_wi
     assert sum(within) > 18
 
 
-@pytest.mark.parametrize("looks", [(8, 16), (64, 512), (8, 4096), (128, 1024, 2048)], ids=repr)
-def test_a_net_that_goes_on_is_the_net_that_was_never_looked_at(looks, bounce):
-    basis, last = ker.Bins(4), looks[-1]
-    parted, whole = (SobolSampler(bounce(), basis, np.random.default_rng(3)) for _ in range(2))
-    for look in looks:
-        found, rays, _ = parted.sampled(look, symmetrise=False)
-        assert rays == look
-    expected, _, _ = whole.sampled(last, symmetrise=False)
-    assert np.array_equal(found.counts, expected.counts)
-    assert np.array_equal(parted.sums.tables, whole.sums.tables)
-
-
 @pytest.mark.parametrize("chunk", [1, 8, 64, 4096])
 @pytest.mark.parametrize("looks", [(2000,), (1, 100, 1000, 3), (30, 31, 900)], ids=repr)
 def test_parts_of_a_net_are_digital_shifts_of_one_sequence_whatever_is_traced_at_a_time(

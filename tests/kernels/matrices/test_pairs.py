@@ -177,22 +177,6 @@ def test_memory_does_not_grow_with_the_stream():
     assert min(peak(256) for _ in range(3)) < 1.1 * peak(16)
 
 
-def test_incoming_angles_that_do_not_follow_the_measure_are_refused_by_default():
-    with pytest.raises(InputError, match="pass invariant=False"):
-        ker.estimate_stream(pairs(invariant=False), ker.Bins(6))
-
-
-def test_rows_are_fractions_of_the_counts() -> None:
-    theta, image = pairs(5000, 0)
-    found = ker.estimate(theta, image, ker.Bins(6))
-    expected = np.zeros((6, 6), dtype=int)
-    for one, other in zip(np.floor(3 - 3 * np.cos(theta)), np.floor(3 - 3 * np.cos(image)), strict=True):
-        expected[int(one), int(other)] += 1
-    assert np.array_equal(found.counts, expected)
-    assert np.abs(found.array - expected / expected.sum(axis=1, keepdims=True)).max() < 1e-15
-    assert found.stochastic_defect() < 1e-15 and found.samples == 5000
-
-
 def test_whether_the_incoming_angles_follow_the_measure_is_seen() -> None:
     for invariant in (False, True):
         found = ker.estimate(*pairs(4000, 0, invariant), ker.Bins(12))
@@ -207,15 +191,6 @@ def test_the_z_score_is_that_of_the_raw_pairs_for_any_incoming_angles(invariant:
         for seed in range(60)
     ]
     assert abs(np.mean(scores)) < 0.6 and 0.7 < np.std(scores) < 1.3
-
-
-def test_pairs_of_an_irreversible_law_give_a_large_z_score() -> None:
-    rng = np.random.default_rng(3)
-    theta = np.pi * rng.beta(1.2, 1.6, 20_000)
-    fraction = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * rng.random(theta.size), 1.0)
-    found = ker.estimate(theta, ker.SINE.quantile(np.clip(fraction, 1e-12, 1 - 1e-12)), ker.Bins(12), symmetrise=True)
-    assert found.symmetry_defect().z_score > 10.0
-    assert np.abs(found.flux - found.flux.T).max() < 1e-17
 
 
 def test_the_test_of_the_incoming_angles_can_be_overruled() -> None:

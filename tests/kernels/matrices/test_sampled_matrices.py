@@ -13,7 +13,7 @@ from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
 from asperity.kernels.laws.law import DrivenLaw, RandomMap
 from asperity.kernels.sampling import rays
-from asperity.kernels.sampling.counts import LEVEL, _squared_norms
+from asperity.kernels.sampling.counts import LEVEL
 from asperity.kernels.sampling.rays import RaySums
 from asperity.kernels.sampling.sobol import PARTS, SobolSampler
 
@@ -158,17 +158,6 @@ def test_errors_hold_in_95_of_100_cases_and_not_much_more_often(name: str) -> No
     assert binomtest(held, REPEATS, LEVEL).pvalue > RARE or (name in CAUTIOUS and held > LEVEL * REPEATS)
     # a normal scalar has 1.96; with few replicates, Student's quantile is larger
     assert np.mean(reported) < (1.6 if name.startswith("distance") else 3.0) * np.sqrt(np.mean(true**2))
-
-
-def test_squared_errors_vary_as_multinomial_counts_do_also_where_most_are_none() -> None:
-    # 40 draws of 200 cells, every other with ten times the weight: normal counts would have half of the variance
-    fraction, weight = np.full(200, 1 / 200), np.where(np.arange(200) % 2, 1.0, 10.0)
-    counts = np.random.default_rng(1).multinomial(40, fraction, size=20_000)
-    squares = (counts - 0.2) ** 2 @ weight
-    mean, variance = _squared_norms([(counts, weight)], counts.sum(axis=1))
-    assert np.mean(mean) == pytest.approx(np.mean(squares), rel=0.01)
-    # fractions from so few draws are uneven, which takes 11 % away
-    assert np.mean(variance) == pytest.approx(np.var(squares), rel=0.2)
 
 
 def test_counts_of_large_partitions_grow_into_wider_integers(monkeypatch) -> None:

@@ -75,11 +75,6 @@ def test_rays_that_continue_a_run_are_traced_at_once(monkeypatch):
     assert traced == [2**11, 2**14 - 2**11]
 
 
-def test_isometries_of_many_pieces_come_before_all_rays():
-    found = ker.discretise(ker.WallLaw(wall_of("profile")), ker.Legendre(2), tolerance=1e-5)
-    assert found.method == "exact"
-
-
 def test_a_profile_of_many_pieces_takes_rays_for_a_rough_answer_and_isometries_for_an_exact_one():
     law, basis = ker.WallLaw(PROFILE), ker.Legendre(2)
     rough, exact = (ker.discretise(law, basis, tolerance=tolerance) for tolerance in (1e-2, 1e-9))

@@ -8,7 +8,6 @@ from campaigns.judges.precise_triangular import ANGLE, BINS, reference
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity import spectral as spec
 from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.discretisation.isometries import branch_matrix
 from asperity.kernels.discretisation.isometry_tables import table_matrix
@@ -143,17 +142,6 @@ def test_few_angles_are_answered_as_many() -> None:
     for k, angle in enumerate(theta):
         probability, _ = law.branches(angle)
         assert np.array_equal(probability, at_once[k][: probability.size]) and not at_once[k][probability.size :].any()
-
-
-def test_polygons_have_no_gap_and_their_walls_are_exact() -> None:
-    law = law_of("skew")
-    assert spec.spectral_gap(law).verdict == "no gap"
-    wall_law = ker.WallLaw(geo.Wall.from_vertices(SKEW))
-    assert wall_law.parts == ((1.0, wall_law),) and wall_law.isometry_table() is not None
-    basis = ker.Legendre(8)
-    exact = ker.discretise(wall_law, basis)
-    assert exact.method == "exact"
-    assert np.linalg.norm(exact.symmetric - ker.discretise(law, basis).symmetric) < 1e-13
 
 
 def test_signs_from_the_table_are_those_found_by_probing() -> None:
