@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import InputError
 
 AVERAGES = ("tangential", "normal", "maxwell_fraction", "misfit")
 
@@ -43,41 +42,20 @@ def test_an_arc_has_its_known_moment_in_both_conventions():
     assert specular.tangential == paper.tangential and specular.misfit == paper.misfit
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "law",
-    [ker.TriangularTeethLaw(0.7), ker.CircularArcLaw(0.8), ker.WallLaw(geo.dispersing_arcs(0.8)),
-     0.3 * ker.lambertian() + 0.7 * ker.CircularArcLaw(1.0)],
-    ids=repr,
-)  # fmt: skip
-def test_rays_agree_with_averages_and_with_the_misfit(law):
-    found = spec.accommodation(law, 1e-6)
-    rng = np.random.default_rng(3)
-    number = 200_000
-    theta = ker.SINE.sample(number, rng)
-    first, second = law.sample(theta, rng), law.sample(theta, rng)
-    tangential = 1.0 + 3.0 * np.cos(theta) * np.cos(first)
-    raised = np.sin(theta) - np.pi / 4.0
-    normal = 1.0 - raised * (np.sin(first) - np.pi / 4.0) / (2.0 / 3.0 - np.pi**2 / 16.0)
-    keeps = 1.0 - found.maxwell_fraction.value
-    # two draws at one angle are independent: the mean of the product is the square of the conditional mean
-    square = sum(
-        (function(first) - maxwell) * (function(second) - maxwell)
-        for function, maxwell in (
-            (np.cos, -keeps * np.cos(theta)), (lambda x: np.sin(x) - np.pi / 4.0, keeps * raised)
-        )
-    )  # fmt: skip
-    for drawn, value in (
-        (tangential, found.tangential.value), (normal, found.normal.value), (square, found.misfit.value**2)
-    ):  # fmt: skip
-        assert abs(drawn.mean() - value) < 4.5 * drawn.std() / np.sqrt(number) + 1e-6
-
-
-@pytest.mark.parametrize("law", [ker.TriangularTeethLaw(0.7), ker.CircularArcLaw(0.3), ker.LeastResistanceLaw()])
-def test_the_fraction_is_where_the_misfit_is_least_and_its_error_holds_against_a_fine_rule(law):
+@pytest.mark.parametrize("law", [
+    ker.TriangularTeethLaw(0.7), ker.CircularArcLaw(0.3), ker.LeastResistanceLaw(),
+    0.3 * ker.lambertian() + 0.7 * ker.CircularArcLaw(1.0),
+])  # fmt: skip
+def test_averages_and_the_least_misfit_hold_against_a_fine_rule(law):
     found = spec.accommodation(law)
     angle, weight = ker.SINE.quadrature(np.linspace(0.0, np.pi, 4097), 4)
+    raised = np.sin(angle) - np.pi / 4.0
     along, across = law.apply(np.cos, angle), law.apply(np.sin, angle) - np.pi / 4.0
+    tangential = 1.0 + 3.0 * weight @ (np.cos(angle) * along)
+    normal = 1.0 - weight @ (raised * across) / (2.0 / 3.0 - np.pi**2 / 16.0)
+    for one, value in ((found.tangential, tangential), (found.normal, normal)):
+        # the rule errs at kinks
+        assert abs(one.value - value) <= one.error + 2e-5
 
     def misfit(fraction):
         rest = along + (1.0 - fraction) * np.cos(angle), across - (1.0 - fraction) * (np.sin(angle) - np.pi / 4.0)
@@ -161,29 +139,6 @@ def test_incidence_from_thirty_degrees_on_keeps_relative_accuracy_for_shallow_wa
     assert np.all(found.normal_errors < 1e-6 * np.abs(found.normal_at))
     # sigma_t is 4 E sin(slope)^2 for the leading order
     assert found.tangential_at[1:] == pytest.approx(4 * float(spec.mean_squared_slope(wall)), rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("degrees", "words"),
-    [
-        ([0, 90], "-90, 90"),
-        ([-120.0], "-90, 90"),
-        ([], "at least one angle"),
-        ([np.nan], "incidence_deg"),
-        (np.degrees(np.arccos(np.pi / 4)), "take one beside it"),
-    ],
-)
-def test_degrees_that_are_no_incidence_are_refused(degrees, words):
-    with pytest.raises(InputError, match=words) as reason:
-        spec.accommodation(ker.lambertian(), incidence_deg=degrees)
-    assert str(reason.value).startswith("incidence_deg: ")
-
-
-def test_angles_are_given_in_one_way():
-    with pytest.raises(InputError, match="either this or theta"):
-        spec.accommodation(ker.lambertian(), theta=1.0, incidence_deg=30.0)
-    with pytest.raises(InputError, match=r"^incidence_deg: expected none"):
-        spec.accommodation(ker.HemisphereLaw(ker.lambertian()), incidence_deg=30.0)
 
 
 def test_the_default_angles_are_far_from_the_poles():

@@ -6,7 +6,6 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.kernels.bases.measure import gauss_rule
 from asperity.kernels.discretisation.arcs import arc_matrix
 from asperity.kernels.expectations.angle_panels import NODES
 from asperity.spectral.bounds.images import expectations, expectations_of, suits_panels
@@ -38,17 +37,6 @@ def test_means_by_tables_are_those_by_cutting_rows_at_edges(half_angle, panels):
     # the functions are as large as their heights on narrow cells
     scale = np.abs(panels.evaluate(ANGLES)).max() * np.abs(vectors).max()
     assert np.abs(images @ vectors - means).max() < 1e-9 * scale
-
-
-def test_rows_integrated_over_theta_give_the_matrix_of_polygons(panels):
-    """A Gauss rule in theta between the breakpoints that one panel's functions have, fine enough for 1e-3."""
-    law = ker.CircularArcLaw(1.2)
-    edges = np.unique(np.concatenate([panels.edges, np.linspace(0.0, np.pi, 200)]))
-    theta, weight = gauss_rule(edges, 3)
-    images, _ = expectations(law, panels)(theta, 1e-8)
-    found = panels.evaluate(theta).T @ ((0.5 * weight * np.sin(theta))[:, None] * images)
-    exact, _ = arc_matrix(1.2, panels)
-    assert np.linalg.norm(found - exact) < 1e-3 * np.linalg.norm(exact)
 
 
 def test_rows_of_traced_walls_are_those_of_the_closed_form(panels):

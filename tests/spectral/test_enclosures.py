@@ -36,15 +36,6 @@ def test_nothing_is_indexed_below_the_essential_spectrum():
     assert found[1].label == "contains-spectrum" and found[1].index is None
 
 
-def test_neighbours_of_the_other_parity_do_not_widen_an_enclosure():
-    """Of arcs in Feres' convention the odd eigenvalues change sign; the even ones and their enclosures do not."""
-    law = ker.CircularArcLaw(0.9)
-    paper, turned = spec.enclosures(law, 3), spec.enclosures(law.in_specular_frame(), 3)
-    first, second = (next(item for item in found if item.parity == "even" and item.index) for found in (paper, turned))
-    assert first.low <= second.high and second.low <= first.high
-    assert 0.5 < first.width / second.width < 2.0
-
-
 def test_the_order_of_values_of_the_same_modulus_and_other_sign_is_not_certain():
     """(.2 - .6)/2 = -.2 and (.04 + .36)/2 = .2: which is the larger is rounding."""
     found = spec.enclosures(0.5 * ker.henyey_greenstein(0.2) + 0.5 * ker.henyey_greenstein(-0.6), 3)

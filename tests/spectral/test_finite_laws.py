@@ -195,29 +195,6 @@ def test_rays_that_show_no_transition_bound_the_gap_by_their_number():
 ARRAY = np.array([[0.75, 0.25], [0.25, 0.75]])
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: ker.KernelMatrix(ARRAY, ker.Bins(2)),
-        lambda: spec.spectral_gap(ARRAY),
-        lambda: spec.spectrum(ARRAY),
-        lambda: spec.enclosures(ARRAY),
-        lambda: spec.diffusivity(ARRAY),
-        lambda: spec.exit_times(ARRAY, [1.0, 2.0, 3.0], 10),
-        lambda: ker.distance(ARRAY, ARRAY),
-        lambda: ker.discretise(ARRAY, ker.Bins(2)),
-    ],
-)
-def test_where_an_array_stands_for_a_law_the_message_names_the_law_of_a_matrix(call):
-    with pytest.raises(InputError, match=r"ker\.MatrixLaw\(array\)") as caught:
-        call()
-    assert "0.75" not in str(caught.value)
-    # the remedy
-    law = ker.MatrixLaw(ARRAY)
-    assert spec.spectral_gap(law).value == pytest.approx(0.5, abs=1e-14) and float(ker.distance(law, law)) == 0.0
-    assert ker.KernelMatrix(ARRAY, ker.Bins(2), Estimate(0.0, 0.0, "bound", "given")).size == 2
-
-
 def test_single_precision_has_its_own_tolerance():
     array, _ = random_chain(np.random.default_rng(1), 7)
     law = ker.MatrixLaw(array.astype(np.float32))

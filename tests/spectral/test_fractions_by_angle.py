@@ -6,7 +6,6 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import InputError
 
 DEGREES = [0.0, 17.0, 30.0, -45.0, 62.5, -80.0, 89.0]
 
@@ -84,20 +83,6 @@ def test_errors_of_rays_hold_against_many_rays():
         misses += sum(abs(one.value - value) > one.error for one, value in zip(row, exact, strict=True))
         assert max(one.error for one in row) < 5e-4
     assert misses <= 3
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ((geo.flat(), 95.0), "^incidence_deg: "),
-        ((geo.flat(), []), "^incidence_deg: "),
-        ((geo.flat(), 0.0, 0), "^most: "),
-        ((ker.lambertian(), 0.0), "^wall: "),
-    ],
-)
-def test_bounces_of_what_is_no_wall_or_angle_are_refused(arguments, words):
-    with pytest.raises(InputError, match=words):
-        spec.bounce_shares(*arguments)
 
 
 def test_a_flat_wall_bounces_once():
@@ -186,21 +171,6 @@ def test_retroreflection_at_normal_incidence_is_not_counted():
     curve = geo.Bezier([(0.9, -0.1), (0.95, -0.15), (1.05, -0.1), (1.1, 0.0)])
     (found,) = spec.specular_share(ker.WallLaw(geo.Wall([*sides, curve], period=1.1)), 0.0)
     assert found.kind == "estimate" and found.value < 0.01
-
-
-@pytest.mark.parametrize(
-    "law",
-    [ker.TriangularTeethLaw(1.0) @ ker.TriangularTeethLaw(1.0), ker.LeastResistanceLaw(), TRACED_WITH_TOPS**2],
-    ids=repr,
-)
-def test_laws_of_which_the_fraction_is_not_known_are_refused(law):
-    with pytest.raises(InputError, match=r"^law: expected"):
-        spec.specular_share(law)
-
-
-def test_degrees_of_the_specular_fraction_are_checked():
-    with pytest.raises(InputError, match=r"^incidence_deg: "):
-        spec.specular_share(ker.specular(), [0.0, 90.0])
 
 
 @pytest.mark.parametrize("angle", [1.2, 2.0, 2.6])

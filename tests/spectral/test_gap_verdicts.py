@@ -83,14 +83,6 @@ def test_symbols_multiply_and_mix():
         assert abs(edge.value - expected) <= edge.error + 1e-12, law
 
 
-def test_half_ellipses_of_any_depth_have_an_edge_between_zero_and_one():
-    shallow, deep = (
-        essential_edge(ker.WallLaw(geo.Wall([geo.Arc((0.5, 0), (0.5, depth), np.pi, 2 * np.pi)])))
-        for depth in (0.3, 0.8)
-    )
-    assert 0.0 < shallow.low <= shallow.high < 1.0 and 0.0 < deep.low <= deep.high < 1.0
-
-
 def test_the_parabola_pair_sends_grazing_rays_back_and_has_no_visible_gap():
     """Its two reflections turn a grazing ray round exactly to first order, whatever its entry point."""
     gap = spec.spectral_gap(ker.WallLaw(geo.double_parabola()), tolerance=1e-6)

@@ -264,20 +264,6 @@ def test_a_saved_certificate_is_checked_without_asperity(tmp_path):
         spec.check_proof(tmp_path / "none.json")
 
 
-@pytest.mark.parametrize(
-    "law",
-    [
-        ker.WallLaw(geo.focusing_arcs(0.5)) ** 2, ker.WallLaw(geo.triangular_teeth(0.5)),
-        HG(0.5) @ ker.WallLaw(geo.dispersing_arcs(1.0)),
-        0.5 * HG(0.5) + 0.5 * HG(0.2), 0.5 * bumps(1.0) + 0.5 * HG(0.2).in_specular_frame(),
-    ],
-    ids=repr,
-)  # fmt: skip
-def test_laws_without_a_theorem_are_refused(law):
-    with pytest.raises(InputError, match="law: expected the law of"):
-        spec.prove_gap(law)
-
-
 def test_what_is_not_proved_says_so(monkeypatch):
     with pytest.raises(ProofError, match=r"between 0 and sqrt\(2\)"):
         spec.prove_gap(bumps(1.9))
