@@ -120,7 +120,8 @@ def test_an_enclosure_contains_the_value(number):
 n, even, odd = sp.Symbol("n", integer=True), sp.Symbol("k", even=True), sp.Symbol("l", odd=True)
 p, q = sp.symbols("p q", positive=True)
 t = sp.Symbol("t", real=True)
-pi, half = sp.pi, sp.Rational(1, 2)
+positive = sp.Symbol("j", odd=True, positive=True)
+pi, half, tiny = sp.pi, sp.Rational(1, 2), sp.Rational(1, 10**30)
 
 # A constant of which sympy believes the wrong sign: it is 66.80 (its issue 29850).
 s = sp.csc(sp.exp(11) + 58 * pi / 125)
@@ -161,6 +162,21 @@ PROVED = {
     "logarithms where both are defined": (sp.log(x**2), 2 * sp.log(x), []),
     "powers": (p ** (x + y), p**x * p**y, []),
     "geometric and arithmetic mean": (2 * sp.sqrt(p * q) <= p + q, None, ()),
+    "a size under a condition between symbols": (sp.Abs(rho - eps), rho - eps, [eps < rho]),
+    "a size of a product under conditions": (sp.Abs(x * y - x), x - x * y, [y > 0, y < x, x < 1]),
+    "a maximum under a condition": (sp.Max(x, y), x, [x >= y]),
+    "an even number": (sp.floor(even / 2), even / 2, []),
+    "a decimal number": (sp.Float(0.5) * x, x / 2, []),
+    "an interval shorter than floats can tell": (sp.sqrt(x**2), x, [x > 1, x < 1 + tiny]),
+    "the size of a positive integer": (sp.Abs(positive), positive, []),
+    # sympy takes s for negative, and would drop a bound or a point
+    "a bound compared by balls": (sp.Abs(x - 70), 70 - x, {x: (s, 67)}),
+    "a relation compared by balls": (sp.Abs(x - 66), x - 66, sp.Gt(x, s, evaluate=False)),
+    "assumptions as intervals": (sp.sqrt(1 - sp.cos(theta) ** 2), sp.sin(theta), {theta: (0, sp.pi)}),
+    "assumptions as one relation": (
+        sp.sqrt(1 - sp.cos(theta) ** 2), sp.sin(theta), sp.And(theta > 0, theta < sp.pi),
+    ),
+    "one assumption": (sp.sqrt(x**2), x, x > 0),
 }  # fmt: skip
 # Undecided, though true: by a derivative, cuts at zeros of sines, parity, integrals, which are refuted only.
 UNDECIDED = {
@@ -204,6 +220,12 @@ REFUTED = {
     "a shifted square above a small number": (sp.Rational(1, 10**25) <= (3 * x + 1) ** 2, [x > -3, x <= 0], ()),
     "a square above a small number": (x**2 >= sp.Rational(1, 10**25), None, ()),
     "on the diagonal": (sp.sign(x**2 - y**2) ** 2, 1, []),
+    "a size without a condition": (sp.Abs(rho - eps), rho - eps, []),
+    "a decimal that is no tenth": (sp.Float(0.1), sp.Rational(1, 10), []),
+    "a short interval": (x**2, 2 * x, [x > 1, x < 1 + tiny]),
+    "half an integer": (sp.floor(n / 2), n / 2, []),
+    "the parity of an odd number": (sp.Mod(odd, 2), 0, []),
+    "assumptions as a larger interval": (sp.sqrt(1 - sp.cos(theta) ** 2), sp.sin(theta), {theta: (0, 4)}),
     "an integral, by 1e-25": (
         sp.Integral(t * sp.sin(t), (t, 0, x)),
         sp.sin(x) - x * sp.cos(x) + sp.Rational(1, 10**25),
@@ -362,6 +384,8 @@ def test_a_counterexample_has_the_values_that_its_symbols_may_have():
     for assumptions in ([], [n > 2], [n < -3], [n > sp.Rational(1, 2), n < sp.Rational(7, 2)]):
         place = verify(sp.cos(n), sp.cos(n + x), assumptions).counterexample
         assert sp.sympify(place["n"]).is_integer
+    place = verify(p, 0, sp.Gt(p, s, evaluate=False)).counterexample
+    assert float(sp.Rational(place["p"])) > 66
 
 
 def test_the_time_limit_holds_and_the_next_question_is_answered():
@@ -468,14 +492,6 @@ def test_matrices_are_compared_entry_by_entry():
     assert verdict.answer == "refuted" and "y" in verdict.counterexample
 
 
-def test_assumptions_may_be_one_relation_or_intervals():
-    root = sp.sqrt(1 - sp.cos(theta) ** 2)
-    assert verify(root, sp.sin(theta), {theta: (0, sp.pi)}).answer == "proved"
-    assert verify(root, sp.sin(theta), sp.And(theta > 0, theta < sp.pi)).answer == "proved"
-    assert verify(root, sp.sin(theta), {theta: (0, 4)}).answer == "refuted"
-    assert verify(sp.sqrt(x**2), x, x > 0).answer == "proved"
-
-
 def test_the_symbols_of_the_disk_are_those_of_its_numbers():
     disk = geo.Disk(mass=2.0, inertia=0.7)
     point = {sym.m: 2.0, sym.J: 0.7, sym.theta: 1.1, sym.psi: 0.4}
@@ -492,42 +508,6 @@ def test_the_symbols_of_the_disk_are_those_of_its_numbers():
             np.allclose(matrix, np.array(sym.branch_matrix(sign, turn).subs(point), dtype=float))
             for sign, turn in ((1, sp.pi - 2 * sp.Rational(4, 5)), (-1, sp.Rational(4, 5)))
         )
-
-
-def test_points_have_the_properties_that_their_symbols_carry():
-    even, whole = sp.Symbol("n", even=True), sp.Symbol("n", integer=True)
-    odd = sp.Symbol("k", odd=True, positive=True)
-    assert verify(sp.floor(even / 2), even / 2).answer != "refuted"
-    assert verify(sp.floor(whole / 2), whole / 2).answer == "refuted"
-    assert verify(sp.Mod(odd, 2), 0).answer == "refuted"
-    assert verify(sp.Abs(odd), odd).answer == "proved"
-
-
-def test_intervals_may_be_shorter_than_floats_can_tell():
-    tiny = sp.Rational(1, 10**30)
-    assert verify(x**2, 2 * x, [x > 1, x < 1 + tiny]).answer == "refuted"
-    assert verify(sp.sqrt(x**2), x, [x > 1, x < 1 + tiny]).answer == "proved"
-
-
-def test_bounds_are_compared_by_balls():
-    # sympy takes s for negative, and would drop a bound or a point
-    assert verify(sp.Abs(x - 70), 70 - x, {x: (s, 67)}).answer == "proved"
-    assert verify(sp.Abs(x - 66), x - 66, sp.Gt(x, s, evaluate=False)).answer == "proved"
-    found = verify(p, 0, sp.Gt(p, s, evaluate=False))
-    assert found.answer == "refuted" and float(sp.Rational(found.counterexample["p"])) > 66
-
-
-def test_conditions_between_symbols_are_used_in_proofs():
-    lhs, rhs = sp.Abs(rho - eps), rho - eps
-    assert verify(lhs, rhs).answer == "refuted"
-    assert verify(lhs, rhs, [eps < rho]).answer == "proved"
-    assert verify(sp.Max(x, y), x, [x >= y]).answer == "proved"
-    assert verify(sp.Abs(x * y - x), x - x * y, [y > 0, y < x, x < 1]).answer == "proved"
-
-
-def test_decimal_numbers_are_the_fractions_that_they_are():
-    assert verify(sp.Float(0.5) * x, x / 2).answer == "proved"
-    assert verify(sp.Float(0.1), sp.Rational(1, 10)).answer == "refuted"
 
 
 def test_measurements_name_the_worst_place():
