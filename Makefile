@@ -57,6 +57,9 @@ bench: $(RUN) ## measure everything that is timed, tables and pictures into benc
 	mkdir -p bench-results
 	$(VENV)/bin/asperity bench --out bench-results/standard
 	$(VENV)/bin/asperity bench 'random-*' --out bench-results/random
+	$(PYTHON) -m venv bench-results/peers/environment
+	-for peer in numpy mitsuba deeptime; do \
+	    bench-results/peers/environment/bin/python -m pip install --quiet --prefer-binary --timeout 10 $$peer; done
 	$(PY) -m campaigns.speed.peers bench-results/peers | tee bench-results/peers.md
 	-$(PY) -m campaigns.speed.goals | tee bench-results/goals.md
 

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import sys
+import json
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import click
@@ -33,37 +34,20 @@ ENCLOSED = ("henyey-greenstein", "triangular", "arcs", "arcs of scatter", "wall:
 
 def digest(result: Any) -> str:
     """The first 16 digits of the sha256 of all numbers and texts in a result, in order."""
-    sha = hashlib.sha256()
-    for part in _parts(result):
-        sha.update(part)
-    return sha.hexdigest()[:16]
+    return hashlib.sha256(json.dumps(result, default=_plain).encode()).hexdigest()[:16]
 
 
-def _parts(result: Any) -> Iterator[bytes]:
-    if dataclasses.is_dataclass(result) and not isinstance(result, type):
+def _plain(part: Any) -> Any:
+    """What JSON has for the part of a result: floats by the digits that make them out, arrays as lists."""
+    if isinstance(part, np.ndarray | np.generic):
+        return part.tolist()
+    if isinstance(part, geo.Wall | complex):
+        return repr(part)
+    if dataclasses.is_dataclass(part):
         # measured times differ from run to run
-        for field in dataclasses.fields(result):
-            if field.name not in ("seconds", "machine"):
-                yield field.name.encode()
-                yield from _parts(getattr(result, field.name))
-    elif isinstance(result, np.ndarray) and result.dtype != object:
-        yield str(result.shape).encode()
-        yield np.ascontiguousarray(result).tobytes()
-    elif isinstance(result, Mapping):
-        for key, value in result.items():
-            yield str(key).encode()
-            yield from _parts(value)
-    elif isinstance(result, list | tuple):
-        for value in result:
-            yield from _parts(value)
-    elif isinstance(result, float | np.floating):
-        yield float(result).hex().encode()
-    elif isinstance(result, geo.Wall):
-        yield repr(result).encode()
-    elif result is None or isinstance(result, str | int | bool | np.generic):
-        yield str(result).encode()
-    else:
-        yield type(result).__name__.encode()
+        names = (field.name for field in dataclasses.fields(part))
+        return {name: getattr(part, name) for name in names if name not in ("seconds", "machine")}
+    return dict(part) if isinstance(part, Mapping) else type(part).__name__
 
 
 def walls() -> dict[str, geo.Wall]:
@@ -113,73 +97,49 @@ def laws() -> dict[str, ker.Law]:
 WALLS = walls()
 
 
-def _rays(wall: geo.Wall) -> Call:
-    def run() -> Any:
-        rng = np.random.default_rng(1)
-        x, theta = wall.period * rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
-        traced = geo.trace(wall, x, theta)
-        return traced.x, traced.theta, traced.collisions, traced.status
-
-    return run
+def rays(wall: geo.Wall) -> Any:
+    rng = np.random.default_rng(1)
+    x, theta = wall.period * rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
+    traced = geo.trace(wall, x, theta)
+    return traced.x, traced.theta, traced.collisions, traced.status
 
 
-def _collisions(wall: geo.Wall) -> Call:
-    def run() -> Any:
-        rng = np.random.default_rng(2)
-        velocity = rng.normal(size=(COLLISIONS, 3))
-        velocity[:, 1] = -np.abs(velocity[:, 1]) - 0.1
-        return geo.collide(geo.Disk(1.0, 0.5), wall, 1e-3, rng.random((COLLISIONS, 2)), velocity)
-
-    return run
+def collisions(wall: geo.Wall) -> Any:
+    rng = np.random.default_rng(2)
+    velocity = rng.normal(size=(COLLISIONS, 3))
+    velocity[:, 1] = -np.abs(velocity[:, 1]) - 0.1
+    return geo.collide(geo.Disk(1.0, 0.5), wall, 1e-3, rng.random((COLLISIONS, 2)), velocity)
 
 
-def _applied(law: ker.Law) -> Call:
-    theta = np.linspace(0.05, 3.09, 9)
-    return lambda: law.apply(np.cos, theta)
-
-
-def _sampled(law: ker.Law) -> Call:
-    theta = np.linspace(0.05, 3.09, 500)
-    return lambda: law.sample(theta, np.random.default_rng(3))
-
-
-def _matrix(law: ker.Law, basis: ker.Basis, method: Any) -> Call:
+def matrix(law: ker.Law, basis: ker.Basis, method: Any) -> Any:
     samples = None if method in ("auto", "exact", "quadrature") else 2**14
-
-    def run() -> Any:
-        rng = np.random.default_rng(4)
-        matrix = ker.discretise(law, basis, method, tolerance=1e-6, samples=samples, rng=rng)
-        return matrix.symmetric, matrix.method, matrix.error
-
-    return run
+    found = ker.discretise(law, basis, method, tolerance=1e-6, samples=samples, rng=np.random.default_rng(4))
+    return found.symmetric, found.method, found.error
 
 
 def calls() -> Iterator[tuple[str, Call]]:
     """Every call with its name."""
     for name, wall in WALLS.items():
-        yield f"rays: {name}", _rays(wall)
+        yield f"rays: {name}", partial(rays, wall)
     for name in ("triangular-teeth", "focusing-arcs", "double-parabola", "rectangular-teeth"):
-        yield f"collisions: {name}", _collisions(WALLS[name])
+        yield f"collisions: {name}", partial(collisions, WALLS[name])
     bases = {"legendre": ker.Legendre(8), "bins": ker.Bins(12), "panels": ker.Panels(np.linspace(0.0, np.pi, 4), 3)}
+    few, many = (np.linspace(0.05, 3.09, angles) for angles in (9, 500))
     for name, law in laws().items():
-        yield f"apply: {name}", _applied(law)
-        yield f"sample: {name}", _sampled(law)
+        yield f"apply: {name}", partial(law.apply, np.cos, few)
+        yield f"sample: {name}", partial(law.sample, many, np.random.default_rng(3))
         for label, basis in bases.items():
             for method in ("auto", "exact", "quadrature", "qmc", "monte-carlo"):
-                yield f"matrix: {name}, {label}, {method}", _matrix(law, basis, method)
-        yield f"spectrum: {name}", _spectrum(law)
-        yield f"gap: {name}", lambda law=law: spec.spectral_gap(law, tolerance=1e-4, rng=np.random.default_rng(6))
-        yield f"edge: {name}", lambda law=law: spec.essential_edge(law)
-        yield f"resistance: {name}", lambda law=law: ker.resistance(law, tolerance=1e-5)
-        yield f"distance: {name}", lambda law=law: ker.distance(law, ker.lambertian(), kind="rows", tolerance=1e-2)
+                yield f"matrix: {name}, {label}, {method}", partial(matrix, law, basis, method)
+        yield f"spectrum: {name}", partial(spec.spectrum, law, 4, tolerance=1e-4)
+        yield f"gap: {name}", partial(spec.spectral_gap, law, tolerance=1e-4, rng=np.random.default_rng(6))
+        yield f"edge: {name}", partial(spec.essential_edge, law)
+        yield f"resistance: {name}", partial(ker.resistance, law, tolerance=1e-5)
+        yield f"distance: {name}", partial(ker.distance, law, ker.lambertian(), kind="rows", tolerance=1e-2)
         if name in ENCLOSED:
-            yield f"enclosures: {name}", lambda law=law: spec.enclosures(law, 3, tolerance=1e-6)
-    yield "least resistance", lambda: ker.extremal_resistance(32)
-    yield "diffusivity", lambda: spec.diffusivity(ker.maxwell(0.5))
-
-
-def _spectrum(law: ker.Law) -> Call:
-    return lambda: spec.spectrum(law, 4, tolerance=1e-4)
+            yield f"enclosures: {name}", partial(spec.enclosures, law, 3, tolerance=1e-6)
+    yield "least resistance", partial(ker.extremal_resistance, 32)
+    yield "diffusivity", partial(spec.diffusivity, ker.maxwell(0.5))
 
 
 @click.command()
@@ -192,8 +152,7 @@ def main(only: str) -> None:
                 found = digest(call())
             except (AsperityError, TypeError) as refusal:
                 found = digest(str(refusal))
-            click.echo(f"{found}  {name}")
-            sys.stdout.flush()
+            print(f"{found}  {name}", flush=True)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,6 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType
@@ -29,7 +28,6 @@ import numpy as np
 import sympy as sp
 
 import asperity
-from asperity.core.tables import table
 from asperity.geometry.disk import disk, rolling
 from asperity.kernels.walls import circular_arc, triangular
 from asperity.ledger import Entry
@@ -40,7 +38,7 @@ from .pages import print_table
 
 ROOT = Path(asperity.__file__).parent
 # Modules with the formulas' own helpers.
-HELPERS = ("ledger",)
+HELPERS = str(ROOT / "ledger")
 # The library's formulas that rows use. Rectangular teeth are excluded: most of their code handles extreme numbers of
 # crossings, which the tests of that law cover. The class of disks is excluded because it has its own tests.
 LIBRARY = (disk, rolling, triangular, circular_arc)
@@ -60,60 +58,34 @@ SWAPPED_NAMES = {
 STEP, SYMBOLIC_STEP = 0.00123, sp.Rational(1, 8)
 # Arguments that are options, not quantities.
 SETTINGS = {"axis", "keepdims", "dtype"}
-
-
+LIBRARY_HEADS = "function | rows | changes | noticed | equivalent | unnoticed"
+HEADS = "row | kind | mutants | refuted | undefined | equivalent | accepted"
 Formula = Callable[..., Any]
 
 
-@dataclass(frozen=True)
-class Change:
-    """A function changed in one position; ``label`` contains its name and the changed line."""
-
-    label: str
-    function: FunctionType
-    code: CodeType
-
-    @contextmanager
-    def in_place(self) -> Iterator[None]:
-        """Install the changed code in the function, for all callers."""
-        kept, self.function.__code__ = self.function.__code__, self.code
-        try:
-            yield
-        finally:
-            self.function.__code__ = kept
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """A wrong formula: a change of its code, of an argument or of its result."""
-
-    label: str
-    formula: Formula
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A row's answer to a mutant of its formula: refused, undecided, raised, slow, or accepted."""
-
-    row: str
-    label: str
-    answer: str
-    evidence: str
-
-
-def changes(function: FunctionType) -> list[Change]:
-    """All versions of the function with one changed position."""
-    name, node = _parsed(function.__code__)
+def changes(function: FunctionType) -> dict[str, CodeType]:
+    """The code of the function with one changed position, by the function's name and the changed line."""
+    code = function.__code__
+    found: dict[str, CodeType] = {}
+    node = _parsed(code)
     if node is None:
-        return []
-    found: dict[str, Change] = {}
-    for changed, line in _changed(node):
-        code = _compiled(changed, function.__code__)
-        label = f"{name}: {line}"
-        if code.co_code != function.__code__.co_code or code.co_consts != function.__code__.co_consts \
-                or code.co_names != function.__code__.co_names:  # fmt: skip
-            found.setdefault(label, Change(label, function, code))
-    return list(found.values())
+        return found
+    name = "formula" if isinstance(node, ast.Lambda) else f"{Path(code.co_filename).stem}.{code.co_qualname}"
+    for line in _changed(node):
+        changed = _compiled(node, code)
+        if (changed.co_code, changed.co_consts, changed.co_names) != (code.co_code, code.co_consts, code.co_names):
+            found.setdefault(f"{name}: {line}", changed)
+    return found
+
+
+@contextmanager
+def in_place(function: FunctionType, code: CodeType) -> Iterator[None]:
+    """Install the changed code in the function, for all callers."""
+    kept, function.__code__ = function.__code__, code
+    try:
+        yield
+    finally:
+        function.__code__ = kept
 
 
 @cache
@@ -121,19 +93,18 @@ def _tree(filename: str) -> ast.Module:
     return ast.parse(Path(filename).read_text(encoding="utf-8"))
 
 
-def _parsed(code: CodeType) -> tuple[str, ast.FunctionDef | ast.Lambda | None]:
-    """The name and the syntax tree of a code object."""
-    path = Path(code.co_filename)
+def _parsed(code: CodeType) -> ast.FunctionDef | ast.Lambda | None:
+    """The syntax tree of a code object: the function of its name and first line, the lambda around its position."""
     for node in ast.walk(_tree(code.co_filename)):
         if isinstance(node, ast.FunctionDef) and node.name == code.co_name:
-            if min([node.lineno, *(d.lineno for d in node.decorator_list)]) == code.co_firstlineno:
-                return f"{path.stem}.{code.co_qualname}", node
+            if (node.decorator_list or [node])[0].lineno == code.co_firstlineno:
+                return node
         elif isinstance(node, ast.Lambda) and code.co_name == "<lambda>" and node.lineno == code.co_firstlineno:
-            places = [(line, column) for line, _, column, _ in code.co_positions() if line and column]
-            ends = node.body.end_lineno, node.body.end_col_offset
-            if places and (node.body.lineno, node.body.col_offset) <= min(places) and max(places) <= ends:
-                return "formula", node
-    return "", None
+            first = min((line, column) for line, _, column, _ in code.co_positions() if line and column)
+            body = node.body
+            if (body.lineno, body.col_offset) <= first <= (body.end_lineno, body.end_col_offset):
+                return node
+    return None
 
 
 def _compiled(node: ast.FunctionDef | ast.Lambda, like: CodeType) -> CodeType:
@@ -150,23 +121,19 @@ def _compiled(node: ast.FunctionDef | ast.Lambda, like: CodeType) -> CodeType:
     )
     module = ast.fix_missing_locations(ast.Module([outer], []))
     made = compile(module, like.co_filename, "exec").co_consts[0]
-    name = "<lambda>" if isinstance(node, ast.Lambda) else node.name
-    return next(c for c in made.co_consts if isinstance(c, CodeType) and c.co_name == name)
+    return next(c for c in made.co_consts if isinstance(c, CodeType) and c.co_name == like.co_name)
 
 
-def _changed(node: ast.FunctionDef | ast.Lambda) -> Iterator[tuple[Any, str]]:
-    """Copies of the function with one changed position, each with the changed line."""
-    for number, (line, field) in enumerate(_lines(node)):
-        start: Steps = ((field, None),)
-        for path in _places(_at(line, start), start):
-            for new in _replacements(_at(line, path)):
-                whole = copy.deepcopy(node)
-                target = _lines(whole)[number][0]
-                _put(target, path, new)
-                yield (
-                    whole,
-                    ast.unparse(target if isinstance(target, ast.stmt) and field == "value" else _at(target, start)),
-                )
+def _changed(node: ast.FunctionDef | ast.Lambda) -> Iterator[str]:
+    """Change one position of the tree at a time and yield the changed line; then the change is undone."""
+    for line, field in _lines(node):
+        whole = isinstance(line, ast.stmt) and field == "value"
+        for entries, key in list(_places(vars(line), field)):
+            original = entries[key]
+            for new in _replacements(original):
+                entries[key] = new
+                yield ast.unparse(line if whole else getattr(line, field))
+                entries[key] = original
 
 
 def _lines(node: ast.FunctionDef | ast.Lambda) -> list[tuple[ast.AST, str]]:
@@ -182,37 +149,17 @@ def _lines(node: ast.FunctionDef | ast.Lambda) -> list[tuple[ast.AST, str]]:
     return found
 
 
-Steps = tuple[tuple[str, int | None], ...]
-
-
-def _places(node: ast.AST, path: Steps) -> Iterator[Steps]:
-    yield path
-    for name, value in ast.iter_fields(node):
-        if isinstance(node, ast.Subscript) and name == "slice":
-            continue
-        if isinstance(node, ast.keyword) and node.arg in SETTINGS:
-            continue
-        if isinstance(value, ast.AST):
-            yield from _places(value, (*path, (name, None)))
-        elif isinstance(value, list):
-            for index, part in enumerate(value):
-                if isinstance(part, ast.AST):
-                    yield from _places(part, (*path, (name, index)))
-
-
-def _at(node: Any, path: Steps) -> Any:
-    for name, index in path:
-        node = getattr(node, name) if index is None else getattr(node, name)[index]
-    return node
-
-
-def _put(node: Any, path: Steps, new: ast.AST) -> None:
-    name, index = path[-1]
-    owner = _at(node, path[:-1])
-    if index is None:
-        setattr(owner, name, new)
-    else:
-        getattr(owner, name)[index] = new
+def _places(entries: Any, key: Any) -> Iterator[tuple[Any, Any]]:
+    """The nodes from an entry of a list or of a node's fields on, each as such an entry; no subscripts, no options."""
+    node = entries[key]
+    if isinstance(node, list):
+        for index in range(len(node)):
+            yield from _places(node, index)
+    elif isinstance(node, ast.AST) and not (isinstance(node, ast.keyword) and node.arg in SETTINGS):
+        yield entries, key
+        for name in node._fields:
+            if not (isinstance(node, ast.Subscript) and name == "slice"):
+                yield from _places(vars(node), name)
 
 
 def _replacements(node: ast.AST) -> Iterator[ast.AST]:
@@ -234,21 +181,31 @@ def _replacements(node: ast.AST) -> Iterator[ast.AST]:
         yield other()
 
 
-def mutants_of(entry: Entry) -> list[Mutant]:
-    """Every mutant of a row's right formula, of its helpers, its arguments and its result."""
+@contextmanager
+def _calls() -> Iterator[dict[CodeType, None]]:
+    """The code that runs inside the context, in the order of its first calls."""
+    called: dict[CodeType, None] = {}
+
+    def profile(frame: FrameType, event: str, _: Any) -> None:
+        if event == "call":
+            called.setdefault(frame.f_code)
+
+    sys.setprofile(profile)
+    try:
+        yield called
+    finally:
+        sys.setprofile(None)
+
+
+def mutants_of(entry: Entry) -> dict[str, Formula]:
+    """Every change of a row's right formula, of its helpers, its arguments and its result, which only it sees."""
     called: dict[CodeType, None] = {}
     calls: list[tuple[tuple[Any, ...], Any]] = []
 
-    def profile(frame: FrameType, event: str, _: Any) -> None:
-        if event == "call" and _written_in(HELPERS, frame.f_code):
-            called.setdefault(frame.f_code)
-
     def watched(*args: Any) -> Any:
-        sys.setprofile(profile)
-        try:
+        with _calls() as codes:
             result = formula(*args)
-        finally:
-            sys.setprofile(None)
+        called.update({code: None for code in codes if code.co_filename.startswith(HELPERS)})
         calls.append((args, result))
         return result
 
@@ -260,92 +217,82 @@ def mutants_of(entry: Entry) -> list[Mutant]:
     owners = [owner for owner in gc.get_referrers(*called) if isinstance(owner, FunctionType)]
     for code in called:
         functions.update({id(owner): owner for owner in owners if owner.__code__ is code})
-    found = [
-        Mutant(change.label, _within(formula, change))
+    found = {
+        label: _within(formula, function, code)
         for function in functions.values()
-        for change in changes(function)
-    ]
+        for label, code in changes(function).items()
+    }
     args, result = calls[0]
     for index, argument in enumerate(args):
-        if _shifted(argument) is not None and _reads(formula, index):
-            found.append(Mutant(f"argument {index + 1} moved", _with_argument(formula, index)))
-    for name, turn in (("moved", _shifted), ("negated", _negated)):
-        if turn(result) is not None:
-            found.append(Mutant(f"result {name}", _with_result(formula, turn)))
-        if isinstance(result, list | tuple):
-            for index, part in enumerate(result):
-                if turn(part) is not None and not _is_zero(turn(part)):
-                    found.append(Mutant(f"result {index + 1} {name}", _with_part(formula, index, turn)))
+        if _turned(argument) is not None and _reads(formula, index):
+            found[f"argument {index + 1} moved"] = _with_argument(formula, index)
+    for name, negate in (("moved", False), ("negated", True)):
+        if _turned(result, negate) is not None:
+            found[f"result {name}"] = _with_result(formula, negate)
+        for index, part in enumerate(result if isinstance(result, list | tuple) else ()):
+            turned = _turned(part, negate)
+            if turned is not None and not _is_zero(turned):
+                found[f"result {index + 1} {name}"] = _with_part(formula, index, negate)
     return found
 
 
 def _reads(formula: Formula, index: int) -> bool:
     """Whether a formula uses an argument at all."""
-    if not isinstance(formula, FunctionType):
+    node = _parsed(formula.__code__) if isinstance(formula, FunctionType) else None
+    if node is None:
         return True
     name = formula.__code__.co_varnames[index]
-    node = _parsed(formula.__code__)[1]
-    return node is None or any(isinstance(part, ast.Name) and part.id == name for part in ast.walk(node))
+    return any(isinstance(part, ast.Name) and part.id == name for part in ast.walk(node))
 
 
 def _is_zero(value: Any) -> bool:
     return isinstance(value, int | sp.Integer) and not isinstance(value, bool) and value == 0
 
 
-def _written_in(places: tuple[str, ...], code: CodeType) -> bool:
-    return code.co_filename.startswith(tuple(str(ROOT / part) for part in places))
-
-
-def _within(formula: Formula, change: Change) -> Formula:
-    """The formula as the only function that sees the change."""
+def _within(formula: Formula, function: FunctionType, code: CodeType) -> Formula:
+    """The formula as the only one that sees the changed code of a function."""
 
     def changed(*args: Any) -> Any:
-        with change.in_place():
+        with in_place(function, code):
             return formula(*args)
 
     return changed
 
 
 def _with_argument(formula: Formula, index: int) -> Formula:
-    return lambda *args: formula(*args[:index], _shifted(args[index]), *args[index + 1 :])
+    return lambda *args: formula(*args[:index], _turned(args[index]), *args[index + 1 :])
 
 
-def _with_result(formula: Formula, turn: Formula) -> Formula:
-    return lambda *args: turn(formula(*args))
+def _with_result(formula: Formula, negate: bool) -> Formula:
+    return lambda *args: _turned(formula(*args), negate)
 
 
-def _with_part(formula: Formula, index: int, turn: Formula) -> Formula:
+def _with_part(formula: Formula, index: int, negate: bool) -> Formula:
     def changed(*args: Any) -> Any:
-        parts = list(formula(*args))
-        parts[index] = turn(parts[index])
-        return type(formula(*args))(parts)
+        result = formula(*args)
+        parts = list(result)
+        parts[index] = _turned(parts[index], negate)
+        return type(result)(parts)
 
     return changed
 
 
-def _shifted(value: Any) -> Any:
-    """The value shifted by STEP, integers by 1, conditions set to always hold; None if it is not a number."""
+def _turned(value: Any, negate: bool = False) -> Any:
+    """The value moved by STEP, an integer by 1, a condition that always holds; or its negative, a condition that never
+    holds; None if it is not a number."""
     if isinstance(value, list | tuple):
-        parts = [_shifted(part) for part in value]
+        parts = [_turned(part, negate) for part in value]
         return None if any(part is None for part in parts) else type(value)(parts)
     if isinstance(value, sp.MatrixBase):
-        return value.applyfunc(lambda part: part + SYMBOLIC_STEP)
+        return -value if negate else value.applyfunc(lambda part: part + SYMBOLIC_STEP)
     if isinstance(value, sp.Expr):
-        return value + (1 if value.is_Integer else SYMBOLIC_STEP)
+        return -value if negate else value + (1 if value.is_Integer else SYMBOLIC_STEP)
     if not isinstance(value, bool | int | float | np.generic | np.ndarray):
         return None
     kind = np.asarray(value).dtype.kind
-    return np.ones_like(value) if kind == "b" else value + 1 if kind in "iu" else value + STEP
-
-
-def _negated(value: Any) -> Any:
-    """The value with the opposite sign, conditions set to never hold; None if it is not a number."""
-    if isinstance(value, list | tuple):
-        parts = [_negated(part) for part in value]
-        return None if any(part is None for part in parts) else type(value)(parts)
-    if isinstance(value, bool) or (isinstance(value, np.ndarray | np.generic) and np.asarray(value).dtype.kind == "b"):
-        return np.zeros_like(value)
-    return -value if isinstance(value, sp.MatrixBase | sp.Expr | int | float | np.generic | np.ndarray) else None
+    if kind == "b":
+        return np.full_like(value, not negate)
+    return -value if negate else value + (1 if kind in "iu" else STEP)
 
 
 class TooSlow(Exception):
@@ -366,110 +313,86 @@ def _at_most(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGVTALRM, before)
 
 
-def judged(entry: Entry, mutant: Mutant) -> Outcome:
-    """The result of a row's check for a mutant that only its formula sees."""
+def judged(entry: Entry, formula: Formula) -> str:
+    """The answer of a row's check to a formula: accepted, refuted, undecided, raised or slow."""
     assert entry.check is not None
-    expected = "proved" if entry.kind == "symbolic" else "agrees"
     try:
         with _at_most(SECONDS), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            found = entry.check(mutant.formula)
+            answer: str = entry.check(formula).answer
     except TooSlow:
-        return Outcome(entry.id, mutant.label, "slow", "")
-    except Exception as error:
-        return Outcome(entry.id, mutant.label, "raised", repr(error))
-    answer = "accepted" if found.answer == expected else found.answer
-    return Outcome(entry.id, mutant.label, answer, str(found))
+        return "slow"
+    except Exception:
+        return "raised"
+    return "accepted" if answer == ("proved" if entry.kind == "symbolic" else "agrees") else answer
 
 
-def outcomes_of(entry: Entry) -> list[Outcome]:
-    """The results of a row's check for all mutants."""
-    return [judged(entry, mutant) for mutant in mutants_of(entry)]
-
-
-@dataclass(frozen=True)
-class LibraryFunction:
-    """A formula of the library, and the rows whose checks or formulas call it."""
-
-    name: str
-    function: FunctionType
-    rows: tuple[Entry, ...]
-
-
-def library(entries: list[Entry]) -> list[LibraryFunction]:
-    """Every function of the library's formulas, with the rows that call it."""
-    functions: dict[str, FunctionType] = {}
+def library(entries: list[Entry]) -> dict[FunctionType, list[Entry]]:
+    """Every function of the library's formulas, with the rows whose checks or formulas call it."""
+    found: dict[CodeType, FunctionType] = {}
     for module in LIBRARY:
-        for owner in (
-            module,
-            *(value for value in vars(module).values() if isinstance(value, type) and value is not disk.Disk),
-        ):
-            for function in vars(owner).values():
-                here = isinstance(function, FunctionType) and function.__code__.co_filename == module.__file__
-                # the code of a function that calls super() cannot be exchanged
-                if here and not function.__closure__ and function.__name__ != "__post_init__":
-                    functions[f"{module.__name__.rpartition('.')[2]}.{function.__qualname__}"] = function
-    callers: dict[str, list[Entry]] = {name: [] for name in functions}
+        classes = (value for value in vars(module).values() if isinstance(value, type) and value is not disk.Disk)
+        for function in (value for owner in (module, *classes) for value in vars(owner).values()):
+            here = isinstance(function, FunctionType) and function.__code__.co_filename == module.__file__
+            # the code of a function that calls super() cannot be exchanged
+            if here and not function.__closure__ and function.__name__ != "__post_init__":
+                found[function.__code__] = function
+    callers: dict[FunctionType, list[Entry]] = {function: [] for function in found.values()}
     for entry in entries:
-        assert entry.check is not None and entry.right is not None
-        with _watched(functions) as called:
+        assert entry.check is not None
+        with _calls() as called:
             entry.check(entry.right)
-        for name in called:
-            callers[name].append(entry)
-    return [LibraryFunction(name, function, tuple(callers[name])) for name, function in functions.items()]
+        for code in called:
+            if code in found:
+                callers[found[code]].append(entry)
+    return callers
 
 
-@contextmanager
-def _watched(functions: dict[str, FunctionType]) -> Iterator[set[str]]:
-    """The names of the functions called inside the context, by any caller."""
-    called: set[str] = set()
-    kept = {name: function.__code__ for name, function in functions.items()}
-    originals = {name: FunctionType(f.__code__, f.__globals__, name, f.__defaults__) for name, f in functions.items()}
-
-    def noted(name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        called.add(name)
-        return originals[name](*args, **kwargs)
-
-    for name, function in functions.items():
-        function.__globals__["_noted"] = noted
-        source = f"lambda *args, **kwargs: _noted({name!r}, args, kwargs)"
-        function.__code__ = compile(source, "<watched>", "eval").co_consts[0]
-    try:
-        yield called
-    finally:
-        for name, function in functions.items():
-            function.__code__ = kept[name]
-            function.__globals__.pop("_noted", None)
-
-
-def noticed(function: LibraryFunction, change: Change) -> str | None:
+def noticed(function: FunctionType, code: CodeType, rows: list[Entry]) -> str | None:
     """The first row whose status fails with the changed function, None if all rows hold."""
-    for entry in function.rows:
-        with change.in_place():
-            outcome = judged(entry, Mutant(change.label, entry.right))
-        if outcome.answer != "accepted":
-            return entry.id
+    for entry in rows:
+        assert entry.right is not None
+        with in_place(function, code):
+            if judged(entry, entry.right) != "accepted":
+                return entry.id
     return None
 
 
-def table_of(outcomes: list[Outcome], rows: list[Entry]) -> str:
-    """One line for each row: its mutants, how many were refused, undecided or raised, and the accepted ones."""
-    lines: list[tuple[object, ...]] = []
-    totals = [0] * 5
+def answers(rows: list[Entry], left: list[str]) -> Iterator[tuple[object, ...]]:
+    """A line for each row: its mutants by the answers; those that are accepted without a reason go to ``left``."""
+    total = Counter[str]()
     for entry in rows:
-        mine = [outcome for outcome in outcomes if outcome.row == entry.id]
-        equal = [outcome for outcome in mine if (outcome.row, outcome.label) in EQUIVALENT]
-        answers = Counter(outcome.answer for outcome in mine if outcome not in equal)
-        undefined = answers["raised"] + answers["undecided"]
-        counts = [len(mine), answers["refuted"], undefined, len(equal)]
-        counts.append(len(mine) - sum(counts[1:]))
-        totals = [total + count for total, count in zip(totals, counts, strict=True)]
-        lines.append((entry.id, entry.kind, *counts))
-    return table("row | kind | mutants | refuted | undefined | equivalent | accepted", [*lines, ("all", "", *totals)])
+        found = Counter[str]()
+        for label, formula in mutants_of(entry).items():
+            answer = "equivalent" if (entry.id, label) in EQUIVALENT else judged(entry, formula)
+            found[answer] += 1
+            if answer in ("accepted", "slow"):
+                left.append(f"{entry.id} {answer}: {label}")
+        total += found
+        yield entry.id, entry.kind, *_counts(found)
+    yield "all", "", *_counts(total)
+
+
+def _counts(found: Counter[str]) -> tuple[int, ...]:
+    undefined, accepted = found["raised"] + found["undecided"], found["accepted"] + found["slow"]
+    return found.total(), found["refuted"], undefined, found["equivalent"], accepted
+
+
+def library_answers(rows: list[Entry], left: list[str]) -> Iterator[tuple[object, ...]]:
+    """A line for each function of the library that a row calls; changes without notice or reason go to ``left``."""
+    for function, callers in library(rows).items():
+        if callers:
+            changed = changes(function)
+            unnoticed = [label for label, code in changed.items() if noticed(function, code, callers) is None]
+            worse = [label for label in unnoticed if label not in EQUIVALENT_IN_THE_LIBRARY]
+            left += [f"unnoticed: {label}" for label in worse]
+            seen, equal = len(changed) - len(unnoticed), len(unnoticed) - len(worse)
+            name = f"`{function.__module__.rpartition('.')[2]}.{function.__qualname__}`"
+            yield name, len(callers), len(changed), seen, equal, len(worse)
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Print the tables; return 1 if a check accepts a wrong formula or no row notices a wrong library."""
+    """Print the table; return 1 if a check accepts a wrong formula or no row notices a wrong library."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("ids", nargs="*", help="rows, by the beginning of their ids")
     parser.add_argument("--library", action="store_true", help="change the library's formulas for the whole ledger")
@@ -477,32 +400,13 @@ def main(argv: list[str] | None = None) -> int:
     if arguments.library and arguments.ids:
         parser.error("--library asks all rows")
     rows = [entry for entry in ledger.selected(arguments.ids) if entry.check is not None]
-    if arguments.library:
-        return _print_library(rows)
-    outcomes = [outcome for entry in rows for outcome in outcomes_of(entry)]
-    print(table_of(outcomes, rows))
-    left = [o for o in outcomes if o.answer in ("accepted", "slow") and (o.row, o.label) not in EQUIVALENT]
-    for outcome in left:
-        print(f"\n{outcome.row} {outcome.answer}: {outcome.label}")
-    return int(bool(left))
-
-
-def _print_library(rows: list[Entry]) -> int:
     left: list[str] = []
-
-    def counts(function: LibraryFunction) -> tuple[object, ...]:
-        all_changes = changes(function.function)
-        unnoticed = [change.label for change in all_changes if noticed(function, change) is None]
-        worse = [label for label in unnoticed if label not in EQUIVALENT_IN_THE_LIBRARY]
-        left.extend(worse)
-        found = len(all_changes) - len(unnoticed)
-        equal = len(unnoticed) - len(worse)
-        return f"`{function.name}`", len(function.rows), len(all_changes), found, equal, len(worse)
-
-    asked = (counts(function) for function in library(rows) if function.rows)
-    print_table("function | rows | changes | noticed | equivalent | unnoticed", asked)
-    for label in left:
-        print(f"\nunnoticed: {label}")
+    if arguments.library:
+        print_table(LIBRARY_HEADS, library_answers(rows, left))
+    else:
+        print_table(HEADS, answers(rows, left))
+    for line in left:
+        print(f"\n{line}")
     return int(bool(left))
 
 

@@ -1,8 +1,10 @@
-"""The command line, and fresh interpreters that import the same asperity as the tests."""
+"""The command line, fresh interpreters that import the same asperity as the tests, and what checkpoints hold."""
 
 import os
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 from click.testing import CliRunner, Result
@@ -35,3 +37,9 @@ def ended(*words: str, env: dict[str, str] | None = None, **options: object) -> 
     """The same when it has ended, with what it printed."""
     asked = [sys.executable, *words]
     return subprocess.run(asked, env=env or environment(), capture_output=True, text=True, timeout=600, **options)
+
+
+def parts_in(path: Path) -> list[tuple]:
+    """The parts of a checkpoint, read as any other program would: key, value and the type of the value."""
+    with closing(sqlite3.connect(path)) as file:
+        return file.execute("SELECT key, value, typeof(value) FROM parts").fetchall()

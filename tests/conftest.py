@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -12,10 +12,11 @@ from asperity import kernels as ker
 from asperity.kernels.laws.law import DrivenLaw
 from wall_shapes import CLOSED, OPEN
 
-# ---- walls -------------------------------------------------------------------------------------------------------
+# Made once, by what makes it.
 made = cache(lambda make: make())
 
 
+# ---- walls -------------------------------------------------------------------------------------------------------
 @pytest.fixture(params=CLOSED | OPEN)
 def wall(request):
     """Each wall by its name."""
@@ -29,33 +30,6 @@ def closed_wall(request):
 
 
 # ---- laws, bases and matrices --------------------------------------------------------------------------------------
-# What is made of the library is made inside functions: a fault that the mutants write into it must fail in tests.
-def halves_exchanged(theta: np.ndarray) -> np.ndarray:
-    """Exchanges the two halves of (0, pi), keeping the orientation of u = -cos(theta)."""
-    u = -np.cos(theta)
-    return np.arccos(-np.where(u < 0.0, u + 1.0, u - 1.0))
-
-
-def tilted(theta: np.ndarray, out: np.ndarray) -> np.ndarray:
-    """A density that preserves sin(theta) d theta and is neither reversible nor mirror symmetric."""
-    return (1.0 + 0.5 * np.cos(theta) * (1.5 * np.cos(out) ** 2 - 0.5)) * ker.SINE.density(out)
-
-
-def cycle() -> ker.Law:
-    """It preserves the measure, in three equal bins, and is not reversible."""
-    return ker.MatrixLaw([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-
-
-def lopsided() -> ker.Law:
-    """It is reversible and has no mirror symmetry."""
-    return ker.MatrixLaw([[0.5, 0.5, 0.0], [0.5, 0.25, 0.25], [0.0, 0.25, 0.75]])
-
-
-def teeth() -> ker.Law:
-    """Triangular teeth."""
-    return ker.TriangularTeethLaw(0.7)
-
-
 @cache
 def bounced_law() -> type[DrivenLaw]:
     """A class of triangular teeth, known only by their rays."""
@@ -72,45 +46,62 @@ def bounced_law() -> type[DrivenLaw]:
     return Bounce
 
 
+def halves_exchanged(theta: np.ndarray) -> np.ndarray:
+    """Exchanges the two halves of (0, pi), keeping the orientation of u = -cos(theta)."""
+    u = -np.cos(theta)
+    return np.arccos(-np.where(u < 0.0, u + 1.0, u - 1.0))
+
+
+def tilted(theta: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """A density that preserves sin(theta) d theta and is neither reversible nor mirror symmetric."""
+    return (1.0 + 0.5 * np.cos(theta) * (1.5 * np.cos(out) ** 2 - 0.5)) * ker.SINE.density(out)
+
+
+# What is made of the library is made inside functions: a fault that the mutants write into it must fail in tests.
+# Cycles of three equal bins preserve the measure, but are not reversible; the other matrix is, but has no symmetry.
+CYCLE = partial(ker.MatrixLaw, [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+LOPSIDED = partial(ker.MatrixLaw, [[0.5, 0.5, 0.0], [0.5, 0.25, 0.25], [0.0, 0.25, 0.75]])
+TEETH, CREVICES = partial(ker.TriangularTeethLaw, 0.7), partial(ker.RectangularTeethLaw, 0.8)
+ARCS = partial(ker.CircularArcLaw, 1.2)
 # Every law of the library, alone and in sums, products, powers and the other frame.
 LAWS: dict[str, Callable[[], ker.Law]] = {
-    "specular": lambda: ker.specular(),
-    "retroreflection": lambda: ker.retroreflection(),
-    "lambertian": lambda: ker.lambertian(),
+    "specular": ker.specular,
+    "retroreflection": ker.retroreflection,
+    "lambertian": ker.lambertian,
     "maxwell": lambda: ker.maxwell(0.3),
     "scattering": lambda: ker.henyey_greenstein(0.6),
     "scattering back": lambda: ker.henyey_greenstein(-0.7),
     "density": lambda: ker.DensityLaw(lambda a, b: (1.0 + 0.5 * np.cos(a) * np.cos(b)) * ker.SINE.density(b)),
     "tilted density": lambda: ker.DensityLaw(tilted),
-    "triangles": teeth,
+    "triangles": TEETH,
     "narrow triangles": lambda: ker.TriangularTeethLaw(0.02),
     "blunt triangles": lambda: ker.TriangularTeethLaw(2.0),
     "flat triangles": lambda: ker.TriangularTeethLaw(np.pi - 1e-4),
-    "rectangles": lambda: ker.RectangularTeethLaw(0.8),
+    "rectangles": CREVICES,
     "shallow rectangles": lambda: ker.RectangularTeethLaw(1e-6),
     "deep rectangles": lambda: ker.RectangularTeethLaw(2.5),
-    "arcs": lambda: ker.CircularArcLaw(1.2),
+    "arcs": ARCS,
     "shallow arcs": lambda: ker.CircularArcLaw(0.02),
     "semicircles": lambda: ker.CircularArcLaw(0.5 * np.pi),
-    "least resistance": lambda: ker.LeastResistanceLaw(),
+    "least resistance": ker.LeastResistanceLaw,
     "involution": lambda: ker.InvolutionLaw(halves_exchanged),
     "exchange": lambda: ker.IntervalExchangeLaw(ker.discretise(ker.lambertian(), ker.Bins(3))),
-    "cycle": cycle,
-    "lopsided matrix": lopsided,
+    "cycle": CYCLE,
+    "lopsided matrix": LOPSIDED,
     "polygon": lambda: ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.5), (1, 0)])),
     "wall in closed form": lambda: ker.WallLaw(geo.triangular_teeth(0.7)),
     "traced wall": lambda: ker.WallLaw(geo.dispersing_arcs(1.0)),
     "rays alone": lambda: bounced_law()(),
     "rays and their mirror images": lambda: bounced_law()(mirror_symmetric=True),
     "mushrooms": lambda: ker.MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 3)),
-    "sum": lambda: 0.2 * ker.specular() + 0.5 * teeth() + 0.3 * ker.lambertian(),
-    "sum of isometries": lambda: 0.4 * teeth() + 0.6 * ker.specular() @ teeth(),
-    "product": lambda: teeth() @ ker.henyey_greenstein(0.7),
-    "product of isometries": lambda: ker.TriangularTeethLaw(2.0 * np.pi / 7.0) @ ker.RectangularTeethLaw(0.8),
-    "product of matrices": lambda: cycle() @ lopsided(),
-    "power": lambda: ker.RectangularTeethLaw(0.8) ** 4,
-    "other frame": lambda: ker.CircularArcLaw(1.2).in_specular_frame(),
-    "product in the other frame": lambda: (teeth() @ teeth()).in_specular_frame(),
+    "sum": lambda: 0.2 * ker.specular() + 0.5 * TEETH() + 0.3 * ker.lambertian(),
+    "sum of isometries": lambda: 0.4 * TEETH() + 0.6 * ker.specular() @ TEETH(),
+    "product": lambda: TEETH() @ ker.henyey_greenstein(0.7),
+    "product of isometries": lambda: ker.TriangularTeethLaw(2.0 * np.pi / 7.0) @ CREVICES(),
+    "product of matrices": lambda: CYCLE() @ LOPSIDED(),
+    "power": lambda: CREVICES() ** 4,
+    "other frame": lambda: ARCS().in_specular_frame(),
+    "product in the other frame": lambda: (TEETH() @ TEETH()).in_specular_frame(),
 }
 # A basis of every kind, with and without the mirror symmetry.
 BASES: dict[str, Callable[[], ker.Basis]] = {
@@ -121,7 +112,7 @@ BASES: dict[str, Callable[[], ker.Basis]] = {
 }
 # Laws that polynomials diagonalise, and the eigenvalue that belongs to that of each degree l > 0.
 DIAGONAL: dict[str, tuple[Callable[[], ker.Law], Callable]] = {
-    "lambertian": (lambda: ker.lambertian(), lambda degree: 0.0 * degree),
+    "lambertian": (ker.lambertian, lambda degree: 0.0 * degree),
     "maxwell": (lambda: ker.maxwell(0.3), lambda degree: 0.7 * (-1.0) ** degree),
     "maxwell in the other frame": (lambda: ker.maxwell(0.3).in_specular_frame(), lambda degree: 0.7 + 0.0 * degree),
     "scattering back": (lambda: ker.henyey_greenstein(-0.7), lambda degree: (-0.7) ** degree),

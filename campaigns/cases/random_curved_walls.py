@@ -14,7 +14,7 @@ from asperity.geometry import Arc, Bezier, Segment
 COUNT = 24
 
 
-def _arc(start, end, sagitta, stretch=1.0):
+def arc_over(start, end, sagitta, stretch=1.0):
     """The arc from start to end whose height over the chord is ``sagitta`` chords, to the right of the way (wall
     side) if positive, as seen after y was divided by ``stretch``."""
     (x0, y0), (x1, y1) = start, end
@@ -68,10 +68,10 @@ def _attempt(kind, rng):
     for place, (start, end) in enumerate(pairwise(joints)):
         what = (kind + place) % 4 if place == 0 else int(rng.integers(0, 4))
         if what == 0:
-            pieces.append(_arc(start, end, float(rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.35))))
+            pieces.append(arc_over(start, end, float(rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.35))))
         elif what == 1:
             stretch = float(rng.uniform(0.6, 1.7))
-            pieces.append(_arc(start, end, float(rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3)), stretch))
+            pieces.append(arc_over(start, end, float(rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3)), stretch))
         elif what == 2:
             pieces.append(_bezier(start, end, rng))
         else:

@@ -16,7 +16,7 @@ from asperity import kernels as ker
 from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import traced_matrix
-from asperity.kernels.walls.conditionals import adaptive_conditionals
+from asperity.kernels.walls.conditionals import WallConditionals
 from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
 from campaigns.engine import Campaign, Judged
 from campaigns.judges.reference_rows import references
@@ -50,7 +50,8 @@ def judge_curved(entry: Reference) -> Iterator[Judged]:
 
 def expectations(entry: Reference, tolerance: float) -> Iterator[Judged]:
     """E[cos theta'] for some incoming angles."""
-    found = adaptive_conditionals(random_curved_wall(entry["kind"]), entry["angles"], tolerance)
+    conditionals = WallConditionals(random_curved_wall(entry["kind"]), 1, np.empty(0))
+    found, _ = conditionals(np.array(entry["angles"]), tolerance)
     away = np.abs(found.mean(np.cos) - [float.fromhex(value) for value in entry["rows"]])
     for error, true, judge_error in zip(found.error, away, entry["row_errors"], strict=True):
         yield Judged(f"expectation to {tolerance:.0e}", float(error), float(true), judge_error)

@@ -1,84 +1,48 @@
 """Whether the reported errors of the transmission of channels hold, against flights with formulas of their own.
 
-The judge starts particles in the opening and reflects them in circles, crevices or by the cosine law.
+The judge starts particles in the opening and reflects them by the textbook tracer, or by the cosine law.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
+from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.checks import Floats
 from campaigns.engine import Campaign, Judged
+from campaigns.judges.textbook_tracer import outgoing_angles
 
 PARTICLES, TOGETHER, TOLERANCE = 2**23, 2**18, 5e-3
 # Standard deviations of the judge: with two, it alone would refute one in twenty exact numbers.
 SIGMAS = 3.5
-# From the components along and across the channel of arriving particles to those of the reflected ones.
-Reflect: TypeAlias = Callable[[Floats, Floats, np.random.Generator], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True)
 class Case:
-    """A law with its reflections, and a length."""
+    """A law, its wall or None if it is smooth, the fraction of diffuse reflections, and a length."""
 
     number: int
     kind: str
     law: ker.Law
-    reflect: Reflect
+    wall: geo.Wall | None
+    diffuse: float
     length: float
 
-
-def in_arcs(half_angle: float) -> Reflect:
-    """Reflections in circular arcs of this half angle on chords of length 1."""
-    radius, height = 0.5 / np.sin(half_angle), 0.5 / np.tan(half_angle)
-
-    def reflect(along: Floats, across: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        x, y, u, v = rng.random(along.size) - 0.5, np.full(along.size, -height), along.copy(), -across
-        inside = np.arange(along.size)
-        while inside.size:
-            a, b, c, d = x[inside], y[inside], u[inside], v[inside]
-            slope = a * c + b * d
-            time = -slope + np.sqrt(np.maximum(slope**2 - a * a - b * b + radius**2, 0.0))
-            a, b = a + time * c, b + time * d
-            stays = b < -height
-            inside, a, b, c, d = (some[stays] for some in (inside, a, b, c, d))
-            # back to the circle, and speed 1: else rounding grows along short chords
-            size = radius / np.hypot(a, b)
-            a, b = size * a, size * b
-            normal = 2.0 * (a * c + b * d) / radius**2
-            c, d = c - normal * a, d - normal * b
-            speed = np.hypot(c, d)
-            x[inside], y[inside], u[inside], v[inside] = a, b, c / speed, d / speed
-        return u, v
-
-    return reflect
-
-
-def in_crevices(ratio: float) -> Reflect:
-    """Reflections of flat tops and, on the other half, in crevices of this depth over width."""
-
-    def reflect(along: Floats, across: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        odd = np.floor(rng.random(along.size) + 2.0 * ratio * np.abs(along) / across) % 2.0 == 1.0
-        return np.where(odd & (rng.random(along.size) < 0.5), -along, along), across
-
-    return reflect
-
-
-def partly(diffuse: float, other: Reflect) -> Reflect:
-    """Diffuse reflection of this fraction, else the other one."""
-
-    def reflect(along: Floats, across: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        cosine, scattered = 2.0 * rng.random(along.size) - 1.0, rng.random(along.size) < diffuse
-        along, across = other(along, across, rng)
+    def reflect(self, along: Floats, across: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """The components along and across the channel of reflected particles, from those of the arriving ones."""
+        if self.wall is not None:
+            theta = np.arctan2(across, -along)
+            out = outgoing_angles(self.wall, rng.random(along.size), theta)
+            # rays that are lost in corners or in thousands of hits near grazing are retroreflected
+            out = np.where(np.isnan(out), theta, out)
+            along, across = np.cos(out), np.sin(out)
+        cosine, scattered = 2.0 * rng.random(along.size) - 1.0, rng.random(along.size) < self.diffuse
         return np.where(scattered, cosine, along), np.where(scattered, np.sqrt(1.0 - cosine**2), across)
-
-    return reflect
 
 
 def draw(number: int) -> Case:
@@ -86,17 +50,15 @@ def draw(number: int) -> Case:
     rng = np.random.default_rng([41, number])
     length, diffuse = float(np.exp(rng.uniform(np.log(0.3), np.log(12.0)))), float(rng.uniform(0.1, 1.0))
     half_angle, ratio = float(rng.uniform(0.2, 1.5)), float(rng.uniform(0.2, 2.0))
-    kind = ("arcs", "crevices", "diffuse and smooth", "arcs and diffuse")[number % 4]
-    law, reflect = {
-        "arcs": (ker.CircularArcLaw(half_angle), in_arcs(half_angle)),
-        "crevices": (ker.RectangularTeethLaw(ratio), in_crevices(ratio)),
-        "diffuse and smooth": (ker.maxwell(diffuse), partly(diffuse, lambda along, across, rng: (along, across))),
-        "arcs and diffuse": (
-            diffuse * ker.lambertian() + (1.0 - diffuse) * ker.CircularArcLaw(half_angle),
-            partly(diffuse, in_arcs(half_angle)),
-        ),
-    }[kind]
-    return Case(number, kind, law, reflect, length)
+    arcs, crevices = geo.focusing_arcs(half_angle), geo.rectangular_teeth(ratio)
+    law = ker.CircularArcLaw(half_angle)
+    mixed = diffuse * ker.lambertian() + (1.0 - diffuse) * law
+    return (
+        Case(number, "arcs", law, arcs, 0.0, length),
+        Case(number, "crevices", ker.RectangularTeethLaw(ratio), crevices, 0.0, length),
+        Case(number, "diffuse and smooth", ker.maxwell(diffuse), None, diffuse, length),
+        Case(number, "arcs and diffuse", mixed, arcs, diffuse, length),
+    )[number % 4]
 
 
 def passed(case: Case, rng: np.random.Generator) -> int:

@@ -1,7 +1,7 @@
 """Rays on the extreme walls, and disks at all scales, and where they go in 50 digits.
 
 ``python -m campaigns.extremes.references [CASE]`` writes ``extreme_rays.json`` and ``extreme_disks.json`` beside it.
-Walls with a closed form are judged by it (`precise_rays`), the others by the tracer in 50 digits (`precise_tracer`);
+Walls with a closed form are judged by it (`precise_rays`), the others by the tracer in 50 digits (`plain_tracer`);
 neither shares code with the library.
 
 Of each ray the file has the position, the angle, the outgoing angle rounded once, the number of hits, the condition (1
@@ -20,9 +20,9 @@ import mpmath as mp
 import numpy as np
 
 from asperity.geometry.disk.satellites import Satellites
-from campaigns.judges import precise_collision
+from campaigns.judges.plain_tracer import DIGITS, GUARD, trace_precisely
+from campaigns.judges.precise_collision import PreciseCollision
 from campaigns.judges.precise_rays import arc, cap, cap_clearance, crevice, tooth
-from campaigns.judges.precise_tracer import DIGITS, trace_precisely
 
 from . import disks, walls
 from .rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
@@ -30,6 +30,8 @@ from .rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
 RAYS, FEW, FEWEST, DISKS = 64, 24, 4, 12
 # Stems so narrow that none of the rays misses them after its first hit, the one that the closed form is about.
 SMALL_STEMS = walls.STEMS[:2]
+# The least angle, from either side, in the names of cases.
+ENDS = ("1e-12", "pi - 1e-12")
 LOWEST_ANGLE, ISLAND_ANGLE = 1e-12, 1e-3
 EPS = mp.mpf(2) ** -52
 # Where the ray goes another way than the traced one, does one moved by so many ulps go the tracer's?
@@ -92,33 +94,31 @@ class Traced:
     reference = "tracer in 50 digits"
 
     def __init__(self, wall, most_hits=MOST_HITS):
-        self.scene, self.cell = wall.scene, mp.mpf(wall.period)
+        self.wall, self.cell = wall, mp.mpf(wall.period)
         self.width, self.most_hits = self.cell, most_hits
 
     def __call__(self, x, theta):
         """State on the way out, hits, itinerary."""
-        ray = trace_precisely(self.scene, x, theta, self.most_hits)
-        if ray.theta is None:
-            raise ArithmeticError(f"x = {x}, theta = {theta}: still inside after {ray.bounces} hits")
-        return (ray.theta, ray.x / self.cell), ray.bounces, ray.itinerary
+        ray = trace_precisely(self.wall, x, theta, self.most_hits)
+        if ray is None:
+            raise ArithmeticError(f"x = {x}, theta = {theta}: still inside")
+        return (ray.theta, ray.x / self.cell), ray.hits, ray.path
+
+
+CLOSED_FORMS = {
+    **{f"triangular teeth, angle {angle:.10g}": tooth(angle) for angle in walls.TOOTH_ANGLES},
+    **{f"rectangular teeth, r = {ratio:g}": crevice(ratio) for ratio in walls.TOOTH_RATIOS},
+    **{f"arcs, half angle {half:.10g}": arc(half) for half in walls.ARC_ANGLES},
+    **{f"mushrooms of stem aspect 0, stem/cap {stem:g}": cap(stem) for stem in SMALL_STEMS},
+    **{f"triangular teeth, theta = {end}": tooth(0.7) for end in ENDS},
+    **{f"rectangular teeth, theta = {end}": crevice(1.0) for end in ENDS},
+    **{f"arcs, theta = {end}": arc(1.2) for end in ENDS},
+}
 
 
 def judge_of(name, wall):
     """What knows where the rays of a case go."""
-    kind, _, rest = name.partition(", ")
-    figure = rest.rpartition(" ")[2]
-    if rest.startswith("theta") and kind in walls.GRAZED:
-        form = {"triangular teeth": tooth(0.7), "rectangular teeth": crevice(1.0), "arcs": arc(1.2)}[kind]
-        return Closed(wall, form)
-    if rest.startswith("angle"):
-        return Closed(wall, tooth(_nearest(figure, walls.TOOTH_ANGLES)))
-    if rest.startswith("r ="):
-        return Closed(wall, crevice(float(figure)))
-    if rest.startswith("half angle"):
-        return Closed(wall, arc(_nearest(figure, walls.ARC_ANGLES)))
-    if rest in [f"stem/cap {stem:g}" for stem in SMALL_STEMS]:
-        return Closed(wall, cap(float(figure)))
-    return Traced(wall)
+    return Closed(wall, CLOSED_FORMS[name]) if name in CLOSED_FORMS else Traced(wall)
 
 
 def rays_of(name, wall):
@@ -173,27 +173,23 @@ def judged_ray(name, judge, x, theta):
         return [x.hex(), theta.hex(), float(state[0]).hex(), hits, float(f"{float(condition):.4g}"), clearance, rest]
 
 
-def _nearest(figure, values):
-    """The value that was written with ten digits."""
-    return min(values, key=lambda value: abs(value - float(figure)))
-
-
 def judged_disk(scale, position, velocity):
     """One disk, as a row of the file: state in, velocity out rounded once, contacts, condition."""
     spacing = Satellites.around(scale, scale * disks.WALL.depth).spacing
-    with mp.workdps(precise_collision.DIGITS + precise_collision.GUARD):
-        place, speed = [mp.mpf(float(p)) for p in position], [mp.mpf(float(v)) for v in velocity]
-        _, out, contacts = precise_collision.Flight(disks.WALL, disks.DISK, scale, spacing, place, speed).collide()
+
+    def judged(state):
+        one = PreciseCollision(disks.DISK, disks.WALL, scale, spacing, state[:2], state[2:])
+        return one.collide()[2:], one.contacts
+
+    with mp.workdps(DIGITS + GUARD):
+        state = [mp.mpf(float(number)) for number in (*position, *velocity)]
+        out, contacts = judged(state)
         condition = mp.mpf(1)
         # positions matter on the scale of the wall's cell and of the satellites' distance
-        for k, size in ((0, scale), (1, spacing), (2, 1), (3, 1), (4, 1)):
-            moved = [*place, *speed]
-            moved[k] += DISK_STEP * size
-            _, other, _ = precise_collision.Flight(
-                disks.WALL, disks.DISK, scale, spacing, moved[:2], moved[2:]
-            ).collide()
-            condition += max(abs(a - b) for a, b in zip(out, other, strict=True)) / DISK_STEP
-        start = [float(number).hex() for number in (*position, *velocity)]
+        for k, size in enumerate((scale, spacing, 1, 1, 1)):
+            moved = [number + (k == at) * DISK_STEP * size for at, number in enumerate(state)]
+            condition += max(abs(a - b) for a, b in zip(out, judged(moved)[0], strict=True)) / DISK_STEP
+        start = [float(number).hex() for number in state]
         return [start, [float(v).hex() for v in out], contacts, float(f"{float(condition):.4g}")]
 
 

@@ -1,8 +1,8 @@
 """Files with random damage: each must be read as it stands or be refused, without a warning and in little memory.
 
-A field is left out, gets a value of another type, NaN, an infinity, a huge or a negative number; an array gets another
-type, shape or entry; an archive gets a member of no use or one that inflates to a thousand times its size; bytes are
-cut off, changed or added. A file that is read must give what it says, and the same after it was saved and read again.
+Bytes are cut off, changed or added, or the parsed file has an entry left out, repeated, added, or replaced by a value
+of another type, NaN, an infinity, a huge or a negative number; an array gets another type, shape or entry, or inflates
+to a thousand times its size. A file that is read must give what it says, and the same after saving and reading again.
 """
 
 from __future__ import annotations
@@ -32,67 +32,73 @@ from campaigns.engine import Campaign, Judged
 # Bytes that reading a small file may take, of which the search for crossings takes up to 60 MB; the files are below
 # 100 kB. A bomb is an array of so many zeros a side, 128 MB.
 ALLOWED, BOMB = 100 * 2**20, 4000
-# What the type of an array may become, and a plain value, and a word.
+# What the type of an array may become, an entry of it, and any other value.
 TYPES = ("f4", "f2", "c16", "U9", "S9", "O", "i8", "u8", "i2", "?", "M8[s]", "m8[s]", "V8", ">f8")
+ENTRIES = (math.nan, math.inf, 1e308, -1e308, -1.0, 2.0**62)
 OTHERS: tuple[Any, ...] = (
     math.nan, math.inf, -math.inf, 1e308, -1e308, 10**30, 10**400, -1, 0, 1, True, False, "", "1", "nan", [], {},
-    [1.0, 2.0], {"a": 1}, 1e-320, 0.5,
-)  # fmt: skip
-WORDS = (
-    "",
-    "nan",
-    "inf",
-    "-inf",
-    "1e400",
-    "-1e400",
-    "1e308",
-    "1e200",
-    "1_0",
-    "0x10",
-    "abc",
-    "1;2",
-    "1,5",
-    "١",
-    "#",
+    [1.0, 2.0], {"a": 1}, 1e-320, 0.5, 1e200, "inf", "1e400", "-1e400", "1_0", "0x10", "abc", "1;2", "1,5", "١", "#",
     "\0",
-)
-
-Damage = Callable[[np.random.Generator, bytes], bytes]
-Reading = Callable[[Path], str | None]
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Files of one format: valid contents, the damages, and the reading, which returns what is wrong, if anything."""
+    """Files of one format: valid contents, how to parse and write them, and the reading, which says what is wrong."""
 
     name: str
     contents: tuple[bytes, ...]
-    damages: tuple[Damage, ...]
-    read: Reading
+    parse: Callable[[bytes], Any]
+    write: Callable[[Any], bytes]
+    read: Callable[[Path], str | None]
 
 
-def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """The paths of all entries of nested lists and dicts."""
-    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, entry in entries:
-        yield (*path, key)
-        yield from leaves(entry, (*path, key))
+def pick(rng: np.random.Generator, values: Any) -> Any:
+    return values[int(rng.integers(len(values)))]
 
 
-def damaged_value(rng: np.random.Generator, document: Any) -> None:
-    """Drop, replace or add one entry of nested lists and dicts."""
-    paths = list(leaves(document))
-    path = paths[rng.integers(len(paths))]
-    holder = document
-    for key in path[:-1]:
-        holder = holder[key]
+def damaged(rng: np.random.Generator, value: Any) -> Any:
+    """Another value; of a list or dict mostly itself, with one entry left out, repeated, added or damaged."""
+    if isinstance(value, np.ndarray):
+        return damaged_array(rng, value)
+    if not isinstance(value, (list, dict)) or not value or rng.random() < 0.1:
+        return pick(rng, OTHERS)
+    key = pick(rng, list(value) if isinstance(value, dict) else range(len(value)))
     draw = rng.integers(8)
     if draw == 0:
-        del holder[path[-1]]
-    elif draw == 1 and isinstance(holder, dict):
-        holder["extra"] = OTHERS[rng.integers(len(OTHERS))]
+        del value[key]
+    elif draw > 1:
+        value[key] = damaged(rng, value[key])
+    elif isinstance(value, dict):
+        value["extra"] = damaged(rng, value[key])
     else:
-        holder[path[-1]] = OTHERS[rng.integers(len(OTHERS))]
+        value.insert(key, value[key])
+    return value
+
+
+def damaged_array(rng: np.random.Generator, array: Any) -> Any:
+    """Another type, shape or entry, a bomb, or the file of an array whose header promises more."""
+    draw = rng.integers(5)
+    if draw == 0:
+        kind = pick(rng, TYPES)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                return array.astype(kind)
+            except (TypeError, ValueError):
+                return np.zeros(array.shape, kind)
+    if draw == 1:
+        return pick(rng, (array.ravel()[:-1], array[..., None], array.ravel(), array.T[None], array.ravel()[:0]))
+    if draw == 2:
+        return np.zeros(pick(rng, ((BOMB, BOMB), BOMB**2)))
+    if draw == 3:
+        stream = io.BytesIO()
+        np.lib.format.write_array_header_2_0(stream, {"shape": (10**6, 10**6), "fortran_order": False, "descr": "<f8"})
+        return stream.getvalue() + array_file(array)
+    with np.errstate(invalid="ignore"):
+        array = array.copy()
+        array.reshape(-1)[rng.integers(array.size)] = np.array(pick(rng, ENTRIES)).astype(array.dtype)
+    return array
 
 
 def damaged_bytes(rng: np.random.Generator, content: bytes) -> bytes:
@@ -124,69 +130,26 @@ def saved(objects: Iterable[Any], name: str) -> tuple[bytes, ...]:
 # matrices
 
 
-def members_of(content: bytes) -> dict[str, bytes]:
+def parsed_archive(content: bytes) -> dict[str, Any]:
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
+        members = {name: np.load(io.BytesIO(archive.read(name))) for name in archive.namelist()}
+    return {**members, "record.npy": json.loads(str(members["record.npy"]))}
 
 
-def archive_of(members: dict[str, bytes]) -> bytes:
+def archive_of(members: Any) -> bytes:
+    """The archive; anything but arrays and their files is written as a text of JSON, as the record is."""
     whole = io.BytesIO()
     with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in members.items():
-            archive.writestr(name, data)
+        for name, value in members.items() if isinstance(members, dict) else ():
+            text = value if isinstance(value, (np.ndarray, bytes)) else np.array(json.dumps(value))
+            archive.writestr(name, text if isinstance(text, bytes) else array_file(text))
     return whole.getvalue()
 
 
-def array_bytes(array: Any) -> bytes:
+def array_file(array: Any) -> bytes:
     stream = io.BytesIO()
     np.save(stream, array)
     return stream.getvalue()
-
-
-def damaged_record(rng: np.random.Generator, content: bytes) -> bytes:
-    members = members_of(content)
-    record = json.loads(str(np.load(io.BytesIO(members["record.npy"]))))
-    damaged_value(rng, record)
-    return archive_of({**members, "record.npy": array_bytes(np.array(json.dumps(record)))})
-
-
-def damaged_array(rng: np.random.Generator, content: bytes) -> bytes:
-    """Another type, shape or entry of one array, or none."""
-    members = members_of(content)
-    name = sorted(members)[rng.integers(len(members))]
-    array = np.load(io.BytesIO(members[name]))
-    draw = int(rng.integers(7))
-    if draw == 0:
-        del members[name]
-        return archive_of(members)
-    if draw == 1 and array.ndim:
-        kind = TYPES[rng.integers(len(TYPES))]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            try:
-                array = array.astype(kind)
-            except (TypeError, ValueError):
-                array = np.zeros(array.shape, kind)
-    elif draw == 2:
-        shapes = (
-            (array[:-1], array[..., None], array.ravel(), array.T[None], array[:0]) if array.ndim else (array[None],)
-        )
-        array = shapes[rng.integers(len(shapes))]
-    elif draw == 3:
-        array = np.zeros((BOMB, BOMB) if rng.integers(2) else BOMB**2)
-    elif draw == 4:
-        return archive_of({**members, "extra.npy": array_bytes(np.zeros(BOMB**2))})
-    elif draw == 5:
-        # a header that promises more, or is in another version
-        stream = io.BytesIO()
-        np.lib.format.write_array_header_2_0(stream, {"shape": (10**6, 10**6), "fortran_order": False, "descr": "<f8"})
-        return archive_of({**members, name: stream.getvalue() + members[name]})
-    elif array.ndim and array.dtype.kind in "fi":
-        is_float = array.dtype.kind == "f"
-        values = (np.nan, np.inf, 1e308, -1e308, -1.0, 2.0**62) if is_float else (np.iinfo(array.dtype).max, -1)
-        array = array.copy()
-        array.reshape(-1)[rng.integers(array.size)] = values[rng.integers(len(values))]
-    return archive_of({**members, name: array_bytes(array)})
 
 
 def read_matrix(path: Path) -> str | None:
@@ -219,17 +182,18 @@ def matrices() -> Kind:
             ker.discretise(ker.lambertian(), ker.Bins(2))
         ),
     )
-    damages = (damaged_record, damaged_record, damaged_array, damaged_bytes)
-    return Kind("matrix.npz", saved(found, "matrix.npz"), damages, read_matrix)
+    return Kind("matrix.npz", saved(found, "matrix.npz"), parsed_archive, archive_of, read_matrix)
 
 
 # walls
 
 
-def damaged_document(rng: np.random.Generator, content: bytes) -> bytes:
-    document = tomllib.loads(content.decode())
-    damaged_value(rng, document)
-    return tomli_w.dumps(document).encode()
+def parsed_document(content: bytes) -> Any:
+    return tomllib.loads(content.decode())
+
+
+def document_of(document: Any) -> bytes:
+    return tomli_w.dumps(document if isinstance(document, dict) else {}).encode()
 
 
 def read_wall(path: Path) -> str | None:
@@ -255,27 +219,19 @@ def walls() -> Kind:
     bezier = geo.Bezier([(0.1, -0.7), (0.3, -2 / 3), (0.4, -1), (1, 0)])
     found.append(geo.Wall([geo.Segment((0, 0), (0.1, -0.7)), bezier], unit="µm"))
     found.append(geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (0.5, -0.1), (1, 0)]))
-    damages = (damaged_document, damaged_document, damaged_bytes)
-    return Kind("wall.toml", saved(found, "wall.toml"), damages, read_wall)
+    return Kind("wall.toml", saved(found, "wall.toml"), parsed_document, document_of, read_wall)
 
 
 # profiles
 
 
-def damaged_word(rng: np.random.Generator, content: bytes) -> bytes:
-    """Another word, a line more or less."""
-    lines = content.decode().splitlines()
-    at = int(rng.integers(len(lines)))
-    draw = rng.integers(6)
-    if draw == 0:
-        del lines[at]
-    elif draw == 1:
-        lines.insert(at, lines[int(rng.integers(len(lines)))])
-    else:
-        words = lines[at].split(" ")
-        words[int(rng.integers(len(words)))] = WORDS[rng.integers(len(WORDS))]
-        lines[at] = " ".join(words)
-    return "\n".join(lines).encode()
+def words_of(content: bytes) -> list[list[str]]:
+    return [line.split(" ") for line in content.decode().splitlines()]
+
+
+def lines_of(words: Any) -> bytes:
+    lines = words if isinstance(words, list) else [words]
+    return "\n".join(" ".join(map(str, line)) if isinstance(line, list) else str(line) for line in lines).encode()
 
 
 def read_profile(path: Path) -> str | None:
@@ -309,9 +265,7 @@ def number(word: str) -> float | None:
 def profiles() -> Kind:
     rows = "\n".join(f"{0.5 * k} {math.sin(k):.4f}" for k in range(12))
     contents = (rows, f"# a scan\nx height\n{rows}", f"x [um], height [nm]\n{rows}", rows.replace(" ", "; "))
-    return Kind(
-        "profile.txt", tuple(map(str.encode, contents)), (damaged_word, damaged_word, damaged_bytes), read_profile
-    )
+    return Kind("profile.txt", tuple(map(str.encode, contents)), words_of, lines_of, read_profile)
 
 
 def draw(number: int) -> tuple[Kind, bytes, str]:
@@ -320,8 +274,10 @@ def draw(number: int) -> tuple[Kind, bytes, str]:
     if number < len(kind.contents):
         return kind, kind.contents[number], "none"
     rng = np.random.default_rng([0, number])
-    content, damage = (some[rng.integers(len(some))] for some in (kind.contents, kind.damages))
-    return kind, damage(rng, content), damage.__name__
+    content = pick(rng, kind.contents)
+    if rng.random() < 0.3:
+        return kind, damaged_bytes(rng, content), "of bytes"
+    return kind, kind.write(damaged(rng, kind.parse(content))), "of an entry"
 
 
 def judge(case: tuple[Kind, bytes, str]) -> Iterator[Judged]:

@@ -1,4 +1,4 @@
-"""Where single rays go, from closed forms in the digits of the context: a second judge beside `precise_tracer`.
+"""Where single rays go, from closed forms in the digits of the context: a second judge beside `plain_tracer`.
 
 `tooth`, `crevice`, `arc` and `cap` return a function of the position x in (0, 1) of the opening and of the angle. That
 gives the outgoing angle, the number of hits, and a tuple of integers that changes where the ray meets a corner.

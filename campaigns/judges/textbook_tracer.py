@@ -7,11 +7,11 @@ orientation, no run skipped.
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 from numba import njit
+from numpy.polynomial import Polynomial
 
 from asperity.geometry import Arc, Bezier, Segment
 
@@ -49,23 +49,13 @@ def table_of(wall):
 
 
 def inflections(control):
-    """Parameters in (0, 1) where b' x b'' changes its sign, found on a fine grid and by bisection."""
-    d = 3.0 * np.diff(control, axis=0)
-    e = 2.0 * np.diff(d, axis=0)
-
-    def bend(s):
-        v = (1 - s) ** 2 * d[0] + 2 * s * (1 - s) * d[1] + s * s * d[2]
-        a = (1 - s) * e[0] + s * e[1]
-        return v[0] * a[1] - v[1] * a[0]
-
-    grid, found = np.linspace(0.0, 1.0, 2001), []
-    for low, high in pairwise(grid):
-        if bend(low) * bend(high) < 0.0:
-            for _ in range(60):
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if bend(low) * bend(middle) > 0.0 else (low, middle)
-            found.append(low)
-    return found
+    """Parameters in (0, 1) where b' x b'' changes its sign."""
+    s, d = Polynomial([0.0, 1.0]), np.diff(control, axis=0)
+    x, y = ((1 - s) ** 2 * d[0, i] + 2 * s * (1 - s) * d[1, i] + s * s * d[2, i] for i in (0, 1))
+    # terms that cancel but for rounding have no roots
+    # of terms that cancel rounding remains
+    roots = (x * y.deriv() - y * x.deriv()).trim(1e-12).roots()
+    return sorted(root.real for root in roots if abs(root.imag) < 1e-9 and 0.0 < root.real < 1.0)
 
 
 @compiled

@@ -22,7 +22,7 @@ from asperity.geometry.tracing.double_double.rays import UNRESOLVED
 from asperity.geometry.tracing.refinement import RefinedTrace, refined_trace
 from asperity.geometry.tracing.tracing import Trace
 from campaigns.engine import Campaign, Judged
-from campaigns.judges.precise_tracer import trace_precisely
+from campaigns.judges.plain_tracer import trace_precisely
 
 RAYS = 500
 # Allowed error on a ray that the twin leaves undecided: hundreds of bounces with a derivative of about 10^6.
@@ -44,6 +44,12 @@ ERROR_UNITS = 32.0
 CONDITION_ULPS = [sign * 2.0**k for k in range(-2, 7) for sign in (-1.0, 1.0)]
 MOVES = list(product(CONDITION_ULPS, ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, -1.0))))
 
+FOUR_ARCS = (
+    (0.1546391703711259, -0.02041208723651003, 0.15598053185709104, 3.0103531934108654, 4.617960019657345),
+    (0.4178723959764181, -0.1979007325141735, 0.27882584942072397, 3.0618778250273615, 4.723808942654955),
+    (0.13104489827115823, -0.029936759920226264, 0.532645878892581, -0.9950349420962289, 0.056233502659632895),
+    (0.8314244154251915, 0.19555783647241926, 0.25818713198087906, -2.2822297626428414, -0.8593628909469517),
+)
 WALLS: dict[str, geo.Wall] = {
     "triangular teeth": geo.triangular_teeth(0.7),
     "rectangular teeth": geo.rectangular_teeth(2.0),
@@ -64,26 +70,7 @@ WALLS: dict[str, geo.Wall] = {
         ],
         period=1.0,
     ),
-    "four arcs": geo.Wall(
-        [
-            geo.Arc(
-                (0.1546391703711259, -0.02041208723651003), 0.15598053185709104, 3.0103531934108654, 4.617960019657345
-            ),
-            geo.Arc(
-                (0.4178723959764181, -0.1979007325141735), 0.27882584942072397, 3.0618778250273615, 4.723808942654955
-            ),
-            geo.Arc(
-                (0.13104489827115823, -0.029936759920226264),
-                0.532645878892581,
-                -0.9950349420962289,
-                0.056233502659632895,
-            ),
-            geo.Arc(
-                (0.8314244154251915, 0.19555783647241926), 0.25818713198087906, -2.2822297626428414, -0.8593628909469517
-            ),
-        ],
-        period=1.0,
-    ),
+    "four arcs": geo.Wall([geo.Arc((x, y), radius, start, end) for x, y, radius, start, end in FOUR_ARCS]),
 }
 
 
@@ -184,8 +171,8 @@ def judge(case: AimedRays, follow: Follow = follow_twin) -> Iterator[Judged]:
 def _judges_compared(case: AimedRays, known: RefinedTrace, rays: NDArray[np.int64]) -> Iterator[Judged]:
     """The judge of these rays, as double-doubles, against the tracer in 50 digits."""
     for k in rays:
-        ray = trace_precisely(case.wall.scene, float(case.x[k]), float(case.theta[k]), COLLISIONS)
-        right = ray.theta is not None and ray.bounces == known.collisions[k]
+        ray = trace_precisely(case.wall, float(case.x[k]), float(case.theta[k]), COLLISIONS)
+        right = ray is not None and ray.hits == known.collisions[k]
         room = TWIN_UNITS * EPS_DOUBLE_DOUBLE * known.amplification[k] * (1.0 + known.collisions[k])
         # the judge's angle consists of two doubles, which limits its accuracy
         room += EPS**2 * abs(known.theta[k, 0])
@@ -196,11 +183,11 @@ def _judges_compared(case: AimedRays, known: RefinedTrace, rays: NDArray[np.int6
 
 def _is_precise(wall: geo.Wall, traced: Trace, k: int, x: float, theta: float) -> bool:
     """Whether the tracer agrees with 50 digits on a ray that its judge left undecided or flagged."""
-    ray = trace_precisely(wall.scene, x, theta, COLLISIONS)
-    if ray.theta is None:
+    ray = trace_precisely(wall, x, theta, COLLISIONS)
+    if ray is None:
         return bool(traced.status[k] == geo.Status.BOUNCE_LIMIT)
     apart = max(abs(float(ray.theta) - traced.theta[k]), abs(float(ray.x) - traced.x[k]) * math.sin(float(ray.theta)))
-    return bool(ray.bounces == traced.collisions[k]) and apart < OPEN_ERROR
+    return bool(ray.hits == traced.collisions[k]) and apart < OPEN_ERROR
 
 
 def agreement(wall: geo.Wall, traced: Trace, known: RefinedTrace) -> tuple[NDArray[np.bool_], Floats]:

@@ -15,14 +15,15 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.core.checks import Floats
 from asperity.errors import AccuracyError, WallError
-from asperity.geometry import Arc, Bezier, Segment
 from campaigns.cases.random_curved_walls import COUNT as CURVED
 from campaigns.cases.random_curved_walls import random_curved_wall
 from campaigns.cases.random_hollows import random_hollow, wall_with
 from campaigns.engine import Campaign, Judged
 from campaigns.judges.plain_tracer import PlainTracer
 
-WALLS, RAYS, JUDGED, DISKS, SPIKES = 200, 5_000, 20, 500, 2_000
+from .aimed_rays import WALLS
+
+CASES, RAYS, JUDGED, DISKS, SPIKES = 200, 5_000, 20, 500, 2_000
 # After more hits, rounding changes positions and angles too much for a comparison.
 MOST_HITS = 200
 # Allowed difference of angles; rounding grows along a ray, on bumps by up to a factor of ten at each hit.
@@ -36,39 +37,26 @@ STEEP = 0.3
 JOINT, FLAT = 1e-6, 1e-4
 
 
-def _polygon(*corners):
-    return geo.Wall.from_vertices(np.array(corners, dtype=float))
-
-
-def _lens():
-    """A bump that touches the level with its top, between two sides, and a bowl."""
-    bump, bowl = Arc((0.2, -0.2), 0.2, np.pi, 0.0), Arc((0.7, 0.0), 0.3, np.pi, 2.0 * np.pi)
-    return geo.Wall([Segment((0, 0), (0, -0.2)), bump, Segment((0.4, -0.2), (0.4, 0)), bowl])
-
-
 NAMED = (
-    lambda: geo.triangular_teeth(0.7),
-    lambda: geo.focusing_arcs(1.2),
-    lambda: geo.mushrooms(0.3, 0.4),
-    lambda: geo.rectangular_teeth(1.5),
-    lambda: geo.dispersing_arcs(1.3),
-    lambda: geo.double_parabola(),
-    lambda: geo.koch(2),
-    lambda: geo.mushrooms(0.3, 0.4, 2),
+    *WALLS.values(),
+    geo.mushrooms(0.3, 0.4, 2),
     # a plate of no thickness over a cavity, one that stands in it, a cavity whose side touches the flat top
-    lambda: _polygon((0, 0), (0.7, 0), (0.2, 0), (0.2, -1), (1, -1), (1, 0)),
-    lambda: _polygon((0, 0), (0, -1), (0.5, -1), (0.5, -0.2), (0.5, -1), (1, -1), (1, 0)),
-    lambda: _polygon((0, 0), (0.3, 0), (0.5, -0.8), (0.4, -0.1), (0.3, 0), (0.9, 0), (1, -0.1), (1, 0)),
-    _lens,
-    lambda: geo.elliptical_arcs(0.9, geo.Disk(1.0, 0.5)),
-    lambda: geo.flat(),
-)
+    geo.Wall.from_vertices([(0, 0), (0.7, 0), (0.2, 0), (0.2, -1), (1, -1), (1, 0)]),
+    geo.Wall.from_vertices([(0, 0), (0, -1), (0.5, -1), (0.5, -0.2), (0.5, -1), (1, -1), (1, 0)]),
+    geo.Wall.from_vertices([(0, 0), (0.3, 0), (0.5, -0.8), (0.4, -0.1), (0.3, 0), (0.9, 0), (1, -0.1), (1, 0)]),
+    # a bump that touches the level with its top, between two sides, and a bowl
+    geo.Wall([
+        geo.Segment((0, 0), (0, -0.2)), geo.Arc((0.2, -0.2), 0.2, np.pi, 0.0), geo.Segment((0.4, -0.2), (0.4, 0)),
+        geo.Arc((0.7, 0.0), 0.3, np.pi, 2.0 * np.pi),
+    ]),
+    geo.flat(),
+)  # fmt: skip
 
 
 def base_wall(number: int) -> geo.Wall:
     """Wall ``number``: the named ones, then curved and polygonal ones in turn."""
     if number < len(NAMED):
-        return NAMED[number]()
+        return NAMED[number]
     number -= len(NAMED)
     if number % 2:
         return random_curved_wall(number // 2 % CURVED)
@@ -179,7 +167,7 @@ def _misjudged(one: Rolled, rng: np.random.Generator) -> Floats:
 
 def _other_disks(one: Rolled, rng: np.random.Generator) -> Floats:
     """Which disks end otherwise and do not say that they may, or with another energy; none over Bezier pieces."""
-    if any(isinstance(piece, Bezier) for piece in one.wall.pieces):
+    if any(isinstance(piece, geo.Bezier) for piece in one.wall.pieces):
         return np.zeros(0, dtype=bool)
     scale = SCALE / max(one.rolled.depth, one.rolled.period)
     velocity = rng.normal(size=(DISKS, 3))
@@ -263,9 +251,9 @@ def judge_spike(number: int) -> Iterator[Judged]:
 
 
 CAMPAIGNS = (
-    Campaign("rolled-walls", "Does the start of the period matter?", draw, judge, WALLS, range(28)),
+    Campaign("rolled-walls", "Does the start of the period matter?", draw, judge, CASES, range(28)),
     Campaign(
-        "rolled-matrices", "Are matrices of rolled walls those of the wall?", draw, judge_matrices, WALLS,
+        "rolled-matrices", "Are matrices of rolled walls those of the wall?", draw, judge_matrices, CASES,
         [0, 3, 6, 15, 16],
     ),
     Campaign("spikes", "Are plates accepted and slits refused?", int, judge_spike, SPIKES, range(120)),

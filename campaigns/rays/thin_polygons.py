@@ -190,15 +190,12 @@ def follow_plainly(wall: geo.Wall, x: Floats, theta: Floats, flagged: NDArray[np
         tracer = PlainTracer(wall, precise=True)
 
         def pieces(angle: mp.mpf) -> object:
-            try:
-                return [piece for _, piece in tracer.trace(x[k], angle, COLLISIONS).path]
-            except ArithmeticError:
-                return None
+            ray = tracer.trace(x[k], angle, COLLISIONS)
+            return ray and [piece for _, piece in ray.path]
 
         for k in range(n):
-            try:
-                ray = tracer.trace(x[k], theta[k], COLLISIONS)
-            except ArithmeticError:
+            ray = tracer.trace(x[k], theta[k], COLLISIONS)
+            if ray is None:
                 status[k] = geo.Status.BOUNCE_LIMIT
                 continue
             collisions[k], length[k] = ray.hits, ray.length

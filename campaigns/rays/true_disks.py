@@ -12,7 +12,7 @@ from asperity import geometry as geo
 from asperity.core.rounding import EPS
 from asperity.geometry.disk.satellites import Satellites
 from campaigns.engine import Campaign, Judged
-from campaigns.judges.plain_collision import collide_plainly
+from campaigns.judges.precise_collision import collide_precisely
 from campaigns.speed.timing import least_time
 
 COLLISIONS, REPEATS = 2**18, 5
@@ -117,9 +117,9 @@ def judge_plates(number: int) -> Iterator[Judged]:
     position, velocity = random_states(wall, scale, PLATE_STATES, np.random.default_rng(2))
     out = geo.collide(DISK, wall, scale, position, velocity)
     spacing = Satellites.around(scale, scale * wall.depth).spacing
-    _, expected, contacts = collide_plainly(DISK, wall, scale, spacing, position, velocity)
+    _, expected, contacts = collide_precisely(DISK, wall, scale, spacing, position, velocity)
     judged = ~np.isnan(expected[:, 0])
-    apart = np.abs(expected - out.velocity).max(axis=1) > 1e-6
+    apart = np.abs(expected - out.velocity).max(axis=1) > 1e-9
     wrong = judged & (~out.escaped | apart | (contacts != out.contacts))
     for number, fault in ((int(wrong.sum()), "lost or wrong"), (int((judged & ~wrong).sum()), "")):
         if number:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,14 +13,8 @@ from asperity.errors import ProofError
 from asperity.kernels.laws.law import sum_of
 from campaigns.engine import Campaign, Judged
 
-
-@dataclass(frozen=True)
-class Case:
-    """A law, and the relative width that is asked for."""
-
-    kind: str
-    law: ker.Law
-    width: float
+# The kind of a law, the law, and the relative width that is asked for.
+Case = tuple[str, ker.Law, float]
 
 
 def draw(number: int) -> Case:
@@ -34,18 +27,19 @@ def draw(number: int) -> Case:
         laws = law, ker.specular(), ker.retroreflection(), ker.lambertian()
         law = sum_of(tuple(zip(rng.dirichlet(np.ones(4)).tolist(), laws, strict=True)))
     words = "bumps" if bumps else "focusing arcs", "specular" if turned else "paper", "mixed" if mixed else "pure"
-    return Case(", ".join(words), law.in_specular_frame() if turned else law, float(10.0 ** rng.uniform(-4.0, -2.0)))
+    return ", ".join(words), law.in_specular_frame() if turned else law, float(10.0 ** rng.uniform(-4.0, -2.0))
 
 
 def judge(case: Case) -> Iterator[Judged]:
     """The middle of the interval and the estimated gap; what is not proved says so."""
+    kind, law, width = case
     try:
-        low, high = map(float, spec.prove_gap(case.law, case.width).interval)
+        low, high = map(float, spec.prove_gap(law, width).interval)
     except ProofError:
-        yield Judged(case.kind, outcome="not proved")
+        yield Judged(kind, outcome="not proved")
         return
-    gap = spec.spectral_gap(case.law, tolerance=0.05 * (high - low))
-    yield Judged(case.kind, 0.5 * (high - low), abs(0.5 * (low + high) - float(gap)), gap.error, outcome="proved")
+    gap = spec.spectral_gap(law, tolerance=0.05 * (high - low))
+    yield Judged(kind, 0.5 * (high - low), abs(0.5 * (low + high) - float(gap)), gap.error, outcome="proved")
 
 
 CAMPAIGNS = (Campaign("proofs", "Do proved intervals contain the gap?", draw, judge, 24, [2], seconds=900.0),)

@@ -11,8 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import reduce
-from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +21,7 @@ from asperity.core.checks import Floats
 from asperity.errors import InputError
 from asperity.estimates import Estimate
 from asperity.kernels.expectations.conditionals import Conditionals
+from asperity.kernels.laws.law import sum_of
 from asperity.spectral.bounds.enclosure import Enclosure
 from campaigns.engine import Campaign, Judged
 
@@ -79,11 +78,7 @@ def draw_diagonal(number: int) -> Case:
             terms.append((ker.henyey_greenstein(g), g**degree))
     weights = rng.dirichlet(np.ones(len(terms)))
     weights[-1] = 1.0 - weights[:-1].sum()
-    law = (
-        reduce(add, [float(w) * one for w, (one, _) in zip(weights, terms, strict=True)])
-        if len(terms) > 1
-        else terms[0][0]
-    )
+    law = sum_of(tuple(zip(weights.tolist(), (one for one, _ in terms), strict=True)))
     exact = sum(w * values for w, (_, values) in zip(weights, terms, strict=True))
     if rng.random() < 0.3:
         law, exact = law.in_specular_frame(), np.where(degree % 2, -1.0, 1.0) * exact

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 import tomllib
 import tracemalloc
 from collections.abc import Callable, Mapping, Sequence
@@ -27,7 +26,7 @@ from threadpoolctl import threadpool_limits
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench.quantities.walls import wall_of
+from asperity.bench.references import known_reference
 from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.discretisation.isometry_tables import table_matrix
 from asperity.kernels.walls.polygon import table_of_beams
@@ -35,14 +34,14 @@ from asperity.spectral.work_diagrams.machine import Machine
 from campaigns.judges import precise_triangular
 
 from ..pages import print_table
-from .throughput import bounces_a_second, first_rays
+from .throughput import bounces_a_second, first_rays, wall_named
+from .timing import least_time
 
 FILE = Path(__file__).with_name("goals.toml")
-# Repeats of a computation, and seconds after which no further repeat starts.
-REPEATS, SECONDS = 4, 10.0
 # Tolerance of the run that compiles.
 ROUGH = 1e-2
 Reached = tuple[float, ...]
+Measure = Callable[[str, Reached], Reached]
 
 
 @dataclass(frozen=True)
@@ -77,116 +76,73 @@ def all_goals() -> list[Goal]:
     return found
 
 
-def timed(job: Callable[[], Any], repeats: int = REPEATS) -> tuple[Any, float]:
-    """The result, and the least time of the repeats in seconds."""
-    begun, least = time.perf_counter(), float("inf")
-    for _ in range(repeats):
-        start = time.perf_counter()
-        result = job()
-        end = time.perf_counter()
-        least = min(least, end - start)
-        if end - begun > SECONDS:
-            break
-    return result, least
-
-
 # errors
 
-EXACT_TEETH, TEETH, ARCS = ker.TriangularTeethLaw(0.7), geo.triangular_teeth(0.7), geo.focusing_arcs(1.2)
-# <u, P u> / <u, u> for u = cos(theta), and 1 - lambda_2: see docs/theory/closed-forms.md
-TEETH_MOMENT, ARC_MOMENT, ARC_GAP = 0.134541971359171, 0.327558333378, 1.0 - 0.3670253152
+TEETH, ARC = ker.TriangularTeethLaw(0.7), ker.CircularArcLaw(1.2)
 # Limit on the beams of a hollow that is only limited by its tolerance.
 MANY_BEAMS = 10**7
+# Right matrices of triangular teeth, ours, and the order of the norm of their difference.
+MATRICES: Mapping[str, tuple[Callable[[], Any], Callable[[], ker.KernelMatrix], int | None]] = {
+    "bins as an operator": (
+        precise_triangular.reference,
+        lambda: ker.discretise(ker.TriangularTeethLaw(precise_triangular.ANGLE), ker.Bins(precise_triangular.BINS)),
+        2,
+    ),
+    "Legendre(64)": (
+        lambda: table_matrix(table_of_beams(beams_of(wall_named("triangular-teeth").vertices)), ker.Legendre(64))[0],
+        lambda: ker.discretise(TEETH, ker.Legendre(64)),
+        None,
+    ),
+}
 
 
-def _moment(wall: geo.Wall) -> float:
-    """By the method that the library chooses."""
-    return float(ker.discretise(ker.WallLaw(wall), ker.Legendre(2)).symmetric[1, 1])
+def _matrix(name: str, limits: Reached) -> Reached:
+    right, solve, order = MATRICES[name]
+    found, seconds = least_time(solve)
+    return float(np.linalg.norm(found.symmetric - right(), order)), seconds
 
 
-def _unresolved(law: ker.PolygonLaw) -> float:
+def _moment(name: str, limits: Reached) -> Reached:
+    right = known_reference(f"{name}/moment")
+    assert right is not None
+    matrix, seconds = least_time(lambda: ker.discretise(ker.WallLaw(wall_named(name)), ker.Legendre(2)))
+    return abs(float(matrix.symmetric[1, 1] - right.value)), seconds
+
+
+def gap_error(name: str, tolerance: float) -> float:
+    """The reported error of a gap, or infinity if the true one is known and larger."""
+    found, right = spec.spectral_gap(ker.WallLaw(wall_named(name)), tolerance), known_reference(f"{name}/lambda2")
+    holds = right is None or abs(1.0 - found.value - float(right.value)) <= found.error + right.error
+    return found.error if holds else float("inf")
+
+
+def _law_error(name: str, tolerance: float) -> float:
+    law = ker.WallLaw(wall_named(name))
+    return float(ker.discretise(law, ker.Bins(64), method="quadrature", tolerance=tolerance).error)
+
+
+def _resistance_error(name: str, tolerance: float) -> float:
+    return ker.resistance(ker.WallLaw(wall_named(name)), tolerance).error
+
+
+def _unresolved(name: str, tolerance: float) -> float:
+    law = ker.PolygonLaw(wall_named(name), tolerance, max_beams=MANY_BEAMS)
     law.branches(1.0)
     return float(law.unresolved)
 
 
-def random_polygon() -> geo.Wall:
-    """A polygonal wall with sixteen random vertices below the opening."""
-    rng = np.random.default_rng(16)
-    x = np.concatenate([[0.0], np.sort(rng.random(14)), [1.0]])
-    y = np.concatenate([[0.0], -0.1 - 0.8 * rng.random(14), [0.0]])
-    return geo.Wall.from_vertices(np.column_stack([x, y]))
+def _distance_error(kind: Any, tolerance: float) -> float:
+    return ker.distance(ARC, TEETH, kind=kind, tolerance=tolerance).error
 
 
-def _gap(wall: geo.Wall, tolerance: float, right: float | None = None) -> float:
-    """The reported error, or infinity if the true one is larger."""
-    found = spec.spectral_gap(ker.WallLaw(wall), tolerance)
-    return found.error if right is None or abs(found.value - right) <= found.error else float("inf")
+def _reported(solve: Callable[[str, float], float]) -> Measure:
+    """Measures the error that is reported for a tolerance, and the time."""
 
+    def measure(name: str, limits: Reached) -> Reached:
+        solve(name, ROUGH)
+        return least_time(partial(solve, name, limits[0]))
 
-def _law_in_bins(wall: geo.Wall, tolerance: float) -> float:
-    return float(ker.discretise(ker.WallLaw(wall), ker.Bins(64), method="quadrature", tolerance=tolerance).error)
-
-
-def _resistance(wall: geo.Wall, tolerance: float) -> float:
-    return ker.resistance(ker.WallLaw(wall), tolerance).error
-
-
-def _distance(kind: Any, tolerance: float) -> float:
-    return ker.distance(ker.WallLaw(ARCS), ker.WallLaw(TEETH), kind=kind, tolerance=tolerance).error
-
-
-# The right value and how ours is computed. The error is their distance, of matrices in the Frobenius norm unless the
-# name says otherwise.
-EXACT: Mapping[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
-    "triangular teeth, first moment": (lambda: TEETH_MOMENT, partial(_moment, TEETH)),
-    "triangular teeth, bins as an operator": (
-        precise_triangular.reference,
-        lambda: (
-            ker.discretise(
-                ker.TriangularTeethLaw(precise_triangular.ANGLE), ker.Bins(precise_triangular.BINS)
-            ).symmetric
-        ),
-    ),
-    "triangular teeth, Legendre(64)": (
-        lambda: table_matrix(table_of_beams(beams_of(TEETH.vertices)), ker.Legendre(64))[0],
-        lambda: ker.discretise(EXACT_TEETH, ker.Legendre(64)).symmetric,
-    ),
-    # the error bound from its beams
-    "polygon of 16 vertices, whole law": (lambda: 0.0, lambda: _unresolved(ker.PolygonLaw(random_polygon()))),
-    "focusing arc, first moment": (lambda: ARC_MOMENT, partial(_moment, ARCS)),
-}
-WALLS: Mapping[str, geo.Wall] = {
-    "cusps": wall_of("cusps"),
-    "mushroom": wall_of("mushroom"),
-    "tooth, arc and Bezier": wall_of("mixed"),
-    "skew Bezier": geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0)])]),
-}
-# The reported error by the tolerance.
-REPORTED: Mapping[str, Callable[[float], float]] = {
-    "gap of focusing arcs, roughly": partial(_gap, ARCS, right=ARC_GAP),
-    "gap of focusing arcs": partial(_gap, ARCS, right=ARC_GAP),
-    **{f"law in Bins(64) by quadrature, {name}": partial(_law_in_bins, wall) for name, wall in WALLS.items()},
-    **{f"resistance, {name}": partial(_resistance, wall) for name, wall in WALLS.items()},
-    "resistance, Koch 8": lambda tolerance: _resistance(geo.koch(8), tolerance),
-    **{f"gap of dispersing arcs of {k}": partial(_gap, geo.dispersing_arcs(curvature))
-       for k, curvature in (("1/3", 1.0 / 3.0), ("2/3", 2.0 / 3.0), ("1", 1.0))},
-    "Koch 5 as an exact law": lambda tolerance: _unresolved(
-        ker.PolygonLaw(geo.koch(5), tolerance, max_beams=MANY_BEAMS)
-    ),
-    "distance of arc and teeth, rows": partial(_distance, "rows"),
-    "distance of arc and teeth, joint": partial(_distance, "joint"),
-}  # fmt: skip
-
-
-def _error_in_a_time(name: str, limits: Reached) -> Reached:
-    right, solve = EXACT[name]
-    found, seconds = timed(solve)
-    return float(np.linalg.norm(found - right(), 2 if name.endswith("as an operator") else None)), seconds
-
-
-def _reported_in_a_time(name: str, limits: Reached) -> Reached:
-    REPORTED[name](ROUGH)
-    return timed(partial(REPORTED[name], limits[0]))
+    return measure
 
 
 # large matrices
@@ -195,24 +151,26 @@ def _reported_in_a_time(name: str, limits: Reached) -> Reached:
 @cache
 def _large_matrix(name: str, bins: int) -> ker.KernelMatrix:
     """A smooth law, a sampled law of a curved wall, or pairs without a known mirror symmetry."""
-    basis, arc, rng = ker.Bins(bins), ker.CircularArcLaw(1.2), np.random.default_rng(0)
+    basis, rng = ker.Bins(bins), np.random.default_rng(0)
     if name == "Henyey-Greenstein 0.9":
         return ker.discretise(ker.henyey_greenstein(0.9), basis)
     if name == "focusing arc":
-        return ker.discretise(arc, basis, method="qmc", samples=2**22, rng=rng)
+        return ker.discretise(ARC, basis, method="qmc", samples=2**22, rng=rng)
     incoming = np.arccos(1.0 - 2.0 * rng.random(2**22))
-    return ker.estimate(incoming, arc.sample(incoming, rng), basis, symmetrise=True)
+    return ker.estimate(incoming, ARC.sample(incoming, rng), basis, symmetrise=True)
 
 
 def _part_of_eigvalsh(name: str, limits: Reached) -> Reached:
     matrix = _large_matrix(name, 4096)
     with threadpool_limits(1):
-        return (timed(lambda: spec.spectrum(matrix, k=2))[1] / timed(lambda: eigvalsh(matrix.symmetric), 1)[1],)
+        return (
+            least_time(lambda: spec.spectrum(matrix, k=2))[1] / least_time(lambda: eigvalsh(matrix.symmetric), 1)[1],
+        )
 
 
 def _seconds_of_gap(name: str, limits: Reached) -> Reached:
     matrix = _large_matrix(name, 10_000)
-    return (timed(lambda: spec.spectrum(matrix, k=2), 1)[1],)
+    return (least_time(lambda: spec.spectrum(matrix, k=2), 1)[1],)
 
 
 # rays and disks
@@ -226,15 +184,13 @@ RUNS = {
 }
 RUN_RAYS, RUN_LIMIT = 2**14, 2**62
 
-_rates = cache(bounces_a_second)
-
 
 def _bounces(name: str, limits: Reached) -> Reached:
-    return (_rates()[name][0] / 1e6,)
+    return (bounces_a_second(name)[0] / 1e6,)
 
 
 def _two_threads(name: str, limits: Reached) -> Reached:
-    one, two = _rates()[name]
+    one, two = bounces_a_second(name)
     return (two / one,)
 
 
@@ -243,7 +199,7 @@ def _run_of_hits(name: str, limits: Reached) -> Reached:
     x, theta = rng.uniform(*place, RUN_RAYS), rng.uniform(*angle, RUN_RAYS)
     job = partial(geo.trace, wall, x, theta, max_collisions=RUN_LIMIT, threads=1)
     job()
-    return (1e6 * timed(job)[1] / RUN_RAYS,)
+    return (1e6 * least_time(job)[1] / RUN_RAYS,)
 
 
 def _disks(name: str, limits: Reached) -> Reached:
@@ -294,7 +250,7 @@ def _memory(name: str, limits: Reached) -> Reached:
 def _start(name: str, limits: Reached) -> Reached:
     """Seconds of a fresh process; the first of the repeats reads the libraries from the disk."""
     if name.startswith("profile"):
-        return (timed(first_rays, 1)[1],)
+        return (least_time(first_rays, 1)[1],)
     program, _, cache_is = name.partition(", ")
     # a warm command has its bytecode, too
     keeping = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
@@ -307,14 +263,20 @@ def _start(name: str, limits: Reached) -> Reached:
             subprocess.run([sys.executable, "-c", PROGRAMS[program]], check=True, env=environment, capture_output=True)
 
     run()
-    return (timed(run)[1],)
+    return (least_time(run)[1],)
 
 
-MEASURES: Mapping[str, Callable[[str, Reached], Reached]] = {
+MEASURES: Mapping[str, Measure] = {
     "bounces": _bounces,
     "two threads against one": _two_threads,
-    "error in a time": _error_in_a_time,
-    "reported error in a time": _reported_in_a_time,
+    "first moment": _moment,
+    "matrix of triangular teeth": _matrix,
+    "gap, roughly": _reported(gap_error),
+    "gap": _reported(gap_error),
+    "law in Bins(64) by quadrature": _reported(_law_error),
+    "resistance": _reported(_resistance_error),
+    "polygon as an exact law": _reported(_unresolved),
+    "distance of arc and teeth": _reported(_distance_error),
     "gap of 4,096 bins, checked to be complete": _part_of_eigvalsh,
     "gap of 10,000 bins, checked to be complete": _seconds_of_gap,
     "run of hits in one step": _run_of_hits,

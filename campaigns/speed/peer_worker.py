@@ -1,8 +1,8 @@
 """Runs one peer, in the peers' own environment: ``python peer_worker.py PEER DATA.npz`` prints one line of JSON.
 
 It imports nothing of asperity. Every peer is run as its expert users run it. Data of rays: x, incoming theta, outgoing
-theta of the reference, and the ``corners`` of the wall. Data of chains: a row-stochastic ``matrix``, or its sparse
-parts, and the number ``wanted`` of eigenvalues.
+theta of the reference, and the ``corners`` of the wall. Data of chains: a row-stochastic ``matrix``, and the number
+``wanted`` of eigenvalues.
 """
 
 from __future__ import annotations
@@ -135,19 +135,8 @@ def deeptime(data):
     uniform = np.full(matrix.shape[0], 1.0 / matrix.shape[0])
     start = time.perf_counter()
     values = eigenvalues(matrix, k=int(data["wanted"]), reversible=True, mu=uniform)
-    return solved(1.0 - np.real(values), time.perf_counter() - start, "deeptime")
-
-
-def pydtmc(data):
-    from pydtmc import MarkovChain
-
-    start = time.perf_counter()
-    gap = MarkovChain(data["matrix"]).spectral_gap
-    return solved([0.0, np.nan if gap is None else gap], time.perf_counter() - start, "PyDTMC")
-
-
-def solved(gaps, seconds, package):
-    return {"version": version(package), "seconds": seconds, "gaps": [float(gap) for gap in gaps]}
+    seconds = time.perf_counter() - start
+    return {"version": version("deeptime"), "seconds": seconds, "gaps": (1.0 - np.real(values)).tolist()}
 
 
 if __name__ == "__main__":

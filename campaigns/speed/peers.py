@@ -2,9 +2,9 @@
 
 Every peer is run as its best users run it, in one thread: Embree from C, one call a ray segment; Mitsuba with the whole
 loop over reflections compiled by Dr.Jit, which needs a recent LLVM; deeptime told that the chain is reversible. Direct
-simulation codes such as SPARTA are not measured: their time goes into moving particles between cells. The peers are
-installed in an environment of their own in the folder; each runs in a process with a time limit, and one that cannot
-be had is a row that says so.
+simulation codes such as SPARTA are not measured: their time goes into moving particles between cells. `make bench`
+installs the peers in ``FOLDER/environment``. Each runs in a process with a time limit; one that is not there or fails
+is a row that says so.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -28,71 +27,25 @@ from ..pages import print_table
 from .timing import least_time
 
 WORKER = Path(__file__).with_name("peer_worker.py")
-# Name in `peer_worker` and requirement. Embree is a system package, such as libembree-dev in Debian; its program needs
-# numpy only. Mitsuba finds LLVM by itself or by DRJIT_LIBLLVM_PATH; on AMD Zen 4 19 works, 16 fails.
-TRACERS = {"embree": "numpy", "mitsuba": "mitsuba"}
-SOLVERS = {"deeptime": "deeptime", "pydtmc": "PyDTMC"}
-# Limits of single commands, and of all commands together.
-MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 40.0, 190.0
-# Short timeouts, so that pip fails soon without an index.
-PIP = ("--quiet", "--disable-pip-version-check", "--prefer-binary", "--timeout", "10", "--retries", "1")
-REPEATS = 3
+# Names in `peer_worker`. Embree is a system package, such as libembree-dev in Debian. Mitsuba finds LLVM by itself or
+# by DRJIT_LIBLLVM_PATH; on AMD Zen 4 19 works, 16 fails.
+TRACERS, SOLVER = ("embree", "mitsuba"), "deeptime"
+SECONDS = 40.0
 
 
-class PeerEnvironment:
-    """The peers' own Python, created in a folder at the first use; each package is installed once.
-
-    Parameters
-    ----------
-    folder : Path
-        An environment left there by an earlier run is reused.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
-        self._folder, self._end = folder, time.monotonic() + ALL_SECONDS
-        self._refusals: dict[str, str] = {}
-
-    def run(self, peer: str, package: str, data: Path) -> dict[str, Any] | str:
-        """The result of the peer's function in `peer_worker`, or the reason of its failure in words."""
-        if package not in self._refusals:
-            self._refusals[package] = self._make() or self._install(package)
-        if self._refusals[package]:
-            return self._refusals[package]
-        output, refusal = self._output([str(self.python), str(WORKER), peer, str(data)], RUN_SECONDS)
-        if refusal:
-            return f"fails: {refusal}"
-        answer: dict[str, Any] = json.loads(output.splitlines()[-1])
-        return answer
-
-    def _make(self) -> str:
-        if self.python.exists() and not self._output([str(self.python), "-m", "pip", "--version"], RUN_SECONDS)[1]:
-            return ""
-        _, refusal = self._output([sys.executable, "-m", "venv", "--clear", str(self._folder)], MAKE_SECONDS)
-        return f"no environment: {refusal}" if refusal else ""
-
-    def _install(self, package: str) -> str:
-        command = [str(self.python), "-m", "pip", "install", *PIP, "numpy", package]
-        _, refusal = self._output(command, INSTALL_SECONDS)
-        return f"cannot be installed: {refusal}" if refusal else ""
-
-    def _output(self, command: list[str], seconds: float) -> tuple[str, str]:
-        """The output of a command, and the reason of its failure in words, or an empty string."""
-        limit = min(seconds, self._end - time.monotonic())
-        if limit <= 0.0:
-            return "", "the peers' time was up"
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
-        except subprocess.TimeoutExpired:
-            return "", f"ended after {limit:.0f} s"
-        except OSError as reason:
-            return "", str(reason)
-        return done.stdout, _last_line(done.stderr or done.stdout) if done.returncode else ""
-
-
-def _last_line(text: str) -> str:
-    lines = [line for line in text.splitlines() if line.strip()]
-    return lines[-1].strip().replace("|", "/") if lines else "no message"
+def answer_of(peer: str, folder: Path, **data: Any) -> dict[str, Any] | str:
+    """The result of the peer's function in `peer_worker`, or in words why there is none."""
+    file = folder / "data.npz"
+    np.savez(file, **data)
+    command = [str(folder / "environment" / "bin" / "python"), str(WORKER), peer, str(file)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
+    except (OSError, subprocess.TimeoutExpired) as reason:
+        return str(reason)
+    if done.returncode:
+        return f"fails: {(done.stderr.strip() or 'no message').splitlines()[-1].replace('|', '/')}"
+    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return answer
 
 
 # rays through polygons
@@ -113,20 +66,18 @@ def random_polygon(sides: int) -> geo.Wall:
     return geo.Wall.from_vertices(np.column_stack([np.linspace(0.0, 1.0, sides + 1), -np.pad(depth, 1)]))
 
 
-def trace_with_all(folder: Path, peers: PeerEnvironment, measured: list[Speed]) -> Iterator[tuple[object, ...]]:
+def trace_with_all(folder: Path, measured: list[Speed]) -> Iterator[tuple[object, ...]]:
     """Rows for the same rays through teeth and polygons, by every tracer in one thread; asperity's angles are right."""
     rng = np.random.default_rng(0)
     x, theta = rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
     for wall in (geo.triangular_teeth(0.7), *map(random_polygon, SIDES)):
         sides = len(wall.pieces)
-        traced, seconds = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=1), REPEATS)
+        traced, seconds = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=1))
         lost, rate = float(np.mean(~traced.escaped)), RAYS / seconds
         measured.append((sides, "asperity", rate, lost))
         yield sides, "asperity, double precision", "-", f"{rate / 1e6:.3g}", "reference", "-", f"{lost:.1e}"
-        data = folder / "rays.npz"
-        np.savez(data, corners=wall.vertices, x=x, theta=theta, out=traced.theta)
-        for peer, package in TRACERS.items():
-            found = peers.run(peer, package, data)
+        for peer in TRACERS:
+            found = answer_of(peer, folder, corners=wall.vertices, x=x, theta=theta, out=traced.theta)
             if isinstance(found, str):
                 yield sides, peer, "-", found, "-", "-", "-"
                 continue
@@ -160,26 +111,18 @@ WRONG, ROUNDING = 0.1, 1e-13
 CHAIN_HEADS = "chain | solver | version | gaps wrong | largest relative error | seconds | what it says"
 
 
-def solve_with_all(folder: Path, peers: PeerEnvironment) -> Iterator[tuple[object, ...]]:
-    """Rows for the same chains, by every solver."""
+def solve_with_all(folder: Path) -> Iterator[tuple[object, ...]]:
+    """Rows for the same chains, by both solvers."""
     for gap in MAXWELL_GAPS:
         matrix = ker.discretise(ker.maxwell(gap), ker.Bins(BINS))
-        found, seconds = least_time(lambda matrix=matrix: spec.spectrum(matrix, k=2), REPEATS)
+        found, seconds = least_time(lambda matrix=matrix: spec.spectrum(matrix, k=2))
         name, right = f"Maxwell's law of {gap:g}, {BINS} bins", np.array([0.0, gap])
         yield _row(name, "asperity.spectrum", right, np.array([0.0, found.gap]), seconds, str(found.completeness))
-        data = {"matrix": matrix.array, "wanted": 2}
-        for peer in SOLVERS:
-            yield _peer_row(name, peer, right, peers, folder, data)
-
-
-def _peer_row(
-    name: str, peer: str, right: np.ndarray[Any, Any], peers: PeerEnvironment, folder: Path, data: dict[str, Any]
-) -> tuple[object, ...]:
-    np.savez(folder / "chain.npz", **data)
-    found = peers.run(peer, SOLVERS[peer], folder / "chain.npz")
-    if isinstance(found, str):
-        return name, peer, "-", "-", "-", "-", found
-    return _row(name, peer, right, np.array(found["gaps"]), found["seconds"], "-", found["version"])
+        other = answer_of(SOLVER, folder, matrix=matrix.array, wanted=2)
+        if isinstance(other, str):
+            yield name, SOLVER, "-", "-", "-", "-", other
+        else:
+            yield _row(name, SOLVER, right, np.array(other["gaps"]), other["seconds"], "-", other["version"])
 
 
 def _row(
@@ -198,11 +141,11 @@ def _row(
 def main(folder: Path) -> None:
     """Print the tables and draw the picture."""
     folder.mkdir(parents=True, exist_ok=True)
-    peers, measured = PeerEnvironment(folder / "environment"), list[Speed]()
-    print_table(RAY_HEADS, trace_with_all(folder, peers, measured))
+    measured: list[Speed] = []
+    print_table(RAY_HEADS, trace_with_all(folder, measured))
     draw_speeds(measured, folder / PICTURE)
     print()
-    print_table(CHAIN_HEADS, solve_with_all(folder, peers))
+    print_table(CHAIN_HEADS, solve_with_all(folder))
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import traced_matrix
 from asperity.kernels.laws.law import sum_of
-from campaigns.errors.transmission import TOGETHER, Case, in_arcs, passed
+from campaigns.errors.transmission import TOGETHER, Case, passed
 from campaigns.judges.clausing_equation import by_trapezoids
 
 from .exact_rows import ArcRow, Atoms, crevice_row, mean_over_angles, tooth_row
@@ -218,7 +218,7 @@ def transmission_found(scene: str) -> Found:
     if scene in DIFFUSE:
         value, error = by_trapezoids(DIFFUSE[scene], LENGTH)
         return Found(np.asarray(value), error, "integral equation by the trapezoidal rule, extrapolated")
-    case = Case(0, scene, ker.WallLaw(wall_of(scene)), in_arcs(1.2), LENGTH)
+    case = Case(0, scene, ker.WallLaw(wall_of(scene)), wall_of(scene), 0.0, LENGTH)
     rng = np.random.default_rng([SEED, PARTICLES])
     value = sum(passed(case, rng) for _ in range(PARTICLES // TOGETHER)) / PARTICLES
     return Found(

@@ -225,14 +225,6 @@ def _edge(is_corner: bool) -> float:
     return c.CORNER_EDGE if is_corner else c.SMOOTH_EDGE
 
 
-def scene_in_one(wall: Cell) -> Scene:
-    """Build the tables of a closed wall with its whole cell, flat tops included, as one hollow."""
-    tables = _Tables()
-    chain = _chain_of(wall.pieces, wall.vertices)
-    tables.add_hollow(0.0, wall.period, [chain], edges=(c.CORNER_EDGE, c.CORNER_EDGE))
-    return tables.scene(wall.period, False)
-
-
 @dataclass(frozen=True)
 class _Chain:
     """Connected pieces with their joints; ``vertices`` and ``corners`` have one row more than ``pieces``."""

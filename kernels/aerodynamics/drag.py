@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,12 +14,12 @@ from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
 from ...core.long_runs import TIME_LIMIT, reported
 from ...geometry.scene.scene import SEGMENT_TIME
-from ..bases.basis import AngleFunction, Basis
+from ..bases.basis import Basis
 from ..bases.directions import Directions
 from ..bases.measure import SINE, gauss_rule
 from ..bases.panels import Panels
 from ..discretisation.method import Budget
-from ..discretisation.methods import recipe
+from ..discretisation.methods import matrix_by
 from ..laws.law import Law
 from ..laws.structure import has_chain
 from ..matrices.matrix import KernelMatrix
@@ -57,7 +56,6 @@ def resistance(
     tolerance: float = 1e-10,
     *,
     cost: CostFunction = air_resistance,
-    incoming: AngleFunction | None = None,
     breakpoints: ArrayLike = (),
     time_limit: float = TIME_LIMIT,
 ) -> Estimate:
@@ -73,12 +71,10 @@ def resistance(
     tolerance : float
         Wanted error; ``error`` is the error reached.
     cost : callable
-        ``cost(theta, theta_out)`` of two arrays that broadcast, radians; smooth between the breakpoints.
-    incoming : callable, optional
-        Vectorised density of the incoming angles with respect to sin(theta)/2 d theta, by default 1. Its integral may
-        differ from 1.
+        ``cost(theta, theta_out)`` of two arrays that broadcast, radians; smooth between the breakpoints. For another
+        distribution of incoming angles it is the cost times the density with respect to sin(theta)/2 d theta.
     breakpoints : array_like, optional
-        Angles in (0, pi) at which the cost or the density is not smooth.
+        Angles in (0, pi) at which the cost is not smooth.
     time_limit : float
         Limit in seconds on the quadrature of a traced wall, counted as some million ray segments each, so that the
         result does not depend on the machine.
@@ -86,8 +82,8 @@ def resistance(
     Returns
     -------
     Estimate
-        The error is the sum of the error of the law's matrix on `Panels` and of the distance of cost times density from
-        piecewise polynomials, measured between their nodes.
+        The error is the sum of the error of the law's matrix on `Panels` and of the distance of the cost from piecewise
+        polynomials, measured between their nodes.
 
     Raises
     ------
@@ -96,8 +92,8 @@ def resistance(
 
     Notes
     -----
-    If c(theta, theta') rho(theta) = sum_ij c_ij e_i(theta) e_j(theta') in an orthonormal basis, the mean is
-    sum_ij c_ij S_ij with the matrix S of the law.
+    If c(theta, theta') = sum_ij c_ij e_i(theta) e_j(theta') in an orthonormal basis, the mean is sum_ij c_ij S_ij with
+    the matrix S of the law.
 
     Source: A. Plakhov, "Billiards and two-dimensional problems of optimal resistance", Arch. Ration. Mech. Anal. 194
     (2009); Rudzis 2022, section 1.2.7.
@@ -115,19 +111,18 @@ def resistance(
         raise InputError(f"law: expected one in the paper's convention, got {law!r}; call in_specular_frame() on it")
     wanted, seconds = positive_number("tolerance", tolerance), positive_number("time_limit", time_limit)
 
-    def weighted(theta: Floats, outgoing: Floats) -> Floats:
-        value = finite_array("cost", cost(theta, outgoing))
-        return value if incoming is None else value * finite_array("incoming", incoming(theta))
+    def checked(theta: Floats, outgoing: Floats) -> Floats:
+        return finite_array("cost", cost(theta, outgoing))
 
-    if cost is air_resistance and incoming is None and not has_chain(law):
+    if cost is air_resistance and not has_chain(law):
         # three functions suffice; a product of laws needs a basis that can be refined
         basis: Basis = Directions()
-        coefficients, missed = _projected(weighted, basis)
+        coefficients, missed = _projected(checked, basis)
     else:
-        basis, coefficients, missed = _represented(weighted, finite_array("breakpoints", breakpoints), 0.1 * wanted)
+        basis, coefficients, missed = _represented(checked, finite_array("breakpoints", breakpoints), 0.1 * wanted)
     size = float(np.linalg.norm(coefficients))
     budget = Budget(MATRIX_FRACTION * wanted / max(size, 1.0), segments=int(seconds / SEGMENT_TIME))
-    matrix = recipe(law, "auto")(basis, budget)
+    matrix = matrix_by(law, "auto", basis, budget)
     value = float(np.sum(coefficients * matrix.symmetric))
     error = _error(matrix, coefficients) + missed
     how = f"{matrix.method} on {basis!r} ({matrix.error.method})"
@@ -144,7 +139,7 @@ def _error(matrix: KernelMatrix, coefficients: Floats) -> float:
     size, parts = float(np.linalg.norm(coefficients)), len(matrix.replicates)
     if parts < 2:
         return size * float(matrix.error)
-    each = [float(cast(Any, part * coefficients).sum()) for part in matrix.replicates]
+    each = [float((part * coefficients).sum()) for part in matrix.replicates]
     other = max(float(matrix.error) - half_width(matrix.symmetric, matrix.replicates), 0.0)
     return student_95(parts) * float(np.std(each, ddof=1)) / math.sqrt(parts) + size * other
 

@@ -216,18 +216,16 @@ class PolygonalBody(Summary):
         InputError
             If the circle does not contain the body.
         """
-        whole_number("n", n, 1)
-        source, middle = generator(rng), shaped("centre", centre, 2)
+        middle = shaped("centre", centre, 2)
         reach = float(np.hypot(*(self._starts - middle).T).max())
         size = reach if radius is None else positive_number("radius", radius)
         if size < reach:
             raise InputError(f"radius: expected at least {reach:g}, to contain the body, got {size:g}")
         # a little outside, so that a corner on the circle is no obstacle
         size *= 1.0 + 1e-12
-        position, theta = 2.0 * math.pi * source.random(n), SINE.sample(n, source)
         circle = Container.from_curves([Arc(middle, size, 0.0, 2.0 * math.pi)])
-        after = self._through_region(np.stack([size * position, theta], axis=1), circle) / [size, 1.0]
-        return np.stack([position, theta], axis=1), after
+        before, after = self.scatter_in(circle, n, rng)
+        return before / [size, 1.0], after / [size, 1.0]
 
     def scatter_in(self, region: Container, n: int, rng: Rng = None) -> tuple[Floats, Floats]:
         """Draw states from the scattering measure of the body B in a convex set C around it: the law P^{B,C}.

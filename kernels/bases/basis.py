@@ -75,6 +75,10 @@ class Basis(ABC):
     def evaluate(self, angle: ArrayLike) -> Floats:
         """Values of all functions, shape ``angle.shape + (n,)``."""
 
+    def nonzero(self, angle: Floats) -> Floats:
+        """Values of the functions of the interval that contains each angle, by default of all functions."""
+        return self.evaluate(angle)
+
     @property
     def weights(self) -> Floats:
         """Squared coefficients of the constant 1, shape (n,), sum 1; for a partition, the measures of the cells."""
@@ -104,8 +108,11 @@ class Basis(ABC):
 
         Two arrays of shape (intervals,). The default takes the largest values at the ends and at Gauss nodes.
         """
-        angle = self._ends_and_nodes()
-        return largest(angle, np.sum(self.evaluate(angle) ** 2, axis=-1))
+        low, high = self.edges[:-1], np.nextafter(self.edges[1:], 0.0)
+        nodes = gauss_rule(self.edges, DENSER * self.nodes_per_interval)[0].reshape(low.size, -1)
+        angle = np.concatenate((low[:, None], nodes, high[:, None]), axis=1)
+        squares = np.sum(self.nonzero(angle) ** 2, axis=-1)
+        return np.sqrt(squares.max(axis=1)), BETWEEN * np.sqrt((squares * np.sin(angle)).max(axis=1))
 
     def derivative_norm(self) -> float:
         """The square root of the sum of the integrals of (d e_i / d theta)^2, apart from jumps at edges.
@@ -115,14 +122,8 @@ class Basis(ABC):
         """
         step = np.repeat(DIFFERENCE * np.diff(self.edges), self.nodes_per_interval)
         angle, weight = self.measure.quadrature(self.edges, self.nodes_per_interval)
-        slope = (self.evaluate(angle + step) - self.evaluate(angle - step)) / (2.0 * step[:, None])
+        slope = (self.nonzero(angle + step) - self.nonzero(angle - step)) / (2.0 * step[:, None])
         return float(np.sqrt(weight @ np.sum(slope**2, axis=1)))
-
-    def _ends_and_nodes(self) -> Floats:
-        """Both ends of each interval between edges and Gauss nodes inside, shape (intervals, angles)."""
-        low, high = self.edges[:-1], np.nextafter(self.edges[1:], 0.0)
-        nodes = gauss_rule(self.edges, DENSER * self.nodes_per_interval)[0].reshape(low.size, -1)
-        return np.concatenate((low[:, None], nodes, high[:, None]), axis=1)
 
     @abstractmethod
     def coarsened(self) -> tuple[Basis, Floats] | None:
@@ -136,12 +137,6 @@ class Basis(ABC):
         order = self.nodes_per_interval if order is None else whole_number("order", order, 1)
         angle, weight = self.measure.quadrature(self.edges, order)
         return np.asarray(self.evaluate(angle).T @ (weight * Vectorised(function, scalar=True)(angle)))
-
-
-def largest(angle: Floats, squares: Floats) -> tuple[Floats, Floats]:
-    """The magnitudes of a basis from the sums of squares at the angles, both of shape (intervals, angles)."""
-    weighted = squares * np.sin(angle)
-    return np.sqrt(squares.max(axis=1)), BETWEEN * np.sqrt(weighted.max(axis=1))
 
 
 class BasisOfPoints(Basis):

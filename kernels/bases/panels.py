@@ -21,7 +21,7 @@ from ...core.checks import (
     shaped,
     whole_number,
 )
-from .basis import Basis, largest
+from .basis import Basis
 from .bins import Bins
 from .measure import SINE, AngularMeasure, WeightName
 
@@ -99,16 +99,9 @@ class Panels(Basis):
         The conditional distributions of a circular arc of half angle xi have breakpoints at theta = xi (1 +- 1/N) and
         at the mirror images. They accumulate at xi; panels are graded towards xi, down to the root of ``smallest``.
         """
-        return cls.for_arc(_single_arc_half_angle(wall), degree, smallest)
-
-    @classmethod
-    def for_arc(cls, half_angle: float | None, degree: int = 6, smallest: float = SMALLEST) -> Panels:
-        """The panels of `for_wall` for one circular arc of this half angle, in radians; None means any other wall."""
         smallest = number_between("smallest", smallest, 1e-12, 0.5)
-        special = [0.0, np.pi]
-        followed: list[float] = []
+        special, followed, half_angle = [0.0, np.pi], [], _single_arc_half_angle(wall)
         if half_angle is not None:
-            half_angle = number_between("half_angle", half_angle, 0.0, np.pi)
             special += [half_angle, np.pi - half_angle]
             last = int(np.ceil(BREAKPOINT_SPACING**-0.5))
             breakpoints = [half_angle * (1.0 + sign / n) for n in range(1, last + 1) for sign in (-1.0, 1.0)]
@@ -196,21 +189,8 @@ class Panels(Basis):
         np.put_along_axis(values, panel[..., None, None], local[..., None, :], axis=-2)
         return values.reshape((*angle.shape, self.size))
 
-    def magnitudes(self) -> tuple[Floats, Floats]:
-        angle = self._ends_and_nodes()
-        panel = np.broadcast_to(np.arange(self._cells.size)[:, None], angle.shape)
-        values = np.einsum("pak,pki->pai", self.legendre(angle, panel), self._coefficients)
-        return largest(angle, np.sum(values**2, axis=-1))
-
-    def derivative_norm(self) -> float:
-        angle, weight = self.measure.quadrature(self.edges, self.nodes_per_interval)
-        panel = np.repeat(np.arange(self._cells.size), self.nodes_per_interval)
-        # L_k' is a sum of lower polynomials of the local variable, which runs through (-1, 1) on a panel.
-        lower = np.polynomial.legendre.legder(np.eye(self.degree + 1))
-        polynomials = self.legendre(angle, panel)[:, : len(lower)] @ lower
-        slope = np.einsum("ak,aki->ai", polynomials, self._coefficients[panel])
-        slope *= (2.0 / np.diff(self.edges))[panel, None]
-        return float(np.sqrt(weight @ np.sum(slope**2, axis=1)))
+    def nonzero(self, angle: Floats) -> Floats:
+        return self.local(angle)[1]
 
     def coarsened(self) -> tuple[Panels, Floats] | None:
         if self.degree > 0:

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checkpoints import Stored
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
 from ...core.errors import InputError
-from ...core.long_runs import Engine, all_parts, reported
-from ...core.version import __version__
+from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.satellite_law import SatelliteLaw
 from ..laws.law import Law
@@ -116,7 +115,9 @@ def play(
     disk = each[0].disk
     located, moving = _starts(container, position, velocity)
     job = _Disks(container, tuple(each), located, moving, collisions, root)
-    parts = all_parts(job.states, -(-len(located) // TOGETHER), job.identity(), engine, job.stored)
+    parts = all_parts(
+        job.states, -(-len(located) // TOGETHER), identity_of("disks between walls", job), engine, job.stored
+    )
     columns = {name: np.concatenate([part[name] for part in parts], axis=-1 if parts[0][name].ndim == 1 else 1)
                for name in parts[0]}  # fmt: skip
     for array in columns.values():
@@ -133,15 +134,7 @@ class _Disks:
     position: Floats
     velocity: Floats
     collisions: int
-    root: tuple[int, ...]
-
-    def identity(self) -> dict[str, Any]:
-        """What tells these disks from others."""
-        return {
-            "computation": "disks between walls", "version": __version__, "laws": self.laws,
-            "container": self.container, "collisions": self.collisions, "seed": self.root,
-            "start": np.hstack([self.position, self.velocity]),
-        }  # fmt: skip
+    seed: tuple[int, ...]
 
     def stored(self, part: int) -> dict[str, Stored]:
         """What the columns of a part must be."""
@@ -155,7 +148,7 @@ class _Disks:
 
     def states(self, part: int) -> dict[str, NDArray[Any]]:
         """The columns of the record for the disks of one part, whose random numbers depend on its number alone."""
-        rng = np.random.default_rng([*self.root, part])
+        rng = np.random.default_rng([*self.seed, part])
         own = slice(part * TOGETHER, (part + 1) * TOGETHER)
         located, moving = self.position[own].copy(), self.velocity[own].copy()
         n = len(located)

@@ -92,13 +92,6 @@ class BilliardRecord(Summary):
         """Kinetic energies <w, w>/2, shape (steps + 1, n)."""
         return np.asarray(0.5 * self.disk.inner(self.velocity, self.velocity))
 
-    @property
-    def angular_momentum(self) -> Floats:
-        """m (x1 v2 - x2 v1) + J omega about the origin, shape (steps + 1, n)."""
-        x, v = self.position, self.velocity
-        orbital = x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]
-        return np.asarray(self.disk.mass * orbital + self.disk.inertia * v[..., 2])
-
     def extent(self, direction: ArrayLike = (1.0, 0.0)) -> Floats:
         """Range, shape (n,), of the collision positions along a direction, without the start."""
         along = self.position[1:] @ shaped("direction", direction, 2)

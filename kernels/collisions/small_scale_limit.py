@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
@@ -27,9 +26,8 @@ from ...core.checks import (
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_errors
 from ...core.frames import data_frame
-from ...core.long_runs import Engine, all_parts, reported
+from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...core.rounding import EPS
-from ...core.version import __version__
 
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall
@@ -69,8 +67,6 @@ class LimitStudy(Summary):
         disk's correlation is <u, P~ u>/<u, u> plus ``shift``.
     errors : dict of arrays
         Standard errors of the eight columns above, from independent repetitions.
-    seconds : array
-        Processor time of the collisions.
     collisions : int
         Number of collisions at each scale.
     psi : array, shape (k,)
@@ -91,7 +87,6 @@ class LimitStudy(Summary):
     drift: Floats
     shift: Floats
     errors: dict[str, Floats]
-    seconds: Floats
     collisions: int
     psi: Floats
     by_psi: dict[str, Floats]
@@ -108,7 +103,7 @@ class LimitStudy(Summary):
         for name in COLUMNS:
             # names of fields of this class
             columns |= {name: getattr(self, name), f"{name}_error": self.errors[name]}
-        return data_frame({**columns, "seconds": self.seconds})
+        return data_frame(columns)
 
     def order(self, column: str, against: str = "scales") -> Estimate:
         """The exponent p of column ~ against^p, by weighted least squares.
@@ -120,8 +115,7 @@ class LimitStudy(Summary):
         ----------
         column : str
             One of the measured columns.
-        against : {"scales", "spacings", "ratio"}
-            ``"ratio"`` is scale/spacing^2.
+        against : {"scales", "spacings"}
 
         Raises
         ------
@@ -129,7 +123,7 @@ class LimitStudy(Summary):
             If a name is unknown, there are fewer than three scales, or an entry is not positive.
         """
         choice("column", column, COLUMNS)
-        bases = {"scales": self.scales, "spacings": self.spacings, "ratio": self.scales / self.spacings**2}
+        bases = {"scales": self.scales, "spacings": self.spacings}
         choice("against", against, bases)
         values = getattr(self, column)
         if len(values) < FEWEST_SCALES or not np.all(values > 0.0):
@@ -138,12 +132,10 @@ class LimitStudy(Summary):
             )
         spread = np.maximum(self.errors[column] / values, EPS)
         x, y = np.log(bases[against]), np.log(values)
-        design = np.stack([x, np.ones_like(x)], axis=1) / spread[:, None]
-        inverse = np.linalg.inv(design.T @ design)
-        slope, offset = inverse @ design.T @ (y / spread)
+        (slope, offset), covariance = np.polyfit(x, y, 1, w=1.0 / spread, cov="unscaled")
         # scatter about the line, in units of the sampling errors
         excess = np.sum(((y - slope * x - offset) / spread) ** 2) / (len(x) - 2)
-        standard_error = math.sqrt(float(inverse[0, 0]))
+        standard_error = math.sqrt(float(covariance[0, 0]))
         by_scatter = student_95(len(x) - 1) * math.sqrt(float(excess)) if excess > 1.0 else 0.0
         error = standard_error * max(NORMAL_95, by_scatter)
         return Estimate(float(slope), error, "estimate", f"slope of {len(x)} scales")
@@ -186,8 +178,7 @@ def limit_study(
     checkpoint : path, optional
         A file to which every repetition at a scale is added; the same call goes on with it.
     client : int, str or distributed.Client, optional
-        As of `asperity.spectral.sweep`. But for its ``seconds`` the study is the same to the last bit without
-        checkpoint and workers.
+        As of `asperity.spectral.sweep`. The study is the same to the last bit without checkpoint and workers.
     key : str, optional
         As of `asperity.spectral.sweep`.
 
@@ -229,9 +220,10 @@ def limit_study(
     target = (wall if limit is None else limit).foreshorten(disk)
     sizes = tuple((space.scale, space.spacing) for space in spaces)
     job = _Repetitions(disk, wall, target, sizes, tuple(map(float, rolls)), samples, repetitions, root)
-    parts = all_parts(job.measured, len(eps) * repetitions, job.identity(), engine, job.stored)
+    parts = all_parts(
+        job.measured, len(eps) * repetitions, identity_of("limit of small scales", job), engine, job.stored
+    )
     each = np.reshape([part["columns"] for part in parts], (len(eps), repetitions, len(rolls), len(COLUMNS)))
-    seconds = np.reshape([part["seconds"] for part in parts], (len(eps), repetitions)).sum(axis=1)
     runs = each.mean(axis=2)
     means, errors = runs.mean(axis=1), runs.std(axis=1, ddof=1) / math.sqrt(repetitions)
     columns = {name: frozen(means[:, j]) for j, name in enumerate(COLUMNS)}
@@ -240,7 +232,6 @@ def limit_study(
         spacings=frozen([space.spacing for space in spaces]),
         gap_fraction=frozen([2.0 * space.gap_radius / space.spacing for space in spaces]),
         errors={name: frozen(errors[:, j]) for j, name in enumerate(COLUMNS)},
-        seconds=frozen(seconds),
         collisions=repetitions * len(rolls) * math.prod(samples),
         psi=frozen(rolls),
         by_psi={name: frozen(each.mean(axis=1)[:, :, j]) for j, name in enumerate(COLUMNS)},
@@ -254,39 +245,28 @@ class _Repetitions:
 
     disk: Disk
     wall: Wall
-    target: Wall
+    limit: Wall
     sizes: tuple[tuple[float, float], ...]
     psi: tuple[float, ...]
     samples: tuple[int, int, int]
     repetitions: int
-    root: tuple[int, ...]
-
-    def identity(self) -> dict[str, Any]:
-        """What tells this study from others."""
-        return {
-            "computation": "limit of small scales", "version": __version__, "disk": self.disk,
-            "wall": self.wall, "limit": self.target, "sizes": self.sizes, "psi": self.psi, "samples": self.samples,
-            "repetitions": self.repetitions, "seed": self.root,
-        }  # fmt: skip
+    seed: tuple[int, ...]
 
     def stored(self, _: int) -> dict[str, Stored]:
         """What the arrays of a part must be."""
-        return {"columns": Stored("f", (len(self.psi), len(COLUMNS))), "seconds": Stored("f", (), 0.0)}
+        return {"columns": Stored("f", (len(self.psi), len(COLUMNS)))}
 
     def measured(self, part: int) -> dict[str, Any]:
-        """Columns and processor seconds of one repetition, whose random numbers depend on its number alone."""
-        rng = np.random.default_rng([*self.root, part])
+        """The columns of one repetition, whose random numbers depend on its number alone."""
+        rng = np.random.default_rng([*self.seed, part])
         scale, spacing = self.sizes[part // self.repetitions]
-        each = [self._measured(scale, spacing, psi, rng) for psi in self.psi]
-        return {"columns": [columns for columns, _ in each], "seconds": sum(seconds for _, seconds in each)}
+        return {"columns": [self._measured(scale, spacing, psi, rng) for psi in self.psi]}
 
-    def _measured(
-        self, scale: float, spacing: float, psi: float, rng: np.random.Generator
-    ) -> tuple[list[float], float]:
-        """The columns of one repetition in the order of COLUMNS, and the processor seconds."""
+    def _measured(self, scale: float, spacing: float, psi: float, rng: np.random.Generator) -> list[float]:
+        """The columns of one repetition in the order of COLUMNS."""
         from ...geometry import collide, collide_cylinder, collide_modified, trace
 
-        disk, wall, target = self.disk, self.wall, self.target
+        disk, wall, target = self.disk, self.wall, self.limit
         directions, turns, starts = self.samples
         per_angle = turns * starts
         u = -1.0 + 2.0 * _strata(directions, rng)
@@ -295,9 +275,7 @@ class _Repetitions:
         x1 = scale * wall.period * _strata(starts, rng, (directions, turns))
         position = np.stack([x1, np.broadcast_to(alpha[..., None], x1.shape)], axis=-1).reshape(-1, 2)
         velocity = -np.repeat(disk.from_angles(theta, psi), per_angle, axis=0)
-        begin = time.process_time()
         true = collide(disk, wall, scale, position, velocity, spacing)
-        spent = time.process_time() - begin
         outgoing, rolled = disk.to_angles(true.velocity)
         limit_wall = target.unforeshorten(disk)
         straight, _ = disk.to_angles(collide_cylinder(disk, limit_wall, scale, position, velocity).velocity)
@@ -314,7 +292,7 @@ class _Repetitions:
         differ = np.abs(modified.velocity - cylinder.velocity).max(axis=1) > 0.1
         # E[u^2] = 1/3 under sin(theta)/2 d theta
         shift = 3.0 * float(np.mean(u[:, None] * (np.cos(limit) - np.cos(outgoing.reshape(shape)))))
-        columns = [
+        return [
             away + psi_defect,
             away + psi_defect + float(moved.sum(axis=1).mean()),
             float(np.mean(np.abs(np.sort(straight.reshape(shape), axis=1) - limit))),
@@ -324,7 +302,6 @@ class _Repetitions:
             float(moved.max(axis=1).mean()),
             shift,
         ]
-        return columns, spent
 
 
 def _strata(n: int, rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Floats:

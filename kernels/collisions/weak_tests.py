@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from ...core.checks import (
     Floats,
     Rng,
-    choice,
     finite_array,
     frozen,
     generator,
@@ -23,8 +22,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import Estimate, Summary, student_95
-from ...core.frames import data_frame
+from ...core.estimates import Summary, student_95
 from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ..bases.measure import SINE, SINE_SQUARED
@@ -75,32 +73,6 @@ class WeakLimit(Summary):
     limit_error: Floats
     unresolved: Floats
     collisions: int
-
-    def estimate(self, scale: int, pair: int, of: str = "cylinder") -> Estimate:
-        """One entry of ``cylinder`` or ``limit`` with its error.
-
-        Raises
-        ------
-        InputError
-            If ``of`` is another name.
-        """
-        tables = {"cylinder": (self.cylinder, self.cylinder_error), "limit": (self.limit, self.limit_error)}
-        choice("of", of, tables)
-        value, error = tables[of]
-        method = f"{self.collisions} collisions on scrambled Sobol points"
-        return Estimate(float(value[scale, pair]), float(error[scale, pair]), "estimate", method)
-
-    def to_frame(self) -> Any:
-        """One row for every scale and pair (extra ``studies``)."""
-        pairs = len(self.names)
-        columns: dict[str, Any] = {
-            "scale": np.repeat(self.scales, pairs), "spacing": np.repeat(self.spacings, pairs),
-            "pair": list(self.names) * len(self.scales),
-        }  # fmt: skip
-        for name in ("cylinder", "cylinder_error", "limit", "limit_error"):
-            # names of fields of this class
-            columns[name] = getattr(self, name).ravel()
-        return data_frame(columns)
 
 
 def _bump(position: Floats) -> Floats:

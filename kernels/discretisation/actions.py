@@ -15,7 +15,7 @@ from ..laws.law import DrivenLaw, Law, knows_errors
 from ..laws.structure import is_compound, lists_branches
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import traced_wall
-from .method import Budget, MethodName, computed, rounding
+from .method import Budget, computed, rounding
 
 # Limit on the values of basis functions: one or two seconds of work.
 MOST_VALUES = 2**26
@@ -28,24 +28,22 @@ MEAN_FRACTION = 0.1
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 
 
-class Actions:
-    """Any law that is not compound and knows the errors of its conditional distributions, by Kronrod's rule."""
+def has_conditionals(law: Law, basis: Basis) -> bool:
+    """Whether a law is not compound, and knows the errors of its conditional distributions and its breakpoints."""
+    if is_compound(law) or _has_too_many_breakpoints(law):
+        return False
+    driven = isinstance(law, DrivenLaw) and law.isometry_table() is None
+    return traced_wall(law) is None and (isinstance(basis, Legendre) or not driven) and knows_errors(law)
 
-    name: MethodName = "quadrature"
 
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        if is_compound(law) or _has_too_many_breakpoints(law):
-            return False
-        driven = isinstance(law, DrivenLaw) and law.isometry_table() is None
-        return traced_wall(law) is None and (isinstance(basis, Legendre) or not driven) and knows_errors(law)
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        symmetric, error = action_matrix(law, basis, budget.tolerance)
-        if law.reversible:
-            # For a reversible law an under-resolved angle causes asymmetry.
-            error = max(error, float(np.linalg.norm(symmetric - symmetric.T)))
-        how = "difference of the rules of Gauss and Kronrod, panel by panel, and errors of conditional means"
-        return computed(symmetric, basis, self.name, error + rounding(basis), how)
+def by_conditionals(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix from conditional distributions, by Kronrod's rule."""
+    symmetric, error = action_matrix(law, basis, budget.tolerance)
+    if law.reversible:
+        # For a reversible law an under-resolved angle causes asymmetry.
+        error = max(error, float(np.linalg.norm(symmetric - symmetric.T)))
+    how = "difference of the rules of Gauss and Kronrod, panel by panel, and errors of conditional means"
+    return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
 
 
 def _has_too_many_breakpoints(law: Law) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,9 @@ from ..bases.intervals import between_cuts, edges_inside, joined_lists
 from ..bases.measure import gauss_on_intervals
 from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..bases.panels import Panels
-from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.circular_arc import CircularArcLaw
-from .method import Budget, MethodName, computed, rounding
+from .method import Budget, computed, rounding
 
 # A fraction of about xi^3 / (6 N^3 sin xi) of the rays has more than N hits, 5e-13 for MOST_HITS. They enter at xi and
 # leave at pi - xi, both within 2 xi / N, and are counted at these angles. N is FEWEST_HITS times a power of 2, so that
@@ -36,18 +34,11 @@ NOISE_PROBES = 5
 ROUNDING = 4.0 * np.pi * EPS
 
 
-class Arcs:
-    """The law of circular arcs by Gauss rules on the polygons of each number of hits."""
-
-    name: MethodName = "quadrature"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        return isinstance(law, CircularArcLaw)
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        symmetric, error = arc_matrix(cast(CircularArcLaw, law).half_angle, basis, budget.tolerance)
-        how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
-        return computed(symmetric, basis, self.name, error + rounding(basis), how)
+def by_arc_polygons(law: CircularArcLaw, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of the law of circular arcs by Gauss rules on the polygons of each number of hits."""
+    symmetric, error = arc_matrix(law.half_angle, basis, budget.tolerance)
+    how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
+    return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
 
 
 def arc_matrix(half_angle: float, basis: Basis, tolerance: float = 0.0) -> tuple[Floats, float]:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Protocol, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE
@@ -14,17 +12,15 @@ from ...core.rounding import EPS
 from ..bases.assembly import add_products
 from ..bases.basis import Basis
 from ..bases.bins import Bins
-from ..bases.directions import Directions
 from ..bases.intervals import bisected
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..laws.density import DensityLaw, cut_by_edges
 from ..laws.involution import InvolutionLaw, jumps_of_map
-from ..laws.law import Law
 from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..matrices.matrix import KernelMatrix
-from .method import Budget, MethodName, computed, rounding, until_converged
+from .method import Budget, computed, rounding, until_converged
 
 # Limits on the evaluations of a density and on the points of a map: one or two seconds of work each.
 MOST_DENSITY_VALUES, MOST_MAP_POINTS = 2**25, 2**20
@@ -44,71 +40,27 @@ CONDITIONAL_CHUNK = 2**17
 GRADING = 0.25 ** np.arange(1.0, 17.0)
 
 
-class HasDensity(Protocol):
-    """The methods of a law that `density_matrix` uses."""
-
-    def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats: ...
-    def panels(self, theta: Floats) -> Floats: ...
-    def incoming_edges(self, edges: Floats) -> Floats: ...
-    @property
-    def outgoing_breakpoints(self) -> Floats: ...
-    @property
-    def resolution(self) -> float: ...
-    @property
-    def mirror_symmetric(self) -> bool | None: ...
+def by_eigenvalues(law: HenyeyGreensteinLaw, basis: Legendre, budget: Budget) -> KernelMatrix:
+    """The matrix of Henyey-Greenstein scattering in Legendre polynomials, in which it is diagonal."""
+    diagonal = np.diag(law.g ** np.arange(float(basis.size)))
+    how = "eigenvalues g^l of the polynomials of degree l, to rounding"
+    return computed(diagonal, basis, "exact", EPS * basis.size**0.5, how, "bound")
 
 
-class Diagonal:
-    """Henyey-Greenstein scattering in Legendre polynomials, in which its matrix is diagonal."""
-
-    name: MethodName = "exact"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        return isinstance(law, HenyeyGreensteinLaw) and isinstance(basis, Legendre)
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        diagonal = np.diag(cast(HenyeyGreensteinLaw, law).g ** np.arange(float(basis.size)))
-        how = "eigenvalues g^l of the polynomials of degree l, to rounding"
-        return computed(diagonal, basis, self.name, EPS * basis.size**0.5, how, "bound")
+def by_density(law: DensityLaw, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of a law with a density by Gauss rules whose order doubles."""
+    return _settled(*density_matrix(law, basis, budget.tolerance), basis)
 
 
-class Densities:
-    """Laws with a density by Gauss rules whose order doubles."""
-
-    name: MethodName = "quadrature"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        # `Actions` integrates the three smooth functions of Directions for each incoming angle on the law's panels.
-        return isinstance(law, DensityLaw) and not isinstance(basis, Directions)
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        return _settled(*density_matrix(cast(DensityLaw, law), basis, budget.tolerance), basis)
+def by_map(law: InvolutionLaw, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of a deterministic law by rules on intervals between the jumps of its map, which are halved."""
+    return _settled(*map_matrix(law.map, basis, budget.tolerance), basis)
 
 
-class Maps:
-    """Deterministic laws, theta' = T(theta), by rules on intervals between the jumps of T that are halved."""
-
-    name: MethodName = "quadrature"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        return isinstance(law, InvolutionLaw)
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        return _settled(*map_matrix(cast(InvolutionLaw, law).map, basis, budget.tolerance), basis)
-
-
-class LeastResistance:
-    """The law of least resistance in bins, from the masses of intervals and their images."""
-
-    name: MethodName = "quadrature"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        return isinstance(law, LeastResistanceLaw) and isinstance(basis, Bins)
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        flux = cast(LeastResistanceLaw, law).flux(cast(Bins, basis))
-        symmetric = basis.normalisation[:, None] * flux * basis.normalisation
-        return computed(symmetric, basis, self.name, rounding(basis), "masses of intervals, to rounding")
+def by_interval_masses(law: LeastResistanceLaw, basis: Bins, budget: Budget) -> KernelMatrix:
+    """The matrix of the law of least resistance in bins, from the masses of intervals and their images."""
+    symmetric = basis.normalisation[:, None] * law.flux(basis) * basis.normalisation
+    return computed(symmetric, basis, "quadrature", rounding(basis), "masses of intervals, to rounding")
 
 
 def _settled(symmetric: Floats, error: float, basis: Basis) -> KernelMatrix:
@@ -116,7 +68,7 @@ def _settled(symmetric: Floats, error: float, basis: Basis) -> KernelMatrix:
     return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
 
 
-def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Floats, float]:
+def density_matrix(law: DensityLaw, basis: Basis, tolerance: float) -> tuple[Floats, float]:
     """<e_i, P e_j> by Gauss rules whose order doubles, and the difference of the last two as error estimate.
 
     Product rules miss a peak narrower than the cells of a partition. Each conditional distribution is then integrated
@@ -142,14 +94,14 @@ def _with_mirror_image(half: Floats) -> Floats:
     return half + half[::-1, ::-1]
 
 
-def _conditional_cost(law: HasDensity, edges: Floats, outer: Floats, order: int) -> int:
+def _conditional_cost(law: DensityLaw, edges: Floats, outer: Floats, order: int) -> int:
     """Approximate number of evaluations of the density; most intervals are small fractions of a panel."""
     panels: int = law.panels(outer[:1]).shape[-1]
     values: int = (outer.size - 1) * order * (FRACTION_NODES[0] * edges.size + FRACTION_NODES[-1] * panels)
     return values
 
 
-def _conditional_levels(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Iterator[Floats]:
+def _conditional_levels(law: DensityLaw, basis: Basis, edges: Floats, outer: Floats, order: int) -> Iterator[Floats]:
     level, spent = 0, 0
     while level < 2 or spent + _conditional_cost(law, edges, outer, order) <= MOST_DENSITY_VALUES:
         spent += _conditional_cost(law, edges, outer, order)
@@ -157,14 +109,15 @@ def _conditional_levels(law: HasDensity, basis: Basis, edges: Floats, outer: Flo
         order, level = 2 * order, level + 1
 
 
-def _conditional_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Floats:
+def _conditional_rule(law: DensityLaw, basis: Basis, edges: Floats, outer: Floats, order: int) -> Floats:
     angle, mass = SINE.quadrature(outer, order)
     source = basis.index(angle)
     flux = np.zeros(basis.size**2)
     step = max(1, CONDITIONAL_CHUNK // (FRACTION_NODES[0] * edges.size))
     for start in range(0, angle.size, step):
         part = slice(start, start + step)
-        row, low, high, nodes = conditional_intervals(law, edges, angle[part])
+        row, low, high, fraction = cut_by_edges(law.panels(angle[part]), edges)
+        nodes = np.asarray(FRACTION_NODES)[np.searchsorted(FRACTIONS, fraction)]
         target = basis.index(0.5 * (low + high))
         for count in FRACTION_NODES:
             chosen = nodes == count
@@ -176,16 +129,7 @@ def _conditional_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Float
     return basis.normalisation[:, None] * flux.reshape(basis.size, basis.size) * basis.normalisation
 
 
-def conditional_intervals(
-    law: HasDensity, edges: Floats, theta: Floats
-) -> tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]:
-    """The intervals into which cells and panels cut (0, pi): index of the angle, ends and number of Gauss nodes."""
-    row, low, high, fraction = cut_by_edges(law.panels(theta), edges)
-    nodes = np.asarray(FRACTION_NODES)[np.searchsorted(FRACTIONS, fraction)]
-    return row, low, high, nodes
-
-
-def _density_levels(law: HasDensity, basis: Basis, edges: Floats) -> Iterator[Floats]:
+def _density_levels(law: DensityLaw, basis: Basis, edges: Floats) -> Iterator[Floats]:
     intervals = edges.size - 1
     order = basis.nodes_per_interval
     if basis.is_partition:
@@ -196,7 +140,7 @@ def _density_levels(law: HasDensity, basis: Basis, edges: Floats) -> Iterator[Fl
         order, level = 2 * order, level + 1
 
 
-def _density_rule(law: HasDensity, basis: Basis, edges: Floats, order: int) -> Floats:
+def _density_rule(law: DensityLaw, basis: Basis, edges: Floats, order: int) -> Floats:
     angle, weight = gauss_rule(edges, order)
     mass = weight * SINE.density(angle)
     total = np.zeros((basis.size, basis.size))
@@ -234,15 +178,11 @@ def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floa
         if basis.is_partition:
             angle, _ = gauss_rule(fine, 1)
             mass = SINE.mass(fine[:-1], fine[1:])
-            total = np.zeros((basis.size, basis.size))
-            add_products(total, basis, angle, np.asarray(map_angle(angle), dtype=np.float64), mass)
-            yield total
         else:
             angle, mass = SINE.quadrature(fine, basis.nodes_per_interval)
-            total = np.zeros((basis.size, basis.size))
-            image = np.asarray(map_angle(angle), dtype=np.float64)
-            add_products(total, basis, angle, image, mass)
-            yield total
+        total = np.zeros((basis.size, basis.size))
+        add_products(total, basis, angle, np.asarray(map_angle(angle), dtype=np.float64), mass)
+        yield total
         pieces *= 2
 
 

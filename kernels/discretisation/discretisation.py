@@ -24,10 +24,18 @@ from ..laws.matrix_law import MatrixLaw, finite_matrix
 from ..laws.structure import Rules, fold, holds_of_all
 from ..laws.tensor_law import SpatialLaw
 from ..matrices.matrix import KernelMatrix
-from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
-from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SAMPLING, SEED_WITHOUT_RNG, SEGMENTS_A_RAY, Budget, MethodName
-from .methods import recipe
+from .method import (
+    DEFAULT_SAMPLES,
+    MOST_SEGMENTS,
+    QUICK_SEGMENTS,
+    SAMPLING,
+    SEED_WITHOUT_RNG,
+    SEGMENTS_A_RAY,
+    Budget,
+    MethodName,
+)
+from .methods import matrix_by
 
 # Memory in which a matrix is computed, in matrices, and least time of an entry.
 MATRICES, SECONDS = 6, 4e-7
@@ -103,22 +111,22 @@ def discretise(
     -----
     ``"auto"`` tries the methods in this order; every other value of ``method`` tries the methods of its kind.
 
-    1. ``RaysOrConditionals`` (auto): a wall without further parts, by the first of these that meets the tolerance, or
-       by the most exact: isometries, if the beams of a polygonal wall resolve; 2^17 rays; conditional distributions,
-       of walls that close and have at most 16 pieces; all rays. The error does not grow if the tolerance falls. The
-       same for a wall in the other frame.
-    2. ``IsometryTables`` (exact): isometries on intervals of angles, with probabilities, such as polygonal walls.
-    3. ``Isometries`` (exact): any other law that lists its isometries and is not a composition.
-    4. ``Diagonal`` (exact): Henyey-Greenstein scattering, in `Legendre`.
-    5. ``Arcs`` (quadrature): circular arcs.
-    6. ``Densities`` (quadrature): laws with a density.
-    7. ``LeastResistance`` (quadrature): `LeastResistanceLaw`, in `Bins`.
-    8. ``Maps`` (quadrature): deterministic laws.
-    9. ``Actions`` (quadrature): any other law whose conditional distributions have errors; laws that average over
-       entry points only in `Legendre`.
-    10. ``Sobol`` (qmc): laws driven by one uniform number.
-    11. ``Traced`` (quadrature): any wall without further parts or isometries.
-    12. ``MonteCarlo`` (monte-carlo): any law.
+    1. ``by_rays_or_conditionals`` (auto): a wall without further parts, by the first of these that meets the tolerance,
+       or by the most exact: isometries, if the beams of a polygonal wall resolve; 2^17 rays; conditional
+       distributions, of walls that close and have at most 16 pieces; all rays. The error does not grow if the tolerance
+       falls. The same for a wall in the other frame.
+    2. ``by_isometry_table`` (exact): isometries on intervals of angles, with probabilities, such as polygonal walls.
+    3. ``by_branches`` (exact): any other law that lists its isometries and is not a composition.
+    4. ``by_eigenvalues`` (exact): Henyey-Greenstein scattering, in `Legendre`.
+    5. ``by_arc_polygons`` (quadrature): circular arcs.
+    6. ``by_density`` (quadrature): laws with a density.
+    7. ``by_interval_masses`` (quadrature): `LeastResistanceLaw`, in `Bins`.
+    8. ``by_map`` (quadrature): deterministic laws.
+    9. ``by_conditionals`` (quadrature): any other law whose conditional distributions have errors; laws that average
+       over entry points only in `Legendre`.
+    10. ``by_sobol_rays`` (qmc): laws driven by one uniform number.
+    11. ``by_adaptive_angles`` (quadrature): any wall without further parts or isometries.
+    12. ``by_independent_rays`` (monte-carlo): any law.
 
     Methods 1 to 9 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the other
     frame from its inner law, a composition from its factors if none of them needs rays. Methods 10 to 12 come last. A
@@ -186,7 +194,7 @@ def discretise(
     has_bins = method == "auto" and not holds_of_all(law, lambda part: not isinstance(part, MatrixLaw))
     entries = basis.size**2
     with reported(f"matrix in {basis!r}", SECONDS * entries, DOUBLE * MATRICES * entries):
-        found = replace(exact, basis=basis) if exact is not None and has_bins else recipe(law, method)(basis, budget)
+        found = replace(exact, basis=basis) if exact is not None and has_bins else matrix_by(law, method, basis, budget)
     return replace(
         found,
         beyond=None if exact is None or found.samples else exact.beyond,

@@ -14,10 +14,10 @@ from ..bases.displacement import Displacement
 from ..bases.measure import gauss_on_intervals
 from ..laws.branches import preimages
 from ..laws.law import Law
-from ..laws.structure import Rules, fold, has_chain, lists_branches
+from ..laws.structure import Rules, fold
 from ..matrices.matrix import KernelMatrix
-from .isometry_tables import bounded, table_matrix
-from .method import Budget, MethodName, rounding
+from .isometry_tables import bounded
+from .method import Budget, rounding
 
 # A probability linear in cot(theta), times sin(theta), is a combination of sin and cos. A Gauss rule with m nodes has
 # an error of about (width/2)^(2m)/(2m)! for it. Probabilities of compositions are products of such terms, smooth on the
@@ -34,25 +34,11 @@ BRANCHES_COMPUTED = Rules(
 )
 
 
-class Isometries:
-    """Laws that list their isometries, by Gauss rules between their breakpoints."""
-
-    name: MethodName = "exact"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        # Chains can have too many isometries; see `products.Chain`.
-        return lists_branches(law) and not has_chain(law)
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        symmetric, error = isometric_matrix(law, basis, budget.tolerance)
-        how = "Gauss rules between the breakpoints of isometries: rounding and omitted breakpoints"
-        return bounded(symmetric, basis, error, how)
-
-
-def isometric_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """The matrix of a law that lists its isometries, and a bound on its Frobenius error."""
-    table = law.isometry_table()
-    return branch_matrix(law, basis, tolerance) if table is None else table_matrix(table, basis)
+def by_branches(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of a law that lists its isometries, by Gauss rules between their breakpoints."""
+    symmetric, error = branch_matrix(law, basis, budget.tolerance)
+    how = "Gauss rules between the breakpoints of isometries: rounding and omitted breakpoints"
+    return bounded(symmetric, basis, error, how)
 
 
 def branch_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:
@@ -107,13 +93,8 @@ def _add_pieces(law: Law, basis: Basis, low: Floats, high: Floats, order: int, t
     step = max(pieces, 1)
     for start in range(0, low.size, step):
         angle, weight = gauss_on_intervals(low[start : start + step], high[start : start + step], order)
-        _add_nodes(law, basis, angle, weight, total)
-
-
-def _add_nodes(law: Law, basis: Basis, angle: Floats, weight: Floats, total: Floats) -> None:
-    mass = weight * basis.measure.density(angle)
-    probability, outgoing = law.branches(angle)
-    for slot in range(outgoing.shape[-1]):
-        used = probability[:, slot] > 0.0
-        fraction = (mass * probability[:, slot])[used]
-        add_products(total, basis, angle[used], outgoing[used, slot], fraction)
+        mass = weight * basis.measure.density(angle)
+        probability, outgoing = law.branches(angle)
+        for slot in range(outgoing.shape[-1]):
+            used = probability[:, slot] > 0.0
+            add_products(total, basis, angle[used], outgoing[used, slot], (mass * probability[:, slot])[used])

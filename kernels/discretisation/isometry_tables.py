@@ -22,7 +22,7 @@ from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.crevice_tail import crevice_nodes, first_crossing
 from ..walls.rectangular import crevice_pieces
-from .method import Budget, MethodName, computed, rounding
+from .method import Budget, computed, rounding
 
 # On a piece of width w, products of two basis functions and a sinusoid vary like exp(n w), with the stiffness n of
 # `_nodes`. The error of a Gauss rule with m nodes, relative to the measure of the piece, is (n w / 2)^(2m) / (2m)!. It
@@ -33,20 +33,13 @@ MORE_NODES = 18
 FEW = 0.1
 
 
-class IsometryTables:
-    """Laws that have a table of isometries, by masses and Gauss rules on every piece of the table."""
-
-    name: MethodName = "exact"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        return law.isometry_table() is not None
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        table = cast(IsometryTable, law.isometry_table())
-        symmetric, error = table_matrix(table, basis)
-        how = "masses and Gauss rules on every piece of the table of isometries, to rounding"
-        found = bounded(symmetric, basis, error, how + (", plus unresolved beams" if table.unresolved else ""))
-        return replace(found, unresolved=table.unresolved)
+def by_isometry_table(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of a law that has a table of isometries, by masses and Gauss rules on every piece of the table."""
+    table = cast(IsometryTable, law.isometry_table())
+    symmetric, error = table_matrix(table, basis)
+    how = "masses and Gauss rules on every piece of the table of isometries, to rounding"
+    found = bounded(symmetric, basis, error, how + (", plus unresolved beams" if table.unresolved else ""))
+    return replace(found, unresolved=table.unresolved)
 
 
 def bounded(symmetric: Floats, basis: Basis, error: float, how: str) -> KernelMatrix:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from ..bases.basis import Basis
 from ..bases.displacement import node_rounding
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from ..sampling.monte_carlo import DEFAULT_SAMPLES
 
 MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
 # The methods whose rays can be stored on the way and traced by workers.
@@ -26,13 +25,11 @@ SAMPLING: tuple[MethodName, ...] = ("qmc", "monte-carlo")
 # an explicit request for quadrature, the time of two million rays, or of the largest number of rays.
 MOST_SEGMENTS, QUICK_SEGMENTS, SEGMENTS_A_RAY = 140_000_000, 4_000_000, 4
 SEED_WITHOUT_RNG = 0
+# Tracing this number of rays takes about a second.
+DEFAULT_SAMPLES = 2**20
 # Rounding error of a matrix with n functions, divided by n. Each edge of n cells has a rounding error that moves a
 # fraction of about n eps of a cell's measure; an error of 1.2e-13 was measured for n eps = 1.1e-13.
 ROUNDING = 8.0 * EPS
-
-
-def _fixed_source() -> np.random.Generator:
-    return np.random.default_rng(SEED_WITHOUT_RNG)
 
 
 @dataclass(frozen=True)
@@ -57,42 +54,30 @@ class Budget:
     tolerance: float
     rays: int = DEFAULT_SAMPLES
     segments: int = MOST_SEGMENTS
-    rng: np.random.Generator = field(default_factory=_fixed_source)
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(SEED_WITHOUT_RNG))
     symmetrise: bool = False
     engine: Engine | None = None
 
 
-class Method(Protocol):
+class Method(NamedTuple):
     """A method that computes the matrices of some laws; each is listed in `methods.METHODS` or `methods.SAMPLED`.
 
     Walls are replaced by their `parts` beforehand. The law may be a sum, a chain, or in the specular frame.
+
+    Attributes
+    ----------
+    name : str
+        The kind of the method.
+    accepts : callable
+        Whether the method can compute the matrix of a law in a basis.
+    matrix : callable
+        From law, basis and budget to the matrix, with its error and the evidence for it; `discretise` adds the
+        properties of the law.
     """
 
     name: MethodName
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        """Whether the method can compute the matrix of this law in this basis."""
-        ...
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        """The symmetric array, its error and the evidence for it; `discretise` adds the properties of the law."""
-        ...
-
-
-class Recipe(Protocol):
-    """The computation of the matrix of a law, by one method or from the matrices of its parts."""
-
-    def has(self, wanted: MethodName, basis: Basis) -> bool:
-        """Whether the matrix can be computed by this kind of method."""
-        ...
-
-    def without_rays(self, basis: Basis) -> bool:
-        """Whether no part needs rays."""
-        ...
-
-    def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        """The matrix; valid only if `has` is True."""
-        ...
+    accepts: Callable[[Law, Basis], bool]
+    matrix: Callable[[Any, Any, Budget], KernelMatrix]
 
 
 def computed(

@@ -4,194 +4,233 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, cast, get_args
+from functools import partial
+from typing import Any, TypeAlias, cast, get_args
 
 import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import InputError
 from ..bases.basis import Basis
+from ..bases.bins import Bins
+from ..bases.directions import Directions
+from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, mirror_image, mirror_refinement
-from ..laws.law import Law, retroreflection, specular
-from ..laws.structure import LONGEST_WORD, Rules, fold, has_chain, law_of, words_of
+from ..bases.panels import Panels
+from ..laws.density import DensityLaw
+from ..laws.involution import InvolutionLaw
+from ..laws.law import Combination, Composition, Law, SpecularFrame, sum_of
+from ..laws.least_resistance import LeastResistanceLaw
+from ..laws.phase_function import HenyeyGreensteinLaw
+from ..laws.structure import LONGEST_WORD, has_chain, holds_of_all, lists_branches, multiplied_out
 from ..matrices.defects import SymmetryDefect
 from ..matrices.matrix import KernelMatrix
-from .actions import Actions
-from .arcs import Arcs
-from .densities import Densities, Diagonal, LeastResistance, Maps
-from .isometries import Isometries
-from .isometry_tables import IsometryTables
-from .method import Budget, Method, MethodName, Recipe
-from .products import Chain, Factor
-from .rays_or_conditionals import RaysOrConditionals
-from .sampled import MonteCarlo, Sobol
-from .traced import Traced
+from ..walls.circular_arc import CircularArcLaw
+from ..walls.wall_law import WallLaw, traced_wall
+from .actions import by_conditionals, has_conditionals
+from .arcs import by_arc_polygons
+from .densities import by_density, by_eigenvalues, by_interval_masses, by_map
+from .isometries import by_branches
+from .isometry_tables import by_isometry_table
+from .method import Budget, Method, MethodName
+from .products import by_panels
+from .rays_or_conditionals import by_rays_or_conditionals
+from .sampled import by_independent_rays, by_sobol_rays
+from .traced import by_adaptive_angles
 
 # Methods without rays, except the first. The docstring of `discretise` states the table in this order.
 METHODS: tuple[Method, ...] = (
-    RaysOrConditionals(), IsometryTables(), Isometries(), Diagonal(), Arcs(), Densities(), LeastResistance(), Maps(),
-    Actions(),
-)  # fmt: skip
+    Method("auto", lambda law, _: isinstance(law, WallLaw) and sum_of(law.parts) is law, by_rays_or_conditionals),
+    Method("exact", lambda law, _: law.isometry_table() is not None, by_isometry_table),
+    # compositions can have too many isometries; see `_of_chain`
+    Method("exact", lambda law, _: lists_branches(law) and not has_chain(law), by_branches),
+    Method(
+        "exact", lambda law, basis: isinstance(law, HenyeyGreensteinLaw) and isinstance(basis, Legendre), by_eigenvalues
+    ),
+    Method("quadrature", lambda law, _: isinstance(law, CircularArcLaw), by_arc_polygons),
+    # `by_conditionals` integrates the three smooth functions of Directions for each incoming angle on the law's panels
+    Method(
+        "quadrature", lambda law, basis: isinstance(law, DensityLaw) and not isinstance(basis, Directions), by_density
+    ),
+    Method(
+        "quadrature",
+        lambda law, basis: isinstance(law, LeastResistanceLaw) and isinstance(basis, Bins),
+        by_interval_masses,
+    ),
+    Method("quadrature", lambda law, _: isinstance(law, InvolutionLaw), by_map),
+    Method("quadrature", has_conditionals, by_conditionals),
+)
 # Methods with rays. They are tried if no method above accepts the law and its parts do not give its matrix.
-SAMPLED: tuple[Method, ...] = (Sobol(), Traced(), MonteCarlo())
-# The kinds of methods of a compound law, in the order of the error message.
-NAMES: tuple[MethodName, ...] = get_args(MethodName)[1:]
+SAMPLED: tuple[Method, ...] = (
+    Method("qmc", lambda law, _: law.random_map() is not None, by_sobol_rays),
+    Method("quadrature", lambda law, _: traced_wall(law) is not None, by_adaptive_angles),
+    Method("monte-carlo", lambda law, _: True, by_independent_rays),
+)
+# Panels for the question whether a factor needs rays, whose answer is the same on all panels.
+ANY_PANELS = Panels(np.array([0.0, np.pi]), 0)
+
+# The computation of a matrix within a budget.
+Computation: TypeAlias = Callable[[Budget], KernelMatrix]
 
 
-def recipe(law: Law, wanted: MethodName) -> Callable[[Basis, Budget], KernelMatrix]:
-    """The function of basis and budget that computes a law's matrix by the first method that accepts it, or by parts.
+def matrix_by(law: Law, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of a law by the first method of the wanted kind that accepts it, or from its parts.
 
-    This function raises InputError if the law does not have the wanted kind of method.
+    Raises InputError if the law does not have this kind of method.
     """
-
-    def made(basis: Basis, budget: Budget) -> KernelMatrix:
-        # Independent rays use the law without simplification.
-        found = _Law(law) if wanted == "monte-carlo" else _simplified(law)
-        if wanted != "auto" and not found.has(wanted, basis):
-            names = ", ".join(_names(found, basis))
-            raise InputError(f"method: {law!r} has no method {wanted!r}; it has {names}")
-        if budget.engine and (isinstance(found, _Sum) or not found.has_whole(wanted, basis)):
-            raise InputError(
-                f"method: checkpoint and client take rays of one kind, and {wanted!r} computes {law!r} from its parts; "
-                "use 'monte-carlo'"
-            )
-        return found.matrix(wanted, basis, budget)
-
-    return made
-
-
-class _Law:
-    """The computation of a law's matrix by the first method that accepts the law, else from its parts."""
-
-    def __init__(self, law: Law, parts: Recipe | None = None) -> None:
-        self.law, self.parts = law, parts
-
-    @property
-    def terms(self) -> Sequence[tuple[float, _Law]]:
-        """The terms of the law as a weighted sum."""
-        return self.parts.terms if isinstance(self.parts, _Sum) else ((1.0, self),)
-
-    @property
-    def factors(self) -> Sequence[Factor]:
-        """The factors of the law as a chain."""
-        return self.parts.factors if isinstance(self.parts, (Chain, _Mirrored)) else (self,)
-
-    def has(self, wanted: MethodName, basis: Basis) -> bool:
-        return self._method(wanted, basis) is not None or (self.parts is not None and self.parts.has(wanted, basis))
-
-    def has_whole(self, wanted: MethodName, basis: Basis) -> bool:
-        """Whether a method takes the law, not its parts."""
-        return self._method(wanted, basis) is not None
-
-    def without_rays(self, basis: Basis) -> bool:
-        if self.parts is not None:
-            return self.parts.without_rays(basis)
-        return any(method.accepts(self.law, basis) for method in METHODS if method.name != "auto")
-
-    def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        method = self._method(wanted, basis)
-        if method is not None:
-            return method.matrix(self.law, basis, budget)
-        assert self.parts is not None  # `has` was True, and any other law can be sampled
-        return self.parts.matrix(wanted, basis, budget)
-
-    def _method(self, wanted: MethodName, basis: Basis) -> Method | None:
-        found = self._first(METHODS, wanted, basis)
-        if found is None and wanted == "auto" and self.parts is not None and self.parts.has("auto", basis):
-            return None
-        return found or self._first(SAMPLED, wanted, basis)
-
-    def _first(self, methods: Sequence[Method], wanted: MethodName, basis: Basis) -> Method | None:
-        named = (method for method in methods if wanted in ("auto", method.name))
-        return next((method for method in named if method.accepts(self.law, basis)), None)
-
-
-class _Sum:
-    """The computation of a weighted sum, each term by its own method."""
-
-    def __init__(self, terms: Sequence[tuple[float, _Law]]) -> None:
-        # If the whole sum has too many chains to be multiplied out, single terms can still be simplified.
-        self.parts = [(weight, _simplified(one.law) if isinstance(one.parts, Chain) else one) for weight, one in terms]
-
-    @property
-    def terms(self) -> Sequence[tuple[float, _Law]]:
-        return [(weight * fraction, one) for weight, part in self.parts for fraction, one in part.terms]
-
-    def has(self, wanted: MethodName, basis: Basis) -> bool:
-        return wanted != "monte-carlo" and all(part.has(wanted, basis) for _, part in self.parts)
-
-    def without_rays(self, basis: Basis) -> bool:
-        return all(part.without_rays(basis) for _, part in self.parts)
-
-    def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        made = self._matrices(wanted, basis, budget)
-        methods = " + ".join(dict.fromkeys(matrix.method for _, matrix in made))
-        sampled = [(weight, matrix.samples, matrix.unresolved) for weight, matrix in made if matrix.samples]
-        parts = [(weight * _norm(matrix), matrix.symmetry_defect()) for weight, matrix in made if matrix.samples]
-        weight, matrix = made.pop(0)
-        total = weight * matrix
-        while made:  # no matrix is kept that has been added
-            weight, matrix = made.pop(0)
-            total = total + weight * matrix
-        del matrix
-        # The other terms are not random, so a single sampled term alone has a raw symmetry defect.
-        single = parts[0] if len(parts) == 1 else None
-        return replace(
-            total,
-            method=methods,
-            samples=sum(samples for _, samples, _ in sampled),
-            unresolved=sum(weight * unresolved for weight, _, unresolved in sampled),
-            symmetrised=budget.symmetrise and bool(sampled),
-            raw_defect=single
-            and SymmetryDefect(single[0] / (_norm(total) or 1.0) * single[1], z_score=single[1].z_score),
-            error=replace(total.error, method="sum over the terms: " + total.error.method),
-            norm_bound=1.0,
+    # Independent rays use the law without simplification.
+    given = law if wanted == "monte-carlo" else multiplied_out(law)
+    found = computation(given, wanted, basis)
+    if found is None:
+        names = ", ".join(name for name in get_args(MethodName)[1:] if computation(given, name, basis) is not None)
+        raise InputError(f"method: {law!r} has no method {wanted!r}; it has {names}")
+    if budget.engine and _method(METHODS + SAMPLED, given, wanted, basis) is None:
+        raise InputError(
+            f"method: checkpoint and client take rays of one kind, and {wanted!r} computes {law!r} from its parts; "
+            "use 'monte-carlo'"
         )
-
-    def _matrices(self, wanted: MethodName, basis: Basis, budget: Budget) -> list[tuple[float, KernelMatrix]]:
-        """The matrices of the terms: exact ones, whose errors do not depend on the tolerance, leave the others more."""
-        exact = [part.has("exact", basis) for _, part in self.parts]
-        found: dict[int, KernelMatrix] = {}
-        share = budget.tolerance
-        for wanted_exact in (True, False):
-            chosen = [k for k, is_exact in enumerate(exact) if is_exact is wanted_exact]
-            for k in chosen:
-                found[k] = self.parts[k][1].matrix(wanted, basis, replace(budget, tolerance=share))
-            left = budget.tolerance - sum(self.parts[k][0] * float(matrix.error) for k, matrix in found.items())
-            weight_left = sum(weight for k, (weight, _) in enumerate(self.parts) if k not in found)
-            share = max(share, left / weight_left) if weight_left > 0.0 else share
-        return [(weight, found[k]) for k, (weight, _) in enumerate(self.parts)]
+    return found(budget)
 
 
-class _Mirrored:
-    """The computation of a law in the other frame, from the law's matrix in a mirror-symmetric basis."""
+def computation(law: Law, wanted: MethodName, basis: Basis) -> Computation | None:
+    """The computation by the first method of the wanted kind that accepts a law, or from its parts, if there is one."""
+    from_rays = _method(SAMPLED, law, wanted, basis)
+    if wanted == "auto":
+        return _without_rays(law, basis) or from_rays
+    return _method(METHODS, law, wanted, basis) or from_rays or _from_parts(law, wanted, basis)
 
-    def __init__(self, inner: _Law) -> None:
-        self.inner = inner
 
-    @property
-    def factors(self) -> Sequence[Factor]:
-        return (*self.inner.factors, _Law(specular()))
+def _without_rays(law: Law, basis: Basis) -> Computation | None:
+    return _method(METHODS, law, "auto", basis) or _from_parts(law, "auto", basis)
 
-    def has(self, wanted: MethodName, basis: Basis) -> bool:
-        if wanted == "auto":
-            # If rays are the best method of the law, rays of the law in the other frame are as good.
-            return self._has_choice(basis) or _names(self.inner, basis)[0] in ("exact", "quadrature")
-        return wanted in ("exact", "quadrature") and self.inner.has(wanted, basis)
 
-    def without_rays(self, basis: Basis) -> bool:
-        return self.inner.without_rays(basis)
+def _method(methods: Sequence[Method], law: Law, wanted: MethodName, basis: Basis) -> Computation | None:
+    named = (method for method in methods if wanted in ("auto", method.name))
+    return next((partial(method.matrix, law, basis) for method in named if method.accepts(law, basis)), None)
 
-    def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        finer, restriction = (basis, None) if is_mirror_symmetric(basis) else mirror_refinement(basis)
-        if wanted == "auto" and not self._has_choice(finer):
-            wanted = "quadrature"
-        inner = self.inner.matrix(wanted, finer, budget)
 
-        def mirrored(part: Any) -> Floats:
-            image = mirror_image(part, finer, rows=False)
-            return image if restriction is None else restriction @ image @ restriction.T
+def _from_parts(law: Law, wanted: MethodName, basis: Basis) -> Computation | None:
+    if isinstance(law, Combination):
+        return _of_sum(law, wanted, basis)
+    if isinstance(law, Composition):
+        return _of_chain(law, wanted, basis)
+    return _of_mirrored(law, wanted, basis) if isinstance(law, SpecularFrame) else None
 
+
+def _of_sum(law: Combination, wanted: MethodName, basis: Basis) -> Computation | None:
+    """Each term by its own method."""
+    # If the whole sum has too many chains to be multiplied out, single terms can still be.
+    terms = [(weight, multiplied_out(term)) for weight, term in law.terms]
+    found = [(weight, computation(term, wanted, basis)) for weight, term in terms]
+    parts = [(weight, one) for weight, one in found if one is not None]
+    if wanted == "monte-carlo" or len(parts) < len(terms):
+        return None
+    exact = [computation(term, "exact", basis) is not None for _, term in terms]
+    return lambda budget: _added(_matrices(parts, exact, budget), budget)
+
+
+def _added(made: list[tuple[float, KernelMatrix]], budget: Budget) -> KernelMatrix:
+    """The weighted sum of the matrices of terms, which are taken out of the list."""
+    methods = " + ".join(dict.fromkeys(matrix.method for _, matrix in made))
+    sampled = [(weight, matrix.samples, matrix.unresolved) for weight, matrix in made if matrix.samples]
+    defects = [(weight * _norm(matrix), matrix.symmetry_defect()) for weight, matrix in made if matrix.samples]
+    weight, matrix = made.pop(0)
+    total = weight * matrix
+    while made:  # no matrix is kept that has been added
+        weight, matrix = made.pop(0)
+        total = total + weight * matrix
+    del matrix
+    # The other terms are not random, so a single sampled term alone has a raw symmetry defect.
+    single = defects[0] if len(defects) == 1 else None
+    return replace(
+        total,
+        method=methods,
+        samples=sum(samples for _, samples, _ in sampled),
+        unresolved=sum(weight * unresolved for weight, _, unresolved in sampled),
+        symmetrised=budget.symmetrise and bool(sampled),
+        raw_defect=single and SymmetryDefect(single[0] / (_norm(total) or 1.0) * single[1], z_score=single[1].z_score),
+        error=replace(total.error, method="sum over the terms: " + total.error.method),
+        norm_bound=1.0,
+    )
+
+
+def _matrices(
+    parts: Sequence[tuple[float, Computation]], exact: Sequence[bool], budget: Budget
+) -> list[tuple[float, KernelMatrix]]:
+    """The matrices of the terms: exact ones, whose errors do not depend on the tolerance, leave the others more."""
+    found: dict[int, KernelMatrix] = {}
+    share = budget.tolerance
+    for wanted_exact in (True, False):
+        for k in (k for k, is_exact in enumerate(exact) if is_exact is wanted_exact):
+            found[k] = parts[k][1](replace(budget, tolerance=share))
+        left = budget.tolerance - sum(parts[k][0] * float(matrix.error) for k, matrix in found.items())
+        weight_left = sum(weight for k, (weight, _) in enumerate(parts) if k not in found)
+        share = max(share, left / weight_left) if weight_left > 0.0 else share
+    return [(weight, found[k]) for k, (weight, _) in enumerate(parts)]
+
+
+def _of_chain(law: Composition, wanted: MethodName, basis: Basis) -> Computation | None:
+    """By isometries, else through panels, which requires that no part of the chain needs rays.
+
+    The first of these matrices that meets the tolerance is returned, or else the most exact one.
+    """
+    if len(law.laws) > LONGEST_WORD:
+        raise InputError(
+            f"law: expected compositions of at most {LONGEST_WORD} laws, got {len(law.laws)}; compose the matrices: "
+            "discretise(law, basis) ** n"
+        )
+    found: list[Computation] = []
+    if wanted in ("auto", "exact") and all(map(lists_branches, law.laws)):
+        found.append(partial(by_branches, law, basis))
+    if wanted in ("auto", "quadrature") and holds_of_all(law, _needs_no_rays):
+        found.append(lambda budget: by_panels(law.laws, basis, budget, _best_matrix))
+    return partial(_most_exact, found) if found else None
+
+
+def _needs_no_rays(law: Law) -> bool:
+    return any(method.accepts(law, ANY_PANELS) for method in METHODS if method.name != "auto")
+
+
+def _best_matrix(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+    return matrix_by(law, "auto", basis, budget)
+
+
+def _most_exact(computations: Sequence[Computation], budget: Budget) -> KernelMatrix:
+    best: KernelMatrix | None = None
+    for compute in computations:
+        try:
+            found = compute(budget)
+        except InputError:
+            # Too many branches to list, or too many panels for the memory.
+            if compute is computations[-1] and best is None:
+                raise
+            continue
+        best = found if best is None else min(best, found, key=lambda matrix: float(matrix.error))
+        if float(best.error) <= budget.tolerance:
+            break
+    assert best is not None  # else the last one raised
+    return best
+
+
+def _of_mirrored(law: SpecularFrame, wanted: MethodName, basis: Basis) -> Computation | None:
+    """A law in the other frame, from the law's matrix in a mirror-symmetric basis."""
+
+    def inner_on(chosen: Basis) -> Computation | None:
+        # If rays are the best method of the law, rays of the law in the other frame are as good.
+        return _without_rays(law.law, chosen) if wanted == "auto" else computation(law.law, wanted, chosen)
+
+    if wanted not in ("auto", "exact", "quadrature") or inner_on(basis) is None:
+        return None
+
+    finer, restriction = (basis, None) if is_mirror_symmetric(basis) else mirror_refinement(basis)
+    matrix_of_law = cast(Computation, inner_on(finer))
+
+    def mirrored(part: Any) -> Floats:
+        image = mirror_image(part, finer, rows=False)
+        return image if restriction is None else restriction @ image @ restriction.T
+
+    def matrix(budget: Budget) -> KernelMatrix:
+        inner = matrix_of_law(budget)
         return KernelMatrix(
             mirrored(inner.symmetric),
             basis,
@@ -202,40 +241,7 @@ class _Mirrored:
             unresolved=inner.unresolved,
         )
 
-    def _has_choice(self, basis: Basis) -> bool:
-        """Whether the law has walls, whose method the tolerance decides."""
-        return any(RaysOrConditionals().accepts(term.law, basis) for _, term in self.inner.terms)
-
-
-def _chain(parts: Sequence[_Law]) -> Recipe:
-    factors = [factor for part in parts for factor in part.factors]
-    if len(factors) > LONGEST_WORD:
-        raise InputError(
-            f"law: expected compositions of at most {LONGEST_WORD} laws, got {len(factors)}; compose the matrices: "
-            "discretise(law, basis) ** n"
-        )
-    return Chain(factors) if factors else _Law(retroreflection())
-
-
-def _simplified(law: Law) -> _Law | _Sum:
-    """The recipe of a law, whose chains are first simplified by the algebra unless this gives too many terms."""
-    words = words_of(law) if has_chain(law) else None
-    if words is None:
-        return cast(_Law, fold(law, RULES))
-    terms = [(weight, cast(_Law, fold(law_of(word), RULES))) for word, weight in words.items()]
-    return terms[0][1] if len(terms) == 1 else _Sum(terms)
-
-
-# `_Law` wraps every compound law and tries the methods first, so all facts in these rules are of type `_Law`.
-RULES: Rules[Any] = Rules(_Law, _Sum, _chain, _Mirrored, _Law)
-
-
-def _names(found: _Law | _Sum, basis: Basis) -> tuple[MethodName, ...]:
-    """The kinds of methods of a law, the best first."""
-    if isinstance(found, _Law) and found.parts is None:
-        accepted = [method.name for method in METHODS + SAMPLED if method.accepts(found.law, basis)]
-        return tuple(dict.fromkeys(name for name in accepted if name != "auto"))
-    return tuple(name for name in NAMES if name == "monte-carlo" or found.has(name, basis))
+    return matrix
 
 
 def _norm(matrix: KernelMatrix) -> float:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -17,12 +16,11 @@ from ..bases.legendre import Legendre
 from ..bases.measure import SINE
 from ..bases.panels import Panels
 from ..laws.involution import InvolutionLaw, jumps_of_map
-from ..laws.law import Law
+from ..laws.law import Combination, Law
 from ..laws.phase_function import HenyeyGreensteinLaw
-from ..laws.structure import law_of, lists_branches
+from ..laws.structure import lists_branches
 from ..matrices.matrix import KernelMatrix
-from .isometries import Isometries
-from .method import Budget, MethodName, Recipe, computed, rounding
+from .method import Budget, computed, rounding
 
 # Width and degree of the first panels; panels of width OSCILLATION / n resolve the n polynomials of a Legendre basis.
 WIDEST, DEGREE, OSCILLATION = np.pi / 12.0, 9, 8.0
@@ -42,66 +40,22 @@ TAIL = 3.0
 PROBES, PROBED = (0.31 + 0.6180339887 * np.arange(24)) % 1.0, 2.0
 # In each round, the panels with this fraction of the error are cut into PARTS parts, and all factors are recomputed.
 MARKED, PARTS = 0.9, 4
-# Panels for the question whether a factor needs rays, whose answer is the same on all panels.
-ANY_PANELS = Panels(np.array([0.0, np.pi]), DEGREE)
 # The sum over the polynomials of a Henyey-Greenstein law ends where g^l is below NEGLIGIBLE. Laws that need more
 # polynomials than HIGHEST_DEGREE are treated like any other density.
 NEGLIGIBLE, HIGHEST_DEGREE = 1e-17, 4096
 
 
-class Factor(Recipe, Protocol):
-    """A law of a chain, and its terms as a weighted sum of laws."""
-
-    law: Law
-
-    @property
-    def terms(self) -> Sequence[tuple[float, Factor]]: ...
+# A law as a term of a factor: its weight, the law, its matrix on panels and the error of the matrix.
+Term: TypeAlias = tuple[float, Law, Floats, float]
+# The matrix of a law by the best method.
+MatrixOf: TypeAlias = Callable[[Law, Basis, Budget], KernelMatrix]
 
 
-class Chain:
-    """A chain of laws: by isometries, else through panels.
-
-    The first of these matrices that meets the tolerance is returned, or else the most exact one. The method through
-    panels requires that no part of the chain needs rays.
-    """
-
-    def __init__(self, factors: Sequence[Factor]) -> None:
-        self.factors = factors
-        self.laws = tuple(factor.law for factor in factors)
-
-    def has(self, wanted: MethodName, basis: Basis) -> bool:
-        isometric = all(map(lists_branches, self.laws))
-        computable = isometric or (wanted != "exact" and self.without_rays(basis))
-        return wanted in ("auto", "exact", "quadrature") and computable
-
-    def without_rays(self, basis: Basis) -> bool:
-        return all(factor.without_rays(ANY_PANELS) for factor in self.factors)
-
-    def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        found: list[KernelMatrix] = []
-        reasons: list[InputError] = []
-        for method in self._methods(wanted):
-            try:
-                found.append(method(basis, budget))
-            except InputError as reason:
-                # Too many branches to list, or too many panels for the memory.
-                reasons.append(reason)
-            if found and float(found[-1].error) <= budget.tolerance:
-                break
-        if not found:
-            raise reasons[-1]
-        return min(found, key=lambda matrix: float(matrix.error))
-
-    def _methods(self, wanted: MethodName) -> Iterator[Callable[[Basis, Budget], KernelMatrix]]:
-        if wanted != "quadrature" and all(map(lists_branches, self.laws)):
-            yield lambda basis, budget: Isometries().matrix(law_of(self.laws), basis, budget)
-        if wanted != "exact":
-            yield self._through_panels
-
-    def _through_panels(self, basis: Basis, budget: Budget) -> KernelMatrix:
-        symmetric, error = product_matrix(self.factors, basis, budget)
-        how = "what panels leave out between the factors, from their last coefficients, plus the factors' errors"
-        return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
+def by_panels(factors: Sequence[Law], basis: Basis, budget: Budget, matrix_of: MatrixOf) -> KernelMatrix:
+    """The matrix of a chain of laws, of which none needs rays, through panels."""
+    symmetric, error = product_matrix(factors, basis, budget, matrix_of)
+    how = "what panels leave out between the factors, from their last coefficients, plus the factors' errors"
+    return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
 
 
 @dataclass(frozen=True)
@@ -117,7 +71,7 @@ class _Level:
         return float(self.truncated.sum()) + self.factors
 
 
-def product_matrix(factors: Sequence[Factor], basis: Basis, budget: Budget) -> tuple[Floats, float]:
+def product_matrix(factors: Sequence[Law], basis: Basis, budget: Budget, matrix_of: MatrixOf) -> tuple[Floats, float]:
     r"""<e_i, P_1 P_2 ... e_j> with each factor's matrix on panels, and an estimate of its Frobenius error.
 
     Let Q be the projection on the panels between two factors. Its error is <P_k* ... e_i, (1 - Q) P_{k+1} ... e_j>. On
@@ -127,17 +81,19 @@ def product_matrix(factors: Sequence[Factor], basis: Basis, budget: Budget) -> t
 
     Parameters
     ----------
-    factors : sequence of Factor
+    factors : sequence of Law
         The factors in their order of application.
     basis : Basis
     budget : Budget
         The returned error exceeds its tolerance if the largest number of panels does not meet it.
+    matrix_of : callable
+        From law, basis and budget to the matrix of a term of a factor.
     """
     of_each = replace(budget, tolerance=budget.tolerance / (2.0 * len(factors)))
-    edges = _first_edges([term.law for factor in factors for _, term in factor.terms], basis)
+    edges = _first_edges([law for factor in factors for _, law in _terms(factor)], basis)
     best: _Level | None = None
     while True:
-        level = _level(factors, basis, _panels(edges, basis), of_each)
+        level = _level(factors, basis, _panels(edges, basis), lambda law, panels: matrix_of(law, panels, of_each))
         if best is None or level.error < best.error:
             best = level
         if level.truncated.sum() <= max(0.5 * budget.tolerance, 0.1 * level.factors):
@@ -167,28 +123,33 @@ def _panels(edges: Floats, basis: Basis) -> Panels:
     return Panels(edges, degree)
 
 
-def _level(chain: Sequence[Factor], basis: Basis, panels: Panels, budget: Budget) -> _Level:
-    laws = [factor.law for factor in chain]
-    factors = {law: _OnPanels(_terms(factor, panels, budget)) for law, factor in _distinct(chain).items()}
+def _level(
+    chain: Sequence[Law], basis: Basis, panels: Panels, matrix_of: Callable[[Law, Basis], KernelMatrix]
+) -> _Level:
+    factors = {
+        law: [(weight, term, *_on_panels(term, panels, matrix_of)) for weight, term in _terms(law)] for law in chain
+    }
     angle, mass = SINE.quadrature(panels.edges, _nodes(basis, panels))
     ends = (local_values(basis, angle).T @ local_values(panels, angle).multiply(mass[:, None])).toarray().T
     with one_blas_thread():
-        before, left = _passed_on(ends, [(factors[law], True) for law in laws], panels)
-        _, right = _passed_on(ends, [(factors[law], False) for law in reversed(laws)], panels)
+        before, left = _passed_on(ends, [factors[law] for law in chain], panels, adjoint=True)
+        _, right = _passed_on(ends, [factors[law] for law in reversed(chain)], panels, adjoint=False)
     # Pairs the functions on both sides of each position between factors.
     truncated = sum(one * other for one, other in zip(left, reversed(right), strict=True))
-    return _Level(before.T @ ends, np.asarray(truncated), float(sum(factors[law].error for law in laws)))
+    errors = [weight * error for law in chain for weight, _, _, error in factors[law]]
+    return _Level(before.T @ ends, np.asarray(truncated), float(sum(errors)))
 
 
 def _passed_on(
-    functions: Floats, factors: Sequence[tuple[_OnPanels, bool]], panels: Panels
+    functions: Floats, factors: Sequence[Sequence[Term]], panels: Panels, *, adjoint: bool
 ) -> tuple[Floats, list[Floats]]:
     """The functions after all factors or their adjoints, and the norms that the panels leave out after each factor."""
     left_out = [TAIL * _last_two(functions, panels)]
-    for factor, adjoint in factors:
-        image = (factor.matrix.T if adjoint else factor.matrix) @ functions
+    for terms in factors:
+        whole = np.asarray(sum(weight * matrix for weight, _, matrix, _ in terms))
+        image = (whole.T if adjoint else whole) @ functions
         missed = TAIL * _last_two(image, panels)
-        for weight, law, matrix, _ in factor.terms:
+        for weight, law, matrix, _ in terms:
             if law.reversible and lists_branches(law):
                 missed = np.maximum(missed, PROBED * weight * _probed(law, matrix, functions, panels))
         functions = image
@@ -215,41 +176,18 @@ def _probed(law: Law, matrix: Floats, functions: Floats, panels: Panels) -> Floa
     return np.asarray(np.sqrt(square * SINE.mass(edges[:-1], edges[1:])))
 
 
-@dataclass(frozen=True)
-class _OnPanels:
-    """A law as a weighted sum of terms: weight, law, its matrix and the matrix's error."""
-
-    terms: list[tuple[float, Law, Floats, float]]
-
-    @cached_property
-    def matrix(self) -> Floats:
-        return np.asarray(sum(weight * matrix for weight, _, matrix, _ in self.terms))
-
-    @property
-    def error(self) -> float:
-        return sum(weight * error for weight, _, _, error in self.terms)
+def _terms(law: Law) -> Sequence[tuple[float, Law]]:
+    return law.terms if isinstance(law, Combination) else ((1.0, law),)
 
 
-def _distinct(chain: Sequence[Factor]) -> dict[Law, Factor]:
-    found: dict[Law, Factor] = {}
-    for factor in chain:
-        found.setdefault(factor.law, factor)
-    return found
-
-
-def _terms(factor: Factor, panels: Panels, budget: Budget) -> list[tuple[float, Law, Floats, float]]:
-    return [(weight, term.law, *_on_panels(term, panels, budget)) for weight, term in factor.terms]
-
-
-def _on_panels(factor: Factor, panels: Panels, budget: Budget) -> tuple[Floats, float]:
-    law = factor.law
+def _on_panels(law: Law, panels: Panels, matrix_of: Callable[[Law, Basis], KernelMatrix]) -> tuple[Floats, float]:
     degrees = _degrees_used(law.g) if isinstance(law, HenyeyGreensteinLaw) else HIGHEST_DEGREE + 1
     if isinstance(law, HenyeyGreensteinLaw) and degrees <= HIGHEST_DEGREE:
         polynomials = Legendre(degrees)
         angle, mass = SINE.quadrature(panels.edges, _nodes(polynomials, panels))
         ends = local_values(panels, angle).T @ (mass[:, None] * polynomials.evaluate(angle))
         return np.asarray((ends * law.g ** np.arange(polynomials.n)) @ ends.T), 0.0
-    matrix = factor.matrix("auto", panels, budget)
+    matrix = matrix_of(law, panels)
     return matrix.symmetric, float(matrix.error)
 
 

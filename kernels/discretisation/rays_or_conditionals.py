@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import cast
 
 from ...core.errors import AccuracyError
 from ..bases.basis import Basis
 from ..bases.panels import Panels
-from ..laws.law import Law, sum_of
 from ..matrices.matrix import KernelMatrix
 from ..sampling.sobol import SobolSampler
 from ..walls.wall_law import FEW_PIECES, WallLaw
-from .isometry_tables import IsometryTables
-from .method import Budget, MethodName
+from .isometry_tables import by_isometry_table
+from .method import Budget
 from .sampled import sobol_matrix
-from .traced import Traced, first_segments
+from .traced import by_adaptive_angles, first_segments
 
 # These rays take .02 to .1 s.
 FIRST_RAYS = 2**17
@@ -27,8 +25,8 @@ FRACTION_OF_PANELS = 0.5
 RAYS_GAIN = 1.0 / 16.0
 
 
-class RaysOrConditionals:
-    """Walls without further parts: the first of these matrices that meets the tolerance, or else the most exact one.
+def by_rays_or_conditionals(law: WallLaw, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The first of these matrices of an undivided wall that meets the tolerance, or else the most exact one.
 
     1. Isometries of a polygonal wall, if its beams resolve; if it has many pieces, after the first rays, but on panels.
     2. The first rays.
@@ -37,38 +35,29 @@ class RaysOrConditionals:
 
     The error does not grow if the tolerance falls.
     """
-
-    name: MethodName = "auto"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        return isinstance(law, WallLaw) and sum_of(law.parts) is law
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        law = cast(WallLaw, law)
-        isometries = IsometryTables()
-        # on panels, mostly between the factors of a chain, rays would have to resolve hundreds of functions
-        if (len(law.wall.pieces) <= FEW_PIECES or isinstance(basis, Panels)) and isometries.accepts(law, basis):
-            return isometries.matrix(law, basis, budget)
-        sampler = SobolSampler(law, basis, budget.rng)
-        first = _by_rays(sampler, basis, replace(budget, rays=min(FIRST_RAYS, budget.rays)))
-        if first is not None and float(first.error) <= budget.tolerance:
-            return first
-        reached, first = 0.0 if first is None else float(first.error), None
-        if isometries.accepts(law, basis):
-            return isometries.matrix(law, basis, budget)
-        if not _has_conditionals(law, basis, budget):
-            return sobol_matrix(sampler, basis, budget)
-        found = Traced().matrix(law, basis, budget)
-        if float(found.error) <= max(budget.tolerance, RAYS_GAIN * reached):
-            return found
-        rays = _by_rays(sampler, basis, budget)
-        return found if rays is None else min(found, rays, key=lambda matrix: float(matrix.error))
+    # on panels, mostly between the factors of a chain, rays would have to resolve hundreds of functions
+    if (len(law.wall.pieces) <= FEW_PIECES or isinstance(basis, Panels)) and law.isometry_table() is not None:
+        return by_isometry_table(law, basis, budget)
+    sampler = SobolSampler(law, basis, budget.rng)
+    first = _by_rays(sampler, replace(budget, rays=min(FIRST_RAYS, budget.rays)))
+    if first is not None and float(first.error) <= budget.tolerance:
+        return first
+    reached, first = 0.0 if first is None else float(first.error), None
+    if law.isometry_table() is not None:
+        return by_isometry_table(law, basis, budget)
+    if not _has_conditionals(law, basis, budget):
+        return sobol_matrix(sampler, budget)
+    found = by_adaptive_angles(law, basis, budget)
+    if float(found.error) <= max(budget.tolerance, RAYS_GAIN * reached):
+        return found
+    rays = _by_rays(sampler, budget)
+    return found if rays is None else min(found, rays, key=lambda matrix: float(matrix.error))
 
 
-def _by_rays(sampler: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix | None:
+def _by_rays(sampler: SobolSampler, budget: Budget) -> KernelMatrix | None:
     """The matrix by rays; None if a bin has none or too many do not escape."""
     try:
-        return sobol_matrix(sampler, basis, budget)
+        return sobol_matrix(sampler, budget)
     except AccuracyError:
         return None
 

@@ -2,63 +2,47 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from ..bases.basis import Basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from ..sampling.counts import SampledArray
-from ..sampling.monte_carlo import independent_rays
+from ..sampling.chunks import IndependentRays, count_long
+from ..sampling.counts import BATCHES, LARGEST_REPLICATES
+from ..sampling.rays import RaySums
 from ..sampling.sobol import PARTS, SobolSampler
 from .method import Budget, MethodName, rounding
 
 
-class Sobol:
-    """Laws driven by a uniform number, by rays of scrambled Sobol sequences."""
-
-    name: MethodName = "qmc"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        return law.random_map() is not None
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        return sobol_matrix(SobolSampler(law, basis, budget.rng), basis, budget)
+def by_sobol_rays(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of a law driven by a uniform number, by rays of scrambled Sobol sequences."""
+    return sobol_matrix(SobolSampler(law, basis, budget.rng), budget)
 
 
-class MonteCarlo:
-    """Any law, by independent rays."""
+def by_independent_rays(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of any law from independent rays with incoming angles from the invariant measure.
 
-    name: MethodName = "monte-carlo"
+    In bases without cells the error comes from the spread of 32 parts, or of 8 if 32 matrices are too large to store.
+    A chunk of rays depends only on numbers drawn from ``budget.rng``, its part and its own index. Workers count or add
+    up the rays and a checkpoint stores the sums, which are the same to the last bit.
+    """
+    root = tuple(int(word) for word in budget.rng.integers(0, 2**63, size=2))
+    most = LARGEST_REPLICATES // (np.dtype(np.float64).itemsize * basis.size**2)
+    parts = 1 if basis.is_partition else BATCHES if most >= BATCHES else PARTS
+    sums = RaySums(law, basis, parts)
+    sums.each = max(-(-budget.rays // parts), 1)
+    count_long(sums, IndependentRays(law, basis, root, sums.each, parts), budget.engine or {})
+    return _sampled("monte-carlo", sums.matrix(symmetrise=budget.symmetrise))
 
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        return True
 
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        found = independent_rays(law, basis, budget.rays, budget.rng, budget.symmetrise, budget.engine)
-        spread = "variance of multinomial counts" if basis.is_partition else "spread of parts"
-        return _sampled(self.name, found, basis, budget, spread)
-
-
-def sobol_matrix(sampler: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix:
+def sobol_matrix(sampler: SobolSampler, budget: Budget) -> KernelMatrix:
     """The matrix from at least ``budget.rays`` rays of the sampler, which continues its Sobol sequence."""
-    found = sampler.sampled(budget.rays, symmetrise=budget.symmetrise, engine=budget.engine)
-    return _sampled("qmc", found, basis, budget, f"spread of {PARTS} scrambled sequences")
+    return _sampled("qmc", sampler.sampled(budget.rays, symmetrise=budget.symmetrise, engine=budget.engine))
 
 
-def _sampled(
-    name: MethodName, found: tuple[SampledArray, int, float], basis: Basis, budget: Budget, how: str
-) -> KernelMatrix:
-    array, used, unresolved = found
-    if unresolved:
-        how += ", plus a bound for rays that did not escape"
-    return KernelMatrix(
-        array.symmetric,
-        basis,
-        # All rays of a cell can go to one cell: then only rounding is left.
-        frobenius_error(array.error + rounding(basis), "estimate", how),
-        method=name,
-        counts=array.counts,
-        replicates=array.replicates,
-        symmetrised=budget.symmetrise,
-        samples=used,
-        unresolved=unresolved,
-        raw_defect=array.raw_defect,
-    )
+def _sampled(name: MethodName, found: KernelMatrix) -> KernelMatrix:
+    # All rays of a cell can go to one cell: then only rounding is left.
+    error = float(found.error) + rounding(found.basis)
+    return replace(found, error=frobenius_error(error, "estimate", found.error.method), method=name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,11 @@ from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..expectations.angle_panels import NODES, NORMAL, NULL_RULES, AnglePanels
-from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.cell_masses import CellMasses
 from ..walls.conditionals import WallConditionals
-from ..walls.wall_law import WallLaw, traced_wall
-from .method import Budget, MethodName, computed, rounding
+from ..walls.wall_law import WallLaw
+from .method import Budget, computed, rounding
 
 if TYPE_CHECKING:
     from ...geometry import Wall
@@ -75,18 +74,11 @@ FEWEST_FUNCTIONS, SPREAD_MARGIN = 4, 1.5
 MOST_MENDINGS = 8
 
 
-class Traced:
-    """Walls by adaptive quadrature in the entry point and in the incoming angle."""
-
-    name: MethodName = "quadrature"
-
-    def accepts(self, law: Law, basis: Basis) -> bool:
-        return traced_wall(law) is not None
-
-    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        symmetric, error, rays = traced_matrix(cast(WallLaw, law).wall, basis, budget)
-        how = f"adaptive angles and panels, {rays} rays: null rules and asymmetry, plus undecided entry points"
-        return computed(symmetric, basis, self.name, error + rounding(basis), how)
+def by_adaptive_angles(law: WallLaw, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of a wall's law by adaptive quadrature in the entry point and in the incoming angle."""
+    symmetric, error, rays = traced_matrix(law.wall, basis, budget)
+    how = f"adaptive angles and panels, {rays} rays: null rules and asymmetry, plus undecided entry points"
+    return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
 
 
 def first_segments(wall: Wall, basis: Basis) -> float:
@@ -166,7 +158,7 @@ class _Integrator:
         self._add_panels(self.edges[:-1], self.edges[1:])
         stage = FIRST_STAGE
         while True:
-            self._begin(stage)
+            self._renew(stage)
             self._meet(stage)
             if self._is_done() or stage <= self.tolerance:
                 return *self.best, self.conditionals.spent()[0]
@@ -193,12 +185,8 @@ class _Integrator:
         """The largest tolerance of an expectation."""
         return COARSEST_MEAN * float(np.median(self.sizes))
 
-    def _begin(self, tolerance: float) -> None:
-        """Begin a stage: recompute the expectations on panels where their error is too large for its tolerance."""
-        self._renew(tolerance, np.ones(len(self.panels.low), dtype=np.bool_))
-
-    def _renew(self, tolerance: float, among: NDArray[np.bool_]) -> None:
-        """Recompute the expectations on some of the panels, where their error is too large for this tolerance."""
+    def _renew(self, tolerance: float, among: NDArray[np.bool_] | bool = True) -> None:
+        """Recompute the expectations on some or all panels, where their error is too large for this tolerance."""
         self.mean_tolerance = max(MEAN_FRACTION * tolerance, SMALLEST_MEAN_TOLERANCE)
         mass = np.maximum(self.panels.mass, FAIR_FRACTION)
         coarse = self.panels.mean_errors(self.basis) > 2.0 * self.mean_tolerance * mass
@@ -227,7 +215,7 @@ class _Integrator:
             if self.cells is not None and conditionals > MOST_MEANS * tolerance and means > 0.01 * tolerance:
                 # gaps where a change hardly changes the angle may count more in cells
                 means *= TIGHTENING
-                self._begin(means)
+                self._renew(means)
                 continue
             if self.cells is not None and panels + conditionals <= tolerance and pieces > 0.01 * tolerance:
                 pieces *= TIGHTENING

@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-import numpy as np
-
 from ...core.checks import choice, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
-from ..bases.bins import Bins
-from ..bases.measure import SINE_SQUARED
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
 from ..laws.matrix_law import not_a_law
@@ -19,16 +15,11 @@ from ..laws.tensor_law import TensorLaw, Term
 from ..matrices.matrix import KernelMatrix
 from .joint import joint_law_distance, joint_matrix_distance
 from .pseudometric import moment_distance
-from .resampling import cell_middles, check_comparable, matrices_error, noise_floor, stochastic_rows
+from .resampling import check_comparable, noise_floor
 from .rowwise import law_distance, matrix_distance
-from .transport import power_mean, wasserstein_order
+from .transport import wasserstein_order
 
 Kind = Literal["rows", "sup", "joint", "pseudometric"]
-# Bins of theta, two numbers, and nodes in psi for collision laws that flip psi with different probabilities.
-COLLISION_BINS, PSI_NODES = (32, 64), 8
-MATRIX_TOLERANCE = 1e-7
-# What is left of a supremum over its last change: 2.4 if it converges with the root of the bins.
-SUPREMUM_REST = 3.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -79,7 +70,8 @@ def distance(
     Raises
     ------
     InputError
-        If the laws are in different frames, the matrices on different bins, or an argument is not as described.
+        If the laws are in different frames, the matrices on different bins, one collision law turns psi and the other
+        does not, or an argument is not as described.
 
     Notes
     -----
@@ -108,10 +100,9 @@ def distance(
 
     *Collision laws* are compared on the angles (theta, psi) of their disks' own frames, with the Euclidean distance of
     pairs of angles and the measure sin(theta) sin(psi)^2 d theta d psi. So disks of other masses are compared at equal
-    angles, not at equal velocities, and a disk has no part in the value. Laws that both turn psi into pi - psi have the
-    distance of their laws of theta: psi stays, and the projection to theta shortens no distance. Otherwise kinds
-    ``"rows"`` and ``"sup"`` are computed by transport between bins of theta on the two lines psi' = psi and
-    psi' = pi - psi; the error is estimated from two numbers of bins. The pseudometric is not defined.
+    angles, not at equal velocities, and a disk has no part in the value. Laws that both turn psi into pi - psi, or both
+    keep it, have the distance of their laws of theta: psi stays, and the projection to theta shortens no distance. The
+    pseudometric is not defined.
 
     Examples
     --------
@@ -150,48 +141,9 @@ def _between_collisions(
 ) -> Distance:
     if kind == "pseudometric":
         raise InputError("kind: expected 'rows', 'sup' or 'joint' for collision laws, got 'pseudometric'")
-    if len(first) == len(second) == 1 and first[0][2] == second[0][2]:
-        return distance(first[0][1], second[0][1], order, kind, tolerance)
-    if kind == "joint":
-        raise InputError(
-            "kind: expected 'rows' or 'sup' for collision laws that flip psi with different probabilities, got "
-            "'joint'; 'rows' is an upper bound of it"
-        )
-    (rough, _), (fine, own) = (_on_two_lines(first, second, order, kind == "sup", bins) for bins in COLLISION_BINS)
-    how = f"transport on two lines of psi', {COLLISION_BINS[1]} bins of theta and half as many"
-    # equal cells near grazing are as wide as the root of their measure, which a supremum feels
-    rest = abs(fine - rough) * (SUPREMUM_REST if kind == "sup" else 1.0)
-    return Distance(fine, rest + own, "estimate", how)
-
-
-def _on_two_lines(
-    first: tuple[Term, ...], second: tuple[Term, ...], order: float, sup: bool, bins: int
-) -> tuple[float, float]:
-    """The mean or largest W_p between the rows on bins of theta, and the error from the matrices."""
-    import ot
-
-    basis = Bins(bins)
-    rows, matrices = np.zeros((2, bins, 2, bins)), []
-    for which, terms in enumerate((first, second)):
-        for weight, law, flip in terms:
-            matrices.append(discretise(law, basis, tolerance=MATRIX_TOLERANCE))
-            rows[which, :, int(flip)] += weight * stochastic_rows(matrices[-1])
-    rows /= rows.sum(axis=(2, 3), keepdims=True)
-    # the lines are pi - 2 psi apart; the distance grows with it
-    psi, of_psi = SINE_SQUARED.quadrature(np.array([0.0, 0.5 * np.pi]), PSI_NODES)
-    psi = np.zeros(1) if sup else psi
-    middle = cell_middles(basis.edges)
-    found = np.empty((bins, psi.size))
-    for k, angle in enumerate(psi.tolist()):
-        line = np.repeat([0.0, np.pi - 2.0 * angle], bins)
-        position = np.column_stack([np.tile(middle, 2), line])
-        cost = np.linalg.norm(position[:, None] - position, axis=2) ** order
-        for row in range(bins):
-            found[row, k] = max(float(ot.emd2(rows[0, row].ravel(), rows[1, row].ravel(), cost)), 0.0) ** (1.0 / order)
-    own = 0.5 * sum(matrices_error(matrix, matrix, order, sup) for matrix in matrices)
-    if sup:
-        return float(found.max()), own
-    return float(power_mean(found.ravel(), np.outer(basis.weights, of_psi / of_psi.sum()).ravel(), order)), own
+    if len(first) != 1 or len(second) != 1 or first[0][2] != second[0][2]:
+        raise InputError("distance: expected collision laws that both turn psi into pi - psi, or both keep it")
+    return distance(first[0][1], second[0][1], order, kind, tolerance)
 
 
 def _on_same_bins(
@@ -208,12 +160,10 @@ def _on_same_bins(
 
 def _between_matrices(first: KernelMatrix, second: KernelMatrix, order: float, kind: Kind) -> Distance:
     sup = kind == "sup"
-    if kind == "joint":
-        found = joint_matrix_distance(first, second, order)
-    else:
-        found = matrix_distance(first, second, order, sup)
-    return Distance(found.value, found.error, found.kind, found.method, noise_floor(first, second, order, sup))
+    joint = kind == "joint"
+    found = joint_matrix_distance(first, second, order) if joint else matrix_distance(first, second, order, sup)
+    return _labelled(found, noise_floor(first, second, order, sup))
 
 
-def _labelled(found: Estimate) -> Distance:
-    return Distance(found.value, found.error, found.kind, found.method)
+def _labelled(found: Estimate, floor: float | None = None) -> Distance:
+    return Distance(found.value, found.error, found.kind, found.method, floor)

@@ -10,7 +10,6 @@ import numpy as np
 from ...core.checks import Floats
 from ..bases.bins import Bins
 from ..bases.intervals import cell_among
-from ..bases.measure import SINE
 from ..discretisation.discretisation import discretise
 from ..expectations.distribution_functions import Distributions
 from ..laws.law import (
@@ -26,10 +25,7 @@ from ..laws.law import (
 )
 from ..laws.structure import law_of, words_of
 from ..matrices.matrix import KernelMatrix
-from .transport import power_mean, wasserstein
 
-# Incoming angles at which the error from entry points is estimated, and the number of cells for products.
-ANGLES = 64
 # Limit on the atoms of the first factors of a product from which the last factor is followed without a matrix.
 MOST_FOLLOWED = 32
 # Incoming angle at which these are counted.
@@ -43,13 +39,12 @@ MATRICES = 4
 class Term(NamedTuple):
     """A law without sums, and of a product on cells its first factor, as terms, and the law of the others.
 
-    ``has_atoms``: the conditional distributions are finitely many atoms, those of entry points if ``is_sampled``.
+    ``has_atoms``: the conditional distributions are finitely many atoms.
     """
 
     law: Law
     factors: tuple[Terms, Law] | None
     has_atoms: bool
-    is_sampled: bool
 
 
 Terms: TypeAlias = "list[tuple[float, Term]]"
@@ -92,9 +87,8 @@ def terms_of(law: Law) -> Terms:
 def _term(law: Law) -> Term:
     factors = None if _is_followed(law) else _first_and_others(law)
     if factors is not None:
-        return Term(law, (terms_of(factors[0]), factors[1]), False, False)
-    has_atoms = has_fixed_nodes(law)
-    return Term(law, None, has_atoms, has_atoms and not knows_errors(law))
+        return Term(law, (terms_of(factors[0]), factors[1]), False)
+    return Term(law, None, has_fixed_nodes(law))
 
 
 def _is_followed(law: Law) -> bool:
@@ -119,18 +113,16 @@ def _first_and_others(law: Law) -> tuple[Law, Law] | None:
     return None
 
 
-def cells_and_atoms(
-    terms: Terms, theta: Floats, edges: Floats, tolerance: float, sup: bool, entries: slice = slice(None)
-) -> CellsAndAtoms:
+def cells_and_atoms(terms: Terms, theta: Floats, edges: Floats, tolerance: float, sup: bool) -> CellsAndAtoms:
     """The conditional distributions of a sum at incoming angles, with its masses between edges from 0 to pi.
 
-    The first factor of a product is multiplied by the matrix of the others. Of entry points only ``entries`` count.
+    The first factor of a product is multiplied by the matrix of the others.
     """
     total, wrong = np.zeros((theta.size, edges.size - 1)), np.zeros(theta.size)
     atoms = [np.empty((2, theta.size, 0))]
     for weight, term in terms:
         if term.factors is not None:
-            first = cells_and_atoms(term.factors[0], theta, edges, tolerance, sup, entries)
+            first = cells_and_atoms(term.factors[0], theta, edges, tolerance, sup)
             matrix = _matrix(term.factors[1], edges.tobytes())
             total += weight * first.masses(edges) @ matrix.array
             wrong += weight * (first.error + float(matrix.error) / (np.sqrt(matrix.weights.min()) if sup else 1.0))
@@ -138,12 +130,12 @@ def cells_and_atoms(
         # one distribution for all angles
         incoming = theta[:1] if term.law.is_lambertian else theta
         given = term.law._conditionals(incoming, tolerance, 0, edges[1:-1])
-        error = np.where(np.isnan(given.error), 0.0 if term.is_sampled else UNKNOWN, given.error)
+        error = np.where(np.isnan(given.error), UNKNOWN, given.error)
         table = term.law.isometry_table() if term.has_atoms and not sup else None
         # of a mean over theta, unresolved rays change no more than their fraction
         wrong += weight * (error if table is None else 2.0 * table.unresolved)
         if term.has_atoms:
-            position, mass = (part[:, entries] if term.is_sampled else part for part in given.atoms())
+            position, mass = given.atoms()
             atoms.append(np.stack((position, weight * mass / mass.sum(axis=1, keepdims=True))))
             continue
         level = is_flat_top(term.law, incoming, given)
@@ -159,27 +151,3 @@ def cells_and_atoms(
 @lru_cache(maxsize=MATRICES)
 def _matrix(law: Law, edges: bytes) -> KernelMatrix:
     return discretise(law, Bins(np.frombuffer(edges)))
-
-
-def entry_error(terms: Terms, order: float, sup: bool, tolerance: float) -> float:
-    """Error of a distance from terms whose atoms are those of equally spaced entry points.
-
-    It is the distance between the laws with every other entry point: each half has twice the spacing of all points, or
-    half of the sample where the angles are chaotic.
-    """
-    if not _has_entry_points(terms):
-        return 0.0
-    angle, edges = SINE.quantile((np.arange(ANGLES) + 0.5) / ANGLES), np.linspace(0.0, np.pi, ANGLES + 1)
-    one, other = (
-        cells_and_atoms(terms, angle, edges, tolerance, sup, slice(start, None, 2)).on(edges) for start in (0, 1)
-    )
-    rows = wasserstein(one, other, order)
-    return float(rows.max() if sup else power_mean(rows, np.full(ANGLES, 1.0 / ANGLES), order))
-
-
-def _has_entry_points(terms: Terms) -> bool:
-    return any(
-        term.is_sampled if term.factors is None else _has_entry_points(term.factors[0])
-        for weight, term in terms
-        if weight > 0.0
-    )

@@ -12,10 +12,9 @@ from ...core.checks import Floats
 from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
 from ..expectations.angle_panels import GAUSS, KRONROD, SLOPES, STRETCHED
-from ..laws.law import ENTRY_POINTS, Law
+from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .conditional import ConditionalDistance
-from .distributions import entry_error
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
 from .transport import power_mean
 
@@ -49,7 +48,7 @@ LARGEST_PANELS, FINE_NODES = 8, 32
 # Distance of the outermost nodes of a panel from its ends, as a fraction of its width, for the supremum.
 INSET = 1e-9
 # Refinement in the incoming angle ends when its error is this fraction of the error from cells, which it does not
-# change, or the error from entry points, which adds noise to the differences of the rules.
+# change.
 SMALL_PART = 0.1
 # Rounding of some hundred sums of angles and probabilities.
 ROUNDING = 1e-13
@@ -63,19 +62,16 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
     outgoing angle are compared.
     """
     between = ConditionalDistance(first, second, order, sup, tolerance)
-    from_entries = sum(entry_error(terms, order, sup, between.law_tolerance) for terms in between.terms)
-    wanted = max(tolerance - from_entries, from_entries)
     probes = SINE.quantile((np.arange(PROBES) + 0.5) / PROBES)
     probes = np.concatenate((probes, _nodes_and_ends(_panel_edges(between, 0)))) if sup else probes
     for most in MOST_CELLS[: 1 if sup else 2]:
-        cells, from_cells, from_laws = between.cells(probes, wanted, most)
-        left = max(wanted - from_cells - from_laws, SMALL_PART * (from_cells + from_laws))
+        cells, from_cells, from_laws = between.cells(probes, tolerance, most)
+        left = max(tolerance - from_cells - from_laws, SMALL_PART * (from_cells + from_laws))
         value, error, from_laws, panels = (_supremum if sup else _mean)(between, cells, left)
-        if error > left or from_cells <= max(wanted, from_laws):
+        if error > left or from_cells <= max(tolerance, from_laws):
             break
     how = f"levels with up to {panels} panels" if sup else f"rules of Gauss and Kronrod on {panels} panels"
-    how += f", and {from_entries:.2g} from {ENTRY_POINTS} entry points" if from_entries else ""
-    return Estimate(value, error + from_cells + from_laws + from_entries + ROUNDING, "estimate", how)
+    return Estimate(value, error + from_cells + from_laws + ROUNDING, "estimate", how)
 
 
 def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> Estimate:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import LEVEL, NORMAL_95, Estimate, Summary
+from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate
 from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.interval_exchange import IntervalExchangeLaw
@@ -93,7 +93,7 @@ class ExchangeHollow(Summary):
         """The fraction of the flux through the opening that does not leave where the exchange sends it.
 
         A ray is counted as missed unless it leaves, after at most 8 collisions, in the interval with which that of its
-        incoming angle changes places. By tracing; the error is the longer half of the interval of Clopper and Pearson.
+        incoming angle changes places. By tracing, with Wilson's interval of 95 %.
 
         Parameters
         ----------
@@ -103,21 +103,8 @@ class ExchangeHollow(Summary):
             ``np.random.default_rng(0)`` by default.
         """
         theta, traced = self._traced(samples, rng)
-        missed = int(np.count_nonzero(~self._arrives(theta, traced)))
-        half = _fraction_half_width(missed, theta.size)
-        return Estimate(missed / theta.size, half, "estimate", f"{theta.size} traced rays")
-
-    def displacement(self, samples: int = SAMPLES, rng: Rng = None) -> Estimate:
-        """Mean distance, radians, of the outgoing angles from those of the exchange; pi for rays that are followed no
-        longer.
-
-        It is an upper bound of the joint Wasserstein distance of the law of the chamber from the exchange: both laws
-        with the same incoming angles are a coupling. By tracing, with a half width of 95 %.
-        """
-        theta, traced = self._traced(samples, rng)
-        away = self._away(traced, self.exchange.image(theta))
-        half = NORMAL_95 * float(np.std(away)) / np.sqrt(theta.size)
-        return Estimate(float(np.mean(away)), half, "estimate", f"{theta.size} traced rays")
+        missed = float(np.mean(~self._arrives(theta, traced)))
+        return fraction_estimate(missed, theta.size, f"{theta.size} traced rays")
 
     def mean(
         self,
@@ -153,18 +140,15 @@ class ExchangeHollow(Summary):
         (0.989, True)
         """
         function, unfollowed = Vectorised(function, scalar=True), Estimate(unfollowed, 0.0, "bound", "given").value
-        ends = np.append(self.exchange.starts, 1.0)
-        rough, fine = (self._mean_over_pieces(function, SINE.quantile(ends), order) for order in PIECE_NODES)
+        ends = SINE.quantile(np.append(self.exchange.starts, 1.0))
+        rules = (SINE.quadrature(ends, order) for order in PIECE_NODES)
+        rough, fine = (float(weights @ function(nodes, self.exchange.image(nodes))) for nodes, weights in rules)
         theta, traced = self._traced(samples, rng)
         value = np.where(traced.escaped, function(theta, traced.theta), unfollowed)
         away = value - function(theta, self.exchange.image(theta))
         half = NORMAL_95 * float(np.std(away)) / np.sqrt(theta.size)
         total = fine + float(np.mean(away))
         return Estimate(total, half + abs(fine - rough), "estimate", f"{theta.size} traced rays")
-
-    def _mean_over_pieces(self, function: Callable[[Floats, Floats], Floats], ends: Floats, order: int) -> float:
-        theta, weights = SINE.quadrature(ends, order)
-        return float(np.sum(weights * function(theta, self.exchange.image(theta))))
 
     def _traced(self, samples: int, rng: Rng) -> tuple[Floats, Trace]:
         from ...geometry import trace
@@ -225,25 +209,13 @@ class ExchangeHollow(Summary):
         covered = -limit * float(np.expm1(number * np.log(carried)))
         theta, traced = self._traced(samples, rng)
         image = self.exchange.image(theta)
-        away = covered * self._away(traced, image) + (1.0 - covered) * np.abs(np.pi - theta - image)
+        # rays that are followed no longer count as pi away
+        own = np.where(traced.escaped, np.abs(traced.theta - image), np.pi)
+        away = covered * own + (1.0 - covered) * np.abs(np.pi - theta - image)
         half = NORMAL_95 * float(np.std(away)) / np.sqrt(theta.size)
         nearby = Estimate(float(np.mean(away)), half, "estimate", f"a coupling of {theta.size} traced rays")
         law = covered * self.exchange + (1.0 - covered) * specular()
         return Generations(number, covered, limit, law, nearby)
-
-    @staticmethod
-    def _away(traced: Trace, image: Floats) -> Floats:
-        return np.where(traced.escaped, np.abs(traced.theta - image), np.pi)
-
-
-def _fraction_half_width(count: int, number: int) -> float:
-    """The longer half of Clopper and Pearson's interval of 95 % of a fraction, ``count`` of ``number``."""
-    from scipy.special import betaincinv
-
-    tail, fraction = 0.5 * (1.0 - LEVEL), count / number
-    low = float(betaincinv(count, number - count + 1, tail)) if count else 0.0
-    high = float(betaincinv(count + 1, number - count, 1.0 - tail)) if count < number else 1.0
-    return max(high - fraction, fraction - low)
 
 
 def exchange_hollow(exchange: IntervalExchangeLaw, opening: float = 1e-3) -> ExchangeHollow:

@@ -42,13 +42,11 @@ class UnitHollow:
     ----------
     wall : Wall
         Of period 1; its cell, scaled, is put side by side with others.
-    label : str
     traced : bool
         Whether its moments come from rays: a polygon with too many beams.
     """
 
     wall: Wall
-    label: str
     traced: bool = False
 
     @classmethod
@@ -68,7 +66,7 @@ class UnitHollow:
             return None
         if len(wall.hollows) != 1 or wall.flat_top > 0.0:
             return None
-        return cls(wall, f"polygon of {len(inner)} inner vertices")
+        return cls(wall)
 
     @property
     def pieces(self) -> int:
@@ -82,7 +80,7 @@ class UnitHollow:
 
     def mirrored(self) -> UnitHollow:
         """Its mirror image."""
-        return UnitHollow(self.wall.mirrored(), f"{self.label}, mirrored")
+        return UnitHollow(self.wall.mirrored())
 
     @property
     def is_exact(self) -> bool:
@@ -106,27 +104,22 @@ class UnitHollow:
             return None
 
 
-def flat() -> UnitHollow:
-    """No hollow: a flat top."""
-    from ...geometry import flat as flat_wall
-
-    return UnitHollow(flat_wall(), "flat top")
-
-
 def simple_hollows() -> list[UnitHollow]:
-    """Isosceles triangles and rectangles in steps."""
+    """A flat top, and isosceles triangles and rectangles in steps."""
+    from ...geometry import flat
+
     slopes = np.tan(np.linspace(0.05, 1.5, 30))
     triangles = [UnitHollow.polygon([(0.5, -0.5 * slope)]) for slope in slopes]
     depths = np.geomspace(0.05, 6.0, 24)
     rectangles = [UnitHollow.polygon([(0.0, -depth), (1.0, -depth)]) for depth in depths]
-    return [hollow for hollow in (*triangles, *rectangles) if hollow is not None]
+    return [UnitHollow(flat()), *(hollow for hollow in (*triangles, *rectangles) if hollow is not None)]
 
 
 def retroreflector() -> UnitHollow:
     """A notched angle, much nearer to a retroreflector than other polygons, with an error of its moments."""
     from ...geometry import notched_angle
 
-    return UnitHollow(notched_angle(NOTCHED_ANGLE, NOTCHES), "notched angle", traced=True)
+    return UnitHollow(notched_angle(NOTCHED_ANGLE, NOTCHES), traced=True)
 
 
 def random_polygons(number: int, most_vertices: int, rng: np.random.Generator) -> list[UnitHollow]:

@@ -24,8 +24,8 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.long_runs import reported
 from ...core.rounding import EPS
+from ...geometry import join_walls
 from ...geometry.cells.miniature import wall_miniature
-from ..bases.bins import Bins
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE
 from ..collisions.collision_law import CollisionLaw
@@ -35,14 +35,13 @@ from ..laws.law import Law
 from ..laws.matrix_law import MatrixLaw, not_a_law
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
-from .hollows import UnitHollow, flat, random_polygons, retroreflector, simple_hollows
+from .hollows import UnitHollow, random_polygons, retroreflector, simple_hollows
 from .hull import few_weights, nearest_weights, possible_gain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ...geometry import Disk, Wall
-    from ...geometry.curves.curve import Curve
 
 # The search draws this many polygons at a time, with one vertex more every second time up to the most, ...
 DRAWN, MOST_VERTICES, ROUNDS = 60, 6, 14
@@ -62,6 +61,7 @@ TRACED_FROM, RETROREFLECTED = 0.1, 0.5
 LEAST_PROGRESS = 1e-3
 # Joint distances are of interest to two digits.
 DISTANCE_TOLERANCE = 1e-2
+UNSYMMETRIC = "law: expected one that is symmetric for sin(theta) d theta, as every wall's is"
 # Rounding of a moment, for each of them.
 ROUNDED = 64.0 * EPS
 
@@ -214,7 +214,9 @@ def wall_for(
     )
     least = search.defect - gain
     chosen, weights = search.result(most_hollows, smallest_opening)
-    wall = side_by_side(chosen, weights)
+    # the last opening ends where the period does
+    weights[-1] = 1.0 - float(np.cumsum([0.0, *weights])[-2])
+    wall = join_walls([hollow.wall.cell.scaled(width) for hollow, width in zip(chosen, weights.tolist(), strict=True)])
     finished = discretise(WallLaw(wall), basis, tolerance=0.1 * tolerance)
     value = float(np.linalg.norm(finished.symmetric - target))
     kind: ErrorKind = "bound" if {finished.error.kind, target_error.kind} == {"bound"} else "estimate"
@@ -275,20 +277,6 @@ def collision_for(
     return replace(found, wall=found.wall.unforeshorten(felt), disk=felt)
 
 
-def side_by_side(hollows: Sequence[UnitHollow], weights: Floats) -> Wall:
-    """The wall of period 1 with the hollows from left to right below openings of the given widths."""
-    from ...geometry import Wall
-
-    ends = np.concatenate([[0.0], np.cumsum(weights)])
-    ends[-1] = 1.0
-    pieces: list[Curve] = []
-    for hollow, left, right in zip(hollows, ends[:-1].tolist(), ends[1:].tolist(), strict=True):
-        path = [piece.stretched(right - left, right - left).moved(left, 0.0) for piece in hollow.wall.cell.pieces]
-        joints = [(left, 0.0), *(piece.end for piece in path[:-1]), (right, 0.0)]
-        pieces += [piece.pinned(joints[k], joints[k + 1]) for k, piece in enumerate(path)]
-    return Wall(pieces, period=1.0)
-
-
 def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[Law | None, Floats, Estimate]:
     """The wanted law, if there is one, its moments and their error; refused unless they can be those of a wall."""
     wanted: Law | None = None
@@ -299,16 +287,20 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
                 f"law: expected at least 2 moments for the weight sin(theta), got a matrix in {law.basis!r}"
             )
     else:
-        wanted = _wanted_law(law)
+        # a matrix in bins stands for its law
+        wanted = MatrixLaw(law) if isinstance(law, KernelMatrix) else law
+        if not isinstance(wanted, Law):
+            raise not_a_law("law", "a Law such as ker.lambertian() or a KernelMatrix", wanted)
+        if wanted.reversible is False:
+            raise InputError(f"{UNSYMMETRIC}, got {law!r}")
+        # the change is its own inverse
+        wanted = wanted if wanted.frame == "paper" else wanted.in_specular_frame()
         matrix = discretise(wanted, Legendre(moments), tolerance=TARGET_FRACTION * tolerance)
     symmetric = matrix.symmetric[:moments, :moments]
     allowed = 4.0 * float(matrix.error) + ROUNDED * len(symmetric)
     defect = float(np.linalg.norm(symmetric - symmetric.T))
     if defect > allowed:
-        raise InputError(
-            f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}; "
-            f"its moments differ from their transpose by {defect:.2g}"
-        )
+        raise InputError(f"{UNSYMMETRIC}, got {law!r}; its moments differ from their transpose by {defect:.2g}")
     missing = float(np.linalg.norm(symmetric[0] - np.eye(len(symmetric))[0]))
     if missing > allowed:
         raise InputError(
@@ -318,22 +310,6 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
     return wanted, 0.5 * (symmetric + symmetric.T), matrix.error
 
 
-def _wanted_law(law: Law | KernelMatrix) -> Law:
-    """The law in the paper's convention; a matrix in bins stands for its `MatrixLaw`."""
-    if isinstance(law, KernelMatrix):
-        if not isinstance(law.basis, Bins):
-            raise InputError(
-                f"law: expected a Law, or a matrix in Bins or Legendre polynomials, got one in {law.basis!r}"
-            )
-        law = MatrixLaw(law)
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a Law such as ker.lambertian() or a KernelMatrix", law)
-    if law.reversible is False:
-        raise InputError(f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}")
-    # the change is its own inverse
-    return law if law.frame == "paper" else law.in_specular_frame()
-
-
 def _given(walls: Sequence[Wall]) -> list[UnitHollow]:
     from ...geometry import Wall
 
@@ -341,7 +317,7 @@ def _given(walls: Sequence[Wall]) -> list[UnitHollow]:
     for k, wall in enumerate(sequence("hollows", walls, Wall, "geo.focusing_arcs(1.0)")):
         if not wall.closes:
             raise InputError(f"hollows[{k}]: expected a Wall without islands, got {wall!r}")
-        found.append(UnitHollow(wall.scaled(1.0 / wall.period), f"wall {k}"))
+        found.append(UnitHollow(wall.scaled(1.0 / wall.period)))
     if not found:
         raise InputError("hollows: expected at least one wall, got none")
     return found
@@ -405,7 +381,7 @@ class _Search:
 
     def run(self, rng: np.random.Generator) -> None:
         """Random polygons of more and more vertices, then moved ones."""
-        self.add([flat(), *simple_hollows()])
+        self.add(simple_hollows())
         for step in range(ROUNDS):
             self.add(random_polygons(DRAWN, min(2 + step // 2, MOST_VERTICES), rng))
             if self.is_done:

@@ -18,6 +18,7 @@ from ..bases.intervals import joined_lists, without_extremal
 from .crevice import crevice_breakpoints, crevice_retro
 
 Whole = NDArray[np.int64]
+COLUMNS = "sign", "offset", "low", "high", "start", "end"
 
 # Offsets that differ by less are equal: they are sums of a few angles of the wall, with dozens of roundings below 2 pi.
 SAME_OFFSET = 64.0 * np.pi * EPS
@@ -91,8 +92,7 @@ class IsometryTable:
     offset_error: float = 0.0
 
     def __post_init__(self) -> None:
-        names = ("sign", "offset", "low", "high", "start", "end")
-        columns = [np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64)) for name in names]
+        columns = [np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64)) for name in COLUMNS]
         shapes = {column.shape for column in columns}
         if len(shapes) != 1 or columns[0].ndim != 1:
             raise InputError(f"table: expected columns of the same length, got shapes {sorted(shapes)}")
@@ -101,7 +101,7 @@ class IsometryTable:
         if np.any(columns[3] - columns[2] > 0.5 * np.pi * (1.0 + 1e-15)):
             raise InputError("table: expected pieces not longer than pi/2; cut the others at pi/2")
         everything = bool(used.all())
-        for name, column in zip(names, columns, strict=True):
+        for name, column in zip(COLUMNS, columns, strict=True):
             shared = everything and not column.flags.writeable
             object.__setattr__(self, name, column if shared else _fixed(column[used]))
 
@@ -155,7 +155,7 @@ class IsometryTable:
         parts = list(tables)
         if not parts:
             raise InputError("tables: expected at least one, got none")
-        columns = [np.concatenate([table._columns()[k] for table in parts]) for k in range(6)]
+        columns = [np.concatenate([getattr(table, name) for table in parts]) for name in COLUMNS]  # names of this class
         crevices: dict[tuple[float, bool], float] = {}
         for crevice in (crevice for table in parts for crevice in table.crevices):
             key = crevice.height_to_width, crevice.exchanged
@@ -167,20 +167,19 @@ class IsometryTable:
     def scaled(self, fraction: float) -> IsometryTable:
         """The table with every probability multiplied by ``fraction``."""
         crevices = tuple(replace(crevice, fraction=fraction * crevice.fraction) for crevice in self.crevices)
-        columns = [*self._columns()[:4], fraction * self.start, fraction * self.end]
-        return self._with(columns, crevices=crevices, unresolved=fraction * self.unresolved)
+        start, end = fraction * self.start, fraction * self.end
+        return replace(self, start=start, end=end, crevices=crevices, unresolved=fraction * self.unresolved)
 
     def mirrored(self) -> IsometryTable:
         """The table of the mirror image of the wall: both angles theta become pi - theta."""
         offset = np.where(self.sign > 0.0, -self.offset, 2.0 * np.pi - self.offset)
-        columns = (self.sign, offset, np.pi - self.high, np.pi - self.low, self.end, self.start)
-        return self._with(columns, crevices=self.crevices, unresolved=self.unresolved)
+        low, high = np.pi - self.high, np.pi - self.low
+        return replace(self, offset=offset, low=low, high=high, start=self.end, end=self.start)
 
     def in_specular_frame(self) -> IsometryTable:
         """The table with every outgoing angle theta' replaced by pi - theta'."""
         crevices = tuple(replace(crevice, exchanged=not crevice.exchanged) for crevice in self.crevices)
-        columns = (-self.sign, np.pi - self.offset, *self._columns()[2:])
-        return self._with(columns, crevices=crevices, unresolved=self.unresolved)
+        return replace(self, sign=-self.sign, offset=np.pi - self.offset, crevices=crevices)
 
     # ---- queries -----------------------------------------------------------------------------------------------
     @cached_property
@@ -308,12 +307,6 @@ class IsometryTable:
         order = np.sort((bucket << 32) | np.arange(bucket.size)) & (2**32 - 1)
         first = np.concatenate([[0], np.cumsum(np.bincount(bucket, minlength=buckets))])
         return np.asarray(first, dtype=np.int64), np.asarray(piece[order], dtype=np.int64)
-
-    def _with(self, columns: Iterable[Floats], *, crevices: tuple[Crevice, ...], unresolved: float) -> IsometryTable:
-        return IsometryTable(*columns, crevices=crevices, unresolved=unresolved, offset_error=self.offset_error)
-
-    def _columns(self) -> tuple[Floats, ...]:
-        return self.sign, self.offset, self.low, self.high, self.start, self.end
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Ends of pieces and breakpoints of crevices, about ``limit`` at most, and the measure with others left out."""

@@ -371,12 +371,8 @@ class DrivenLaw(Law):
         return self.reflect(np.maximum(rng.random(theta.shape), SMALLEST_DRAW), theta)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        outgoing = self.reflect(_entry_points(), theta[:, None])
+        outgoing = self.reflect((np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS, theta[:, None])
         return Conditionals.of_atoms(outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS), np.nan)
-
-
-def _entry_points() -> Floats:
-    return np.asarray((np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS)
 
 
 def as_weight(weight: object) -> float | None:

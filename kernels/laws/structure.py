@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import product
+from functools import reduce
+from itertools import chain, product
+from operator import add
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -43,15 +45,12 @@ class Rules(Generic[Fact]):
         From the facts of composed laws, in their order of application; an empty list stands for the identity.
     mirrored : callable
         From the fact of a law to the fact of the law in the other frame.
-    whole : callable, optional
-        From a compound law and the fact computed from its parts to the final fact; by default the latter.
     """
 
     leaf: Callable[[Law], Fact]
     mixture: Callable[[Sequence[tuple[float, Fact]]], Fact]
     chain: Callable[[Sequence[Fact]], Fact]
     mirrored: Callable[[Fact], Fact]
-    whole: Callable[[Law, Fact], Fact] = lambda law, fact: fact
 
 
 def fold(law: Law, rules: Rules[Fact]) -> Fact:
@@ -67,18 +66,18 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     2.5
     """
     if isinstance(law, Composition):
-        return rules.whole(law, rules.chain([fold(part, rules) for part in law.laws]))
+        return rules.chain([fold(part, rules) for part in law.laws])
     if isinstance(law, Power):
         if law.exponent > MOST_FACTORS:
             raise InputError(
                 f"law: expected a power of at most {MOST_FACTORS}, got {law.exponent}; use discretise(law, basis) ** n"
             )
-        return rules.whole(law, rules.chain([fold(law.law, rules)] * law.exponent))
+        return rules.chain([fold(law.law, rules)] * law.exponent)
     if isinstance(law, SpecularFrame):
-        return rules.whole(law, rules.mirrored(fold(law.law, rules)))
+        return rules.mirrored(fold(law.law, rules))
     whole = sum_of(law.parts)
     if isinstance(whole, Combination):
-        return rules.whole(whole, rules.mixture([(weight, fold(term, rules)) for weight, term in whole.terms]))
+        return rules.mixture([(weight, fold(term, rules)) for weight, term in whole.terms])
     return rules.leaf(law) if whole is law else fold(whole, rules)
 
 
@@ -120,6 +119,29 @@ def words_of(law: Law) -> Sum | None:
     {(lambertian(),): 0.75, (specular(), specular()): 0.25}
     """
     return fold(law, Rules(_word, _mixed, _multiplied, lambda words: _multiplied((words, _word(specular())))))
+
+
+def multiplied_out(law: Law) -> Law:
+    """The law as a sum of words if there are few, else as a sum or composition without other ones of its kind in it.
+
+    Walls are replaced by the sum of their parts.
+
+    Examples
+    --------
+    >>> from asperity.kernels import lambertian
+    >>> multiplied_out((0.5 * lambertian() + 0.5 * specular()) ** 2)
+    0.75*lambertian() + 0.25*retroreflection()
+    """
+    words = words_of(law) if has_chain(law) else None
+    if words is not None:
+        law = sum_of(tuple((weight, law_of(word)) for word, weight in words.items()))
+    factors: Rules[Word] = Rules(
+        lambda leaf: (leaf,),
+        lambda terms: (reduce(add, (weight * law_of(word) for weight, word in terms)),),
+        lambda words: tuple(chain.from_iterable(words)),
+        lambda word: (*word, specular()),
+    )
+    return law_of(fold(law, factors))
 
 
 def law_of(word: Word) -> Law:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import IO, Any, TypeAlias
 
@@ -155,9 +155,7 @@ def tabulated(parts: Parts, n_in: int, n_out: int, frame: Frame, law: str) -> Ta
     own, _ = _quantiles(parts, between, fine, 2 * cells)
     difference = np.abs(unchecked._at(*np.broadcast_arrays(between[:, None], fine)) - own)
     mean = float(np.average(difference.mean(axis=1), weights=SINE.density(between)))
-    return Table(
-        unchecked.theta, unchecked.probability, unchecked.quantile, mean, float(difference.max()), missed, frame, law
-    )
+    return replace(unchecked, error=mean, largest_error=float(difference.max()))
 
 
 def _quantiles(parts: Parts, theta: Floats, probability: Floats, cells: int) -> tuple[Floats, float]:

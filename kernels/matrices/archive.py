@@ -179,30 +179,3 @@ def _basis_from(described: dict[str, Any], arrays: Stored, most: int) -> Basis:
     equal = Bins(edges.size - 1, described["weight"])
     # equal bins are known by their number, which also makes finding a bin faster
     return equal if np.array_equal(equal.edges, edges) else Bins(edges, described["weight"])
-
-
-def store_array(part: Any, arrays: Arrays, name: str) -> str:
-    """Put a dense or sparse array among named arrays; returns its kind."""
-    if isinstance(part, np.ndarray):
-        arrays[name] = part
-        return "dense"
-    arrays[f"{name}.data"], arrays[f"{name}.indices"], arrays[f"{name}.indptr"] = part.data, part.indices, part.indptr
-    arrays[f"{name}.shape"] = np.array(part.shape)
-    return "sparse"
-
-
-def load_array(kind: str, arrays: Stored, name: str, size: int) -> Any:
-    """The array of shape (size, size) of a kind that `store_array` put there."""
-    if kind == "dense":
-        return arrays.read(name, "f8", (size, size))
-    from scipy.sparse import csr_array
-
-    data = arrays.read(f"{name}.data", "f8", (range(size * size + 1),))
-    indices = arrays.read(f"{name}.indices", "i4 i8", (data.size,))
-    indptr = arrays.read(f"{name}.indptr", "i4 i8", (size + 1,))
-    if indptr[-1] != data.size or arrays.read(f"{name}.shape", "i8", (2,)).tolist() != [size, size]:
-        raise ValueError(f"{name}: expected {data.size} entries of a matrix of shape {(size, size)}")
-    part = csr_array((data, indices, indptr), shape=(size, size))
-    # compiled code trusts the indices
-    part.check_format(full_check=True)
-    return part

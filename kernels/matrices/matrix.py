@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, cast, get_args, overload
+from typing import TYPE_CHECKING, Any, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -38,7 +38,7 @@ from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..bases.tensor import TensorBasis
 from . import archive
-from .archive import Arrays, Record, Stored, load_array, store_array
+from .archive import Arrays, Record, Stored
 from .defects import STOCHASTIC_NORM, STOCHASTIC_NORM_CELLS, Defect, SymmetryDefect, relative_asymmetry
 from .plot import draw_kernel
 
@@ -84,110 +84,6 @@ def frobenius_error(error: float, kind: ErrorKind, method: str) -> Estimate:
     return Estimate(error, error, kind, method)
 
 
-def scaled(matrix: KernelMatrix, factor: float) -> KernelMatrix:
-    """``factor * matrix``."""
-    error = frobenius_error(abs(factor) * float(matrix.error), matrix.error.kind, matrix.error.method)
-    return _derived(
-        matrix, factor * matrix.symmetric, error, f"{factor:g}*{_name(matrix)}",
-        replicates=Mapped(matrix.replicates, lambda part: factor * part), reversible=matrix.reversible,
-        mirror_symmetric=matrix.mirror_symmetric, norm_bound=abs(factor) * matrix.norm_bound,
-        beyond=_beyond(lambda number: factor * number, matrix),
-    )  # fmt: skip
-
-
-def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
-    """``first + second``; errors add."""
-    check_same_basis(first, second)
-    replicates: Sequence[Any] = ()
-    # parts of different samples cannot be paired; those of one term are shifted by the other where it has none
-    if first.replicates and not second.replicates:
-        replicates = Mapped(first.replicates, lambda part: part + second.symmetric)
-    elif second.replicates and not first.replicates:
-        replicates = Mapped(second.replicates, lambda part: part + first.symmetric)
-    how = f"sum of ({first.error.method}) and ({second.error.method})"
-    error = frobenius_error(float(first.error) + float(second.error), joint_kind(first, second), how)
-    return _derived(
-        first, first.symmetric + second.symmetric, error, f"{_name(first)} + {_name(second)}", replicates=replicates,
-        reversible=_both(first.reversible, second.reversible),
-        mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
-        norm_bound=first.norm_bound + second.norm_bound,
-        beyond=_beyond(operator.add, first, second),
-    )  # fmt: skip
-
-
-def multiplied(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
-    """First the one, then the other: S_1 S_2, with S_1 S_2 - S_1* S_2* = E_1 S_2* + S_1 E_2."""
-    check_same_basis(first, second)
-    mine, yours = float(first.error), float(second.error)
-    how = f"product of ({first.error.method}) and ({second.error.method})"
-    total = mine * second.norm_bound + (first.norm_bound + mine) * yours
-    error = frobenius_error(total, joint_kind(first, second), how)
-    return _derived(
-        first, first.symmetric @ second.symmetric, error, f"{_name(first)} @ {_name(second)}",
-        reversible=first.reversible if first is second else None,
-        mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
-        norm_bound=first.norm_bound * second.norm_bound,
-        beyond=_beyond(operator.mul, first, second),
-    )  # fmt: skip
-
-
-def to_power(matrix: KernelMatrix, exponent: int) -> KernelMatrix:
-    """``matrix ** exponent``; telescoping S^n - S*^n with ||S*|| <= b, ||S|| <= b + e gives (b + e)^n - b^n."""
-    bound, error = matrix.norm_bound, float(matrix.error)
-    if bound == 1.0:
-        with np.errstate(over="ignore"):
-            whole = float(np.expm1(exponent * np.log1p(error)))
-    else:
-        if exponent * np.log(bound + error) > LARGEST_LOGARITHM:
-            raise InputError(f"exponent: {exponent} is too large for norm {bound:.3g}; divide the matrix by it")
-        whole = (bound + error) ** exponent - bound**exponent
-    power = frobenius_error(whole, matrix.error.kind, f"power {exponent} of: {matrix.error.method}")
-    array = np.linalg.matrix_power(matrix.symmetric, exponent)
-    return _derived(
-        matrix, array, power, f"({_name(matrix)})**{exponent}",
-        reversible=True if exponent == 0 else matrix.reversible,
-        mirror_symmetric=True if exponent == 0 else matrix.mirror_symmetric, norm_bound=bound**exponent,
-        beyond=_beyond(lambda number: number**exponent, matrix),
-    )  # fmt: skip
-
-
-def tensor_product(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
-    """The two kernels side by side: A x B - A* x B* = E_A x B + A* x E_B, in the Frobenius norm."""
-    check_same_frame(first, second)
-    mine, yours = float(first.error), float(second.error)
-    size = float(np.linalg.norm(first.symmetric)) + mine
-    error = mine * float(np.linalg.norm(second.symmetric)) + size * yours
-    return _derived(
-        first, np.asarray(np.kron(first.symmetric, second.symmetric), dtype=np.float64),
-        frobenius_error(error, joint_kind(first, second), "tensor product"), f"({_name(first)}) x ({_name(second)})",
-        TensorBasis((first.basis, second.basis)), reversible=_both(first.reversible, second.reversible),
-        mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
-        norm_bound=first.norm_bound * second.norm_bound,
-    )  # fmt: skip
-
-
-def in_other_frame(matrix: KernelMatrix) -> KernelMatrix:
-    """P J: the matrix in the other convention."""
-    if not is_mirror_symmetric(matrix.basis):
-        raise InputError(
-            f"{matrix.basis!r} is not kept by theta -> pi - theta; discretise law.in_specular_frame() instead"
-        )
-    return replace(
-        matrix,
-        symmetric=mirror_image(matrix.symmetric, matrix.basis, rows=False),
-        counts=None,
-        replicates=Mapped(matrix.replicates, lambda part: mirror_image(part, matrix.basis, rows=False)),
-        symmetrised=False,
-        law=f"({_name(matrix)}).in_specular_frame()",
-        # P J is self-adjoint exactly if P commutes with J
-        reversible=matrix.reversible if matrix.mirror_symmetric else None,
-        beyond=None if matrix.beyond is None else (matrix.beyond[0], -matrix.beyond[1]),
-        frame="paper" if matrix.frame == "specular" else "specular",
-        raw_defect=None,
-        metadata={},
-    )
-
-
 def _beyond(combined: Callable[..., float], *matrices: KernelMatrix) -> tuple[float, float] | None:
     """``beyond`` of a matrix computed from others; None unless all of them have it."""
     pairs = [matrix.beyond for matrix in matrices if matrix.beyond is not None]
@@ -227,10 +123,7 @@ def _both(first: bool | None, second: bool | None) -> bool | None:
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from scipy.sparse import csr_array
     from scipy.sparse.linalg import LinearOperator
-
-    Replicate: TypeAlias = "Floats | csr_array[Any, tuple[int, int]]"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -254,7 +147,7 @@ class KernelMatrix:
     counts : ndarray of int64, shape (n, n), optional
         Raw counts of sampled pairs (incoming bin, outgoing bin), before any symmetrisation.
     replicates : sequence of arrays
-        ``symmetric`` from equal parts of the rays, dense or sparse; their mean is ``symmetric``. For errors.
+        ``symmetric`` from equal parts of the rays; their mean is ``symmetric``. For errors.
     symmetrised : bool
         Whether each sampled pair was counted both ways.
     samples : int
@@ -294,7 +187,7 @@ class KernelMatrix:
     basis: Basis
     error: Estimate = None  # type: ignore[assignment]
     counts: NDArray[np.int64] | None = field(default=None, kw_only=True)
-    replicates: Sequence[Replicate] = field(default=(), kw_only=True)
+    replicates: Sequence[Floats] = field(default=(), kw_only=True)
     symmetrised: bool = field(default=False, kw_only=True)
     samples: int = field(default=0, kw_only=True)
     method: str = field(default="given", kw_only=True)
@@ -433,7 +326,7 @@ class KernelMatrix:
         """``P @ Q``: first P, then Q. ``P @ f``: the operator on values in the cells (or coefficients), or on a
         function of the angle, which is projected."""
         if isinstance(other, KernelMatrix):
-            return multiplied(self, other)
+            return self._followed_by(other)
         return np.asarray(self.array @ self._coordinates(other, "f"))
 
     def __rmatmul__(self, measure: ArrayLike | AngleFunction) -> Floats:
@@ -443,8 +336,30 @@ class KernelMatrix:
             return np.asarray((self._coordinates(measure, "mu") / self.basis.normalisation**2) @ self.array)
         return np.asarray(self._coordinates(measure, "mu", axis=-1) @ self.array)
 
+    def _followed_by(self, other: KernelMatrix) -> KernelMatrix:
+        """S_1 S_2, with S_1 S_2 - S_1* S_2* = E_1 S_2* + S_1 E_2."""
+        check_same_basis(self, other)
+        mine, yours = float(self.error), float(other.error)
+        how = f"product of ({self.error.method}) and ({other.error.method})"
+        total = mine * other.norm_bound + (self.norm_bound + mine) * yours
+        return _derived(
+            self, self.symmetric @ other.symmetric, frobenius_error(total, joint_kind(self, other), how),
+            f"{_name(self)} @ {_name(other)}",
+            reversible=self.reversible if self is other else None,
+            mirror_symmetric=_both(self.mirror_symmetric, other.mirror_symmetric),
+            norm_bound=self.norm_bound * other.norm_bound,
+            beyond=_beyond(operator.mul, self, other),
+        )  # fmt: skip
+
     def __mul__(self, factor: float) -> KernelMatrix:
-        return scaled(self, finite_number("factor", factor))
+        factor = finite_number("factor", factor)
+        return _derived(
+            self, factor * self.symmetric,
+            frobenius_error(abs(factor) * float(self.error), self.error.kind, self.error.method),
+            f"{factor:g}*{_name(self)}", replicates=Mapped(self.replicates, lambda part: factor * part),
+            reversible=self.reversible, mirror_symmetric=self.mirror_symmetric,
+            norm_bound=abs(factor) * self.norm_bound, beyond=_beyond(lambda number: factor * number, self),
+        )  # fmt: skip
 
     __rmul__ = __mul__
 
@@ -452,13 +367,46 @@ class KernelMatrix:
         return -1.0 * self
 
     def __add__(self, other: KernelMatrix) -> KernelMatrix:
-        return added(self, other) if isinstance(other, KernelMatrix) else foreign(other)
+        if not isinstance(other, KernelMatrix):
+            return foreign(other)
+        check_same_basis(self, other)
+        replicates: Sequence[Floats] = ()
+        # parts of different samples cannot be paired; those of one term are shifted by the other where it has none
+        if self.replicates and not other.replicates:
+            replicates = Mapped(self.replicates, lambda part: part + other.symmetric)
+        elif other.replicates and not self.replicates:
+            replicates = Mapped(other.replicates, lambda part: part + self.symmetric)
+        how = f"sum of ({self.error.method}) and ({other.error.method})"
+        error = frobenius_error(float(self.error) + float(other.error), joint_kind(self, other), how)
+        return _derived(
+            self, self.symmetric + other.symmetric, error, f"{_name(self)} + {_name(other)}", replicates=replicates,
+            reversible=_both(self.reversible, other.reversible),
+            mirror_symmetric=_both(self.mirror_symmetric, other.mirror_symmetric),
+            norm_bound=self.norm_bound + other.norm_bound,
+            beyond=_beyond(operator.add, self, other),
+        )  # fmt: skip
 
     def __sub__(self, other: KernelMatrix) -> KernelMatrix:
-        return added(self, -1.0 * other) if isinstance(other, KernelMatrix) else foreign(other)
+        return self + -1.0 * other if isinstance(other, KernelMatrix) else foreign(other)
 
     def __pow__(self, exponent: int) -> KernelMatrix:
-        return to_power(self, whole_number("exponent", exponent, 0))
+        # Telescoping S^n - S*^n with ||S*|| <= b, ||S|| <= b + e gives (b + e)^n - b^n.
+        exponent, bound, error = whole_number("exponent", exponent, 0), self.norm_bound, float(self.error)
+        if bound == 1.0:
+            with np.errstate(over="ignore"):
+                whole = float(np.expm1(exponent * np.log1p(error)))
+        else:
+            if exponent * np.log(bound + error) > LARGEST_LOGARITHM:
+                raise InputError(f"exponent: {exponent} is too large for norm {bound:.3g}; divide the matrix by it")
+            whole = (bound + error) ** exponent - bound**exponent
+        power = frobenius_error(whole, self.error.kind, f"power {exponent} of: {self.error.method}")
+        array = np.linalg.matrix_power(self.symmetric, exponent)
+        return _derived(
+            self, array, power, f"({_name(self)})**{exponent}",
+            reversible=True if exponent == 0 else self.reversible,
+            mirror_symmetric=True if exponent == 0 else self.mirror_symmetric, norm_bound=bound**exponent,
+            beyond=_beyond(lambda number: number**exponent, self),
+        )  # fmt: skip
 
     def adjoint(self) -> KernelMatrix:
         """The matrix of the adjoint kernel in L^2 of the invariant measure."""
@@ -472,7 +420,18 @@ class KernelMatrix:
 
     def tensor(self, other: KernelMatrix) -> KernelMatrix:
         """The kernel that applies this one to the first angle and the other to the second, independently."""
-        return tensor_product(self, other)
+        # A x B - A* x B* = E_A x B + A* x E_B, in the Frobenius norm
+        check_same_frame(self, other)
+        mine, yours = float(self.error), float(other.error)
+        size = float(np.linalg.norm(self.symmetric)) + mine
+        error = mine * float(np.linalg.norm(other.symmetric)) + size * yours
+        return _derived(
+            self, np.asarray(np.kron(self.symmetric, other.symmetric), dtype=np.float64),
+            frobenius_error(error, joint_kind(self, other), "tensor product"), f"({_name(self)}) x ({_name(other)})",
+            TensorBasis((self.basis, other.basis)), reversible=_both(self.reversible, other.reversible),
+            mirror_symmetric=_both(self.mirror_symmetric, other.mirror_symmetric),
+            norm_bound=self.norm_bound * other.norm_bound,
+        )  # fmt: skip
 
     def in_specular_frame(self) -> KernelMatrix:
         """P J, J f(theta) = f(pi - theta): Feres' convention, where specular reflection is the identity.
@@ -481,7 +440,24 @@ class KernelMatrix:
         Raises an InputError where J does not keep the span of the basis; discretise the law's own
         ``in_specular_frame()`` then.
         """
-        return in_other_frame(self)
+        if not is_mirror_symmetric(self.basis):
+            raise InputError(
+                f"{self.basis!r} is not kept by theta -> pi - theta; discretise law.in_specular_frame() instead"
+            )
+        return replace(
+            self,
+            symmetric=mirror_image(self.symmetric, self.basis, rows=False),
+            counts=None,
+            replicates=Mapped(self.replicates, lambda part: mirror_image(part, self.basis, rows=False)),
+            symmetrised=False,
+            law=f"({_name(self)}).in_specular_frame()",
+            # P J is self-adjoint exactly if P commutes with J
+            reversible=self.reversible if self.mirror_symmetric else None,
+            beyond=None if self.beyond is None else (self.beyond[0], -self.beyond[1]),
+            frame="paper" if self.frame == "specular" else "specular",
+            raw_defect=None,
+            metadata={},
+        )
 
     def as_linear_operator(self) -> LinearOperator:
         """``array`` as a scipy LinearOperator, with its transpose."""
@@ -589,7 +565,8 @@ class KernelMatrix:
         record["error"] = [error.value, error.error, error.kind, error.method]
         record["raw_defect"] = None if defect is None else [float(defect), defect.norm, defect.z_score]
         record["metadata"] = dict(self.metadata)
-        record["replicates"] = [store_array(part, arrays, f"replicate{k}") for k, part in enumerate(self.replicates)]
+        record["replicates"] = len(self.replicates)
+        arrays |= {f"replicate{k}": part for k, part in enumerate(self.replicates)}
         return record, arrays
 
     # ---- internals -------------------------------------------------------------------------------------------
@@ -626,7 +603,7 @@ def _restored(record: Record, arrays: Stored, basis: Basis) -> KernelMatrix:
         basis,
         Estimate(*record["error"]),
         counts=arrays.read("counts", "i8", (n, n)) if "counts" in arrays else None,
-        replicates=tuple(load_array(kind, arrays, f"replicate{k}", n) for k, kind in enumerate(record["replicates"])),
+        replicates=tuple(arrays.read(f"replicate{k}", "f8", (n, n)) for k in range(record["replicates"])),
         raw_defect=None if defect is None else SymmetryDefect(*defect),
         metadata=record["metadata"],
         # files from before this field was introduced have no "beyond"
@@ -656,7 +633,7 @@ def _check_entries(matrix: KernelMatrix) -> None:
     if matrix.counts is not None and not matrix.counts.sum(dtype=np.float64) <= 2 * matrix.samples * (1.0 + rounding):
         raise InputError(f"the counts add up to more than twice the stated number of samples, {matrix.samples}")
     if matrix.replicates:
-        mean = sum(cast(Any, part) for part in matrix.replicates) / len(matrix.replicates)
+        mean = sum(matrix.replicates) / len(matrix.replicates)
         if not np.abs(mean - symmetric).max() <= rounding:
             raise InputError("the mean of the replicates is not the matrix")
     if not np.linalg.norm(symmetric @ constant) <= matrix.norm_bound * np.linalg.norm(constant) + excess:

@@ -13,7 +13,7 @@ from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate
 from ...geometry import Wall
 from ..bases.measure import SINE
 
-# The number of largest displacements from which the exponent of the tail is estimated, by default: its square root.
+# Fewest of the largest displacements from which the exponent of the tail is estimated.
 LEAST_TAIL = 20
 
 
@@ -59,18 +59,10 @@ class Displacements(Summary):
         sampled = fraction_estimate(found, self.rays, f"{self.rays} random rays")
         return replace(sampled, error=sampled.error + self.unresolved)
 
-    def quantile(self, probability: float) -> float:
-        """The displacement below which a fraction of the rays lies."""
-        return float(np.quantile(self.values, probability))
+    def tail_exponent(self) -> Estimate:
+        """The exponent a of P(abs(x' - x) > d) ~ d^-a, by the estimator of Hill from the largest displacements.
 
-    def tail_exponent(self, largest: int | None = None) -> Estimate:
-        """The exponent a of P(abs(x' - x) > d) ~ d^-a, by the estimator of Hill.
-
-        Parameters
-        ----------
-        largest : int, optional
-            Number of largest displacements that are used, at least 20; by default about the two-thirds power of the
-            number of rays.
+        Of n rays they are n^(2/3)/4.
 
         Returns
         -------
@@ -85,11 +77,9 @@ class Displacements(Summary):
         """
         if math.isfinite(self.longest_possible):
             raise InputError(f"tail: the wall closes; no displacement exceeds {self.longest_possible:g}")
-        count = round(self.rays ** (2.0 / 3.0)) // 4 if largest is None else whole_number("largest", largest, 1)
-        if count < LEAST_TAIL or 4 * count >= self.rays:
-            raise InputError(
-                f"largest: expected from {LEAST_TAIL} to a quarter of {self.rays} rays, got {count}; trace more rays"
-            )
+        count = round(self.rays ** (2.0 / 3.0)) // 4
+        if count < LEAST_TAIL:
+            raise InputError(f"tail: expected more rays, got {self.rays}, too few for {LEAST_TAIL} long displacements")
         size = np.sort(np.abs(self.values))[::-1]
         near, far = _hill(size, 4 * count), _hill(size, count)
         error = NORMAL_95 * far / math.sqrt(count) + abs(far - near)

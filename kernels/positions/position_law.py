@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -15,18 +15,14 @@ from ...core.checks import (
     angles,
     broadcast,
     finite_array,
-    finite_number,
     frozen,
     generator,
     sequence,
-    whole_number,
 )
 from ...core.errors import InputError
 from ...core.estimates import Summary
-from ...geometry import Wall
 from ..bases.given import Vectorised, seed_by_name
 from ..laws.law import Combination, Law
-from ..walls.wall_law import WallLaw
 
 PositionFunction = Callable[[Floats, Floats], Floats]
 
@@ -79,45 +75,6 @@ class PositionLaw(Summary):
                 raise InputError(f"laws: expected laws in the paper's convention, got {law!r}")
         object.__setattr__(self, "edges", frozen(edges))
         object.__setattr__(self, "laws", laws)
-
-    @classmethod
-    def from_family(
-        cls, family: Callable[[float], Law | Wall], left: float, right: float, intervals: int
-    ) -> PositionLaw:
-        """The law of a wall whose cell depends on x, with ``intervals`` intervals; the family at their middles.
-
-        Parameters
-        ----------
-        family : callable
-            From a position to a law, or to a wall.
-        left, right : float
-            Ends of the piece.
-        intervals : int
-
-        Examples
-        --------
-        >>> from asperity import kernels as ker
-        >>> ker.PositionLaw.from_family(ker.maxwell, 0.0, 1.0, 2).laws
-        (0.25*lambertian() + 0.75*specular(), 0.75*lambertian() + 0.25*specular())
-        """
-        number = whole_number("intervals", intervals, 1)
-        a, b = finite_number("left", left), finite_number("right", right)
-        if not a < b:
-            raise InputError(f"right: expected a number greater than left = {a:g}, got {b:g}")
-        edges = np.linspace(a, b, number + 1)
-        found = [family(float(x)) for x in 0.5 * (edges[1:] + edges[:-1])]
-        return cls(edges, tuple(WallLaw(one) if isinstance(one, Wall) else one for one in found))
-
-    @classmethod
-    def of_walls(cls, walls: Sequence[Wall], repeats: ArrayLike = 1) -> PositionLaw:
-        """The limit law of ``geo.join_walls`` of the same walls, when each is repeated and made finer in proportion."""
-        from ...geometry import join_walls
-
-        whole = join_walls(walls, repeats)
-        counts = np.broadcast_to(np.asarray(repeats), (len(walls),))
-        edges = np.concatenate(([0.0], np.cumsum([w.period * int(n) for w, n in zip(walls, counts, strict=True)])))
-        edges[-1] = whole.period
-        return cls(edges, tuple(WallLaw(wall) for wall in walls))
 
     @property
     def weights(self) -> Floats:

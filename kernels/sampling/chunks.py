@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,50 +39,61 @@ MOST_WAITING = 2**28
 Sums = tuple[NDArray[Any], int]
 
 
-class Job(Protocol):
-    """Rays in tasks; it is sent to workers."""
-
-    @property
-    def law(self) -> Law:
-        """The law."""
-
-    @property
-    def basis(self) -> Basis:
-        """The basis."""
-
-    @property
-    def tasks(self) -> int:
-        """Their number."""
-
-    @property
-    def total(self) -> int:
-        """Rays of all tasks."""
-
-    @property
-    def tables(self) -> int:
-        """Number of consecutive tables to which each task adds."""
-
-    def rays_of(self, task: int) -> int:
-        """Rays of one task."""
-
-    def first_table(self, task: int) -> int:
-        """The first table to which a task adds."""
-
-    def add_to(self, sums: RaySums, first: int, task: int) -> None:
-        """Add the rays of a task to the tables from ``first`` on."""
-
-    def identity(self) -> dict[str, Any]:
-        """What tells the rays from others of this law and basis."""
-
-
-@dataclass(frozen=True)
-class IndependentRays:
-    """Independent rays of a law with incoming angles from the invariant measure, chunk by chunk.
+@dataclass(frozen=True, eq=False)
+class Job(ABC):
+    """Rays of a law in tasks, each of which depends on its number alone; it is sent to workers.
 
     Attributes
     ----------
     law : Law
     basis : Basis
+    tables : int
+        Number of consecutive tables to which each task adds.
+    """
+
+    law: Law
+    basis: Basis
+    tables: ClassVar[int]
+
+    @property
+    @abstractmethod
+    def tasks(self) -> int:
+        """Their number."""
+
+    @abstractmethod
+    def rays_of(self, task: int) -> int:
+        """Rays of one task."""
+
+    @abstractmethod
+    def first_table(self, task: int) -> int:
+        """The first table to which a task adds."""
+
+    @abstractmethod
+    def add_to(self, sums: RaySums, first: int, task: int) -> None:
+        """Add the rays of a task to the tables from ``first`` on."""
+
+    @abstractmethod
+    def identity(self) -> dict[str, Any]:
+        """What tells the rays from others of this law and basis."""
+
+    @property
+    def total(self) -> int:
+        """Rays of all tasks."""
+        return sum(map(self.rays_of, range(self.tasks)))
+
+    def sums(self, task: int) -> Sums:
+        """The sums of one task."""
+        sums = RaySums(self.law, self.basis, self.tables)
+        self.add_to(sums, 0, task)
+        return sums.tables, sums.unresolved
+
+
+@dataclass(frozen=True, eq=False)
+class IndependentRays(Job):
+    """Independent rays of a law with incoming angles from the invariant measure, chunk by chunk.
+
+    Attributes
+    ----------
     root : tuple of int
         The seed.
     samples : int
@@ -92,8 +104,6 @@ class IndependentRays:
         Rounded to whole chunks.
     """
 
-    law: Law
-    basis: Basis
     root: tuple[int, ...]
     samples: int
     parts: int
@@ -116,10 +126,6 @@ class IndependentRays:
     @property
     def tasks(self) -> int:
         return self.parts * self.tasks_a_part
-
-    @property
-    def total(self) -> int:
-        return self.parts * self.samples
 
     def rays_of(self, task: int) -> int:
         whole = self.chunk * self.chunks_a_task
@@ -154,19 +160,6 @@ class IndependentRays:
             "computation": "independent rays", "rays": self.samples, "seed": list(self.root), "chunk": self.chunk,
             "chunks a task": self.chunks_a_task,
         }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Task:
-    """What a worker is sent."""
-
-    job: Job
-
-    def sums(self, task: int) -> Sums:
-        """The sums of one task."""
-        sums = RaySums(self.job.law, self.job.basis, self.job.tables)
-        self.job.add_to(sums, 0, task)
-        return sums.tables, sums.unresolved
 
 
 def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
@@ -254,7 +247,7 @@ class _Run:
                 raise InputError(f"checkpoint: its counts are not of the {self.rays_done} rays that it has; delete it")
         bar.update(self.rays_done)
         rest = np.flatnonzero(~self.state.done).tolist()
-        found: Iterable[tuple[int, Sums]] = results(_Task(self.job).sums, rest, workers, self._backlog(workers))
+        found: Iterable[tuple[int, Sums]] = results(self.job.sums, rest, workers, self._backlog(workers))
         stored = time.monotonic()
         try:
             for task, own in found if self.job.basis.is_partition else in_order(found, rest):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from dataclasses import replace
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from ...core.estimates import LEVEL
 from ...core.rounding import EPS
 from ..bases.assembly import add_products
 from ..bases.basis import Basis
-from ..bases.panels import Panels
 from ..matrices.defects import (
     SymmetryDefect,
     occupied_pairs,
@@ -25,12 +24,7 @@ from ..matrices.defects import (
     reversibility_z_score,
     row_blocks,
 )
-from ..matrices.matrix import Mapped
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
-    Replicate: TypeAlias = "Floats | csr_array[Any, tuple[int, int]]"
+from ..matrices.matrix import KernelMatrix, Mapped, frobenius_error
 
 Counts: TypeAlias = NDArray[np.int64]
 
@@ -42,37 +36,22 @@ LARGEST_REPLICATES = 2**28
 # estimate is too large if a few dimensions dominate. For simulated normal parts with eleven spectra, the coverage is
 # 93.6 to 96.4 % with 8 parts and 94.6 to 95.8 % with 32.
 UNSURE_DIMENSIONS = 1.5
-# Pairs times functions of all rows that are added together.
-MOST_TOGETHER = 2**18
 # Entries of a part that are compared with those of the other parts; larger arrays are compared in some rows only.
 MOST_COMPARED = 2**20
 WORST_NAMED = 8
 
 
-@dataclass(frozen=True)
-class SampledArray:
-    """A symmetric array from samples with its error, replicates and raw symmetry defect.
+def with_missed_events(matrix: KernelMatrix, rays: int) -> KernelMatrix:
+    """The matrix with an error of at least the change by an event that none of the rays met, such as a narrow notch.
 
-    The error is the 95 % quantile of the Frobenius norm of the sampling error.
+    By `missed_fraction` it has a probability of at most p. If p is the same at all angles, the matrix changes by at
+    most p ||S|| + p sqrt(n), because the law given the event is a contraction; on the constants it does not change.
+    The spread of rays that agree cannot show such an event.
     """
-
-    symmetric: Floats
-    error: float
-    replicates: Sequence[Replicate]
-    raw_defect: SymmetryDefect
-    counts: Counts | None
-
-    def with_missed_events(self, rays: int) -> SampledArray:
-        """The array with an error of at least the change by an event that none of the rays met, such as a narrow notch.
-
-        By `missed_fraction` it has a probability of at most p. If p is the same at all angles, the matrix changes by at
-        most p ||S|| + p sqrt(n), because the law given the event is a contraction; on the constants it does not change.
-        The spread of rays that agree cannot show such an event.
-        """
-        # of a large matrix the squares would be another one
-        own = math.sqrt(max(float(np.linalg.norm(self.symmetric)) ** 2 - 1.0, 0.0))
-        most = missed_fraction(rays) * (own + math.sqrt(len(self.symmetric) - 1.0))
-        return replace(self, error=max(self.error, most))
+    # of a large matrix the squares would be another one
+    own = math.sqrt(max(float(np.linalg.norm(matrix.symmetric)) ** 2 - 1.0, 0.0))
+    most = missed_fraction(rays) * (own + math.sqrt(matrix.size - 1.0))
+    return replace(matrix, error=frobenius_error(max(float(matrix.error), most), "estimate", matrix.error.method))
 
 
 def missed_fraction(rays: int) -> float:
@@ -99,23 +78,13 @@ def sum_products(basis: Basis, incoming: Floats, outgoing: Floats, weight: Float
 
 
 def sums_of_rows(basis: Basis, incoming: Floats, outgoing: Floats) -> NDArray[Any]:
-    """Of each row of pairs the numbers from cell to cell, or the sums of e_i(theta) e_j(theta'), shape (rows, n, n).
-
-    Rows of few pairs are done together, because every call of numpy takes some microseconds.
-    """
-    rows, n = len(incoming), basis.size
-    if incoming.size * n > MOST_TOGETHER or isinstance(basis, Panels):
-        each = count_pairs if basis.is_partition else sum_products
-        return np.array([each(basis, *row) for row in zip(incoming, outgoing, strict=True)])
-    if basis.is_partition:
-        cell = (np.arange(rows)[:, None] * n + basis.index(incoming)) * n + basis.index(outgoing)
-        return np.bincount(cell.ravel(), minlength=rows * n * n).reshape(rows, n, n)
-    values, images = basis.evaluate(incoming), basis.evaluate(outgoing)
-    return np.array([value.T @ image for value, image in zip(values, images, strict=True)])
+    """Of each row of pairs the numbers from cell to cell, or the sums of e_i(theta) e_j(theta'), shape (rows, n, n)."""
+    each = count_pairs if basis.is_partition else sum_products
+    return np.array([each(basis, *row) for row in zip(incoming, outgoing, strict=True)])
 
 
-def array_from_counts(parts: Sequence[Any], basis: Basis, *, symmetrise: bool, independent: bool) -> SampledArray:
-    r"""The estimate from counts C of pairs whose incoming angles follow the invariant measure.
+def matrix_from_counts(parts: Sequence[Any], basis: Basis, *, symmetrise: bool, independent: bool) -> KernelMatrix:
+    r"""The matrix from counts C of pairs whose incoming angles follow the invariant measure.
 
     Parameters
     ----------
@@ -130,6 +99,11 @@ def array_from_counts(parts: Sequence[Any], basis: Basis, *, symmetrise: bool, i
         is (C_ij + C_ji) / (2 N).
     independent : bool
         Whether the pairs are independent, so that counts are multinomial; otherwise the parts give the error.
+
+    Returns
+    -------
+    KernelMatrix
+        Its error is the 95 % quantile of the Frobenius norm of the sampling error.
 
     Raises
     ------
@@ -164,7 +138,7 @@ def array_from_counts(parts: Sequence[Any], basis: Basis, *, symmetrise: bool, i
     symmetric = np.empty(counts.shape)
     for some in row_blocks(len(counts)):
         symmetric[some] = numerators(counts, some)
-    replicates: Sequence[Replicate] = ()
+    replicates: Sequence[Floats] = ()
     if independent:
         error = _quantile(*_moments_of_counts(counts, basis, symmetrise))
         z_score = reversibility_z_score(np.asarray(counts, dtype=np.int64))
@@ -175,16 +149,22 @@ def array_from_counts(parts: Sequence[Any], basis: Basis, *, symmetrise: bool, i
             for pairs in occupied_pairs(counts)
         )
         if _may_be_stored(symmetric, len(parts)):  # as counts, which take less memory
-            replicates = Mapped(parts, lambda part: _compact(symmetric + influence(part, slice(None))))
+            replicates = Mapped(parts, lambda part: _read_only(symmetric + influence(part, slice(None))))
     raw = relative_asymmetry(counts, basis.normalisation)
-    for array in (counts, symmetric):
-        array.setflags(write=False)
-    whole = cast(Counts, counts) if counts.dtype == np.int64 else None
-    return SampledArray(symmetric, error, replicates, SymmetryDefect(raw, z_score=z_score), whole)
+    how = "variance of multinomial counts" if independent else f"spread of {len(parts)} parts"
+    return KernelMatrix(
+        _read_only(symmetric),
+        basis,
+        frobenius_error(error, "estimate", how),
+        counts=cast(Counts, _read_only(counts)) if counts.dtype == np.int64 else None,
+        replicates=replicates,
+        symmetrised=symmetrise,
+        raw_defect=SymmetryDefect(raw, z_score=z_score),
+    )
 
 
-def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
-    """The estimate from means of e_i(theta) e_j(theta') over batches of one size or replicates of a Sobol sequence.
+def matrix_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> KernelMatrix:
+    """The matrix from means of e_i(theta) e_j(theta') over batches of one size or replicates of a Sobol sequence.
 
     P 1 = 1 is enforced, and P* 1 = 1 if the law keeps the measure. The spread of the means gives the error.
     """
@@ -200,30 +180,29 @@ def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, 
             mean[:] = 0.5 * (mean + mean.T)
     symmetric = np.asarray(np.mean(fixed, axis=0))
     error = _half_width(lambda some: fixed[:, some] - symmetric[some], symmetric, len(fixed))
-    stored = tuple(map(_compact, fixed)) if _may_be_stored(symmetric, len(fixed)) else ()
-    return SampledArray(symmetric, error, stored, SymmetryDefect(relative_asymmetry(raw), z_score=z_score), None)
+    return KernelMatrix(
+        symmetric,
+        basis,
+        frobenius_error(error, "estimate", f"spread of {len(fixed)} parts"),
+        replicates=tuple(map(_read_only, fixed)) if _may_be_stored(symmetric, len(fixed)) else (),
+        symmetrised=symmetrise,
+        raw_defect=SymmetryDefect(relative_asymmetry(raw), z_score=z_score),
+    )
 
 
-def half_width(symmetric: Floats, replicates: Sequence[Replicate]) -> float:
+def half_width(symmetric: Floats, replicates: Sequence[Floats]) -> float:
     """The 95 % quantile of the sampling error of a matrix from the matrices of several parts of the rays."""
     parts = list(replicates)
-    return _half_width(
-        lambda some: np.array([np.asarray(part[some] - symmetric[some]) for part in parts]), symmetric, len(parts)
-    )
+    return _half_width(lambda some: np.array([part[some] - symmetric[some] for part in parts]), symmetric, len(parts))
 
 
 def _may_be_stored(symmetric: Floats, number: int) -> bool:
     return symmetric.nbytes * number <= LARGEST_REPLICATES
 
 
-def _compact(replicate: Floats) -> Replicate:
-    """A read-only array, or a sparse one if that is smaller."""
-    if 4 * np.count_nonzero(replicate) > replicate.size:
-        replicate.setflags(write=False)
-        return replicate
-    from scipy.sparse import csr_array
-
-    return csr_array(replicate)
+def _read_only(array: Any) -> Any:
+    array.setflags(write=False)
+    return array
 
 
 def _half_width(differences: Callable[[slice], Floats], symmetric: Floats, number: int) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -11,8 +13,16 @@ from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score
-from ..matrices.matrix import KernelMatrix, frobenius_error
-from .counts import BATCHES, Counts, array_from_counts, array_from_sums, count_pairs, sum_products
+from ..matrices.matrix import KernelMatrix
+from .counts import (
+    BATCHES,
+    Counts,
+    count_pairs,
+    matrix_from_counts,
+    matrix_from_sums,
+    sum_products,
+    with_missed_events,
+)
 
 # Incoming angles count as not invariant if their totals in bins deviate from the measure by this z-score.
 NOT_INVARIANT_Z = 4.0
@@ -95,27 +105,17 @@ def matrix_of_pairs(
 ) -> KernelMatrix:
     """The matrix from counts of all pairs, or from means of e_i(theta) e_j(theta') over batches if there are any."""
     if means is None:
-        assert counts is not None
-        array = array_from_counts([counts], basis, symmetrise=symmetrise, independent=True)
-        method = "variance of multinomial counts"
+        found = matrix_from_counts([counts], basis, symmetrise=symmetrise, independent=True)
+    elif counts is not None:
+        fluxes = [mean / (basis.normalisation[:, None] * basis.normalisation) for mean in means]
+        found = matrix_from_counts(fluxes, basis, symmetrise=symmetrise, independent=False)
     else:
-        method = f"spread of {len(means)} batches"
-        if counts is not None:
-            fluxes = [mean / (basis.normalisation[:, None] * basis.normalisation) for mean in means]
-            array = array_from_counts(fluxes, basis, symmetrise=symmetrise, independent=False)
-        else:
-            array = array_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=False)
-    array = array.with_missed_events(pairs)
-    return KernelMatrix(
-        array.symmetric,
-        basis,
-        frobenius_error(array.error, "estimate", method),
+        found = matrix_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=False)
+    return replace(
+        with_missed_events(found, pairs),
         counts=counts,
-        replicates=array.replicates,
-        symmetrised=symmetrise,
         samples=pairs,
         method="pairs",
-        raw_defect=array.raw_defect,
         reversible=True if symmetrise else None,
         metadata={"incoming_angles_follow_measure": follows},
     )

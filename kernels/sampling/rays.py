@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,9 @@ from ..bases.basis import Basis
 from ..bases.mirror import mirror_image
 from ..laws.law import Law
 from ..matrices.defects import BLOCK
+from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..walls.traced_map import UNRESOLVED_TOLERANCE
-from .counts import SampledArray, array_from_counts, array_from_sums, sums_of_rows
+from .counts import matrix_from_counts, matrix_from_sums, sums_of_rows, with_missed_events
 
 # Memory of sums of real numbers: the tables, their means, and the replicates.
 TABLES = 3
@@ -97,11 +98,11 @@ class RaySums:
         """Count the rays that did not escape."""
         self.unresolved += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
 
-    def array(self, *, symmetrise: bool, mirrored: bool = False) -> tuple[SampledArray, int, float]:
-        """The matrix, the number of rays used, and the fraction of rays that did not escape.
+    def matrix(self, *, symmetrise: bool, mirrored: bool = False) -> KernelMatrix:
+        """The matrix; if ``mirrored``, every ray counts with its mirror image.
 
-        The error includes twice this fraction times sup |e|^2; see also `SampledArray.with_missed_events`. If
-        ``mirrored``, every ray counts with its mirror image.
+        The error includes twice the fraction of rays that did not escape times sup |e|^2; see also
+        `with_missed_events`.
 
         Raises
         ------
@@ -118,16 +119,17 @@ class RaySums:
             )
         if self.basis.is_partition:
             parts = [_Counts(table, mirrored) for table in self.tables]
-            array = array_from_counts(parts, self.basis, symmetrise=symmetrise, independent=len(parts) == 1)
+            found = matrix_from_counts(parts, self.basis, symmetrise=symmetrise, independent=len(parts) == 1)
         else:
             means = [
                 (table + mirror_image(table, self.basis)) / (2 * self.each) if mirrored else table / self.each
                 for table in self.tables
             ]
             keeps_measure = bool(self.law.reversible)
-            array = array_from_sums(means, self.basis, symmetrise=symmetrise, keeps_measure=keeps_measure)
-        array = array.with_missed_events(used)
+            found = matrix_from_sums(means, self.basis, symmetrise=symmetrise, keeps_measure=keeps_measure)
+        found = with_missed_events(found, used)
+        error, how = float(found.error), found.error.method
         if fraction > 0.0:
-            extra = 2.0 * fraction * largest_square_sum(self.basis)
-            array = SampledArray(array.symmetric, array.error + extra, array.replicates, array.raw_defect, array.counts)
-        return array, used, fraction
+            error += 2.0 * fraction * largest_square_sum(self.basis)
+            how += ", plus a bound for rays that did not escape"
+        return replace(found, error=frobenius_error(error, "estimate", how), samples=used, unresolved=fraction)

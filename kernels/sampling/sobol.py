@@ -17,9 +17,9 @@ from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..bases.mirror import is_mirror_symmetric
 from ..laws.law import Law, entry_inside
+from ..matrices.matrix import KernelMatrix
 from . import chunks
-from .chunks import count_long
-from .counts import SampledArray
+from .chunks import Job, count_long
 from .rays import RaySums
 
 if TYPE_CHECKING:
@@ -34,13 +34,11 @@ SOBOL_BITS = 32
 
 
 @dataclass(frozen=True, eq=False)
-class SobolRays:
+class SobolRays(Job):
     """Rays ``start`` to ``end - 1`` of each of eight shifted Sobol sequences, in tasks.
 
     Attributes
     ----------
-    law : Law
-    basis : Basis
     shifts, beyond : ndarray of shape (PARTS, 2)
         Of the digits of each part, and of the digits beyond.
     seed : tuple of int
@@ -53,8 +51,6 @@ class SobolRays:
         Rounded to whole chunks.
     """
 
-    law: Law
-    basis: Basis
     shifts: NDArray[np.uint64]
     beyond: Floats
     seed: tuple[int, ...]
@@ -76,10 +72,6 @@ class SobolRays:
     @property
     def tasks(self) -> int:
         return -(-self.end // self.points_a_task) - self.start // self.points_a_task
-
-    @property
-    def total(self) -> int:
-        return PARTS * (self.end - self.start)
 
     def range_of(self, task: int) -> tuple[int, int]:
         """The first point of a task, and the one after its last."""
@@ -164,10 +156,8 @@ class SobolSampler:
         self.shifts = source.integers(0, 2**SOBOL_BITS, size=(PARTS, 2), dtype=np.uint64)
         self.beyond = source.random((PARTS, 2)) * 2.0**-SOBOL_BITS
 
-    def sampled(
-        self, samples: int, *, symmetrise: bool, engine: Engine | None = None
-    ) -> tuple[SampledArray, int, float]:
-        """The matrix from at least ``samples`` rays, rounded up to 8 times a power of two; see `RaySums.array`.
+    def sampled(self, samples: int, *, symmetrise: bool, engine: Engine | None = None) -> KernelMatrix:
+        """The matrix from at least ``samples`` rays, rounded up to 8 times a power of two; see `RaySums.matrix`.
 
         With an ``engine`` its workers trace the rays and its checkpoint stores the sums, which are the same to the last
         bit: the points of a task depend only on its number.
@@ -192,4 +182,4 @@ class SobolSampler:
             self.sums.tables = self.sums.tables.copy() if self.sums.each else self.sums.tables
             count_long(self.sums, rays, engine or {})
             self.sums.each = each
-        return self.sums.array(symmetrise=symmetrise, mirrored=self.halved)
+        return self.sums.matrix(symmetrise=symmetrise, mirrored=self.halved)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import chain
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arra
 from ...core.checks import Floats, angles, check_memory, instance, shortened
 from ...core.errors import InputError
 from ...core.version import __version__
-from ...core.workers import connected, in_order, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score
@@ -29,11 +28,6 @@ BLOCK = 2**20
 # Seconds between two states of a checkpoint.
 STORED_EVERY = 5.0
 STATE = "state"
-# Blocks that are on their way to or at a worker.
-BLOCKS_A_WORKER = 3
-
-# Its number, and the incoming and outgoing angles.
-Block: TypeAlias = tuple[int, Floats, Floats]
 
 
 def estimate_stream(
@@ -44,7 +38,6 @@ def estimate_stream(
     invariant: bool = True,
     checkpoint: str | Path | None = None,
     key: str | None = None,
-    client: Any = None,
 ) -> KernelMatrix:
     """Estimate the matrix of a law from more pairs (theta, theta') than memory holds.
 
@@ -64,17 +57,12 @@ def estimate_stream(
         goes on with it: arrays are read from where they were, an iterable is advanced to there.
     key : str, optional
         A name for the computation, needed for a basis of one's own that a checkpoint cannot compare.
-    client : int, str or distributed.Client, optional
-        As of `discretise`: this process reads the stream, and workers count or add up its blocks. That is of use where
-        this takes longer than to send a block, so for many functions of a basis without cells.
-
     Returns
     -------
     KernelMatrix
-        The same to the last bit for any size of the chunks and any workers, and however often it was stopped. In a
-        basis of cells it is that of `estimate` on all pairs if these follow the measure; else the two differ by
-        rounding, or by the blocks in which pairs are weighted. Memory is that of the matrix, once for cells, else 32
-        times, and of a block; with workers of three blocks, and as many such sums, for each of them.
+        The same to the last bit for any size of the chunks, and however often it was stopped. In a basis of cells it is
+        that of `estimate` on all pairs if these follow the measure; else the two differ by rounding, or by the blocks
+        in which pairs are weighted. Memory is that of the matrix, once for cells, else 32 times, and of a block.
 
     Raises
     ------
@@ -94,19 +82,24 @@ def estimate_stream(
     instance("basis", basis, Basis, "ker.Bins(64)")
     if basis.measure != SINE:
         raise InputError(f"basis: expected one for sin(theta), got {basis!r}")
-    source = _source(pairs)
+    chunks_after, size = _source(pairs)
+    blocks = _blocks(chunks_after(0) if chunks_after else iter(pairs))
     sums = _Sums.empty(basis, bool(invariant))
     try:
         if checkpoint is None:
-            sums.add_all(source, basis, None, client)
+            sums.add_all(blocks, basis, None)
         else:
+            first = next(blocks, np.empty((2, 0)))
             identity = {
                 "computation": "stream of pairs", "version": __version__, "basis": basis,
-                "invariant": sums.invariant, "pairs": source.size, "block": BLOCK,
-                "first pairs": np.stack(source.first()),
+                "invariant": sums.invariant, "pairs": size, "block": BLOCK, "first pairs": first,
             }  # fmt: skip
             with Checkpoint(checkpoint, identity, key=key) as store:
-                sums.add_all(source, basis, store, client)
+                sums.restore(store)
+                rest = (
+                    _blocks(chunks_after(sums.number)) if chunks_after else _after(chain([first], blocks), sums.number)
+                )
+                sums.add_all(rest, basis, store)
     except KeyboardInterrupt as stop:
         lost = "without a checkpoint their sums are lost"
         how = lost if checkpoint is None else f"{checkpoint} has {sums.stored} of them: give the same call"
@@ -137,47 +130,25 @@ class _Sums:
             np.zeros((batches, basis.size, basis.size)), np.zeros(batches),
         )  # fmt: skip
 
-    def add_all(self, source: _Source, basis: Basis, store: Checkpoint | None, client: Any) -> None:
-        """Add all pairs of a source, or those that the checkpoint does not have; block by block."""
-        if store is not None:
-            for _, known in store.parts(self._read):
-                self.number, self.stored = (int(known["number"]),) * 2
-                self.totals, self.counts, self.tables, self.masses = (
-                    known[name] for name in ("totals", "counts", "tables", "masses")
-                )
-        blocks = (
-            (number, angles("theta_in", theta), angles("theta_out", image))
-            for number, (theta, image) in enumerate(source.blocks(self.number))
-        )
+    def restore(self, store: Checkpoint) -> None:
+        """Take the sums of the checkpoint, if it has some."""
+        for _, known in store.parts(self._read):
+            self.number, self.stored = (int(known["number"]),) * 2
+            self.totals, self.counts, self.tables, self.masses = (
+                known[name] for name in ("totals", "counts", "tables", "masses")
+            )
+
+    def add_all(self, blocks: Iterable[Floats], basis: Basis, store: Checkpoint | None) -> None:
+        """Add all pairs, block by block."""
         stored = time.monotonic()
-        with connected(client) as workers:
-            for _ in self._add_each(blocks, basis, workers):
-                if store is not None and time.monotonic() - stored > STORED_EVERY:
-                    self._store(store)
-                    stored = time.monotonic()
+        for theta, image in blocks:
+            self._add(angles("theta_in", theta), angles("theta_out", image), basis)
+            if store is not None and time.monotonic() - stored > STORED_EVERY:
+                self._store(store)
+                stored = time.monotonic()
         # not after an interrupt, which may leave half a block in the sums
         if store is not None:
             self._store(store)
-
-    def _add_each(self, blocks: Iterator[Block], basis: Basis, workers: Any) -> Iterator[None]:
-        """Add the blocks in their order."""
-        if workers is None:
-            for _, theta, image in blocks:
-                self._add(theta, image, basis)
-                yield
-            return
-        backlog = BLOCKS_A_WORKER * max(len(workers.nthreads()), 1)
-        found = results(_Adding(basis, self.invariant).sums, blocks, workers, backlog)
-        for _, own in in_order(((number, own) for (number, *_), own in found), count()):
-            self._merge(own)
-            yield
-
-    def _merge(self, other: _Sums) -> None:
-        self.totals += other.totals
-        self.counts += other.counts
-        self.tables += other.tables
-        self.masses += other.masses
-        self.number += other.number
 
     def _add(self, theta: Floats, image: Floats, basis: Basis) -> None:
         bins, batches = bins_of_test(basis), len(self.tables)
@@ -229,74 +200,48 @@ class _Sums:
         return found
 
 
-@dataclass(frozen=True)
-class _Adding:
-    """What a worker is sent."""
-
-    basis: Basis
-    invariant: bool
-
-    def sums(self, block: Block) -> _Sums:
-        """The sums of one block."""
-        _, theta, image = block
-        found = _Sums.empty(self.basis, self.invariant)
-        found._add(theta, image, self.basis)
-        return found
-
-
-class _Source:
-    """Pairs in blocks of ``BLOCK``, whatever chunks they come in.
-
-    Parameters
-    ----------
-    chunks : iterable, or callable
-        Of a stream its chunks; of arrays a function that gives the chunks after so many pairs.
-    size : int or None
-        Number of pairs of arrays.
-    """
-
-    def __init__(self, chunks: Iterable[Any] | Callable[[int], Iterator[Any]], size: int | None) -> None:
-        self.size = size
-        self._after = chunks if callable(chunks) else None
-        self._chunks: Iterator[Any] = chunks(0) if callable(chunks) else iter(chunks)
-        self._waiting: list[tuple[Floats, Floats]] = []
-
-    def first(self) -> tuple[Floats, Floats]:
-        """The first block, which is not taken away."""
-        block = self._next()
-        self._waiting.insert(0, block)
-        return block
-
-    def blocks(self, known: int) -> Iterator[tuple[Floats, Floats]]:
-        """All blocks after the first pairs, so many of them: whole blocks, or all pairs that there were."""
-        if self._after is not None:
-            self._chunks, self._waiting = self._after(known), []
-        passed = 0 if self._after is None else known
-        while passed < known:
-            block = self._next()
-            passed += block[0].size
-            if not block[0].size or passed > known:
-                raise InputError(
-                    f"pairs: expected the stream whose {known} pairs the checkpoint has, got one that has "
-                    f"{'fewer' if passed < known else 'more'}; name another checkpoint"
-                )
-        while (block := self._next())[0].size:
-            yield block
-
-    def _next(self) -> tuple[Floats, Floats]:
-        """The next block, shorter at the end of the stream."""
-        number = sum(theta.size for theta, _ in self._waiting)
-        while number < BLOCK and (chunk := next(self._chunks, None)) is not None:
-            theta, image = _columns(chunk)
-            self._waiting.append((theta, image))
-            number += theta.size
-        columns = [np.concatenate([np.empty(0), *(chunk[k] for chunk in self._waiting)]) for k in (0, 1)]
-        rest = columns[0][BLOCK:], columns[1][BLOCK:]
-        self._waiting = [rest] if rest[0].size else []
-        return columns[0][:BLOCK], columns[1][:BLOCK]
+def _source(pairs: Any) -> tuple[Callable[[int], Iterator[Any]] | None, int | None]:
+    """Of an array of pairs or two arrays the function that gives the chunks after so many pairs, and their number."""
+    # numpy's arrays and those of other libraries, which have a shape and are sliced
+    shape = getattr(pairs, "shape", None)
+    if shape is not None:
+        if len(shape) != 2 or shape[1] != 2:
+            raise InputError(f"pairs: expected an array of shape (n, 2), got {tuple(shape)}")
+        size = int(shape[0])
+        return (lambda start: (np.asarray(pairs[k : k + BLOCK]).T for k in range(start, size, BLOCK))), size
+    if isinstance(pairs, Sequence) and len(pairs) == 2 and all(_is_column(column) for column in pairs):
+        theta, image = pairs
+        if theta.shape != image.shape:
+            raise InputError(f"pairs: expected two arrays of one length, got {theta.shape} and {image.shape}")
+        length = int(theta.shape[0])
+        return (
+            lambda start: ((theta[k : k + BLOCK], image[k : k + BLOCK]) for k in range(start, length, BLOCK))
+        ), length
+    if isinstance(pairs, (str, bytes)) or not isinstance(pairs, Iterable):
+        raise InputError(f"pairs: expected an array of shape (n, 2) or an iterable of chunks, got {shortened(pairs)}")
+    return None, None
 
 
-def _columns(chunk: Any) -> tuple[Floats, Floats]:
+def _is_column(column: Any) -> bool:
+    shape = getattr(column, "shape", None)  # of other libraries' arrays too
+    return shape is not None and len(shape) == 1
+
+
+def _blocks(chunks: Iterator[Any]) -> Iterator[Floats]:
+    """Incoming and outgoing angles, shape (2, ``BLOCK``), whatever chunks they come in; fewer in the last block."""
+    waiting, number = [np.empty((2, 0))], 0
+    for chunk in chunks:
+        waiting.append(_columns(chunk))
+        number += waiting[-1].shape[1]
+        if number >= BLOCK:
+            whole, end = np.concatenate(waiting, axis=1), number - number % BLOCK
+            yield from (whole[:, start : start + BLOCK] for start in range(0, end, BLOCK))
+            waiting, number = [whole[:, end:].copy()], number % BLOCK
+    if number:
+        yield np.concatenate(waiting, axis=1)
+
+
+def _columns(chunk: Any) -> Floats:
     try:
         theta, image = (np.asarray(column, dtype=np.float64).ravel() for column in chunk)
     except (TypeError, ValueError) as reason:
@@ -307,31 +252,18 @@ def _columns(chunk: Any) -> tuple[Floats, Floats]:
         raise InputError(
             f"pairs: expected as many outgoing as incoming angles in a chunk, got {image.size} and {theta.size}"
         )
-    return theta, image
+    return np.stack([theta, image])
 
 
-def _source(pairs: Any) -> _Source:
-    """The blocks of an array of pairs, of two arrays, or of an iterable of chunks."""
-    # numpy's arrays and those of other libraries, which have a shape and are sliced
-    shape = getattr(pairs, "shape", None)
-    if shape is not None:
-        if len(shape) != 2 or shape[1] != 2:
-            raise InputError(f"pairs: expected an array of shape (n, 2), got {tuple(shape)}")
-        size = int(shape[0])
-        return _Source(lambda start: (np.asarray(pairs[k : k + BLOCK]).T for k in range(start, size, BLOCK)), size)
-    if isinstance(pairs, Sequence) and len(pairs) == 2 and all(_is_column(column) for column in pairs):
-        theta, image = pairs
-        if theta.shape != image.shape:
-            raise InputError(f"pairs: expected two arrays of one length, got {theta.shape} and {image.shape}")
-        length = int(theta.shape[0])
-        return _Source(
-            lambda start: ((theta[k : k + BLOCK], image[k : k + BLOCK]) for k in range(start, length, BLOCK)), length
-        )
-    if isinstance(pairs, (str, bytes)) or not isinstance(pairs, Iterable):
-        raise InputError(f"pairs: expected an array of shape (n, 2) or an iterable of chunks, got {shortened(pairs)}")
-    return _Source(pairs, None)
-
-
-def _is_column(column: Any) -> bool:
-    shape = getattr(column, "shape", None)  # of other libraries' arrays too
-    return shape is not None and len(shape) == 1
+def _after(blocks: Iterator[Floats], known: int) -> Iterator[Floats]:
+    """The blocks of a stream after its first pairs, so many of them: whole blocks, or all pairs that there were."""
+    passed = 0
+    while passed < known:
+        size = next(blocks, np.empty((2, 0))).shape[1]
+        passed += size
+        if not size or passed > known:
+            raise InputError(
+                f"pairs: expected the stream whose {known} pairs the checkpoint has, got one that has "
+                f"{'fewer' if passed < known else 'more'}; name another checkpoint"
+            )
+    return blocks

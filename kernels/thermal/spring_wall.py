@@ -11,9 +11,6 @@ from numpy.typing import ArrayLike
 from ...core.checks import (
     Floats,
     Rng,
-    angles,
-    broadcast,
-    finite_array,
     generator,
     number_between,
     positive_number,
@@ -118,24 +115,6 @@ class SpringWall:
             fastest = float(np.abs(incoming[:, 1]).max())
             raise InputError(f"velocity: {reason} for a speed of {fastest:g} against {self}; {OVERFLOW}") from reason
         return outgoing
-
-    @seed_by_name
-    def sample_polar(self, speed: ArrayLike, theta: ArrayLike, rng: Rng = None) -> tuple[Floats, Floats]:
-        """Draw speed and angle of the outgoing velocity from those of *minus* the incoming one, as laws of angles do.
-
-        Examples
-        --------
-        >>> speed, theta = SpringWall(1.0, 0.0).sample_polar(2.0, 0.5, rng=0)
-        >>> round(float(speed), 12), round(float(theta + 0.5), 12) == round(np.pi, 12)
-        (2.0, True)
-        """
-        size, angle = broadcast(speed=finite_array("speed", speed), theta=angles("theta", theta))
-        if not np.all(size > 0.0):
-            raise InputError("speed: expected numbers greater than 0")
-        velocity = -np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1).reshape(-1, 2)
-        out = self.sample(velocity, rng=rng)
-        shape = size.shape
-        return np.hypot(out[:, 0], out[:, 1]).reshape(shape), np.arctan2(out[:, 1], out[:, 0]).reshape(shape)
 
     def equilibrium(self, n: int, rng: Rng = None, temperature: float | None = None) -> Floats:
         """Draw incoming velocities (n, 2) from the flux of Maxwell's distribution, by default at the wall's T."""

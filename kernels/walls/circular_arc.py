@@ -7,19 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, number_between, whole_number
+from ...core.checks import Floats, number_between, whole_number
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
-from ..bases.intervals import between_cuts, edges_inside, joined_lists
+from ..bases.intervals import between_cuts, edges_inside
 from ..bases.measure import SINE
-from ..expectations.arcs import ArcPieces, outgoing_lines
+from ..expectations.arcs import arc_lines, followed_hits
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..laws.law import DrivenLaw, entries
-
-# Each interval with a constant number of hits N <= MOST_HITS has its own Gauss rule. Rays with more hits are a fraction
-# of about 1/(4 N^2), for theta within xi/N of xi. Their outgoing angle lies within xi/N of pi - xi (or xi), and its
-# mean within xi/N^2. For a smooth function the error is below 1/(4 N^4) = 4e-12.
-MOST_HITS = 500
-FEWEST_HITS = 8
 
 
 @dataclass(frozen=True)
@@ -105,7 +99,7 @@ class CircularArcLaw(DrivenLaw):
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Gauss rules in delta between the changes of N and the edges; the error is that of rays with more hits."""
-        lines = outgoing_lines(self.half_angle, self.pieces(theta, followed_hits(tolerance)), theta)
+        lines = arc_lines(self.half_angle, theta, followed_hits(tolerance))
         long = np.flatnonzero(~lines.single)
         offset, slope, lower, upper = lines.offset[long], lines.slope[long], lines.lower[long], lines.upper[long]
         ends = offset + slope * lower, offset + slope * upper
@@ -124,33 +118,3 @@ class CircularArcLaw(DrivenLaw):
             np.concatenate((weight * SINE.density(chord), lines.mass[single])),
             2.0 * left / lines.of_angles(lines.mass, theta.size),
         )
-
-    def pieces(self, theta: Floats, most_hits: int = MOST_HITS) -> ArcPieces:
-        """The intervals of delta on which N is constant, for every theta and both sides, sorted by incoming angle."""
-        xi, theta, most_hits = self.half_angle, angles("theta", theta).ravel(), whole_number("most_hits", most_hits, 1)
-        base = np.stack([theta, np.pi - theta], axis=-1).reshape(-1)
-        total = xi + base
-        low, high = np.abs(base - xi), np.minimum(np.pi - np.abs(np.pi - total), 0.5 * np.pi)
-        # If theta is below the rounding of xi, one piece of zero width remains, with the right outgoing angle.
-        alone = (np.abs(high - low) <= 0.0) & (base <= 0.5 * np.pi)
-        fewest = np.maximum(np.ceil((total - high) / (2.0 * high)), 1.0)
-        with np.errstate(divide="ignore"):
-            most = np.minimum(np.ceil((total - low) / (2.0 * low)), most_hits)
-        most = np.maximum(most, fewest)
-        pieces = np.where((high > low) | alone, most - fewest + 2.0, 0.0).astype(np.intp)
-        owner, order = joined_lists(pieces)
-        hits = np.asarray(fewest[owner] + order, dtype=np.float64)
-        # The last piece of every angle holds all rays with more hits, at the mean of their outgoing angles.
-        rest = order == pieces[owner] - 1
-        lower = np.where(rest, low[owner], np.maximum(low[owner], total[owner] / (2.0 * hits + 1.0)))
-        upper = np.minimum(high[owner], total[owner] / (2.0 * hits - 1.0))
-        return ArcPieces(owner // 2, owner % 2 == 1, lower, upper, hits, rest, alone[owner])
-
-
-def followed_hits(tolerance: float) -> int:
-    """The number of hits N to follow, so that integrals over theta of means of functions of slope 10 meet a tolerance.
-
-    Rays with more hits are a fraction of 1/(4 N^2), occur for theta within xi/N of xi, and leave within 2 xi/N of
-    pi - xi (or xi).
-    """
-    return int(np.clip(np.ceil((100.0 / tolerance) ** 0.25), FEWEST_HITS, MOST_HITS))

@@ -5,11 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, finite_array, finite_number, instance, whole_number
-from ...core.errors import InputError
-from ...core.rounding import EPS
+from ...core.checks import Floats
 from ...geometry import Wall
 from ...geometry.itineraries.hollow import NO_LIMIT, HollowConditionals
 from ..expectations.conditionals import Conditionals
@@ -30,32 +27,27 @@ def is_few(wall: Wall) -> bool:
     return len(wall.pieces) + sum(map(len, wall.islands)) <= MOST_PIECES
 
 
-def adaptive_conditionals(
-    wall: Wall, theta: ArrayLike, tolerance: float = 1e-10, degree: int = 1, edges: ArrayLike = ()
-) -> Conditionals:
-    r"""Conditional distributions of a wall's law to a given tolerance.
+class WallConditionals:
+    """Conditional distributions of one wall for one kind of functions, with data shared by all calls.
 
     Parameters
     ----------
     wall : Wall
-    theta : array_like
-        Incoming angles in (0, pi), radians, in any order.
-    tolerance : float
-        Wanted error of the mean of a function of sup norm 1.
     degree : int
         Highest degree, as trigonometric polynomials, of the averaged functions; 0 if constant between the edges.
-    edges : array_like
+    edges : array
         Outgoing angles where the functions are not smooth.
+    least_level : int
+        Lowest nested rule on a piece.
+    most_segments : int
+        Limit on the ray segments for one angle in one hollow; the error includes the intervals undecided at the limit.
+    sizes : array, optional
+        Bounds of the functions between the edges, or of the norm if they are vectors; 1 by default.
 
-    Returns
-    -------
-    Conditionals
-        The errors include twice the probability of rays that did not escape, which count as retroreflected.
-
-    Raises
-    ------
-    InputError
-        If an angle is not in (0, pi), or the tolerance is less than the rounding, 2.2e-16.
+    Attributes
+    ----------
+    outdated : set of float
+        Angles of earlier calls now known to have missed a piece; the caller may clear the set.
 
     Notes
     -----
@@ -69,20 +61,10 @@ def adaptive_conditionals(
     --------
     >>> from math import cos
     >>> from asperity import geometry as geo
-    >>> conditionals = adaptive_conditionals(geo.flat(), [0.5])
-    >>> conditionals.weights.tolist(), bool(conditionals.mean(np.cos)[0] == cos(np.pi - 0.5))
-    ([1.0], True)
+    >>> conditionals, unresolved = WallConditionals(geo.flat(), 1, np.empty(0))(np.array([0.5]), 1e-10)
+    >>> conditionals.weights.tolist(), bool(conditionals.mean(np.cos)[0] == cos(np.pi - 0.5)), unresolved.tolist()
+    ([1.0], True, [0.0])
     """
-    instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
-    if finite_number("tolerance", tolerance) < EPS:
-        raise InputError(f"tolerance: expected a number of at least {EPS:.2g}, the rounding, got {tolerance!r}")
-    incoming = np.atleast_1d(angles("theta", theta)).ravel()
-    conditionals = WallConditionals(wall, whole_number("degree", degree, 0), finite_array("edges", edges))
-    return conditionals(incoming, tolerance)[0]
-
-
-class WallConditionals:
-    """Conditional distributions of one wall for one kind of functions, with data shared by all calls."""
 
     def __init__(
         self,
@@ -95,52 +77,31 @@ class WallConditionals:
     ) -> None:
         self.wall = wall.cell
         self.degree = degree
-        # for one angle in one hollow; the error includes the intervals undecided at the limit
         self.most_segments = most_segments
-        # lowest nested rule on a piece
         self.least_level = least_level
         # a writable copy: numba would compile again for read-only arrays
         self.edges = np.array(edges, dtype=np.float64)
-        if self.edges.ndim != 1:
-            raise InputError(f"edges: expected shape (n,), got {self.edges.shape}")
-        # bounds of the functions between the edges, or of the norm if they are vectors
         self.sizes = np.ones(len(self.edges) + 1) if sizes is None else sizes
-        # angles of earlier calls now known to have missed a piece; the caller may clear the set
         self.outdated: set[float] = set()
 
     @cached_property
-    def _hollows(self) -> list[HollowConditionals]:
-        """The conditional distributions of one hollow of each shape."""
-        task = self.degree, self.edges, self.sizes, self.least_level, self.most_segments
-        return [HollowConditionals(self.wall.scene, k, *task) for k, _ in self._shapes]
-
-    @property
     def hollows(self) -> list[tuple[HollowConditionals, float]]:
         """One hollow of each shape, and the fraction of the period covered by all of this shape."""
-        return list(zip(self._hollows, self._fractions, strict=True))
+        from ...geometry.cells.hollow_shape import distinct_hollows
+
+        wall, shapes = self.wall, [(0, 1.0)]
+        if wall.closes:
+            shapes = [
+                (wall.hollows.index(hollows[0]), sum(hollow.width for hollow in hollows) / wall.period)
+                for _, hollows in distinct_hollows(wall)
+            ]
+        task = self.degree, self.edges, self.sizes, self.least_level, self.most_segments
+        return [(HollowConditionals(wall.scene, number, *task), fraction) for number, fraction in shapes]
 
     @property
     def flat_fraction(self) -> float:
         """The fraction of the period covered by flat tops."""
         return self.wall.flat_top / self.wall.period if self.wall.closes else 0.0
-
-    @property
-    def _fractions(self) -> list[float]:
-        return [fraction for _, fraction in self._shapes]
-
-    @cached_property
-    def _shapes(self) -> list[tuple[int, float]]:
-        """The index of one hollow per shape, and the fraction of the period covered by all hollows of this shape."""
-        from ...geometry.cells.hollow_shape import distinct_hollows
-
-        wall = self.wall
-        if not wall.closes:
-            return [(0, 1.0)]
-        shapes = [hollows for _, hollows in distinct_hollows(wall)]
-        return [
-            (wall.hollows.index(hollows[0]), sum(hollow.width for hollow in hollows) / wall.period)
-            for hollows in shapes
-        ]
 
     def __call__(self, theta: Floats, tolerance: float | Floats) -> tuple[Conditionals, Floats]:
         """The conditional distributions at checked angles, and the probabilities of rays that did not escape.
@@ -178,9 +139,8 @@ class WallConditionals:
 
     def spent(self) -> tuple[int, int]:
         """Rays and ray segments so far."""
-        return sum(conditionals.rays for conditionals in self._hollows), sum(
-            conditionals.segments for conditionals in self._hollows
-        )
+        every = [conditionals for conditionals, _ in self.hollows]
+        return sum(each.rays for each in every), sum(each.segments for each in every)
 
     def shared(self, theta: Floats) -> Floats:
         """The probability of entry points whose itinerary also exists at the next of these known angles."""
@@ -191,7 +151,7 @@ class WallConditionals:
 
     def critical_angles(self, low: float, high: float) -> Floats:
         """Known angles in (low, high), increasing, where the widest pieces appear or disappear."""
-        found = [cut for conditionals in self._hollows for cut in conditionals.critical_angles(low, high)]
+        found = [cut for conditionals, _ in self.hollows for cut in conditionals.critical_angles(low, high)]
         return np.unique([angle for angle, _ in found])
 
 

@@ -1,17 +1,11 @@
-"""The reason why a law is not self-adjoint in its convention, and its norm on functions of mean 0."""
+"""Laws that are not known to be self-adjoint in their convention, and their norm on functions of mean 0."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...core.errors import AccuracyError, InputError
+from ...core.errors import AccuracyError
 from ...kernels import Law
-from ...kernels.laws.structure import lists_branches
-from .images import suits_panels
-
-# Angles at which the law is compared with its mirror image, and the difference of two means of cos(theta') that exceeds
-# their errors.
-COMPARED, DIFFERENT = np.array([0.4, 0.8, 1.2]), 1e-6
 
 
 def self_adjoint_elsewhere(law: Law) -> Law | None:
@@ -54,21 +48,11 @@ def refuse_unless_self_adjoint(law: Law) -> None:
 
 
 def why_not_self_adjoint(other: Law) -> str:
-    """The reason, in words, why P J is not (or not known to be) self-adjoint for a self-adjoint P."""
-    if lists_branches(other) or suits_panels(other):
-        try:
-            here, there = (other.apply(np.cos, angle) for angle in (COMPARED, np.pi - COMPARED))
-        except InputError:
-            # too many branches
-            return _unknown(other)
-        worst = int(np.argmax(np.abs(here + there)))
-        if abs(here[worst] + there[worst]) > DIFFERENT:
-            return (
-                f"P J with P = {other!r} and J f(theta) = f(pi - theta) is not self-adjoint, for P does not commute "
-                f"with J: E[cos(theta')] is {here[worst]:.6g} at theta = {COMPARED[worst]:g} and {there[worst]:.6g} at "
-                "pi - theta. Its spectrum need not be real"
-            )
-    return _unknown(other)
+    """The reason, in words, why P J is not known to be self-adjoint for a self-adjoint P."""
+    return (
+        f"P J with P = {other!r} and J f(theta) = f(pi - theta) is not known to be self-adjoint, for the cell has no "
+        "mirror axis. Its spectrum need not be real"
+    )
 
 
 def what_is_true() -> str:
@@ -77,11 +61,4 @@ def what_is_true() -> str:
         "J is unitary and keeps the constants, so on functions f of mean 0 the norm of P J is the slem of P: "
         "||P J f|| <= slem ||f||, the best constant for one step, and the spectrum off the constants lies in the disk "
         "of radius slem"
-    )
-
-
-def _unknown(other: Law) -> str:
-    return (
-        f"P J with P = {other!r} and J f(theta) = f(pi - theta) is not known to be self-adjoint, for the cell has no "
-        "mirror axis. Its spectrum need not be real"
     )

@@ -14,7 +14,6 @@ from ...kernels.expectations.basis_means import Means, height_of, weighted_means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.structure import holds_of_all
-from ...kernels.walls.circular_arc import followed_hits
 from ...kernels.walls.conditionals import is_chaotic, is_few, traced_conditionals
 from ...kernels.walls.wall_law import traced_wall
 
@@ -71,8 +70,7 @@ def expectations(law: Law, basis: Basis) -> Means:
 def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
     """The expectations of functions with coefficients ``vectors``, shape (n, k), with errors for the worst one."""
     if isinstance(law, CircularArcLaw) and isinstance(basis, Panels):
-        means_of_arcs = ArcMeans(law.half_angle, law.pieces, basis, vectors)
-        return lambda theta, tolerance: means_of_arcs(theta, followed_hits(tolerance))
+        return ArcMeans(law.half_angle, basis, vectors)
     height, each = height_of(basis, vectors), expectations(law, basis)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,7 +81,14 @@ def residuals(
     ``mirrored``: each function is even or odd, and the law is mirror-symmetric. Quotients are refined until their error
     is below ``quotient_error``.
     """
-    function = _TrialFunctions(law, basis, vectors, quotient_error)
+    rule = image_rule(law, basis, vectors)
+
+    def here_and_images(theta: Floats) -> tuple[Floats, Floats, Floats]:
+        images, errors = rule(theta, quotient_error or MEAN_TOLERANCE)
+        if np.isnan(errors).any():
+            raise AccuracyError("rows without a known error are no ground for an enclosure", float("nan"))
+        return expansion(basis, vectors, theta), images, errors
+
     low, high = _first_panels(law, basis)
     if mirrored:
         inside = low < 0.5 * np.pi - HALF_ROUNDING
@@ -90,7 +98,7 @@ def residuals(
     total, error, uncertainty = (np.zeros((0, 2, len(values))) for _ in range(3))
     angles_used = 0
     while low.size:
-        fresh = _integrals(function, values, low, high, 2.0 if mirrored else 1.0)
+        fresh = _integrals(here_and_images, values, low, high, 2.0 if mirrored else 1.0)
         angles_used += low.size * len(NODES)
         ends = np.concatenate([ends, [low, high]], axis=1)
         total, error, uncertainty = (
@@ -133,38 +141,21 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
     return joint[:-1], joint[1:]
 
 
-class _TrialFunctions:
-    """Trial functions v and their images P v."""
-
-    def __init__(self, law: Law, basis: Basis, vectors: Floats, mean_tolerance: float) -> None:
-        self.basis, self.vectors = basis, vectors
-        self.mean_tolerance = mean_tolerance or MEAN_TOLERANCE
-        self.rule = image_rule(law, basis, vectors)
-
-    def __call__(self, theta: Floats) -> Floats:
-        """The values of v, shape (angles, k)."""
-        return expansion(self.basis, self.vectors, theta)
-
-    def images(self, theta: Floats) -> tuple[Floats, Floats]:
-        """The values of P v, shape (angles, k), and their errors."""
-        found, errors = self.rule(theta, self.mean_tolerance)
-        if np.isnan(errors).any():
-            raise AccuracyError("rows without a known error are no ground for an enclosure", float("nan"))
-        return found, errors
-
-
 def _integrals(
-    function: _TrialFunctions, values: Floats, low: Floats, high: Floats, copies: float
+    function: Callable[[Floats], tuple[Floats, Floats, Floats]],
+    values: Floats,
+    low: Floats,
+    high: Floats,
+    copies: float,
 ) -> tuple[Floats, Floats, Floats]:
     """Integrals of v (P v - rho v) and (P v - rho v)^2 over each panel, differences of two rules, and error effects.
 
-    An error e of P v adds e v to the first integrand and 2 e (P v - rho v) + e^2 to the second.
+    The function gives v, P v, shape (angles, k), and the errors of P v. An error e of P v adds e v to the first
+    integrand and 2 e (P v - rho v) + e^2 to the second.
     """
     half = 0.5 * (high - low)
     angle = (0.5 * (low + high))[:, None] + half[:, None] * NODES
-    flat = angle.ravel()
-    image, mean_error = function.images(flat)
-    here = function(flat)
+    here, image, mean_error = function(angle.ravel())
     rest, uncertainty = image - here * values, mean_error[:, None]
     shape = (*angle.shape, len(values))
     parts = np.stack([(here * rest).reshape(shape), (rest * rest).reshape(shape)], axis=2)

@@ -9,8 +9,8 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.estimates import ErrorKind
 from ...core.rounding import EPS
-from ...kernels import DensityLaw, Law, MatrixLaw
-from ...kernels.bases.measure import SINE, gauss_rule
+from ...kernels import DensityLaw, Law
+from ...kernels.bases.measure import gauss_rule
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold
@@ -54,8 +54,6 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
     next_value : float
         Modulus plus residual of the next eigenvalue in the basis, for laws without a better bound.
     """
-    if isinstance(law, MatrixLaw):
-        return _of_matrix(law, len(values))
     found = _hilbert_schmidt(law, values, width)
     if found is not None:
         return found
@@ -74,18 +72,6 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
         return Separation(1.0, "estimate", f"fast oscillations show spectrum near 1, how much is not known: {fast[1]}")
     reason = f"next eigenvalue in the basis, with its residual; essential part at most {edge.high:.3g}"
     return Separation(next_value, "estimate", reason)
-
-
-def _of_matrix(law: MatrixLaw, listed: int) -> Separation:
-    """The bound for a law that is constant on bins, whose spectrum is 0 and the eigenvalues of its matrix."""
-    root = np.sqrt(SINE.mass(law.edges[:-1], law.edges[1:]))
-    symmetric = root[:, None] * law.array / root
-    moduli = np.sort(np.abs(np.linalg.eigvalsh(0.5 * (symmetric + symmetric.T))))[::-1]
-    rounding = len(moduli) * EPS + float(np.linalg.norm(symmetric - symmetric.T))
-    radius = float(moduli[listed]) + rounding if listed < len(moduli) else 0.0
-    return Separation(
-        radius, "bound", f"the next of the {len(moduli)} eigenvalues of its matrix; beyond its bins it is 0"
-    )
 
 
 def lambertian_fraction(law: Law) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,8 +58,6 @@ class TrialSpace:
         Parities of ``vectors``.
     mirrored : bool
         Whether every function is even or odd under theta -> pi - theta.
-    levels : tuple of (int, float)
-        For each level the size of the basis and the joint residual.
     """
 
     basis: Panels
@@ -69,7 +67,6 @@ class TrialSpace:
     following: Floats
     parities: tuple[Parity, ...]
     mirrored: bool
-    levels: tuple[tuple[int, float], ...]
 
 
 def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = MOST_LEVELS) -> TrialSpace:
@@ -89,19 +86,17 @@ def _adapted(law: Law, k: int, tolerance: float, most_levels: int, bar: Any) -> 
     """The trial functions; the bar shows their residual."""
     mirrored = bool(law.mirror_symmetric)
     edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[is_traced(law)]
-    history: list[tuple[int, float]] = []
     goal, before = float(np.sqrt(tolerance)), None
-    while True:
+    for number in count(1):
         level = _Level(law, edges, mirrored, MEAN_FRACTION * goal)
         with one_blas_thread():
             values, vectors, parity = level.leading(k + EXTRA, CONVERGED * goal)
         squares = level.squared_residuals(values, vectors, parity)
         goal = float(np.sqrt(tolerance * _room(values, k)))
         joint = float(np.sqrt(squares[:, :k].sum()))
-        history.append((level.panels.size, joint))
         bar.describe(f"residual {joint:.1g}, asked for {goal:.1g}")
         bar.update()
-        if joint <= goal or len(history) == most_levels or len(edges) > most_panels:
+        if joint <= goal or number == most_levels or len(edges) > most_panels:
             break
         now = _Residuals(edges, squares[:, :k].sum(axis=1))
         edges, before = _divided(now, before, goal, mirrored), now
@@ -110,7 +105,7 @@ def _adapted(law: Law, k: int, tolerance: float, most_levels: int, bar: Any) -> 
     whole = level.extended(vectors, parity)
     return TrialSpace(
         level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:],
-        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored, tuple(history),
+        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored,
     )  # fmt: skip
 
 
@@ -134,31 +129,17 @@ class _Level:
         half = 0.5 * np.diff(edges)
         angle = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * NODES
         self.angle, self.weight = angle, half[:, None] * SINE.density(angle) * KRONROD * (2.0 if mirrored else 1.0)
-        self._images, _ = expectations(law, self.panels)(angle.ravel(), mean_tolerance)
+        images, _ = expectations(law, self.panels)(angle.ravel(), mean_tolerance)
         # values of each panel's functions, shape (panels, nodes, degree + 1), normalised on (0, pi) or (0, pi/2)
         self.norm = np.sqrt(0.5) if mirrored else 1.0
         self.local = self.panels.local(angle)[1] * self.norm
         self._signs = (-1.0) ** np.arange(DEGREE + 1)
-
-    def images(self, parity: int) -> Floats:
-        """The images of the functions of one parity, shape (angles, functions)."""
-        return self._even if parity > 0 else self._odd
-
-    @cached_property
-    def _even(self) -> Floats:
-        return self._folded(1)
-
-    @cached_property
-    def _odd(self) -> Floats:
-        return self._folded(-1)
-
-    def _folded(self, parity: int) -> Floats:
-        count = len(self.angle)
-        if not self.mirrored:
-            return self._images
-        blocks = self._images.reshape(self.angle.size, -1, DEGREE + 1)
-        folded = blocks[:, :count] + parity * self._signs * blocks[:, ::-1][:, :count]
-        return np.asarray(self.norm * folded.reshape(self.angle.size, -1))
+        # of the functions of each parity, 0 without mirror symmetry, shape (angles, functions)
+        self.images = {0: images}
+        if mirrored:
+            blocks = images.reshape(angle.size, -1, DEGREE + 1)
+            own, other = blocks[:, : len(angle)], self._signs * blocks[:, ::-1][:, : len(angle)]
+            self.images = {sign: self.norm * (own + sign * other).reshape(angle.size, -1) for sign in (1, -1)}
 
     def projected(self, values: Floats) -> Floats:
         """Coefficients of functions with given values at the nodes, shape (angles, k)."""
@@ -172,7 +153,7 @@ class _Level:
 
     def leading(self, k: int, algebraic: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
         """Eigenvalues of largest modulus, constants first, with vectors and parities (0 without mirror symmetry)."""
-        signs = (1, -1) if self.mirrored else (0,)
+        signs = list(self.images)
         found = [self._leading_of(parity, k, algebraic) for parity in signs]
         values = np.concatenate([part[0] for part in found])
         vectors = np.concatenate([part[1] for part in found], axis=1)
@@ -183,7 +164,7 @@ class _Level:
         return values[order], vectors[:, order], parity[order]
 
     def _leading_of(self, parity: int, k: int, algebraic: float) -> tuple[Floats, Floats]:
-        images = self.images(parity or 1)
+        images = self.images[parity]
         start = Legendre(2 * (k + GUARD) if self.mirrored else k + GUARD).evaluate(self.angle.ravel())
         start = start[:, (0 if parity >= 0 else 1) :: 2] if self.mirrored else start
         block = np.linalg.qr(self.projected(start))[0]
@@ -210,7 +191,7 @@ class _Level:
         rest = np.empty((self.angle.size, len(values)))
         for sign in np.unique(parity):
             own = parity == sign
-            rest[:, own] = self.images(int(sign)) @ vectors[:, own] - self.expanded(vectors[:, own]) * values[own]
+            rest[:, own] = self.images[int(sign)] @ vectors[:, own] - self.expanded(vectors[:, own]) * values[own]
         squares = (rest**2).reshape(*self.angle.shape, -1)
         return np.asarray(np.einsum("pq,pqk->pk", self.weight, squares))
 

@@ -1,9 +1,10 @@
-"""Exit times of particles from a channel with rough walls, by direct simulation."""
+"""Flights of particles in a channel with rough walls, and the times after which they leave it, by simulation."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any, Literal, Unpack, get_args
+from typing import Literal, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,8 +25,7 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, with_errors
-from ...core.long_runs import Engine, all_parts, reported
-from ...core.version import __version__
+from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.law import IsometryLaw
@@ -168,11 +168,11 @@ def simulated_times(
     """`exit_times` at ``least`` lengths or more."""
     paper, levels = checked(law, "lengths", lengths, arrangement, particles, least)
     refuse_kept_sines(paper)
-    width, pace = 2.0 * number_between("radius", radius, 0.0, LARGEST), number_between("speed", speed, 0.0, LARGEST)
+    half, pace = number_between("radius", radius, 0.0, LARGEST), number_between("speed", speed, 0.0, LARGEST)
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
-    job = _Particles(paper, levels, particles, root, width, pace, arrangement)
-    parts = all_parts(job.times, -(-particles // TOGETHER), job.identity(), engine, job.stored)
-    return ExitTimes(frozen(levels), frozen(np.concatenate([part["times"] for part in parts])), 0.5 * width, pace)
+    job = _Particles(paper, levels, particles, root, half, pace, arrangement)
+    parts = all_parts(job.times, -(-particles // TOGETHER), identity_of("exit times", job), engine, job.stored)
+    return ExitTimes(frozen(levels), frozen(np.concatenate([part["times"] for part in parts])), half, pace)
 
 
 def in_paper_frame(law: Law) -> Law:
@@ -187,8 +187,7 @@ def checked(
     """The law in the paper's convention and increasing levels, at which each particle gives a number."""
     paper, found = in_paper_frame(law), finite_array(name, levels).ravel()
     if found.size < least or found[0] <= 0.0 or np.any(np.diff(found) <= 0.0):
-        count = {1: "one or more", 3: "at least three"}[least]
-        raise InputError(f"{name}: expected {count} increasing positive {name}, got {shortened(levels)}")
+        raise InputError(f"{name}: expected at least {least} increasing positive {name}, got {shortened(levels)}")
     choice("arrangement", arrangement, get_args(Arrangement))
     check_memory("particles", f"the table of {name}", 2 * found.size * whole_number("particles", particles, 2))
     return paper, found
@@ -218,7 +217,87 @@ def reflected(law: Law, incoming: Floats, rng: np.random.Generator) -> Floats:
     return law.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
 
 
-def passed(levels: Floats, reached: NDArray[np.int64], ends: Floats) -> tuple[NDArray[np.int64], ...]:
+@dataclass(frozen=True)
+class Channel:
+    """Flights between two walls: number 0 is the lower or inner one, number 1 the other.
+
+    ``direction`` is the angle in (0, pi) between the direction of flight and the walls where the flight begins; its
+    cosine is positive in the direction of the channel.
+    """
+
+    half: float
+    # radius of the middle line; inf in a straight channel
+    bend: float
+    # whether the x axis of the upper wall's frame runs against the channel
+    turned: bool
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the walls are lines."""
+        return math.isinf(self.bend)
+
+    @property
+    def longest(self) -> float:
+        """The longest flight: in a straight channel at the least angle, in a bent one along the inner circle."""
+        return 2.0 * self.half / SMALLEST if self.is_straight else 4.0 * math.sqrt(self.half) * math.sqrt(self.bend)
+
+    def framed(self, angle: Floats, wall: Floats) -> Floats:
+        """The angle in the frame of the wall, from that in the channel, and the other way round."""
+        return np.where((wall > 0) & self.turned, math.pi - angle, angle)
+
+    def flight(self, direction: Floats, wall: Floats) -> tuple[Floats, Floats, Floats]:
+        """Length of the flight, the wall at its end, and the angle of the same direction with this wall."""
+        sine, cosine = np.sin(direction), np.cos(direction)
+        if self.is_straight:
+            return 2.0 * self.half / sine, 1.0 - wall, direction
+        inner, outer = self.bend - self.half, self.bend + self.half
+        start, end = np.where(wall > 0, outer, inner), np.where(wall > 0, inner, outer)
+        # distance of the line from the centre is start * cosine; at the other wall the angle has this cosine
+        level = start * cosine / end
+        passes = (wall > 0) & (np.abs(level) >= 1.0)
+        level = np.clip(level, -1.0, 1.0)
+        rise = end * np.sqrt((1.0 - level) * (1.0 + level))
+        length = np.where(passes, 2.0 * outer * sine, np.abs(rise - start * sine))
+        return length, np.where(passes, wall, 1.0 - wall), np.where(passes, direction, np.arccos(level))
+
+    def advance(self, direction: Floats, wall: Floats, length: Floats) -> Floats:
+        """The increase of X along a part of this length of a flight."""
+        along, up = length * np.cos(direction), length * np.sin(direction)
+        if self.is_straight:
+            return along
+        radial = np.where(wall > 0, self.bend + self.half - up, self.bend - self.half + up)
+        return np.asarray(self.bend * np.arctan2(along, radial))
+
+    def crossings(self, law: Law, levels: Floats, wall: Floats, rng: np.random.Generator, *, of_x: bool) -> Floats:
+        """Where particles that start at X = 0 on these walls cross increasing levels, shape (particles, n).
+
+        Levels of abs(X), in a straight channel: the lengths of path up to them. Levels of the length of path: X there.
+        """
+        found, going = np.full((len(wall), levels.size), np.nan), np.arange(len(wall))
+        x, run, reached = np.zeros(len(wall)), np.zeros(len(wall)), np.zeros(len(wall), dtype=np.int64)
+        direction = self.framed(SINE.sample(len(wall), rng), wall)
+        for _ in range(MOST_FLIGHTS):
+            length, after, arriving = self.flight(direction, wall)
+            shift = self.advance(direction, wall, length)
+            x_end, run_end = x + shift, run + length
+            who, level, reached = _passed(levels, reached, np.abs(x_end) if of_x else run_end)
+            if of_x:
+                ahead = np.copysign(levels[level], x_end[who]) - x[who]
+                found[going[who], level] = run[who] + ahead / shift[who] * length[who]
+            else:
+                ahead = levels[level] - run[who]
+                found[going[who], level] = x[who] + self.advance(direction[who], wall[who], ahead)
+            stays = reached < levels.size
+            if not stays.any():
+                return found
+            x, run, wall = x_end[stays], run_end[stays], after[stays]
+            going, reached = going[stays], reached[stays]
+            incoming = math.pi - self.framed(arriving[stays], wall)
+            direction = self.framed(reflected(law, incoming, rng), wall)
+        raise InputError(f"law: {law!r} keeps {len(x)} particles below {levels[-1]:g} after {MOST_FLIGHTS} flights")
+
+
+def _passed(levels: Floats, reached: NDArray[np.int64], ends: Floats) -> tuple[NDArray[np.int64], ...]:
     """Particles and the levels that their flights to these ends pass, as index pairs; then all numbers of levels."""
     after = np.maximum(reached, np.searchsorted(levels, ends, side="right"))
     particle = np.repeat(np.arange(len(ends)), after - reached)
@@ -230,50 +309,23 @@ class _Particles:
     """Particles in a channel, ``TOGETHER`` of them at a time; what a worker is sent."""
 
     law: Law
-    levels: Floats
+    lengths: Floats
     particles: int
-    root: tuple[int, ...]
-    width: float
+    seed: tuple[int, ...]
+    radius: float
     speed: float
     arrangement: Arrangement
 
-    def identity(self) -> dict[str, Any]:
-        """What tells these particles from others."""
-        return {
-            "computation": "exit times", "version": __version__, "law": self.law,
-            "lengths": self.levels, "particles": self.particles, "seed": self.root,
-            "width": self.width, "speed": self.speed, "arrangement": self.arrangement,
-        }  # fmt: skip
+    def count(self, part: int) -> int:
+        """The particles of a part."""
+        return min(TOGETHER, self.particles - part * TOGETHER)
 
     def stored(self, part: int) -> dict[str, Stored]:
         """What the arrays of a part must be."""
-        shape = min(TOGETHER, self.particles - part * TOGETHER), self.levels.size
-        return {"times": Stored("f", shape, 0.0)}
+        return {"times": Stored("f", (self.count(part), self.lengths.size), 0.0)}
 
     def times(self, part: int) -> dict[str, Floats]:
         """Exit times of the particles of one part, which depend on its number alone."""
-        rng = np.random.default_rng([*self.root, part])
-        count, levels = min(TOGETHER, self.particles - part * TOGETHER), self.levels
-        times, inside = np.full((count, levels.size), np.nan), np.arange(count)
-        x, clock, reached = np.zeros(count), np.zeros(count), np.zeros(count, dtype=np.int64)
-        # angle at which a particle leaves a wall, in the frame of this wall, and the sign of its x axis in the channel
-        theta, sign = SINE.sample(count, rng), 1.0
-        half_turn = self.arrangement == "half-turn"
-        for _ in range(MOST_FLIGHTS):
-            shift = sign * self.width * np.cos(theta) / np.sin(theta)
-            duration = self.width / (self.speed * np.sin(theta))
-            target = x + shift
-            out, level, reached = passed(levels, reached, np.abs(target))
-            # fraction of the ray segment up to |x| = L
-            ahead = np.copysign(levels[level], target[out]) - x[out]
-            times[inside[out], level] = clock[out] + ahead / shift[out] * duration[out]
-            stays = reached < levels.size
-            if not stays.any():
-                return {"times": times}
-            inside, reached, x, clock = inside[stays], reached[stays], target[stays], (clock + duration)[stays]
-            incoming = theta[stays] if half_turn else np.pi - theta[stays]
-            theta = reflected(self.law, incoming, rng)
-            sign = -sign if half_turn else sign
-        raise InputError(
-            f"law: {self.law!r} keeps {x.size} particles within L = {levels[-1]:g} after {MOST_FLIGHTS} flights"
-        )
+        channel = Channel(self.radius, math.inf, self.arrangement == "half-turn")
+        wall, rng = np.zeros(self.count(part)), np.random.default_rng([*self.seed, part])
+        return {"times": channel.crossings(self.law, self.lengths, wall, rng, of_x=True) / self.speed}

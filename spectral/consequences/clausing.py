@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from ...core.checks import Floats, Rng, choice, generator, number_between, positive_number
 from ...core.errors import InputError
@@ -35,8 +34,6 @@ LEAST_DIFFUSE, TERMS, KNOTS = 0.01, 50.0, 50
 # Other laws: polynomials of the cosine, with the nodes of a panel; those of the first matrix; the largest number of
 # both that does not shorten the panels at the ends; limit on the unknowns, a few seconds.
 LEVELS, FIRST_SIZE, FULL_PANELS, MOST_UNKNOWNS = ((8, 4), (16, 6), (32, 8), (64, 6)), 32, 16, 4000
-# Larger systems are solved by GMRES, to this relative residual.
-MOST_DIRECT, GMRES_TOLERANCE = 1000, 1e-11
 # The factor by which a doubling of the polynomials is trusted to reduce their error.
 GAIN, FEWEST_LEVELS = 8.0, 3
 # Largest norm of a law between polynomials of degrees 16 to 31. For laws that smooth it is below 0.3; isometries, as of
@@ -374,13 +371,6 @@ def _solved(flights: _Flights, matrix: Floats, length: float, nodes: int) -> tup
 
 def _reflected(matrix: Floats, first: Floats, flown: Floats) -> Floats:
     """Particles that all places send, which the matrix gives of the first and of those flown there from all places."""
-    if len(flown) > MOST_DIRECT:
-        operator = LinearOperator(
-            flown.shape, lambda some: some - ((flown @ some).reshape(first.shape) @ matrix.T).ravel(), dtype=np.float64
-        )
-        sent, failed = gmres(operator, (first @ matrix.T).ravel(), rtol=GMRES_TOLERANCE, restart=200, maxiter=1)
-        if not failed:
-            return np.asarray(sent)
     equation = np.eye(len(flown)) - (matrix @ flown.reshape(*first.shape, -1)).reshape(flown.shape)
     return np.asarray(np.linalg.solve(equation, (first @ matrix.T).ravel()))
 

@@ -35,8 +35,6 @@ class LaplacianComparison(Summary):
         1 - <e_l, P_F e_l> for the normalised Legendre polynomials e_l.
     ratios : array of shape (n,)
         deficits / (2 h l (l + 1)), which is 1 if the Laplacian describes the law.
-    leaks : array of shape (n,)
-        Norm of the part of P_F e_l orthogonal to e_l, over the deficit; small if e_l is nearly an eigenfunction.
     error : float
         Frobenius error of the matrix.
     """
@@ -45,7 +43,6 @@ class LaplacianComparison(Summary):
     degrees: Floats
     deficits: Floats
     ratios: Floats
-    leaks: Floats
     error: float
 
 
@@ -81,14 +78,8 @@ def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) ->
     diagonal = np.diagonal(matrix.symmetric)[order]
     deficits = 1.0 - diagonal
     flatness = float(deficits[0]) / 4.0
-    columns = matrix.symmetric[:, order].copy()
-    columns[order, np.arange(degrees)] = 0.0
-    scale = np.where(deficits > 0.0, deficits, np.inf)
     ratios = deficits / (2.0 * flatness * order * (order + 1)) if flatness > 0.0 else np.full(degrees, np.nan)
-    leaks = np.linalg.norm(columns, axis=0) / scale
-    return LaplacianComparison(
-        flatness, frozen(order), frozen(deficits), frozen(ratios), frozen(leaks), float(matrix.error)
-    )
+    return LaplacianComparison(flatness, frozen(order), frozen(deficits), frozen(ratios), float(matrix.error))
 
 
 def mean_squared_slope(wall: Wall) -> float:

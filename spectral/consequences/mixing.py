@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
-from ...core.checks import Floats, choice, number_between
-from ...core.errors import AccuracyError, InputError
+from ...core.checks import choice, number_between
+from ...core.errors import AccuracyError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
-from ...kernels import DensityLaw, KernelMatrix, Law
-from ...kernels.bases.measure import SINE
+from ...kernels import KernelMatrix, Law
 from ...kernels.laws.matrix_law import not_a_law
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..gap.gap import modulus_gap
@@ -22,8 +20,6 @@ Distance = Literal["L2", "total variation", "chi-square"]
 
 # Number of eigenvalues computed for a matrix, and wanted error of the gap of a law.
 SOUGHT, TOLERANCE = 6, 1e-4
-# Panels and nodes for the norm of a density.
-PANELS, NODES = 48, 16
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,8 +67,6 @@ def mixing_time(
     within: float = 0.25,
     distance: Distance = "total variation",
     *,
-    density: Callable[[Floats], Floats] | None = None,
-    start: float | None = None,
     initial: float = 1.0,
 ) -> MixingTime:
     r"""The number of steps until a distribution with a density in L^2 is close to the invariant distribution.
@@ -85,12 +79,9 @@ def mixing_time(
         The allowed distance from the invariant distribution.
     distance : {"L2", "total variation", "chi-square"}
         ||f_n - 1||, half of the L^1 norm of f_n - 1, or ||f_n - 1||^2.
-    density : callable, optional
-        Initial density with respect to sin(theta)/2 d theta, a vectorised function of the angle.
-    start : float, optional
-        Initial angle, for laws with a density only. The first step, which yields a density, is counted.
     initial : float
-        ||f - 1|| of the initial density, if neither ``density`` nor ``start`` is given.
+        ||f - 1|| of the initial density f with respect to sin(theta)/2 d theta. A particle that starts at one angle has
+        a density after the first reflection by a law that has one.
 
     Returns
     -------
@@ -101,7 +92,7 @@ def mixing_time(
     AccuracyError
         If the law has no gap, or its slem is not known to be less than 1.
     InputError
-        If ``start`` is given for a law without a density, or ``density`` is negative or not normalised.
+        If an argument is not as described.
 
     Notes
     -----
@@ -119,11 +110,7 @@ def mixing_time(
     choice("distance", distance, get_args(Distance))
     if not isinstance(kernel, Law | KernelMatrix | Spectrum):
         raise not_a_law("kernel", "a Law, a KernelMatrix or a Spectrum", kernel)
-    steps_before, size = 0, number_between("initial", initial, 0.0, np.inf, closed="low")
-    if density is not None:
-        size = _distance_of(density)
-    elif start is not None:
-        steps_before, size = 1, _distance_after_a_step(kernel, start)
+    size = number_between("initial", initial, 0.0, np.inf, closed="low")
     gap = _modulus_gap(kernel)
     slem = slem_from_gap(gap)
     # in terms of the gap, because 1 - slem loses digits for a slem near 1
@@ -135,8 +122,7 @@ def mixing_time(
     norm = {"L2": within, "total variation": 2.0 * within, "chi-square": float(np.sqrt(within))}[distance]
     target = norm / size if size else np.inf
     earliest = 0 if distance == "total variation" else _steps(most, target)
-    steps = steps_before + _steps(least, target)
-    return MixingTime(steps, earliest, relaxation_time(gap), slem, distance, size, slem.kind)
+    return MixingTime(_steps(least, target), earliest, relaxation_time(gap), slem, distance, size, slem.kind)
 
 
 def slem_from_gap(gap: Estimate) -> Estimate:
@@ -187,26 +173,3 @@ def _steps(gap: float, target: float) -> int:
 
 def _time_scale(gap: float) -> float:
     return float(-1.0 / np.log1p(-gap)) if 0.0 < gap < 1.0 else (np.inf if gap <= 0.0 else 0.0)
-
-
-def _distance_of(density: Callable[[Floats], Floats]) -> float:
-    angle, weight = SINE.quadrature(np.linspace(0.0, np.pi, PANELS + 1), NODES)
-    values = np.asarray(density(angle), dtype=np.float64)
-    mass = float(weight @ values)
-    if np.min(values) < 0.0 or abs(mass - 1.0) > 1e-6:
-        raise InputError(
-            f"density: expected values of at least 0 and an integral of 1 under sin(theta)/2 d theta, got {mass:.8g}"
-        )
-    return float(np.sqrt(weight @ (values - 1.0) ** 2))
-
-
-def _distance_after_a_step(kernel: object, start: float) -> float:
-    if not isinstance(kernel, DensityLaw):
-        raise InputError(
-            "start: expected a law with a density, whose first step has one in L^2; give other laws an initial density"
-        )
-    theta = np.array([number_between("start", start, 0.0, np.pi)])
-    edges = np.unique(np.concatenate([kernel.panels(theta)[0], np.linspace(0.0, np.pi, PANELS + 1)]))
-    angle, weight = SINE.quadrature(edges, NODES)
-    values = kernel.density(theta[:, None], angle)[0] / SINE.density(angle)
-    return float(np.sqrt(weight @ (values - 1.0) ** 2))

@@ -14,8 +14,7 @@ from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, student_95
 from ...core.long_runs import reported
 from ...kernels import Law
-from ...kernels.bases.measure import SINE
-from .channel import MOST_FLIGHTS, SMALLEST, Arrangement, checked, passed, reflected
+from .channel import MOST_FLIGHTS, Arrangement, Channel, checked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,11 +44,6 @@ class ChannelPaths(Summary):
     radius: float
     speed: float
     bend: float
-
-    @property
-    def mean_squares(self) -> Floats:
-        """E[X_t^2], shape (n,)."""
-        return np.asarray(np.mean(self.positions**2, axis=0))
 
     def variance_rate(self) -> Estimate:
         r"""The variance of the limit of X_t/t^(1/2) in a bent channel, lim E[X_t^2]/t.
@@ -212,83 +206,11 @@ def channel_paths(
     middle = math.inf if isinstance(bend, float) and bend == math.inf else positive_number("bend", bend)
     if not middle > half:
         raise InputError(f"bend: expected a number greater than the radius {half:g}, got {bend!r}")
-    channel = _Channel(half, middle, arrangement == "half-turn")
+    channel = Channel(half, middle, arrangement == "half-turn")
     latest = MOST_FLIGHTS * channel.longest / pace
     if not moments[-1] <= latest:
         raise InputError(f"times: expected at most {latest:.3g} ({MOST_FLIGHTS} flights), got {moments[-1]:.3g}")
-    positions = _simulated(paper, channel, pace * moments, particles, generator(rng))
+    source = generator(rng)
+    outer = source.random(particles) < (0.5 if channel.is_straight else 0.5 * (1.0 + half / middle))
+    positions = channel.crossings(paper, pace * moments, outer.astype(np.float64), source, of_x=False)
     return ChannelPaths(frozen(moments), frozen(positions), half, pace, middle)
-
-
-@dataclass(frozen=True)
-class _Channel:
-    """Flights between two walls: number 0 is the lower or inner one, number 1 the other.
-
-    ``direction`` is the angle in (0, pi) between the direction of flight and the walls where the flight begins; its
-    cosine is positive in the direction of the channel.
-    """
-
-    half: float
-    bend: float
-    # whether the x axis of the upper wall's frame runs against the channel
-    turned: bool
-
-    @property
-    def is_straight(self) -> bool:
-        """Whether the walls are lines."""
-        return math.isinf(self.bend)
-
-    @property
-    def longest(self) -> float:
-        """The longest flight: in a straight channel at the least angle, in a bent one along the inner circle."""
-        return 2.0 * self.half / SMALLEST if self.is_straight else 4.0 * math.sqrt(self.half) * math.sqrt(self.bend)
-
-    def framed(self, angle: Floats, wall: Floats) -> Floats:
-        """The angle in the frame of the wall, from that in the channel, and the other way round."""
-        return np.where((wall > 0) & self.turned, math.pi - angle, angle)
-
-    def flight(self, direction: Floats, wall: Floats) -> tuple[Floats, Floats, Floats]:
-        """Length of the flight, the wall at its end, and the angle of the same direction with this wall."""
-        sine, cosine = np.sin(direction), np.cos(direction)
-        if self.is_straight:
-            return 2.0 * self.half / sine, 1.0 - wall, direction
-        inner, outer = self.bend - self.half, self.bend + self.half
-        start, end = np.where(wall > 0, outer, inner), np.where(wall > 0, inner, outer)
-        # distance of the line from the centre is start * cosine; at the other wall the angle has this cosine
-        level = start * cosine / end
-        passes = (wall > 0) & (np.abs(level) >= 1.0)
-        level = np.clip(level, -1.0, 1.0)
-        rise = end * np.sqrt((1.0 - level) * (1.0 + level))
-        length = np.where(passes, 2.0 * outer * sine, np.abs(rise - start * sine))
-        return length, np.where(passes, wall, 1.0 - wall), np.where(passes, direction, np.arccos(level))
-
-    def advance(self, direction: Floats, wall: Floats, length: Floats) -> Floats:
-        """The increase of X along a part of this length of a flight."""
-        along, up = length * np.cos(direction), length * np.sin(direction)
-        if self.is_straight:
-            return along
-        radial = np.where(wall > 0, self.bend + self.half - up, self.bend - self.half + up)
-        return np.asarray(self.bend * np.arctan2(along, radial))
-
-
-def _simulated(law: Law, channel: _Channel, paths: Floats, particles: int, rng: np.random.Generator) -> Floats:
-    """Positions (particles, n) after these lengths of path."""
-    positions = np.empty((particles, paths.size))
-    going = np.arange(particles)
-    share = 0.5 if channel.is_straight else 0.5 * (1.0 + channel.half / channel.bend)
-    wall = (rng.random(particles) < share).astype(np.float64)
-    x, run, reached = np.zeros(particles), np.zeros(particles), np.zeros(particles, dtype=np.int64)
-    direction = channel.framed(SINE.sample(particles, rng), wall)
-    for _ in range(MOST_FLIGHTS):
-        length, after, arriving = channel.flight(direction, wall)
-        who, level, reached = passed(paths, reached, run + length)
-        part = paths[level] - run[who]
-        positions[going[who], level] = x[who] + channel.advance(direction[who], wall[who], part)
-        stays = reached < paths.size
-        if not stays.any():
-            return positions
-        x = (x + channel.advance(direction, wall, length))[stays]
-        run, going, reached, wall = (run + length)[stays], going[stays], reached[stays], after[stays]
-        incoming = math.pi - channel.framed(arriving[stays], wall)
-        direction = channel.framed(reflected(law, incoming, rng), wall)
-    raise InputError(f"law: {law!r} keeps {len(x)} particles in flight after {MOST_FLIGHTS} collisions")

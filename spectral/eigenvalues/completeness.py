@@ -16,12 +16,6 @@ ENTRY_ROUNDINGS = 6
 # Roundings beyond n in gamma_{n+3}: the division by a pivot, one more if BLAS multiplies by its reciprocal, and the
 # square root.
 PIVOT_ROUNDINGS = 3
-# Roundings of an entry of S - V diag(values) V^T, without one for each product: values, last sum, transpose and spare.
-FORM_ROUNDINGS = 4
-# Rows and columns of a block whose norm is bounded, and single precision.
-BLOCK = 512
-SINGLE_ROUNDOFF, SMALLEST_SINGLE = 2.0**-24, 2.0**-126
-SMALLEST_NORM = 1e-140
 
 
 @dataclass(frozen=True)
@@ -75,63 +69,6 @@ def norm_beyond(matrix: Deflated, values: Floats) -> float:
     # sums of n^2 squares, in any order
     rounding = 2.0 * matrix.array.size * UNIT_ROUNDOFF * float(np.vdot(matrix.array, matrix.array))
     return float(np.sqrt(max(square - float(values @ values), 0.0) + rounding))
-
-
-def block_norm_beyond(matrix: Deflated, vectors: Floats, values: Floats) -> float:
-    r"""A bound of the moduli of all eigenvalues other than the listed Ritz values, from norms of blocks.
-
-    It needs a fraction of the work of two factorisations and is sharp enough where the other eigenvalues are far from
-    the listed ones, as in matrices of sampled rays.
-
-    Notes
-    -----
-    Let R = S - V diag(values) V^T. For x orthogonal to V, x^T S x = x^T R x, so by the minimax principle at most as
-    many eigenvalues as V has columns exceed the norm of R in modulus. If N_ij bounds the spectral norm of the block
-    R_ij, the norm of R is at most that of N, because abs(x^T R x) <= sum_ij |x_i| N_ij |x_j|. For a block B with the
-    Gram matrix G = B^T B, \|B\|^4 = \|G^2\| <= \|G^2\|_F. The products are in single precision with the unit
-    roundoff u: for every order of summation \|fl(B^T B) - B^T B\|_F <= gamma_b \|B\|_F^2 with gamma_b = b u/(1 - b u),
-    plus b^2 results that may underflow, each by b times the least normal number. The blocks are divided by their
-    Frobenius norms.
-
-    Source: N. J. Higham, *Accuracy and Stability of Numerical Algorithms* (2nd ed. 2002), section 3.5.
-    """
-    left, right = [vectors * values], [vectors]
-    if matrix.constant is not None and matrix.image is not None:
-        left += [matrix.constant[:, None], matrix.image[:, None]]
-        right += [matrix.image[:, None], matrix.constant[:, None]]
-    one, other = np.column_stack(left), np.column_stack(right)
-    starts = range(0, len(matrix.array), BLOCK)
-    norms = np.empty((len(starts), len(starts)))
-    for row, first in enumerate(starts):
-        for column, second in enumerate(starts[: row + 1]):
-            here, there = slice(first, first + BLOCK), slice(second, second + BLOCK)
-            block = matrix.array[here, there] - one[here] @ other[there].T
-            norms[row, column] = norms[column, row] = _norm_of_block(block)
-    # the sums of an entry of R, and the largest eigenvalue of N
-    parts = float(np.linalg.norm(matrix.array)) + float(np.linalg.norm(one, axis=0) @ np.linalg.norm(other, axis=0))
-    rounding = (one.shape[1] + FORM_ROUNDINGS) * UNIT_ROUNDOFF * parts
-    largest = float(np.linalg.eigvalsh(norms)[-1])
-    return float(largest + len(norms) ** 2 * UNIT_ROUNDOFF * float(np.linalg.norm(norms)) + rounding)
-
-
-def _norm_of_block(block: Floats) -> float:
-    """A bound of the spectral norm: the fourth root of the Frobenius norm of the squared Gram matrix."""
-    size = max(block.shape)
-    scale = float(np.linalg.norm(block))
-    if scale <= SMALLEST_NORM:
-        # squares may underflow
-        return float(size * np.abs(block).max())
-    single = (block / scale).astype(np.float32)
-    terms = (size + 2) * SINGLE_ROUNDOFF
-    gamma, underflow = terms / (1.0 - terms), float(size**2) * size * SMALLEST_SINGLE
-    gram = single.T @ single
-    square = gram.T @ gram
-    length = float(np.linalg.norm(gram.astype(np.float64)))
-    fourth = float(np.linalg.norm(square.astype(np.float64))) + gamma * length**2 + underflow
-    # the Frobenius norm of the rounded block is 1 to a few roundings; gamma covers the rounding of the block as well
-    bound = np.sqrt(np.sqrt(fourth) + gamma * (1.0 + gamma) + underflow) + gamma
-    # three Frobenius norms of size^2 entries
-    return float(scale * bound * (1.0 + 3.0 * size**2 * UNIT_ROUNDOFF))
 
 
 def margin_below(matrix: Deflated, sign: float, vectors: Floats, values: Floats, threshold: float) -> float | None:

@@ -10,15 +10,11 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from .completeness import Deflated, block_norm_beyond, margin_below, norm_beyond
+from .completeness import Deflated, margin_below, norm_beyond
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-# Two tiles with this many rows and columns fit in the cache.
-TILE = 256
-# Rows with some thousand columns that fit in the cache.
-ROWS_AT_ONCE = 32
 Which = Literal["largest", "moduli"]
 _Pairs = tuple[Floats, Floats]
 # LAPACK's complete solver is used below this size and above this fraction of the spectrum, where it takes no longer.
@@ -34,8 +30,6 @@ GUARDS = 6
 SEARCHES, MORE_VALUES = 2, 8
 # Distance from the last value to the threshold of the check, in backward errors n u of a factorisation.
 CLEARANCE = 2.0
-# Norms of blocks overestimate by more than this factor; they are tried where the known values leave so much room.
-BLOCK_ROOM = 2.0
 
 
 def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
@@ -58,62 +52,12 @@ def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
 
 def compressed(array: Floats, embedding: csr_array[Any]) -> Floats:
     """The symmetric part of E A E^T for a sparse E of shape (m, n): the form of A on the rows of E."""
-    pairs = _of_pairs(embedding)
-    if pairs is not None:
-        return symmetric_half(_on_pairs(array, *pairs))
-    rows = embedding @ array
-    found = np.empty((len(rows), len(rows)))
-    for start in range(0, len(rows), TILE):
-        # tile by tile, because a product with a transpose would read memory across the rows
-        found[:, start : start + TILE] = embedding @ np.ascontiguousarray(rows[start : start + TILE].T)
-    return symmetric_half(found)
-
-
-def _of_pairs(embedding: csr_array[Any]) -> tuple[slice, slice, Floats] | None:
-    """The columns of the first and second entries as slices, and the entries, if each row has two evenly spaced ones.
-
-    Bins joined with their neighbours and functions joined with their mirror images are such embeddings.
-    """
-    rows = embedding.shape[0]
-    if embedding.nnz != 2 * rows or rows < 2 or np.any(np.diff(embedding.indptr) != 2):
-        return None
-    where = np.asarray(embedding.indices, dtype=np.int64).reshape(rows, 2).T
-    steps = [np.diff(one) for one in where]
-    if any(step[0] == 0 or np.any(step != step[0]) for step in steps):
-        return None
-    first, second = (
-        slice(int(one[0]), None if end < 0 else end, int(step[0]))
-        for one, step in zip(where, steps, strict=True)
-        for end in [int(one[-1] + np.sign(step[0]))]
-    )
-    return first, second, np.asarray(embedding.data, dtype=np.float64).reshape(rows, 2)
-
-
-def _on_pairs(array: Floats, first: slice, second: slice, weights: Floats) -> Floats:
-    """E A E^T for an E with the given columns and entries, some rows at a time, which fit in the cache."""
-    one, other = weights.T
-    above, below = array[first], array[second]
-    found = np.empty((len(weights), len(weights)))
-    for start in range(0, len(weights), ROWS_AT_ONCE):
-        here = slice(start, start + ROWS_AT_ONCE)
-        rows = one[here, None] * above[here]
-        rows += other[here, None] * below[here]
-        np.multiply(rows[:, first], one, out=found[here])
-        found[here] += rows[:, second] * other
-    return found
+    return symmetric_half(embedding @ (embedding @ array).T)
 
 
 def symmetric_half(array: Floats) -> Floats:
-    """The symmetric part (A + A^T)/2, tile by tile, so that memory is read along the rows; A itself if symmetric."""
-    starts = range(0, len(array), TILE)
-    tiles = [(slice(i, i + TILE), slice(j, j + TILE)) for i in starts for j in starts if j <= i]
-    if all(np.array_equal(array[here, there], array[there, here].T) for here, there in tiles):
-        return array
-    found = np.empty_like(array)
-    for here, there in tiles:
-        found[here, there] = 0.5 * (array[here, there] + array[there, here].T)
-        found[there, here] = found[here, there].T
-    return found
+    """The symmetric part (A + A^T)/2."""
+    return np.asarray(0.5 * (array + array.T))
 
 
 def _reflect(v: Floats, array: Floats) -> Floats:
@@ -163,13 +107,13 @@ def extremal(array: Floats, constant: Floats | None, k: int, which: Which = "mod
 
     Notes
     -----
-    Lanczos computes values and vectors, which are then deflated. What is left has a norm below sigma, just beyond the
-    last value, by its Frobenius norm or, as for noise of sampling, by the norms of its blocks. Otherwise a Cholesky
-    factorisation of sigma - S shows, in floating point with bounds of its rounding, that no other eigenvalue is above
-    sigma; sigma + S shows the same for the lower end. This takes a tenth of the time of LAPACK's solver, which is used
-    if Lanczos does not converge. With the vectors V and R = S V - V diag(values), the eigenvalues of S are by Weyl
-    within \|R\| of the values and of the spectrum of the compression to the complement of V, whose upper end is at most
-    sigma plus a margin of rounding. A cluster may be cut: its unlisted eigenvalues are not larger than the listed ones.
+    Lanczos computes values and vectors, which are then deflated. If the Frobenius norm of what is left is not below
+    sigma, just beyond the last value, a Cholesky factorisation of sigma - S shows, in floating point with bounds of its
+    rounding, that no other eigenvalue is above sigma; sigma + S shows the same for the lower end. This takes a tenth of
+    the time of LAPACK's solver, which is used if Lanczos does not converge. With the vectors V and R = S V - V
+    diag(values), the eigenvalues of S are by Weyl within \|R\| of the values and of the spectrum of the compression to
+    the complement of V, whose upper end is at most sigma plus a margin of rounding. A cluster may be cut: its unlisted
+    eigenvalues are not larger than the listed ones.
     """
     size = len(array)
     if size < SMALL or k > LARGEST_FRACTION * size:
@@ -243,12 +187,8 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
         last = float(np.sort(np.abs(chosen))[-min(k, len(chosen))])
         ends = {1.0: min(last, float(chosen[0])), -1.0: last}
     thresholds = {sign: end + joint + CLEARANCE * rounding for sign, end in ends.items()}
-    nearest, how = min(thresholds.values()), "Frobenius norms"
     others, reach = norm_beyond(matrix, values), {}
-    if others > nearest and nearest >= BLOCK_ROOM * np.abs(values).min():
-        others, how = block_norm_beyond(matrix, vectors, values), "norms of blocks"
-    if others > nearest:
-        how = "Cholesky factorisations"
+    how = "Frobenius norms" if others <= min(thresholds.values()) else "Cholesky factorisations"
     for sign, threshold in thresholds.items():
         margin = 0.0 if others <= threshold else margin_below(matrix, sign, vectors, values, threshold)
         if margin is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -111,6 +111,13 @@ class SpectrumErrors(Summary):
         """Half width of an interval of about 95 %: algebraic + discretisation + quantile x sampling error."""
         return np.asarray(self.algebraic + self.discretisation + self.quantile * self.sampling)
 
+    def at(self, indices: NDArray[np.intp], factor: float | Floats = 1.0) -> SpectrumErrors:
+        """The errors of some eigenvalues, or these times a factor for each eigenvalue."""
+        algebraic, discretisation, sampling = (
+            frozen((factor * part)[indices]) for part in (self.algebraic, self.discretisation, self.sampling)
+        )
+        return SpectrumErrors(algebraic, discretisation, sampling, self.quantile)
+
 
 @dataclass(frozen=True, repr=False)
 class Spectrum(Summary):
@@ -178,6 +185,14 @@ class Spectrum(Summary):
         """Total error of the gap, as in ``errors.total()``."""
         return float(self.gap_errors.total()[0])
 
+    def at(self, indices: NDArray[np.intp]) -> Spectrum:
+        """The same with these eigenvalues only, in this order."""
+        return replace(
+            self, values=frozen(self.values[indices]), vectors=frozen(self.vectors[:, indices]),
+            residuals=frozen(self.residuals[indices]), errors=self.errors.at(indices),
+            parity=tuple(self.parity[i] for i in indices),
+        )  # fmt: skip
+
     def estimates(self) -> tuple[Estimate, ...]:
         """Every eigenvalue with its total error.
 
@@ -195,17 +210,6 @@ class Spectrum(Summary):
     def eigenfunction(self, index: int, theta: Any) -> Floats:
         """Values at the angles theta of the eigenfunction of ``values[index]``, normalised to the mean square 1."""
         return np.asarray(self.basis.evaluate(theta) @ self.vectors[:, index])
-
-    def implied_time_scales(self) -> tuple[Floats, Floats]:
-        """Time scales -1/ln|lambda| in steps, without the constants, and their intervals, shape (k - 1, 2).
-
-        An interval is unbounded if the interval of the eigenvalue reaches modulus 1.
-        """
-        modulus, width = np.abs(self.values[1:]), self.errors.total()[1:]
-        ends = np.stack([np.maximum(modulus - width, 0.0), np.minimum(modulus + width, 1.0)], axis=1)
-        with np.errstate(divide="ignore"):
-            scales, intervals = (-1.0 / np.log(np.minimum(part, 1.0)) for part in (modulus, ends))
-        return scales, np.asarray(intervals)
 
     def plot_eigenfunctions(self, ax: Axes | None = None) -> Axes:
         """Draw up to five eigenfunctions, without the constants, against the incoming angle."""
@@ -267,27 +271,23 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
     algebraic = algebraic + matrix.basis.size * EPS
     # errors of entries change an eigenvalue by at most their Frobenius norm; sampling errors are separate
     discretisation = changes + (0.0 if matrix.samples else float(matrix.error))
-    sampling, quantile = sampling_errors(matrix, vectors, values), sampling_quantile(matrix)
-
-    def errors_of(indices: NDArray[np.intp]) -> SpectrumErrors:
-        parts = [frozen(part[indices]) for part in (algebraic, discretisation, sampling)]
-        return SpectrumErrors(parts[0], parts[1], parts[2], quantile)
-
+    sampling = sampling_errors(matrix, vectors, values)
+    errors = SpectrumErrors(algebraic, discretisation, sampling, sampling_quantile(matrix))
     # without a second function the gap is 1 by convention, with unknown error
     unknown = frozen([np.inf])
     gap, slem, gap_errors = 1.0, 0.0, SpectrumErrors(unknown, unknown, unknown)
     if len(rest.values):
-        gap_errors = errors_of(np.array([1]))
+        gap_errors = errors.at(np.array([1]))
         gap, slem = float(1.0 - rest.values[0]), float(np.abs(rest.values).max())
     if matrix.beyond is not None:
-        gap_errors = gap_errors if len(rest.values) else errors_of(np.array([0]))
+        gap_errors = gap_errors if len(rest.values) else errors.at(np.array([0]))
         gap, slem = min(gap, 1.0 - max(matrix.beyond)), max(slem, *np.abs(matrix.beyond).tolist())
     indices = np.append(0, 1 + chosen)
     return Spectrum(
         values=frozen(values[indices]),
         vectors=frozen(vectors[:, indices]),
         residuals=frozen(residuals[indices]),
-        errors=errors_of(indices),
+        errors=errors.at(indices),
         gap=gap,
         gap_errors=gap_errors,
         slem=slem,

@@ -27,7 +27,7 @@ from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
-from .refinement import EIGENVALUES, RAYS_FRACTION, Refinement, refined
+from .refinement import EIGENVALUES, HOW, RAYS_FRACTION, Refinement, refined
 from .shallow import shallow_gap
 from .theorems import gap_by_theorem, gap_of_exact, split_gap
 from .verdict import SpectralGap, isolated, made_from
@@ -145,7 +145,7 @@ def spectral_gap(
     >>> round(float(semicircle), 6), semicircle.verdict
     (0.176041, 'essential edge')
     """
-    positive_number("tolerance", tolerance)
+    tolerance = positive_number("tolerance", tolerance)
     seconds, rng = positive_number("time_limit", time_limit), generator(rng, 0)
     if isinstance(law, CollisionLaw):
         law = law.law
@@ -293,7 +293,7 @@ def _by_matrices(
     steps = refined(law, tolerance, rng, seconds, edge)
     found, error = steps.finest, steps.error
     evidence = (*steps.evidence, *_lower_bound(law))
-    gap = isolated(found, error, steps.how, edge, law.frame, evidence) if steps.converges else None
+    gap = isolated(found, error, HOW, edge, law.frame, evidence) if steps.converges else None
     if gap is not None:
         return gap
     reasons, top = (*edge.reasons, *evidence), 1.0 - found.gap

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -12,15 +11,15 @@ from ...core.checks import Rng, frozen, generator, number_between, positive_numb
 from ...core.errors import InputError
 from ...core.long_runs import TIME_LIMIT, reported
 from ...core.rounding import EPS
-from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
+from ...kernels import CollisionLaw, KernelMatrix, Law
 from ...kernels.laws.matrix_law import not_a_law
 from ..bounds.contraction import refuse_unless_self_adjoint
-from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
+from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..essential.edge import essential_edge
 from .gap import spectral_gap
-from .methods import DEGREES, discretisation_only, law_eigenvalues
+from .methods import discretisation_only, law_eigenvalues
 from .theorems import gap_by_theorem
-from .verdict import SpectralGap
+from .verdict import SpectralGap, isolated
 
 TOLERANCE = 1e-4
 
@@ -33,7 +32,6 @@ def spectrum(
     tolerance: float | None = None,
     rng: Rng = None,
     time_limit: float = TIME_LIMIT,
-    **discretisation: Any,
 ) -> Spectrum:
     """The k eigenvalues of largest modulus of a reversible kernel, sorted descending.
 
@@ -45,14 +43,11 @@ def spectrum(
         Number of eigenvalues; a matrix with fewer rows has fewer.
     tolerance : float, optional
         Wanted error of every eigenvalue of a law, 1e-4 by default and at least 2^-52; ``errors`` are the errors
-        reached. If a basis is given, it is the wanted error of the matrix.
+        reached.
     rng : None, int or numpy.random.Generator
         Source of rays for traced laws.
     time_limit : float
         As of `spectral_gap`.
-    **discretisation
-        ``basis=`` and further keywords of `asperity.kernels.discretise`. The law is then replaced by its matrix in this
-        basis (by default Legendre polynomials of degree below 48), without refinement.
 
     Returns
     -------
@@ -89,25 +84,18 @@ def spectrum(
     """
     whole_number("k", k, 1)
     seconds = positive_number("time_limit", time_limit)
-    how = dict(discretisation)
-    if tolerance is not None:
-        how["tolerance"] = number_between("tolerance", tolerance, EPS, math.inf, closed="low")
-    if rng is not None:
-        how["rng"] = generator(rng)
+    wanted = number_between("tolerance", TOLERANCE if tolerance is None else tolerance, EPS, math.inf, closed="low")
+    source = rng if rng is None else generator(rng)
     if isinstance(kernel, CollisionLaw):
-        return _both_signs(spectrum(kernel.law, max(1, (k + 1) // 2), time_limit=seconds, **how), k)
+        half = spectrum(kernel.law, max(1, (k + 1) // 2), tolerance=wanted, rng=source, time_limit=seconds)
+        return _both_signs(half, k)
     if isinstance(kernel, KernelMatrix):
-        if how:
-            raise InputError(f"{', '.join(how)}: only for laws; a KernelMatrix is discretised already")
+        if tolerance is not None or rng is not None:
+            raise InputError("tolerance, rng: only for laws; a KernelMatrix is discretised already")
         return matrix_spectrum(kernel, k)
     if not isinstance(kernel, Law):
         raise not_a_law("kernel", "a KernelMatrix, a Law or a CollisionLaw", kernel)
     refuse_unless_self_adjoint(kernel)
-    if discretisation:
-        basis = how.pop("basis", None) or Legendre(DEGREES[0])
-        found = matrix_spectrum(discretise(kernel, basis, **how), k)
-        return _with_verdict(kernel, found, tolerance or TOLERANCE, rng, seconds)
-    wanted = tolerance or TOLERANCE
     return _with_verdict(kernel, law_eigenvalues(kernel, k, wanted, rng, seconds), wanted, rng, seconds)
 
 
@@ -117,16 +105,13 @@ def _with_verdict(law: Law, found: Spectrum, tolerance: float, rng: Rng, seconds
     if known is None:
         edge = essential_edge(law)
         inside = int(np.sum(np.abs(found.values[1:]) + found.errors.total()[1:] <= edge.high))
-        evidence = edge.reasons
-        if inside:
-            evidence += (
-                f"{inside} of the values are not beyond {edge.high:.6g}, which the essential spectrum may reach: they "
-                "may belong to the basis",
-            )
-        top = 1.0 - found.gap
-        if top - found.gap_error > edge.high and found.gap > found.gap_error:
-            outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
-            return replace(found, verdict="isolated", evidence=(*evidence, outside))
+        caution = (
+            f"{inside} of the values are not beyond {edge.high:.6g}, which the essential spectrum may reach: they may "
+            "belong to the basis"
+        )
+        gap = isolated(found, found.gap_error, "", edge, law.frame, (caution,) if inside else ())
+        if gap is not None:
+            return replace(found, verdict="isolated", evidence=gap.evidence)
         known = spectral_gap(law, tolerance, rng, time_limit=seconds)
     return with_gap(found, known)
 
@@ -145,18 +130,4 @@ def _both_signs(half: Spectrum, k: int) -> Spectrum:
     values = np.concatenate([half.values, -half.values])
     order = np.argsort(-np.abs(values), kind="stable")[:k]
     order = order[np.argsort(-values[order], kind="stable")]
-    pick = index[order]
-    errors = half.errors
-    return replace(
-        half,
-        values=frozen(values[order]),
-        vectors=frozen(half.vectors[:, pick]),
-        residuals=frozen(half.residuals[pick]),
-        parity=tuple(half.parity[i] for i in pick),
-        errors=SpectrumErrors(
-            frozen(errors.algebraic[pick]),
-            frozen(errors.discretisation[pick]),
-            frozen(errors.sampling[pick]),
-            errors.quantile,
-        ),
-    )
+    return replace(half.at(index[order]), values=frozen(values[order]))

@@ -155,24 +155,16 @@ def _raised(found: Spectrum, exponent: int, k: int) -> Spectrum:
     if exponent % 2 == 0 and found.slem > base:
         base, error = found.slem, float(width[np.argmin(found.values)])
     gap, grown = gap_of_power(1.0 - base if base != 1.0 - found.gap else found.gap, error, exponent)
-    parts = found.errors
     return replace(
-        found,
+        found.at(order),
         values=frozen(values[order]),
-        vectors=frozen(found.vectors[:, order]),
         residuals=frozen((slope * found.residuals)[order]),
-        errors=SpectrumErrors(
-            frozen((slope * parts.algebraic)[order]),
-            frozen((slope * parts.discretisation)[order]),
-            frozen((slope * parts.sampling)[order]),
-            parts.quantile,
-        ),
+        errors=found.errors.at(order, slope),
         gap=gap,
         gap_errors=discretisation_only(np.array([grown])),
         slem=found.slem**exponent,
         method=f"{_ordinal(exponent)} powers of the eigenvalues; {found.method}",
         matrix_error=exponent * found.matrix_error,
-        parity=tuple(found.parity[i] for i in order),
     )
 
 

@@ -37,6 +37,8 @@ STALLED = 0.6
 NEGLIGIBLE = 1e-3
 # Rounding of a gap; smaller changes are noise.
 ROUNDING_FLOOR = 1e-12
+# The composition of the error of a refinement.
+HOW = "change by the last refinement + algebraic + matrix + 1.96 x sampling error"
 
 
 @dataclass(frozen=True)
@@ -97,11 +99,6 @@ class Refinement:
         if ratio >= STALLED:
             return 0.0
         return max(float(tops[-1] + change[-1] * ratio / (1.0 - ratio)) - edge, 0.0)
-
-    @property
-    def how(self) -> str:
-        """The composition of the error, in words."""
-        return "change by the last refinement + algebraic + matrix + 1.96 x sampling error"
 
 
 def refined(law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge) -> Refinement:

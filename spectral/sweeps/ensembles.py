@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
-from ...core.checks import Floats, Rng, check_memory, generator, instance, positive_number, whole_number
+from ...core.checkpoints import Stored
+from ...core.checks import Rng, check_memory, generator, instance, positive_number, whole_number
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate, Summary
 from ...core.frames import data_frame
-from ...core.long_runs import reported
-from ...core.version import __version__
-from ...core.workers import connected, results
+from ...core.long_runs import Engine, all_parts, identity_of
 from ...kernels import Basis, KernelMatrix, discretise
-from ...kernels.bases.basis import Frame
 from ...kernels.sampling.counts import half_width
 from .quantities import UserQuantity, name_of
-from .running import Family, law_of, sweep
+from .running import Family, in_words, law_of, sweep
 from .statistics import FEWEST, mean_estimate, spread_estimate
 from .table import SweepTable, csv_text
 
@@ -213,41 +210,37 @@ def _warn_of_refused(what: str, refused: int, realisations: int, reason: str) ->
 
 @dataclass(frozen=True)
 class _Matrices:
-    """What a worker is sent: it makes the matrix of a realisation."""
+    """The matrices of all realisations, each a part; what a worker is sent."""
 
     family: Family
     basis: Basis
     tolerance: float
+    seeds: NDArray[np.int64]
 
-    def packed(self, seed: int) -> bytes | str:
-        """The matrix, with what is known of it, as a file of numpy's; or why there is none."""
+    def stored(self, _: int) -> dict[str, Stored]:
+        """What the arrays of a part must be."""
+        return {
+            "refused": Stored("U", ()), "symmetric": Stored("f", (self.basis.size, self.basis.size)),
+            "error": Stored("f", (), 0.0, math.inf), "unresolved": Stored("f", (), 0.0, 1.0),
+            "reversible": Stored("b", ()), "mirror_symmetric": Stored("b", ()), "frame": Stored("U", ()),
+        }  # fmt: skip
+
+    def arrays(self, part: int) -> dict[str, Any]:
+        """The matrix of one realisation with what is known of it; or 0 and the reason why there is none."""
+        refused = ""
         try:
-            found = discretise(law_of(self.family(**{SEED: seed})), self.basis, tolerance=self.tolerance)
-        except Exception as reason:  # a task must not raise
-            return str(reason) if isinstance(reason, AsperityError) else f"{type(reason).__name__}: {reason}"
-        return packed_arrays(
-            {
-                "symmetric": found.symmetric, "error": float(found.error), "unresolved": float(found.unresolved),
-                "reversible": found.reversible is True, "mirror_symmetric": found.mirror_symmetric is True,
-                "frame": found.frame,
-            }
-        )  # fmt: skip
-
-    def read(self, _: str, content: bytes | str) -> bytes | str:
-        """What `packed` gave, checked."""
-        if isinstance(content, bytes):
-            shape = self.basis.size, self.basis.size
-            found = unpacked_arrays(
-                content,
-                {
-                    "symmetric": Stored("f", shape), "error": Stored("f", (), 0.0, math.inf),
-                    "unresolved": Stored("f", (), 0.0, 1.0), "reversible": Stored("b", ()),
-                    "mirror_symmetric": Stored("b", ()), "frame": Stored("U", ()),
-                },
-            )  # fmt: skip
-            if found["frame"].item() not in get_args(Frame):
-                raise ValueError(f"frame: expected one of {', '.join(get_args(Frame))}, got {found['frame'].item()!r}")
-        return content
+            found = discretise(
+                law_of(self.family(**{SEED: int(self.seeds[part])})), self.basis, tolerance=self.tolerance
+            )
+        except Exception as reason:  # a realisation must not stop the others
+            refused = in_words(reason)
+            nothing = Estimate(0.0, 0.0, "bound", refused)
+            found = KernelMatrix(np.zeros((self.basis.size, self.basis.size)), self.basis, nothing)
+        return {
+            "refused": refused, "symmetric": found.symmetric, "error": float(found.error),
+            "unresolved": float(found.unresolved), "reversible": found.reversible is True,
+            "mirror_symmetric": found.mirror_symmetric is True, "frame": found.frame,
+        }  # fmt: skip
 
 
 def mean_law(
@@ -307,74 +300,33 @@ def mean_law(
     number = whole_number("realisations", realisations, FEWEST)
     instance("basis", basis, Basis, "ker.Bins(64)")
     check_memory("realisations", f"{number} matrices in {basis!r}", 2 * number * basis.size**2)
-    job = _Matrices(family, basis, positive_number("tolerance", tolerance))
     seeds = _seeds(rng, number)
-    try:
-        with ExitStack() as stack:
-            stack.enter_context(reported("mean law"))
-            store = None
-            if checkpoint is not None:
-                store = stack.enter_context(Checkpoint(checkpoint, _identity(job, seeds), key=key))
-            packed = _all_matrices(job, seeds, store, client)
-    except KeyboardInterrupt as stop:
-        stored = f"{checkpoint} has what was finished; the same call goes on from there"
-        raise KeyboardInterrupt(f"mean_law stopped; {'nothing is stored' if checkpoint is None else stored}") from stop
-    refused = {seed: reason for seed in seeds if isinstance(reason := packed[seed], str)}
-    seed, first = next(iter(refused.items()), (0, ""))
-    if number - len(refused) < FEWEST:
-        raise AsperityError(
-            f"family: {len(refused)} of {number} laws were refused, that of rng={seed} because of: {first}"
-        )
-    _warn_of_refused("the mean law is that of", len(refused), number, f"{first} (rng={seed})")
-    return _mean(job, packed, seeds)
-
-
-def _identity(job: _Matrices, seeds: Sequence[int]) -> dict[str, Any]:
-    return {
-        "computation": "mean law", "version": __version__, "family": job.family, "basis": job.basis,
-        "tolerance": job.tolerance, "realisations": len(seeds), "seeds": np.array(seeds),
-    }  # fmt: skip
-
-
-def _all_matrices(
-    job: _Matrices, seeds: Sequence[int], store: Checkpoint | None, client: Any
-) -> Mapping[int, bytes | str]:
-    """The packed matrix of each seed, those that the checkpoint has first."""
-    found = {} if store is None else {int(key): value for key, value in store.parts(job.read)}
-    with connected(client) as workers:
-        for seed, packed in results(job.packed, [seed for seed in seeds if seed not in found], workers):
-            found[seed] = packed
-            if store is not None:
-                store.put(str(seed), packed)
-    return found
-
-
-def _mean(job: _Matrices, packed: Mapping[int, bytes | str], seeds: Sequence[int]) -> KernelMatrix:
-    """The mean, added up in the order of the seeds whatever the order in which they came."""
-    arrays: list[Floats] = []
-    properties: list[dict[str, Any]] = []
-    for seed in seeds:
-        content = packed[seed]
-        if isinstance(content, str):
-            continue
-        found = unpacked_arrays(content)
-        arrays.append(found.pop("symmetric"))
-        properties.append({name: value.item() for name, value in found.items()})
-    of = f"{len(arrays)} of {len(seeds)} not refused" if len(arrays) < len(seeds) else f"{len(arrays)}"
-    frames = {one["frame"] for one in properties}
+    job = _Matrices(family, basis, positive_number("tolerance", tolerance), np.array(seeds))
+    engine: Engine = {"checkpoint": checkpoint, "key": key, "client": client}
+    parts = all_parts(job.arrays, number, identity_of("mean law", job), engine, job.stored)
+    known = [part for part in parts if not part["refused"]]
+    refused = number - len(known)
+    first = next((k for k, part in enumerate(parts) if part["refused"]), 0)
+    seed, reason = seeds[first], parts[first]["refused"]
+    if len(known) < FEWEST:
+        raise AsperityError(f"family: {refused} of {number} laws were refused, that of rng={seed} because of: {reason}")
+    _warn_of_refused("the mean law is that of", refused, number, f"{reason} (rng={seed})")
+    of = f"{len(known)} of {number} not refused" if refused else f"{number}"
+    frames = {part["frame"].item() for part in known}
     if len(frames) > 1:
         raise InputError("family: expected laws in one convention, got some in each; use law.in_specular_frame()")
+    arrays = [part["symmetric"] for part in known]
     symmetric = np.mean(arrays, axis=0)
-    error = half_width(symmetric, arrays) + math.fsum(one["error"] for one in properties) / len(properties)
+    error = half_width(symmetric, arrays) + math.fsum(part["error"] for part in known) / len(known)
     return KernelMatrix(
         symmetric,
-        job.basis,
-        Estimate(error, error, "estimate", f"spread of {len(arrays)} realisations"),
+        basis,
+        Estimate(error, error, "estimate", f"spread of {len(known)} realisations"),
         replicates=tuple(arrays),
         method="mean law",
-        law=f"mean of {of} of {name_of(job.family)}",
-        reversible=True if all(one["reversible"] for one in properties) else None,
-        mirror_symmetric=True if all(one["mirror_symmetric"] for one in properties) else None,
+        law=f"mean of {of} of {name_of(family)}",
+        reversible=True if all(part["reversible"] for part in known) else None,
+        mirror_symmetric=True if all(part["mirror_symmetric"] for part in known) else None,
         frame=frames.pop(),
-        unresolved=math.fsum(one["unresolved"] for one in properties) / len(properties),
+        unresolved=math.fsum(part["unresolved"] for part in known) / len(known),
     )

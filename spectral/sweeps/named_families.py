@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InputError
-from ...geometry import WALLS, HeightCorrelation, SelfAffine, Wall, random_wall, wall_from_text
+from ...geometry import WALLS, HeightCorrelation, SelfAffine, Wall, wall_from_text
 from .points import RESOLUTION, Between, Value
 
 # How heights are correlated, by name: what makes it, and its parameters, of which the first must be given.
@@ -98,31 +98,6 @@ def _number(text: str) -> float | int:
     if not np.isfinite(float(number)):
         raise ValueError("not finite")
     return number
-
-
-@dataclass(frozen=True)
-class RandomFamily:
-    """Random walls of one kind, by their seeds.
-
-    Examples
-    --------
-    >>> family = RandomFamily(spectrum_from_text("gaussian:length=0.1"), 64, rms_slope=0.2)
-    >>> family(rng=3) == random_wall(HeightCorrelation(0.1), 64, rms_slope=0.2, rng=3)
-    True
-    """
-
-    spectrum: HeightCorrelation | SelfAffine
-    points: int
-    rms_slope: float | None = None
-    rms_height: float | None = None
-    period: float = 1.0
-    smooth: bool = False
-
-    def __call__(self, rng: int) -> Wall:
-        return random_wall(
-            self.spectrum, self.points, rms_slope=self.rms_slope, rms_height=self.rms_height, period=self.period,
-            smooth=self.smooth, rng=rng,
-        )  # fmt: skip
 
 
 def spectrum_from_text(text: str) -> HeightCorrelation | SelfAffine:

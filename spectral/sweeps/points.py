@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Generator, Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import groupby, product
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from ...core.checkpoints import content
 from ...core.checks import finite_number, positive_number, whole_number
 from ...core.errors import InputError
 
@@ -21,8 +22,8 @@ TOGETHER = 4
 # Loss of `adaptive` below which no point is added.
 RESOLUTION = 0.01
 
-# Yields points that can be computed side by side, and is sent the first quantity at each of them.
-Plan: TypeAlias = Generator[list[Point], Sequence[float], None]
+# The first quantity at a point that was computed.
+Leading: TypeAlias = Callable[[Point], float]
 
 
 @dataclass(frozen=True)
@@ -110,12 +111,12 @@ class Grid:
         return next((name for name, values in self.axes.items() if isinstance(values, Between)), None)
 
     def in_order(self, points: Sequence[Point]) -> list[Point]:
-        """Points as they stand in the grid, chosen ones ascending."""
+        """Points as they stand in the grid, those of each curve ascending."""
         name = self.choosing
         if name is None:
             return list(points)
-        order = {key: number for number, key in enumerate(dict.fromkeys(_others(point, name) for point in points))}
-        return sorted(points, key=lambda point: (order[_others(point, name)], point[name]))
+        curves = groupby(points, lambda point: key_of({**point, name: 0}))
+        return [point for _, curve in curves for point in sorted(curve, key=lambda point: point[name])]
 
     @property
     def is_product(self) -> bool:
@@ -126,44 +127,34 @@ class Grid:
     def size(self) -> int:
         """The number of points, at most."""
         sizes = [values.points if isinstance(values, Between) else len(values) for values in self.axes.values()]
-        return sizes[0] if self.zipped else int(np.prod(sizes, dtype=object))
-
-    @property
-    def ends(self) -> tuple[Point, Point]:
-        """The first and the last point."""
-        first, last = (
-            {
-                name: (values.low, values.high)[end] if isinstance(values, Between) else values[-end]
-                for name, values in self.axes.items()
-            }
-            for end in (0, 1)
-        )
-        return first, last
+        return sizes[0] if self.zipped else math.prod(sizes)
 
     def some(self, number: int) -> list[Point]:
-        """At most so many points, evenly spread, the first and the last among them; the ends of a `Between`."""
-        if self.choosing is not None:
-            return list(self.ends)
-        points = list(self._points(self.axes))
-        picked = np.unique(np.linspace(0, len(points) - 1, min(number, max(len(points), 2))).astype(int))
-        chosen = [points[k] for k in picked]
-        return chosen if len(chosen) > 1 else chosen * 2
+        """At most so many points, evenly spread, the first and the last among them; of a `Between` its ends."""
+        known = {name: (one.low, one.high) if isinstance(one, Between) else one for name, one in self.axes.items()}
+        points = list(self._points(known))
+        return [points[k] for k in np.unique(np.linspace(0, len(points) - 1, number).astype(int))]
 
     def as_dict(self) -> dict[str, str]:
         """A line for each parameter that tells its values from others."""
-        return {name: _in_words(values) for name, values in self.axes.items()}
+        return {
+            name: repr(one) if isinstance(one, Between) else f"{len(one)} from {one[0]} to {one[-1]} ({content(one)})"
+            for name, one in self.axes.items()
+        }
 
-    def plan(self) -> Plan:
-        """The points, in one portion or as they are chosen."""
+    def portions(self, leading: Leading) -> Iterator[list[Point]]:
+        """The points, in portions that can be computed side by side.
+
+        Chosen ones depend on the first quantity at all points before them.
+        """
         choosing = self.choosing
         if choosing is None:
             yield list(self._points(self.axes))
             return
         axis = self.axes[choosing]
         assert isinstance(axis, Between)
-        others = {name: values for name, values in self.axes.items() if name != choosing}
-        for fixed in self._points(others):
-            yield from _chosen(choosing, axis, {name: fixed.get(name, 0.0) for name in self.axes})
+        for fixed in self._points({**self.axes, choosing: (axis.low,)}):
+            yield from _chosen(choosing, axis, fixed, leading)
 
     def _points(self, axes: Mapping[str, Any]) -> Iterable[Point]:
         together = zip(*axes.values(), strict=True) if self.zipped else product(*axes.values())
@@ -181,10 +172,6 @@ def key_of(point: Point) -> str:
     return json.dumps(list(point.values()), separators=(",", ":"))
 
 
-def _others(point: Point, name: str) -> str:
-    return key_of({key: value for key, value in point.items() if key != name})
-
-
 def _axis(name: str, values: Any) -> tuple[Value, ...] | Between:
     if isinstance(values, Between):
         return values
@@ -197,15 +184,8 @@ def _axis(name: str, values: Any) -> tuple[Value, ...] | Between:
     return tuple(plain)
 
 
-def _in_words(values: tuple[Value, ...] | Between) -> str:
-    if isinstance(values, Between):
-        return repr(values)
-    digest = hashlib.sha256(json.dumps(values).encode()).hexdigest()[:12]
-    return f"{len(values)} from {values[0]} to {values[-1]} ({digest})"
-
-
-def _chosen(name: str, axis: Between, fixed: Point) -> Plan:
-    """The points of one curve, a few at a time: each portion depends on the values at all points before it."""
+def _chosen(name: str, axis: Between, fixed: Point, leading: Leading) -> Iterator[list[Point]]:
+    """The points of one curve, a few at a time."""
     try:
         from adaptive import Learner1D
         from adaptive.learner.learner1D import curvature_loss_function
@@ -214,5 +194,6 @@ def _chosen(name: str, axis: Between, fixed: Point) -> Plan:
     learner = Learner1D(lambda _: 0.0, (axis.low, axis.high), loss_per_interval=curvature_loss_function())
     while learner.npoints < axis.points and learner.loss() > axis.resolution:
         asked, _ = learner.ask(TOGETHER if learner.npoints else 2)
-        values = yield [{**fixed, name: float(x)} for x in asked]
-        learner.tell_many(asked, list(values))
+        points: list[Point] = [{**fixed, name: float(x)} for x in asked]
+        yield points
+        learner.tell_many(asked, list(map(leading, points)))

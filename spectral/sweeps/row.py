@@ -9,7 +9,7 @@ from typing import Any
 
 from ...core.checks import finite_number, number_between
 from ...core.estimates import Estimate, Summary, finite, shown
-from .points import Point, Value
+from .points import Value
 
 COLUMNS = ("quantity", "value", "error", "kind", "verdict", "method", "seconds", "version", "message")
 # What the quantities are measured in; all others are pure numbers.
@@ -59,20 +59,16 @@ class SweepRow(Summary):
         number = "refused" if self.value is None else self._fact("value")
         return f"{number} at {', '.join(map(shown, self.point.values()))}"
 
-    @staticmethod
-    def of(point: Point, quantity: str, found: Estimate, verdict: str, seconds: float, version: str) -> SweepRow:
-        """The row of an estimate."""
-        return SweepRow(
-            point, quantity, found.value, found.error, found.kind, verdict, found.method, seconds, version, ""
-        )
-
     def cells(self) -> list[Any]:
         """What is in the columns ``quantity`` to ``message``."""
         return [getattr(self, name) for name in COLUMNS]
 
     def as_list(self) -> list[Any]:
         """The point and the columns as plain JSON values; an infinite error is None beside a value."""
-        return [list(self.point.values()), *map(_plain, self.cells())]
+        return [
+            list(self.point.values()),
+            *(finite(cell) if isinstance(cell, float) else cell for cell in self.cells()),
+        ]
 
     @staticmethod
     def of_list(names: Sequence[str], cells: Sequence[Any]) -> SweepRow:
@@ -100,7 +96,3 @@ class SweepRow(Summary):
             Estimate(self.value, self.error, self.kind, self.method)  # type: ignore[arg-type]
         elif self.error is not None or not self.message:
             raise ValueError(f"expected a reason why {quantity!r} has no value")
-
-
-def _plain(cell: Any) -> Any:
-    return finite(cell) if isinstance(cell, float) else cell

@@ -8,13 +8,14 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias
 
 from ...core.checkpoints import Checkpoint, content, told
 from ...core.checks import finite_number, positive_number
 from ...core.errors import AsperityError, InputError
-from ...core.long_runs import progress_bar
+from ...core.long_runs import Engine, progress_bar
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...geometry import Wall
@@ -61,13 +62,30 @@ class _Study:
             return [_refused(point, name, reason, seconds) for name in quantity.names]
         seconds = time.perf_counter() - start
         return [
-            SweepRow.of(point, name, number, verdict, seconds, __version__)
+            SweepRow(
+                point, name, number.value, number.error, number.kind, verdict, number.method, seconds, __version__, ""
+            )
             for name, number in zip(quantity.names, numbers, strict=True)
         ]
 
-    def as_lists(self, point: Point) -> list[list[Any]]:
-        """`rows` as plain values, which travel between processes and are stored."""
-        return [row.as_list() for row in self.rows(point)]
+    def read(self, key: str, text: str, parameters: Sequence[str]) -> list[SweepRow]:
+        """The rows of a point as they are stored, each checked."""
+        names = [name for one in quantities_from(self.asked) for name in one.names]
+        rows = [SweepRow.of_list(parameters, cells) for cells in json.loads(text)]
+        for row, name in zip(rows, names, strict=True):
+            if key_of(dict(row.point)) != key:
+                raise ValueError(f"rows of the point {row.point}")
+            row.check(name)
+        return rows
+
+    def identity(self, grid: Grid, by_name: bool) -> dict[str, Any]:
+        """What tells a sweep from others; ``by_name`` of the user's functions and classes only their names."""
+        walls = [_made(self.family, point, by_name) for point in grid.some(TOLD_APART)]
+        return {
+            "computation": "sweep", "version": __version__, "family": self.family,
+            "first wall": walls[0], "last wall": walls[-1], "walls": content(walls),
+            "grid": grid.as_dict(), "zipped": grid.zipped, "quantities": self.asked, "tolerance": self.tolerance,
+        }  # fmt: skip
 
 
 def sweep(
@@ -145,108 +163,49 @@ def sweep(
     if not callable(family):
         raise InputError(f"family: expected a function that returns a wall, as geo.focusing_arcs, got {family!r}")
     points = Grid.of(grid, zipped)
-    _check_names(family, points.ends[0])
+    _check_names(family, points.some(1)[0])
     study = _Study(family, listed, wanted)
-    run = _Run(study, points, found[0].names[0])
-    rows = run.all_rows(checkpoint, key, client, progress)
+    engine: Engine = {"checkpoint": checkpoint, "key": key, "client": client}
+    rows = _all_rows(study, points, found[0].names[0], engine, progress)
     # walls of the command line have a text, functions a name
     name = str(getattr(family, "text", getattr(family, "__name__", "")))
     return SweepTable(points.names, rows, not points.is_product, study.rows, "" if "<" in name else name)
 
 
-class _Run:
-    """One call of `sweep`."""
+def _all_rows(study: _Study, grid: Grid, leading: str, engine: Engine, progress: bool) -> tuple[SweepRow, ...]:
+    """The rows of all points, in the order of the grid."""
+    path, key = engine["checkpoint"], engine["key"]
+    points: list[Point] = []
+    found: dict[str, list[SweepRow]] = {}
 
-    def __init__(self, study: _Study, grid: Grid, leading: str) -> None:
-        self.study, self.grid, self.leading = study, grid, leading
-        self.found: dict[str, list[SweepRow]] = {}
-
-    def all_rows(
-        self, checkpoint: str | Path | None, key: str | None, client: Any, progress: bool
-    ) -> tuple[SweepRow, ...]:
-        """The rows of all points, in the order of the grid."""
-        try:
-            points = self._points(checkpoint, key, client, progress)
-        except KeyboardInterrupt as stop:
-            raise KeyboardInterrupt(self._where_to_go_on(checkpoint)) from stop
-        return tuple(row for point in self.grid.in_order(points) for row in self.found[key_of(point)])
-
-    def _points(self, checkpoint: str | Path | None, key: str | None, client: Any, progress: bool) -> list[Point]:
-        """All points of the plan, whose rows are then found."""
-        points: list[Point] = []
-        with ExitStack() as stack:
-            store = None
-            if checkpoint is not None:
-                store = stack.enter_context(Checkpoint(checkpoint, self.identity(key is not None), key=key))
-            known = {} if store is None else dict(store.parts(self._read))
-            workers = stack.enter_context(connected(client))
-            bar = stack.enter_context(progress_bar(self.grid.size, "point", "sweep", shown=progress))
-            plan = self.grid.plan()
-            portion = next(plan, [])
-            while portion:
-                points += portion
-                self._compute(portion, known, store, workers, bar)
-                try:
-                    portion = plan.send([self._leading_value(point) for point in portion])
-                except StopIteration:
-                    break
-        return points
-
-    def _compute(
-        self, portion: Sequence[Point], known: Mapping[str, Any], store: Checkpoint | None, workers: Any, bar: Any
-    ) -> None:
-        """Find the rows of some points, those that the checkpoint has first."""
-        rest = []
-        for point in portion:
-            if (rows := known.get(key_of(point))) is None:
-                rest.append(point)
-            else:
-                self._keep(point, rows, bar)
-        for point, rows in results(self.study.as_lists, rest, workers):
-            self._keep(point, rows, bar)
-            if store is not None:
-                store.put(key_of(point), json.dumps(rows))
-
-    def _keep(self, point: Point, rows: Sequence[Sequence[Any]], bar: Any) -> None:
-        self.found[key_of(point)] = [SweepRow.of_list(self.grid.names, row) for row in rows]
-        bar.update()
-
-    def _leading_value(self, point: Point) -> float:
-        """Of the quantity whose curve chooses the next points; 0 where it was refused."""
-        row = next(row for row in self.found[key_of(point)] if row.quantity == self.leading)
+    def value(point: Point) -> float:
+        row = next(row for row in found[key_of(point)] if row.quantity == leading)
+        # a point that was refused
         return 0.0 if row.value is None else row.value
 
-    def _where_to_go_on(self, checkpoint: str | Path | None) -> str:
-        done = f"stopped after {len(self.found)} of {self.grid.size} points"
-        if checkpoint is None:
-            return f"{done}; without a checkpoint they are lost"
-        return f"{done}, which are in {checkpoint}; the same call goes on from there"
-
-    def _read(self, key: str, text: str) -> list[list[Any]]:
-        """The rows of a point as they are stored, each checked."""
-        names = [name for one in quantities_from(self.study.asked) for name in one.names]
-        rows: list[list[Any]] = json.loads(text)
-        for row, name in zip(rows, names, strict=True):
-            if key_of(cast(Point, dict(enumerate(row[0])))) != key:
-                raise ValueError(f"rows of the point {row[0]}")
-            SweepRow.of_list(self.grid.names, row).check(name)
-        return rows
-
-    def identity(self, by_name: bool) -> dict[str, Any]:
-        """What tells this sweep from others; ``by_name`` of the user's functions and classes only their names."""
-        first, *between, last = (_made(self.study.family, point, by_name) for point in self.grid.some(TOLD_APART))
-        return {
-            "computation": "sweep",
-            "version": __version__,
-            "family": self.study.family,
-            "first wall": first,
-            "last wall": last,
-            "walls between": content(between),
-            "grid": self.grid.as_dict(),
-            "zipped": self.grid.zipped,
-            "quantities": self.study.asked,
-            "tolerance": self.study.tolerance,
-        }
+    try:
+        with ExitStack() as stack:
+            store, known = None, {}
+            if path is not None:
+                store = stack.enter_context(Checkpoint(path, study.identity(grid, key is not None), key=key))
+                known = dict(store.parts(partial(study.read, parameters=grid.names)))
+            workers = stack.enter_context(connected(engine["client"]))
+            bar = stack.enter_context(progress_bar(grid.size, "point", "sweep", shown=progress))
+            for portion in grid.portions(value):
+                points += portion
+                found |= {one: known[one] for one in map(key_of, portion) if one in known}
+                bar.update(len([point for point in portion if key_of(point) in known]))
+                rest = [point for point in portion if key_of(point) not in known]
+                for point, rows in results(study.rows, rest, workers):
+                    found[key_of(point)] = rows
+                    bar.update()
+                    if store is not None:
+                        store.put(key_of(point), json.dumps([row.as_list() for row in rows]))
+    except KeyboardInterrupt as stop:
+        done = f"stopped after {len(found)} of {grid.size} points"
+        where = f"{done}, which are in {path}; the same call goes on from there"
+        raise KeyboardInterrupt(f"{done}; without a checkpoint they are lost" if path is None else where) from stop
+    return tuple(row for point in grid.in_order(points) for row in found[key_of(point)])
 
 
 def law_of(made: object) -> Law:
@@ -260,10 +219,13 @@ def law_of(made: object) -> Law:
     return made
 
 
+def in_words(reason: Exception) -> str:
+    """Why a computation failed: our own messages say what to do, others need the name of their class."""
+    return str(reason) if isinstance(reason, AsperityError) else f"{type(reason).__name__}: {reason}"
+
+
 def _refused(point: Point, quantity: str, reason: Exception, seconds: float) -> SweepRow:
-    # our own messages say what to do; others need the name of their class
-    own = str(reason) if isinstance(reason, AsperityError) else f"{type(reason).__name__}: {reason}"
-    return SweepRow(point, quantity, None, None, "", "", "", seconds, __version__, own)
+    return SweepRow(point, quantity, None, None, "", "", "", seconds, __version__, in_words(reason))
 
 
 def _check_names(family: Family, point: Point) -> None:

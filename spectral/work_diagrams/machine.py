@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any
 
 from ...core.estimates import Summary
 
@@ -25,86 +23,59 @@ class Machine(Summary):
     ----------
     processor : str
     cores : int
-    threads : int
-        Number of threads of the linear algebra, and of cores that the process was pinned to.
-    pinned_to : tuple of int
-        Numbers of these cores; empty if the system cannot pin.
+    pinned_to : int or None
+        Number of the core that the process was pinned to; None if the system cannot pin.
     system, python : str
-    versions : mapping of str to str
-        Versions of asperity, numpy, scipy and numba.
-    linear_algebra : str
-        The BLAS library behind numpy.
+    software : str
+        Versions of asperity, numpy, scipy and numba, and the BLAS library behind numpy.
     """
 
     processor: str
     cores: int
-    threads: int
-    pinned_to: tuple[int, ...]
+    pinned_to: int | None
     system: str
     python: str
-    versions: MappingProxyType[str, str]
-    linear_algebra: str
+    software: str
 
     @classmethod
-    def here(cls, threads: int = 1) -> Machine:
-        """This machine with the given number of threads."""
+    def here(cls) -> Machine:
+        """This machine."""
         from threadpoolctl import threadpool_info
 
         pools = {
             f"{pool['internal_api']} {pool['version']}" for pool in threadpool_info() if pool["user_api"] == "blas"
         }
+        software = [*(f"{name} {_version(name)}" for name in PACKAGES), *sorted(pools)]
         return cls(
-            _processor(), os.cpu_count() or 1, threads, tuple(_cores(threads)), platform.platform(),
-            platform.python_version(), MappingProxyType({name: _version(name) for name in PACKAGES}),
-            ", ".join(sorted(pools)) or "unknown",
+            _processor(), os.cpu_count() or 1, _last_core(), platform.platform(), platform.python_version(),
+            ", ".join(software),
         )  # fmt: skip
 
-    def as_dict(self) -> dict[str, Any]:
-        """A dictionary of plain values for JSON."""
-        return {**self.__dict__, "versions": dict(self.versions), "pinned_to": list(self.pinned_to)}
-
-    @classmethod
-    def of_dict(cls, data: dict[str, Any]) -> Machine:
-        """The machine from the result of `as_dict`."""
-        versions = MappingProxyType(dict(data["versions"]))
-        return cls(**{**data, "versions": versions, "pinned_to": tuple(data["pinned_to"])})
-
-    def is_comparable_with(self, other: Machine) -> bool:
-        """Whether processor, cores and threads are the same, so that times may be compared."""
-        return (self.processor, self.cores, self.threads) == (other.processor, other.cores, other.threads)
-
     def __str__(self) -> str:
-        pinned = f"pinned to core {', '.join(map(str, self.pinned_to))}" if self.pinned_to else "not pinned"
-        software = ", ".join(f"{name} {number}" for name, number in self.versions.items())
-        return (
-            f"{self.processor}, {self.cores} cores; {self.threads} thread{'s' * (self.threads > 1)}, {pinned}; "
-            f"Python {self.python}, {software}, {self.linear_algebra}"
-        )
+        pinned = "not pinned" if self.pinned_to is None else f"pinned to core {self.pinned_to}"
+        return f"{self.processor}, {self.cores} cores; 1 thread, {pinned}; Python {self.python}, {self.software}"
 
 
 @contextmanager
-def on_few_cores(threads: int) -> Iterator[None]:
-    """Pin this thread and the threads it starts to ``threads`` cores, and limit the threads of the linear algebra.
-
-    The threads of the tracer inherit these cores.
-    """
+def on_one_core() -> Iterator[None]:
+    """Pin this thread and the threads it starts to one core, and the linear algebra to one thread."""
     from threadpoolctl import threadpool_limits
 
-    chosen = _cores(threads)
-    before = os.sched_getaffinity(0) if chosen else set()
+    core = _last_core()
+    before = set() if core is None else os.sched_getaffinity(0)
     try:
-        if chosen:
-            os.sched_setaffinity(0, chosen)
-        with threadpool_limits(limits=threads):
+        if core is not None:
+            os.sched_setaffinity(0, {core})
+        with threadpool_limits(limits=1):
             yield
     finally:
-        if chosen:
+        if core is not None:
             os.sched_setaffinity(0, before)
 
 
-def _cores(threads: int) -> list[int]:
-    """The last of the allowed cores, because the first one handles interrupts; empty if the system cannot pin."""
-    return sorted(os.sched_getaffinity(0))[-threads:] if hasattr(os, "sched_getaffinity") else []
+def _last_core() -> int | None:
+    """The last of the allowed cores, because the first one handles interrupts; None if the system cannot pin."""
+    return max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
 
 
 def _processor() -> str:

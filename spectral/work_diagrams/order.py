@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array
+from ...core.checks import finite_array
 from ...core.errors import InputError
 from ...core.estimates import Summary, with_error
 
@@ -95,6 +95,9 @@ def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = Non
     >>> round(few.order, 12), round(few.high - few.low, 2)
     (0.5, 0.7)
     """
+    from scipy.special import polygamma
+    from scipy.stats import norm, t
+
     sizes, errors = finite_array("size", size), finite_array("error", error)
     if sizes.shape != errors.shape or np.any(sizes <= 0.0) or np.any(errors <= 0.0):
         raise InputError(f"size, error: expected positive numbers of one shape, got {size!r}, {error!r}")
@@ -103,32 +106,12 @@ def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = Non
         raise InputError(f"repeats: expected a number of at least 1 for each of {sizes.size} sizes, got {repeats!r}")
     if len(np.unique(sizes)) < FEWEST_POINTS:
         return None
-    slope, half = _by_scatter(sizes, errors) if number is None else _by_spread(sizes, errors, number)
+    x, y = np.log(sizes), np.log(errors) - np.log(errors[0])
+    weight = np.ones(x.size) if number is None else 4.0 / polygamma(1, 0.5 * number)
+    (slope, level), covariance = np.polyfit(x, y, 1, w=np.sqrt(weight), cov="unscaled")
+    spread = float(np.sqrt(weight @ (y - slope * x - level) ** 2 / (x.size - 2)))
+    if number is None:
+        half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, x.size - 2)) * spread * covariance[0, 0] ** 0.5
+    else:
+        half = float(norm.ppf(0.5 + 0.5 * CONFIDENCE)) * max(spread, 1.0) * covariance[0, 0] ** 0.5
     return FittedOrder(-slope, -slope - half, -slope + half, len(sizes))
-
-
-def _by_scatter(sizes: Floats, errors: Floats) -> tuple[float, float]:
-    """Slope and half width of its interval, by Student's t."""
-    from scipy.stats import t
-
-    # relative to the first error, so that equal errors are 0 without rounding
-    x, y = np.log(sizes) - np.mean(np.log(sizes)), np.log(errors) - np.log(errors[0])
-    slope = float(x @ y / (x @ x))
-    rest = y - np.mean(y) - slope * x
-    spread = float(np.sqrt(rest @ rest / (len(x) - 2) / (x @ x)))
-    return slope, float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(sizes) - 2)) * spread
-
-
-def _by_spread(sizes: Floats, errors: Floats, repeats: Floats) -> tuple[float, float]:
-    """Slope and half width of its interval, from the variances of root mean squares over repeats."""
-    from scipy.special import polygamma
-    from scipy.stats import norm
-
-    weight = 4.0 / polygamma(1, 0.5 * repeats)
-    x, y = np.log(sizes), np.log(errors)
-    x = x - np.average(x, weights=weight)
-    precision = float(weight @ x**2)
-    slope = float(weight @ (x * y)) / precision
-    rest = y - np.average(y, weights=weight) - slope * x
-    birge = float(np.sqrt(weight @ rest**2 / (len(x) - 2)))
-    return slope, float(norm.ppf(0.5 + 0.5 * CONFIDENCE)) * max(birge, 1.0) / precision**0.5

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from ...core.rounding import EPS
 
 # Relative error of a value that counts as exact: rounding of a few thousand operations.
 ROUNDED = 4096.0 * EPS
-ErrorNorm = Callable[[Floats], float]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,7 +27,7 @@ class ReferenceValue(Summary):
     value : array_like
         A number or an array of any shape.
     error : float
-        Error of ``value`` in the problem's first norm; 0 if ``value`` is exact to rounding.
+        Error of ``value`` in the problem's norm; 0 if ``value`` is exact to rounding.
     source : str
         Origin in words, such as "closed form", "beams", "2^24 rays of independent Sobol sequences".
     made_by : tuple of str
@@ -67,38 +65,17 @@ class ReferenceValue(Summary):
         return self.error <= ROUNDED * max(1.0, float(np.max(np.abs(self.value), initial=0.0)))
 
 
-def absolute(difference: Floats) -> float:
-    """The largest modulus of an entry."""
-    return float(np.max(np.abs(difference), initial=0.0))
-
-
-def frobenius(difference: Floats) -> float:
-    """The root of the sum of squares."""
-    return float(np.linalg.norm(difference))
-
-
-def operator_norm(difference: Floats) -> float:
-    """The largest singular value of a matrix."""
-    return float(np.linalg.norm(difference, 2))
-
-
-NUMBER_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({"absolute": absolute})
-ARRAY_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({"Frobenius": frobenius, "largest entry": absolute})
-MATRIX_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({**ARRAY_NORMS, "operator": operator_norm})
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class WorkProblem(Summary):
-    """A quantity with its reference values and error norms.
+    """A quantity with its reference values and the norm of errors.
 
     Parameters
     ----------
     name : str
     references : ReferenceValue or tuple of ReferenceValue
         A method is compared with the first reference that does not share its code.
-    norms : mapping of str to callable, optional
-        Norms of the difference of a value from its reference. The first one is used for orders and fronts. By default
-        ``absolute`` for a number; ``Frobenius``, ``largest entry`` and, for matrices, ``operator`` for arrays.
+    norm : callable, optional
+        Norm of the difference of a value from its reference, by default the root of the sum of squares.
     auto : str
         Name of the method by which the library chooses a method itself.
 
@@ -110,13 +87,13 @@ class WorkProblem(Summary):
     Examples
     --------
     >>> problem = WorkProblem("one third", ReferenceValue(1 / 3, 0.0, "by hand"))
-    >>> list(problem.norms), problem.errors(0.5, "any method")
-    (['absolute'], {'absolute': 0.16666666666666669})
+    >>> round(problem.error(0.5, "any method"), 12)
+    0.166666666667
     """
 
     name: str
     references: tuple[ReferenceValue, ...]
-    norms: Mapping[str, ErrorNorm] = field(default_factory=dict)
+    norm: Callable[[Floats], Any] = np.linalg.norm
     auto: str = "auto"
 
     def __post_init__(self) -> None:
@@ -127,10 +104,7 @@ class WorkProblem(Summary):
         shapes = {reference.value.shape for reference in given}
         if len(shapes) > 1:
             raise InputError(f"references: expected values of one shape, got {sorted(shapes)}")
-        dimension = given[0].value.ndim
-        usual = (NUMBER_NORMS, ARRAY_NORMS, MATRIX_NORMS)[min(dimension, 2)]
         object.__setattr__(self, "references", given)
-        object.__setattr__(self, "norms", MappingProxyType(dict(self.norms or usual)))
 
     def reference_for(self, method: str) -> ReferenceValue:
         """The first reference that does not share its code with ``method``; an InputError if there is none."""
@@ -139,13 +113,13 @@ class WorkProblem(Summary):
                 return reference
         raise InputError(f"{self.name}: method {method!r} made every reference; add one that is independent of it")
 
-    def errors(self, value: Any, method: str) -> dict[str, float]:
-        """The norms of ``value`` minus the reference for ``method``."""
+    def error(self, value: Any, method: str) -> float:
+        """The norm of ``value`` minus the reference for ``method``."""
         reference = self.reference_for(method).value
         found = np.asarray(value, dtype=np.float64)
         if found.shape != reference.shape:
             raise InputError(f"{method}: expected a value of shape {reference.shape}, got {found.shape}")
-        return {name: norm(found - reference) for name, norm in self.norms.items()}
+        return float(self.norm(found - reference))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from math import sqrt
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 RowStatus = Literal["done", "failed", "timed out", "left out"]
-FORMAT = 1
+FORMAT = 2
 # Errors below this multiple of the error of the reference are not significant.
 ABOVE_REFERENCE = 3.0
 MARKERS = "osv^D<>Ph*X"
@@ -42,8 +42,8 @@ class WorkRow(Summary):
     budget : float
     status : {"done", "failed", "timed out", "left out"}
         ``"left out"`` if a smaller budget reached the time limit.
-    errors : mapping of str to float
-        Errors by norm; for a random method root mean squares over the repeats.
+    error : float or None
+        Norm of the error; for a random method the root mean square over the repeats.
     seconds : tuple of float
         Wall time of every repeat.
     reported : float or None
@@ -53,7 +53,7 @@ class WorkRow(Summary):
 
     Examples
     --------
-    >>> row = WorkRow("midpoint", 8, "done", {"absolute": 1e-3}, (0.2, 0.1, 0.4))
+    >>> row = WorkRow("midpoint", 8, "done", 1e-3, (0.2, 0.1, 0.4))
     >>> row.least, round(row.spread, 12)
     (0.1, 3.0)
     """
@@ -61,7 +61,7 @@ class WorkRow(Summary):
     method: str
     budget: float
     status: RowStatus
-    errors: Mapping[str, float] = field(default_factory=dict)
+    error: float | None = None
     seconds: tuple[float, ...] = ()
     reported: float | None = None
     note: str = ""
@@ -69,7 +69,6 @@ class WorkRow(Summary):
     def __post_init__(self) -> None:
         choice("status", self.status, get_args(RowStatus))
         object.__setattr__(self, "budget", float(self.budget))
-        object.__setattr__(self, "errors", MappingProxyType(dict(self.errors)))
         object.__setattr__(self, "seconds", tuple(map(float, self.seconds)))
 
     @property
@@ -87,22 +86,11 @@ class WorkRow(Summary):
         """Range of the times of the repeats as a fraction of the least time."""
         return (max(self.seconds) - self.least) / self.least if self.seconds else 0.0
 
-    def as_dict(self) -> dict[str, Any]:
-        """A dictionary of plain values for JSON."""
-        plain = {name: getattr(self, name) for name in ("method", "budget", "status", "reported", "note")}
-        return {**plain, "errors": dict(self.errors), "seconds": list(self.seconds)}
-
-    @classmethod
-    def of_dict(cls, data: Mapping[str, Any]) -> WorkRow:
-        """The row from the result of `as_dict`."""
-        return cls(**{**data, "seconds": tuple(data["seconds"])})
-
 
 def table_of(report: WorkReport) -> str:
     """The Markdown table of a report, see `WorkReport.table`."""
     front = set(map(id, report.front()))
-    norms = " | ".join(f"{norm} error" for norm in report.norms)
-    heads = f"method | budget | {norms} | reported | seconds | spread | "
+    heads = "method | budget | error | reported | seconds | spread | "
     lines = [table(heads, (_cells(report, row, id(row) in front) for row in report.rows)), ""]
     for name, record in report.methods.items():
         words = f"- {name}: against {record.reference} (known to {record.floor:.1e})"
@@ -124,11 +112,11 @@ def table_of(report: WorkReport) -> str:
 def _cells(report: WorkReport, row: WorkRow, in_front: bool) -> list[str]:
     name = f"**{row.method}**" if row.method == report.auto else row.method
     if not row.is_done:
-        return [name, f"{row.budget:g}", *["-"] * (len(report.norms) + 3), f"{row.status}: {row.note}"]
-    errors = [report.methods[row.method].in_words(row.errors[norm]) for norm in report.norms]
+        return [name, f"{row.budget:g}", *["-"] * 4, f"{row.status}: {row.note}"]
+    error = report.methods[row.method].in_words(row.error or 0.0)
     reported = "-" if row.reported is None else f"{row.reported:.1e}"
     marks = [mark for mark, holds in (("front", in_front), (row.note, bool(row.note))) if holds]
-    return [name, f"{row.budget:g}", *errors, reported, f"{row.least:.2g}", f"{row.spread:.0%}", ", ".join(marks)]
+    return [name, f"{row.budget:g}", error, reported, f"{row.least:.2g}", f"{row.spread:.0%}", ", ".join(marks)]
 
 
 @dataclass(frozen=True)
@@ -162,8 +150,6 @@ class WorkReport(Summary):
     Attributes
     ----------
     problem : str
-    norms : tuple of str
-        Error norms; the first one is used for orders, the front and the choice.
     auto : str
         Name of the method by which the library chooses a method itself.
     methods : mapping of str to MethodFacts
@@ -176,12 +162,11 @@ class WorkReport(Summary):
     >>> problem = spec.WorkProblem("one third", spec.ReferenceValue(1 / 3, 0.0, "by hand"))
     >>> decimals = spec.WorkMethod("decimals", lambda n: round(1 / 3, n))
     >>> report = spec.work_precision(problem, [decimals], [1, 2, 3], repeats=1)
-    >>> [f"{row.errors['absolute']:.1e}" for row in report.rows]
+    >>> [f"{row.error:.1e}" for row in report.rows]
     ['3.3e-02', '3.3e-03', '3.3e-04']
     """
 
     problem: str
-    norms: tuple[str, ...]
     auto: str
     methods: Mapping[str, MethodFacts]
     machine: Machine
@@ -193,7 +178,7 @@ class WorkReport(Summary):
 
     def _facts(self) -> dict[str, str]:
         """Of each method on the front the least error there, with the time that it took."""
-        return {row.method: f"error {self.error(row):.1e} in {row.least:.2g} s" for row in self.front()}
+        return {row.method: f"error {row.error:.1e} in {row.least:.2g} s" for row in self.front()}
 
     @classmethod
     def of(cls, problem: WorkProblem, methods: Sequence[WorkMethod], machine: Machine) -> WorkReport:
@@ -204,7 +189,7 @@ class WorkReport(Summary):
             size = float(np.max(np.abs(reference.value), initial=0.0))
             floor = max(reference.error, ROUNDED * size, ROUNDED * np.finfo(np.float64).tiny)
             records[method.name] = MethodFacts(method.order, method.is_random, reference.source, floor)
-        return cls(problem.name, tuple(problem.norms), problem.auto, MappingProxyType(records), machine)
+        return cls(problem.name, problem.auto, MappingProxyType(records), machine)
 
     def with_row(self, row: WorkRow) -> WorkReport:
         """The report with an additional row."""
@@ -215,76 +200,62 @@ class WorkReport(Summary):
 
         Rows of a method that was compared with another reference are left out, so that they are measured again.
         """
-        if (earlier.problem, earlier.norms) != (self.problem, self.norms):
+        if earlier.problem != self.problem:
             raise InputError(f"path: expected rows of {self.problem!r}, got {earlier.problem!r}; name another file")
-        if not earlier.machine.is_comparable_with(self.machine):
+        if (earlier.machine.processor, earlier.machine.cores) != (self.machine.processor, self.machine.cores):
             raise InputError(f"path: its times are of {earlier.machine}, not of {self.machine}; name another file")
         methods = {**earlier.methods, **self.methods}
         rows = tuple(row for row in earlier.rows if earlier.methods.get(row.method) == methods.get(row.method))
         return replace(self, methods=MappingProxyType(methods), rows=rows)
 
-    def error(self, row: WorkRow) -> float:
-        """Error of a completed row in the first norm."""
-        return row.errors[self.norms[0]]
-
     def level(self, row: WorkRow) -> float:
         """The error of a row, or the reported error if less and the former is not significant; at least rounding."""
         floor = self.methods[row.method].floor
-        error = max(self.error(row), floor)
+        error = max(row.error or 0.0, floor)
         if error > ABOVE_REFERENCE * floor or row.reported is None:
             return error
         return max(min(row.reported, error), min(floor, ROUNDED))
 
-    def lasting_level(self, row: WorkRow, *, known: bool = False) -> float:
-        """The largest `level` at this and all larger budgets of the row's method.
-
-        A small error by chance at a single budget therefore does not count. With ``known``, it is the maximum of level
-        and reported error, where a missing report counts as infinite.
-        """
-        later = [other for other in self._done(row.method) if other.budget >= row.budget]
-        levels = [self.level(other) for other in later]
-        if known:
-            levels += [float("inf") if other.reported is None else other.reported for other in later]
-        return max(levels)
+    def lasting_level(self, row: WorkRow) -> float:
+        """The largest `level` at this and all larger budgets: a small error by chance at one budget does not count."""
+        return max(self.level(other) for other in self._done(row.method) if other.budget >= row.budget)
 
     def order(self, method: str) -> FittedOrder | None:
         """The order in the budget, fitted to the significant errors; None for fewer than three of them."""
         least = ABOVE_REFERENCE * self.methods[method].floor
-        rows = [row for row in self._done(method) if self.error(row) > least]
+        rows = [(row.budget, row.error, len(row.seconds)) for row in self._done(method) if (row.error or 0.0) > least]
         if not rows:
             return None
-        repeats = [len(row.seconds) for row in rows] if self.methods[method].is_random else None
-        return fit_order([row.budget for row in rows], [self.error(row) for row in rows], repeats)
+        budgets, errors, repeats = zip(*rows, strict=True)
+        return fit_order(budgets, errors, repeats if self.methods[method].is_random else None)
 
     def front(self) -> tuple[WorkRow, ...]:
         """The Pareto front: rows not surpassed by another in both error (see `level`) and least time, fastest first."""
         found: list[WorkRow] = []
-        for row in sorted(self._done(), key=lambda row: (row.least, self.error(row))):
+        for row in sorted(self._done(), key=lambda row: (row.least, row.error)):
             if not found or self.level(row) < self.level(found[-1]):
                 found.append(row)
         return tuple(found)
 
-    def choice(self, *, known: bool = False) -> float | None:
+    def choice(self) -> float | None:
         """Largest ratio, over the rows of ``auto``, of its time to the best time of the other methods at equal error.
 
-        Times between the rows of a method are interpolated logarithmically. Errors are taken from `lasting_level`: true
-        errors or, with ``known``, errors that the method also reports. None without rows of both kinds.
+        Times between the rows of a method are interpolated logarithmically. Errors are taken from `lasting_level`. None
+        without rows of both kinds.
         """
         ratios = []
         for row in self._done(self.auto):
-            error = self.lasting_level(row, known=known)
+            error = self.lasting_level(row)
             others = (name for name in self.methods if name != self.auto)
-            times = [time for name in others if (time := self._time_to(name, error, known)) is not None]
+            times = [time for name in others if (time := self._time_to(name, error)) is not None]
             if times:
                 ratios.append(row.least / min(times))
         return max(ratios, default=None)
 
     def to_frame(self) -> Any:
-        """One row a measurement, as a pandas.DataFrame (extra ``studies``); errors have a column a norm."""
-        names = ("method", "budget", "status", "reported", "note", "least", "spread")
-        columns = {name: [getattr(row, name) for row in self.rows] for name in names}  # names of fields of a row
-        errors = {f"{norm} error": [row.errors.get(norm, np.nan) for row in self.rows] for norm in self.norms}
-        return data_frame({**columns, **errors})
+        """One row a measurement, as a pandas.DataFrame (extra ``studies``)."""
+        names = ("method", "budget", "status", "error", "reported", "note", "least", "spread")
+        return data_frame({name: [getattr(row, name) for row in self.rows] for name in names})
 
     def table(self) -> str:
         """A Markdown table, followed by references, orders, choice and machine."""
@@ -299,11 +270,10 @@ class WorkReport(Summary):
         data = {
             "format": FORMAT,
             "problem": self.problem,
-            "norms": list(self.norms),
             "auto": self.auto,
-            "methods": {name: dict(record.__dict__) for name, record in self.methods.items()},
-            "machine": self.machine.as_dict(),
-            "rows": [row.as_dict() for row in self.rows],
+            "methods": {name: asdict(method) for name, method in self.methods.items()},
+            "machine": asdict(self.machine),
+            "rows": [asdict(row) for row in self.rows],
         }
         return json.dumps(data, indent=1, allow_nan=False)
 
@@ -315,20 +285,19 @@ class WorkReport(Summary):
             if data["format"] != FORMAT:
                 raise InputError(f"JSON: expected format {FORMAT} of a report, got {data['format']!r}")
             methods = {name: MethodFacts(**record) for name, record in data["methods"].items()}
-            rows = tuple(WorkRow.of_dict(row) for row in data["rows"])
-            machine = Machine.of_dict(data["machine"])
-            return cls(data["problem"], tuple(data["norms"]), data["auto"], MappingProxyType(methods), machine, rows)
+            rows = tuple(WorkRow(**row) for row in data["rows"])
+            return cls(data["problem"], data["auto"], MappingProxyType(methods), Machine(**data["machine"]), rows)
         except (ValueError, KeyError, TypeError, RecursionError) as reason:
             raise InputError(f"JSON: expected what WorkReport.to_json() gives: {reason!r}") from reason
 
     def _done(self, method: str | None = None) -> list[WorkRow]:
         return [row for row in self.rows if row.is_done and method in (None, row.method)]
 
-    def _time_to(self, method: str, error: float, known: bool) -> float | None:
+    def _time_to(self, method: str, error: float) -> float | None:
         """The time after which a method has at most this error, now and at larger budgets; None if it never does."""
         best: list[tuple[float, float]] = []
         for row in sorted(self._done(method), key=lambda row: row.least):
-            level = self.lasting_level(row, known=known)
+            level = self.lasting_level(row)
             if level < (best[-1][1] if best else float("inf")):
                 best.append((row.least, level))
         if not best or best[-1][1] > error:
@@ -360,7 +329,7 @@ def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
             color="black" if chosen else f"C{number}", fillstyle="none" if chosen else "full", label=verbatim(name),
         )  # fmt: skip
     ax.axhline(max(floors), color="0.5", linestyle=":", linewidth=1.0, label="reference known to")
-    ax.set(xscale="log", yscale="log", xlabel="seconds", ylabel=verbatim(f"{report.norms[0]} error"))
+    ax.set(xscale="log", yscale="log", xlabel="seconds", ylabel="error")
     ax.set_title(verbatim(report.problem))
     from matplotlib.ticker import NullFormatter
 

@@ -15,7 +15,7 @@ from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate
 from ...core.files import regular_file, text_of, write_whole
 from ...kernels import KernelMatrix
-from .machine import Machine, on_few_cores
+from .machine import Machine, on_one_core
 from .problem import WorkMethod, WorkProblem
 from .report import WorkReport, WorkRow
 
@@ -34,7 +34,7 @@ def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: in
     An AsperityError, ArithmeticError, LinAlgError or MemoryError becomes a row with its message.
     """
     times: list[float] = []
-    errors: list[dict[str, float]] = []
+    errors: list[float] = []
     reports: list[float | None] = []
     spent = 0.0
     try:
@@ -44,15 +44,14 @@ def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: in
             times.append(time.perf_counter() - start)
             spent += times[-1]
             value, reported, note = parts_of(result)
-            errors.append(problem.errors(value, method.name))
+            errors.append(problem.error(value, method.name))
             reports.append(reported)
     except FAILURES as reason:
         words = " ".join(f"{type(reason).__name__}: {reason}".split())
         return WorkRow(method.name, budget, "failed", seconds=tuple(times), note=words)
-    norms = {name: _root_mean_square([one[name] for one in errors]) for name in problem.norms}
     known = [one for one in reports if one is not None]
     together = _root_mean_square(known) if len(known) == len(reports) else None
-    return WorkRow(method.name, budget, "done", norms, tuple(times), together, note)
+    return WorkRow(method.name, budget, "done", _root_mean_square(errors), tuple(times), together, note)
 
 
 def _root_mean_square(values: Sequence[float]) -> float:
@@ -86,16 +85,15 @@ def work_precision(
     repeats: int = 5,
     seconds: float = 60.0,
     warm_up: bool = True,
-    threads: int = 1,
     path: str | PathLike[str] | None = None,
     runner: Runner = measure,
 ) -> WorkReport:
-    """Measure the error against the run time of several methods for one quantity.
+    """Measure the error against the run time of several methods for one quantity, on one core.
 
     Parameters
     ----------
     problem : WorkProblem
-        The quantity, its references and the norms of the error.
+        The quantity, its references and the norm of the error.
     methods : sequence of WorkMethod
     budgets : sequence of numbers, or mapping from a method's name to one
         Budgets of every method, measured in increasing order.
@@ -106,8 +104,6 @@ def work_precision(
         budgets of the method are left out. A running computation is ended only by a ``runner`` with a hard limit.
     warm_up : bool
         Whether each method first runs once, untimed, at its smallest budget, for compilation and loading.
-    threads : int
-        Number of cores that the measurement is pinned to, and of threads of the linear algebra.
     path : path-like, optional
         A JSON file that is written after every row. If it exists, its rows are reused and only the rest is measured.
     runner : callable
@@ -135,13 +131,12 @@ def work_precision(
     """
     whole_number("repeats", repeats, 1)
     positive_number("seconds", seconds)
-    whole_number("threads", threads, 1)
     ladders = _ladders(methods, budgets)
-    report = WorkReport.of(problem, methods, Machine.here(threads))
+    report = WorkReport.of(problem, methods, Machine.here())
     file = None if path is None else Path(path)
     if file is not None and regular_file(file).exists():
         report = report.continued(WorkReport.of_json(text_of(file)))
-    with on_few_cores(threads):
+    with on_one_core():
         for method in methods:
             earlier = [row for row in report.rows if row.method == method.name]
             for row in _climb(problem, method, ladders[method.name], earlier, (repeats, seconds, warm_up, runner)):

@@ -319,16 +319,17 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
       asperity ensemble gaussian:length=0.3 --points 12 --rms-slope 0.1 --smooth --quantity gap_specular --out gaussian
       asperity ensemble self-affine:hurst=0.8 --rms-slope 0.2 --quantity resistance,accommodation --out affine
     """
+    from .geometry import random_wall
     from .kernels import Bins
     from .spectral import ensemble as over_random_walls
     from .spectral import mean_law
     from .spectral.sweeps.folder import LAW_CHECKPOINT, MEAN_LAW, save_ensemble
-    from .spectral.sweeps.named_families import RandomFamily, spectrum_from_text
+    from .spectral.sweeps.named_families import spectrum_from_text
 
     kind = {name: given.pop(name) for name in ("points", "rms_slope", "rms_height", "period", "smooth")}
-    family = RandomFamily(spectrum_from_text(spectrum), **kind)
+    family = partial(random_wall, spectrum_from_text(spectrum), **kind)
     # a wall that cannot be made is refused before the work
-    family(seed)
+    family(rng=seed)
     found = _run_in_folder(partial(over_random_walls, family, walls, rng=seed), out, **given)
     click.echo(repr(found))
     for path in save_ensemble(found, out):
@@ -494,8 +495,7 @@ def bench(problems: tuple[str, ...], quick: bool, out: Path, force: bool) -> Non
     names = known.problem_names(problems)
     run.prepare_folder(out, names, force=force)
     effort = standard_set.QUICK if quick else standard_set.FULL
-    reports = standard_set.run_problems(names, effort, out, lambda line: click.echo(line, err=True))
-    found = run.BenchRun(tuple(reports))
-    click.echo(found.summary())
-    for path in found.save(out):
+    found = list(standard_set.run_problems(names, effort, out, lambda line: click.echo(line, err=True)))
+    click.echo(run.summary(found))
+    for path in run.save(found, out):
         click.echo(f"wrote {path}", err=True)

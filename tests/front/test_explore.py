@@ -76,9 +76,9 @@ def test_the_first_interval_holds_the_gap_for_95_of_100_generators():
 @pytest.mark.parametrize("wall", [TEETH, geo.triangular_teeth(0.7), geo.flat()], ids=["skew", "symmetric", "flat"])
 def test_polygons_are_answered_exactly_at_once(wall, convention):
     first = first_answer(Question(wall, "polygon", convention=convention))
-    assert first.matrix.method == "exact"
-    assert first.matrix.frame == convention
-    assert float(first.matrix.error) < 1e-10
+    assert first.kernel.method == "exact"
+    assert first.kernel.frame == convention
+    assert float(first.kernel.error) < 1e-10
     assert (first.gap.value, first.gap.error, first.gap.verdict) == (0.0, 0.0, "no gap")
 
 
@@ -92,8 +92,8 @@ def test_answers_improve_and_agree_with_each_other():
         assert abs(earlier.gap.value - later.gap.value) <= earlier.gap.error + later.gap.error
         mine, yours = earlier.collision.mean, later.collision.mean
         assert abs(mine.value - yours.value) <= 2.0 * (mine.error + yours.error)
-    assert found[-1].eigenvalues.of == "the law"
-    assert found[-1].eigenvalues.values[1] == pytest.approx(1.0 - found[-1].gap.value, abs=1e-4)
+    assert found[-1].spectrum.of == "the law"
+    assert found[-1].spectrum.values[1] == pytest.approx(1.0 - found[-1].gap.value, abs=1e-4)
 
 
 def test_intervals_of_the_histogram_hold_the_probabilities():
@@ -127,15 +127,15 @@ def test_the_histogram_reaches_the_extreme_velocities_of_energy_and_rolling_mome
 def test_foreshortening_shows_the_law_that_the_disk_feels():
     disk = geo.Disk(1.0, 0.5)
     first = first_answer(Question(TEETH, "teeth", disk, foreshortened=True))
-    felt = ker.discretise(ker.WallLaw(TEETH.foreshorten(disk)), first.matrix.basis)
-    assert np.abs(first.matrix.array - felt.array).max() < 1e-12
+    felt = ker.discretise(ker.WallLaw(TEETH.foreshorten(disk)), first.kernel.basis)
+    assert np.abs(first.kernel.array - felt.array).max() < 1e-12
     plain = first_answer(Question(TEETH, "teeth", disk)).collision
     assert np.array_equal(first.collision.fractions, plain.fractions)
 
 
 def test_a_refusal_replaces_an_earlier_one():
-    answer = Answer("coarse").refused("gap", "first").refused("spectrum", "other").refused("gap", "second")
-    assert answer.refusals == (("spectrum", "other"), ("gap", "second"))
+    answer = Answer("coarse").refused("first", "gap", "spectrum").refused("second", "gap")
+    assert answer.refusals == {"gap": "second", "spectrum": "first"}
 
 
 # -- computations of other processes

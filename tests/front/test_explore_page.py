@@ -1,13 +1,11 @@
 """The page in a real browser: load, drag, change, profiles, phone, dark, save, two tabs; and who may ask the server."""
 
-import asyncio
 import http.client
 import io
 import re
 import shutil
 import signal
 import time
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -340,33 +338,26 @@ def answer_to(server, path=None, method="GET", **headers):
             return response.status
 
 
-def test_other_hosts_and_origins_are_refused(server):
-    own = f"127.0.0.1:{server.port}"
-    assert answer_to(server) == 200
-    assert answer_to(server, Host=f"localhost:{server.port}") == 200
+# What a browser sends to open a websocket.
+UPGRADE = {
+    "Connection": "Upgrade",
+    "Upgrade": "websocket",
+    "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "A" * 24,
+}
+
+
+@pytest.mark.parametrize("upgrade", [{}, UPGRADE], ids=["page", "websocket"])
+def test_other_hosts_origins_and_tokens_are_refused(server, upgrade):
+    own, path = f"127.0.0.1:{server.port}", f"{server.path}ws" if upgrade else None
+    for host in (own, f"localhost:{server.port}"):
+        assert answer_to(server, path, Host=host, Origin=f"http://{host}", **upgrade) == (101 if upgrade else 200)
     for host in ("evil.example", f"evil.example:{server.port}", "127.0.0.1", f"{own}.evil.example"):
-        assert answer_to(server, Host=host) == 403, host
-    assert answer_to(server, Origin=f"http://{own}") == 200
+        assert answer_to(server, path, Host=host, **upgrade) == 403, host
     for origin in ("http://evil.example", "null", f"http://{own}.evil.example", f"https://{own}"):
-        assert answer_to(server, Origin=origin) == 403, origin
-
-
-@pytest.mark.parametrize(("header", "path"), [("Origin", None), ("Host", None), ("X", "/"), ("X", f"/{'A' * 43}/")])
-def test_the_websocket_refuses_other_origins_hosts_and_tokens(server, header, path):
-    from tornado.httpclient import HTTPClientError, HTTPRequest
-    from tornado.websocket import websocket_connect
-
-    async def connect():
-        headers = {
-            "Origin": f"http://127.0.0.1:{server.port}",
-            header: {"Origin": "http://evil.example"}.get(header, "evil.example"),
-        }
-        request = HTTPRequest(f"ws://127.0.0.1:{server.port}{path or server.path}ws", headers=headers)
-        await websocket_connect(request, subprotocols=["bokeh", "token"])
-
-    # a thread of its own, because playwright's loop runs in this one
-    with ThreadPoolExecutor(1) as pool, pytest.raises(HTTPClientError, match="403"):
-        pool.submit(asyncio.run, connect()).result()
+        assert answer_to(server, path, Origin=origin, **upgrade) == 403, origin
+    for token in ("/", f"/{'A' * 43}/"):
+        assert answer_to(server, f"{token}ws", Origin=f"http://{own}", **upgrade) == 403, token
 
 
 # The module's name comes first in the addresses of panel's handler of components, which imports it.

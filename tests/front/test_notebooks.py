@@ -103,7 +103,7 @@ def test_an_estimate_has_no_arithmetic():
             lambda: ker.limit_study(
                 geo.Disk(), geo.triangular_teeth(1.0), [0.1, 0.05, 0.02], np.random.default_rng(0), samples=(4, 4, 4)
             ),
-            ["scale", "spacing", "distance", "distance_error", "seconds"], 3,
+            ["scale", "spacing", "distance", "distance_error", "shift"], 3,
         ),
     ],
     ids=["spectrum", "enclosures", "work", "limit"],
@@ -114,13 +114,30 @@ def test_a_table_of_results_is_a_data_frame(make, columns, rows):
     assert set(columns) <= set(frame.columns) and len(frame) == rows
 
 
-def test_without_pandas_or_xarray_the_message_names_the_extra(monkeypatch):
-    for library, make in (
-        ("pandas", spec.spectrum(LAW, k=2).to_frame), ("xarray", ker.discretise(LAW, ker.Bins(2)).to_xarray),
-    ):  # fmt: skip
-        monkeypatch.setitem(sys.modules, library, None)
-        with pytest.raises(InputError, match=r"asperity\[studies\]"):
-            make()
+SWEPT = spec.sweep(ker.maxwell, {"diffuse_fraction": [0.5]})
+
+
+@pytest.mark.parametrize(
+    ("library", "call", "extra"),
+    [
+        ("pandas", lambda: spec.spectrum(LAW, k=2).to_frame(), "studies"),
+        ("xarray", lambda: ker.discretise(LAW, ker.Bins(2)).to_xarray(), "studies"),
+        ("pandas", SWEPT.to_frame, "studies"),
+        ("xarray", SWEPT.to_xarray, "studies"),
+        ("SurfaceTopography", lambda: geo.read_profile("scan.opd"), "profiles"),
+        (
+            "SurfaceTopography.Generation",
+            lambda: geo.random_wall(geo.HeightCorrelation(1), 16, rms_slope=1),
+            "profiles",
+        ),
+    ],
+)
+def test_without_a_library_the_message_names_the_extra(library, call, extra, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00\x01" * 20)
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(InputError, match=rf"asperity\[{extra}\]"):
+        call()
 
 
 @pytest.mark.parametrize("frame", ["paper", "specular"])

@@ -10,7 +10,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import AsperityError, FileExistsRefusal, InputError
+from asperity.errors import FileExistsRefusal, InputError
 from asperity.kernels.inverse.named_laws import law_from_text
 from commands import run
 
@@ -110,13 +110,6 @@ def test_where_nothing_can_be_written_every_writer_says_so_before_its_work(name,
         pytest.skip("not on this system")
     with at_once(), pytest.raises((InputError, FileExistsRefusal)):
         WRITERS[name](path)
-
-
-@pytest.mark.parametrize("encoding", ["undefined", "klingon", "hex", "idna", "\0", "", 3])
-def test_an_encoding_that_reads_no_text_is_refused_by_name(encoding, tmp_path):
-    (tmp_path / "scan.txt").write_bytes(b"# \xc3\xb6\n0 1\n1 2\n")
-    with pytest.raises(AsperityError, match="encoding"):
-        geo.read_profile(tmp_path / "scan.txt", encoding=encoding)
 
 
 @pytest.mark.skipif(not Path("/proc/kcore").exists(), reason="not on this system")

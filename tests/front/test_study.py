@@ -4,7 +4,6 @@ import json
 import math
 import re
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,10 +14,9 @@ from asperity import spectral as spec
 from asperity.errors import AccuracyError, FileExistsRefusal, InputError
 from asperity.study import DATA, PICTURES, check_tracer, pictures, study_wall
 from asperity.study.pictures import draw_study_wall
+from wall_shapes import over_floor, square
 
 TOLERANCE = 1e-2
-POST = [(0.4, -0.4), (0.4, -0.2), (0.6, -0.2), (0.6, -0.4), (0.4, -0.4)]
-ISLAND = [geo.Segment(p, q) for p, q in pairwise(POST)]
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +54,7 @@ def test_the_gaps_are_those_of_the_library_and_of_the_reference(arcs):
 def test_the_disk_feels_the_foreshortened_wall(arcs):
     deeper = geo.focusing_arcs(1.2).foreshorten(geo.Disk(1.0, 0.5))
     assert arcs.collision.law == ker.WallLaw(deeper)
-    assert "1.73205 times as deep" in arcs.summary(verbose=True)  # (1 + m/J)^(1/2)
+    assert "1.732 times as deep" in arcs.summary()  # (1 + m/J)^(1/2)
 
 
 def test_collisions_keep_energy_and_rolling_momentum(arcs):
@@ -69,9 +67,7 @@ def test_mean_collisions_agree_with_kac(arcs, teeth):
     assert teeth.tracer.expected_collisions == pytest.approx(5.0, rel=1e-14)  # two sides of height 1, a floor of 1/2
     for report in (arcs, teeth):
         assert abs(report.tracer.z_score) < 4.5
-        assert "out of reach" not in report.summary(verbose=True) and "Kac's formula presumes" not in report.summary(
-            verbose=True
-        )
+        assert "Kac's formula presumes" not in report.summary(verbose=True)
         assert sum(report.tracer.counts.values()) == report.tracer.counts["escaped"] == 2**16
 
 
@@ -90,15 +86,15 @@ def test_too_many_collisions_are_called_a_defect(teeth):
 def test_a_polygon_has_no_gap_and_the_summary_says_so(teeth):
     assert teeth.gap.verdict == teeth.specular_gap.verdict == teeth.collision_gap.verdict == "no gap"
     text = teeth.summary(verbose=True)
-    assert text.count("0 (no gap)") == 3 and "they belong to the grid" in text
+    assert text.count("0 no gap") == 3 and "they belong to the grid" in text
 
 
 def test_the_summary_names_method_error_tolerance_and_both_conventions(arcs):
     text = arcs.summary(verbose=True)
-    assert "Bins(32) by quadrature: Frobenius error" in text and f"tolerance {0.01 * math.sqrt(32):g} met" in text
+    assert "Bins(32) by quadrature, Frobenius error" in text and text.count("tolerance 0.01 met") == 3
     # the foreshortened arc is elliptic and has no closed form
     assert f"{arcs.collision_matrix.samples} rays" in text and "against the sampling noise" in text
-    assert "paper convention: 0.63" in text and "specular convention: 0.6" in text
+    assert all(line in text for gap in (arcs.gap, arcs.specular_gap) for line in (gap.method, *gap.evidence))
 
 
 def test_the_consequences_are_those_of_the_library(arcs, teeth):
@@ -108,11 +104,11 @@ def test_the_consequences_are_those_of_the_library(arcs, teeth):
     assert abs(float(found.relaxation_time) + 1 / math.log(0.3670253152)) <= found.relaxation_time.error
     # a grazing ray leaves an arc at a finite angle: D is that of diffuse walls
     assert found.diffusion.eta == pytest.approx(1.0, abs=1e-5)
-    assert "relaxation time" in arcs.summary(verbose=True) and "D = 1.27" in arcs.summary(verbose=True)
+    assert f"slem {found.slem} " in arcs.summary(verbose=True) and "D = 1.27" in arcs.summary()
     for text in (arcs.summary(), arcs.summary(verbose=True)):
         assert "the slope of L^2/tau against ln(L/r) for L well above" in text
     assert not math.isfinite(teeth.consequences.relaxation_time.error)
-    assert "no relaxation time" in teeth.summary(verbose=True)
+    assert "relaxation infinite" in teeth.summary()
 
 
 def test_the_eigenvalues_and_enclosures_can_be_quoted(arcs, teeth):
@@ -136,13 +132,13 @@ def test_the_eigenvalues_and_enclosures_can_be_quoted(arcs, teeth):
 def test_a_tolerance_that_was_not_met_is_said_loudly(teeth):
     missed = replace(teeth.matrix, error=replace(teeth.matrix.error, value=0.5, error=0.5))
     # 1e-3 for each of 16 bins
-    assert "Frobenius error 0.5 (bound), tolerance 0.004 NOT met" in replace(teeth, matrix=missed).summary(verbose=True)
+    assert "Frobenius error 0.5, tolerance 0.004 NOT met" in replace(teeth, matrix=missed).summary()
 
 
 def test_a_gap_that_was_not_decided_is_not_rounded_away(arcs):
     open_question = replace(arcs.gap, value=0.71234, error=0.71234, verdict="undecided")
     text = replace(arcs, gap=open_question).summary(verbose=True)
-    assert "paper convention: not decided; 0.7123 at the finest basis, error up to 0.71" in text
+    assert "0.7123 with error 0.71, tolerance 0.01 NOT met" in text
 
 
 def test_a_law_without_mirror_axis_is_said_not_to_be_self_adjoint_and_contracts_by_the_slem():
@@ -150,13 +146,11 @@ def test_a_law_without_mirror_axis_is_said_not_to_be_self_adjoint_and_contracts_
     report = study_wall(wall, bins=8, tolerance=0.1)
     gap = report.as_dict()["gap"]["specular"]
     assert (gap["self_adjoint"], gap["value"], gap["verdict"]) == (False, 0.0, "no gap")
-    assert "P_F is not known to be self-adjoint" in report.summary(
-        verbose=True
-    ) and "mean 0 is 1 (no gap)" in report.summary(verbose=True)
+    assert "norm 1 on functions of mean 0, not self-adjoint" in report.summary()
     curved = geo.Wall([geo.Bezier([(0, 0), (0.1, -0.3), (0.7, -0.25), (1, 0)])])
     report = study_wall(curved, bins=8, tolerance=0.1)
     assert report.consequences.slem.value == 1.0 - report.specular_gap.value
-    assert "a step shrinks functions of mean 0 by the factor 0.40" in report.summary(verbose=True)
+    assert "norm 0.40" in report.summary() and "best constant for one step" in report.summary(verbose=True)
 
 
 def test_the_summary_lists_all_eigenvalues_by_modulus(arcs):
@@ -250,7 +244,7 @@ def test_the_summary_of_a_profile_begins_with_momentum_and_any_with_a_disk_that_
 
 
 def test_no_line_of_a_report_says_none(arcs, teeth):
-    open_wall = study_wall(geo.Wall([geo.Segment((0, -0.5), (1, -0.5))], 1.0, [ISLAND]), bins=4, tolerance=0.1)
+    open_wall = study_wall(over_floor(square(0.4, -0.4, 0.2)), bins=4, tolerance=0.1)
     skew = study_wall(geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (0.7, -0.1), (1, 0)]), bins=8, tolerance=0.1)
     refused = replace(teeth, accommodation=None, refusals={**teeth.refusals, "accommodation": "too rough"})
     for report in (arcs, teeth, open_wall, skew, refused):

@@ -39,7 +39,6 @@ for call in (
     lambda: ker.discretise(ker.lambertian(), ker.Bins(2), "monte-carlo", samples=64, rng=MATRIX),
     lambda: ker.CollisionLaw(ker.lambertian(), geo.Disk()).sample([[0.0, -1.0, 0.0]], MATRIX),
     lambda: ker.CircularArcLaw(1.2).apply(np.cos, MATRIX),
-    lambda: ker.CircularArcLaw(1.2).pieces(MATRIX),
     lambda: ker.RectangularTeethLaw(1.0).conditionals(MATRIX, degree=0, edges=[1.0]),
     lambda: ker.WallLaw(geo.elliptical_arcs(1.0)).conditionals(MATRIX, degree=0, edges=[1.0]),
 ):
@@ -98,7 +97,6 @@ def test_the_door_of_sources_takes_what_numpy_recommends():
         "ker.specular().sample({value}, {source})",
         "ker.WallLaw(geo.flat()).sample({value}, {source})",
         "ker.PositionLaw([0.0, 1.0], [ker.specular()]).sample(0.5, {value}, {source})",
-        "ker.SpringWall(0.5, 0.0).sample_polar(1.0, {value}, {source})",
         "ker.CollisionLaw(ker.specular(), geo.Disk()).sample({velocity}, {source})",
         "ker.SatelliteLaw(geo.flat(), geo.Disk(), 0.01).sample({velocity}, {source})",
     ],

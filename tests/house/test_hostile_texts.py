@@ -12,7 +12,6 @@ import pytest
 import sympy as sp
 
 from asperity import InputError, verify
-from asperity.bench.run import BenchRun
 from asperity.core.checkpoints import Checkpoint
 from asperity.explore.files import opened
 from asperity.geometry import load_wall, read_profile, wall_from_text
@@ -142,7 +141,6 @@ DOORS = {
     "a quantity": quantities_from,
     "a table of a sweep": SweepTable.of_json,
     "a report of work": WorkReport.of_json,
-    "a run of benchmarks": BenchRun.of_json,
     "a checkpoint": lambda text: Checkpoint(written(text, "run.checkpoint"), {}),
     "the description in a checkpoint": lambda text: checkpoint_of("", text, "1"),
     "a part of a checkpoint": lambda text: checkpoint_of(text, "{}", text),

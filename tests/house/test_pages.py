@@ -1,7 +1,6 @@
 """Examples and scripts of pages run and are right, and the reference lists all public names."""
 
 import importlib
-import importlib.util
 import inspect
 import math
 import re
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaigns.engine import campaigns
+from docs import reference
 
 import asperity
 from asperity import geometry as geo
@@ -31,14 +31,6 @@ def run(monkeypatch):
     monkeypatch.setattr(pyplot, "show", lambda: None)
     yield lambda name, folder="how-to": runpy.run_path(str(DOCS / folder / f"{name}.py"))
     pyplot.close("all")
-
-
-@pytest.fixture(scope="module")
-def reference():
-    spec = importlib.util.spec_from_file_location("docs_reference", DOCS / "reference.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_the_wall_and_its_law(run):
@@ -208,7 +200,7 @@ def test_every_campaign_of_the_table_has_a_section():
     assert {anchor for _, anchor, *_ in rows} == headings
 
 
-def test_every_short_example_is_in_the_story_and_runs_here(reference):
+def test_every_short_example_is_in_the_story_and_runs_here():
     assert sorted(reference.STORY) == HOW_TO
     # `make check` builds the documentation without running them
     text = Path(__file__).read_text(encoding="utf-8")
@@ -228,7 +220,7 @@ def test_small_pictures_of_pages_are_drawn_and_exist(tmp_path, monkeypatch):
     assert all((DOCS / name).exists() or (tmp_path / name).stat().st_size > 2000 for name in names)
 
 
-def test_the_reference_lists_every_public_name_once(reference, tmp_path):
+def test_the_reference_lists_every_public_name_once(tmp_path):
     reference.write_pages(tmp_path)
     listed = [
         line.strip().removeprefix("~")
@@ -243,7 +235,7 @@ def test_the_reference_lists_every_public_name_once(reference, tmp_path):
     assert "automodule:: asperity.geometry.disk.symbolic" in by_hand and "   verify\n" in by_hand
 
 
-def test_classes_that_functions_return_are_documented_with_them_and_are_no_public_names(reference):
+def test_classes_that_functions_return_are_documented_with_them_and_are_no_public_names():
     documented = {name for names in reference.returned_classes().values() for name in names}
     for name in documented:
         module, _, last = name.rpartition(".")
@@ -258,13 +250,13 @@ def test_classes_that_functions_return_are_documented_with_them_and_are_no_publi
                 assert public or f"{found.__module__}.{found.__name__}" in documented, function
 
 
-def test_a_folder_without_a_task_has_its_own_page(reference, monkeypatch, tmp_path):
+def test_a_folder_without_a_task_has_its_own_page(monkeypatch, tmp_path):
     monkeypatch.setattr(reference, "TASKS", reference.TASKS[1:])
     reference.write_pages(tmp_path)
     assert "asperity.geometry.Wall" in (tmp_path / "task-geometry-walls.rst").read_text(encoding="utf-8")
 
 
-def test_inventories_have_the_links_of_the_table(reference, tmp_path):
+def test_inventories_have_the_links_of_the_table(tmp_path):
     found = reference.write_inventories(DOCS / "links.txt", tmp_path)
     assert set(found) == {"python", "numpy", "scipy", "matplotlib"}
     head, packed = Path(found["matplotlib"]).read_bytes().split(b"by zlib.\n")
@@ -311,7 +303,7 @@ def test_the_scripts_on_a_page_run_in_small(page, blocks, tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize("room", ["geometry", "kernels", "spectral"])
-def test_the_help_of_a_room_lists_each_public_name_once_below_what_people_do(reference, room):
+def test_the_help_of_a_room_lists_each_public_name_once_below_what_people_do(room):
     module = importlib.import_module(f"asperity.{room}")
     lines = [line.partition(": ") for line in module.__doc__.split("\n- ")[1:]]
     listed = [name for _, _, names in lines for name in re.findall(r"\w+", names)]

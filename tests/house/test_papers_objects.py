@@ -1,7 +1,6 @@
 """The table of the paper's objects: each name exists; and the figures of the paper: each is drawn by one call."""
 
 import doctest
-import importlib.util
 import inspect
 import math
 import re
@@ -9,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from docs.examples import paper_figures as figures
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from asperity import geometry as geo
@@ -26,16 +26,6 @@ ROWS = [
 NAMES = sorted({name for row in ROWS for name in re.findall(r"`([^`]+)`", row[-1].strip(" |"))})
 
 
-def load_figures():
-    spec_of = importlib.util.spec_from_file_location("paper_figures", DOCS / "examples" / "paper_figures.py")
-    module = importlib.util.module_from_spec(spec_of)
-    spec_of.loader.exec_module(module)
-    return module
-
-
-FIGURES = load_figures()
-
-
 def test_every_row_has_an_object_a_section_and_a_name():
     assert len(ROWS) > 70
     for row in ROWS:
@@ -44,12 +34,8 @@ def test_every_row_has_an_object_a_section_and_a_name():
         assert re.fullmatch(r"`[^`]+`(, `[^`]+`)*", name), row
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name.startswith("asperity ")])
-def test_every_command_of_the_table_exists(name, capsys):
-    with pytest.raises(SystemExit) as left:
-        command([name.split()[1], "--help"])
-    assert left.value.code == 0
-    assert name.split()[1] in capsys.readouterr().out
+def test_every_command_of_the_table_exists():
+    assert {name.split()[1] for name in NAMES if name.startswith("asperity ")} <= set(command.commands)
 
 
 TEETH, DISK = geo.triangular_teeth(math.pi / 2), geo.Disk(1.0, 1 / 3)
@@ -115,13 +101,13 @@ def test_objects_that_work_by_their_examples_have_no_second_check():
 
 
 def test_the_paper_has_eighteen_figures_with_captions():
-    names = [figure.__name__ for figure in FIGURES.FIGURES]
+    names = [figure.__name__ for figure in figures.FIGURES]
     assert len(names) == len(set(names)) == 18
-    assert all(re.search(r"\(section \d.*\)\.$", figure.__doc__) for figure in FIGURES.FIGURES)
-    assert FIGURES.page().count("```{figure}") == 18
+    assert all(re.search(r"\(section \d.*\)\.$", figure.__doc__) for figure in figures.FIGURES)
+    assert figures.page().count("```{figure}") == 18
 
 
-@pytest.mark.parametrize("figure", FIGURES.FIGURES, ids=lambda figure: figure.__name__)
+@pytest.mark.parametrize("figure", figures.FIGURES, ids=lambda figure: figure.__name__)
 def test_every_figure_is_drawn_by_one_call(figure):
     drawn = figure()
     drawn.set_dpi(40)
@@ -133,6 +119,6 @@ def test_every_figure_is_drawn_by_one_call(figure):
 
 
 def test_all_figures_are_written_with_their_number(tmp_path, monkeypatch):
-    monkeypatch.setattr(FIGURES, "FIGURES", FIGURES.FIGURES[2:4])
-    assert FIGURES.main(tmp_path / "figures") == {"figures": 2}
+    monkeypatch.setattr(figures, "FIGURES", figures.FIGURES[2:4])
+    assert figures.main(tmp_path / "figures") == {"figures": 2}
     assert all(path.stat().st_size > 2000 for path in (tmp_path / "figures").iterdir())

@@ -1,70 +1,42 @@
-"""The peers' environment: made from scratch, and where a peer cannot be had, a row that says so."""
+"""Other programs: what one that is not there, fails or hangs says in its row, and the rows."""
+
+import sys
 
 import numpy as np
 import pytest
 from campaigns.speed import peers
 
 
-@pytest.fixture
-def data(tmp_path):
-    file = tmp_path / "chain.npz"
-    np.savez(file, matrix=np.eye(2), gap=0.5)
-    return file
+def environment(folder):
+    """An environment whose Python is this one, without any peer."""
+    python = folder / "environment" / "bin" / "python"
+    python.parent.mkdir(parents=True)
+    python.write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
+    python.chmod(0o755)
+    return folder
 
 
-def commands(monkeypatch, **codes):
-    """Replace processes by what they would say; returns the commands that were asked for."""
-    asked = []
-
-    def run(command, **options):
-        asked.append(command)
-        word = next(word for word in ("venv", "--version", "install", "peer_worker") if word in " ".join(command))
-        code, out, err = codes.get(word.strip("-"), (0, '{"gap": 0.5}\n', ""))
-        return peers.subprocess.CompletedProcess(command, code, out, err)
-
-    monkeypatch.setattr(peers.subprocess, "run", run)
-    return asked
+def test_a_peer_that_is_not_there_or_hangs_says_so(tmp_path, monkeypatch):
+    assert "No such file" in peers.answer_of("deeptime", tmp_path, matrix=np.eye(2), wanted=2)
+    refusal = peers.answer_of("no_such_peer", environment(tmp_path), matrix=np.eye(2), wanted=2)
+    assert refusal == "fails: KeyError: 'no_such_peer'"
+    monkeypatch.setattr(peers, "SECONDS", 0.01)
+    assert "timed out" in peers.answer_of("deeptime", tmp_path, matrix=np.eye(2), wanted=2)
 
 
-def test_the_environment_is_made_once_and_each_package_installed_once(tmp_path, data, monkeypatch):
-    asked = commands(monkeypatch)
-    environment = peers.PeerEnvironment(tmp_path / "environment")
-    assert environment.run("deeptime", "deeptime", data) == {"gap": 0.5}
-    assert environment.run("deeptime", "deeptime", data) == {"gap": 0.5}
-    assert ["venv" in command for command in asked] == [True, False, False, False]
-    assert ["install" in command for command in asked] == [False, True, False, False]
-
-
-def test_without_an_index_the_row_says_so_and_the_others_go_on(tmp_path, data, monkeypatch):
-    asked = commands(monkeypatch, install=(1, "", "WARNING: retrying\nERROR: No matching | distribution\n"))
-    environment = peers.PeerEnvironment(tmp_path / "environment")
-    refusal = environment.run("deeptime", "deeptime", data)
-    assert refusal == "cannot be installed: ERROR: No matching / distribution"
-    assert environment.run("deeptime", "deeptime", data) == refusal
-    assert len(asked) == 2
-
-
-def test_a_peer_that_fails_or_an_environment_that_cannot_be_made_is_a_row(tmp_path, data, monkeypatch):
-    commands(monkeypatch, peer_worker=(1, "", "IndexError: index -1\n"))
-    assert peers.PeerEnvironment(tmp_path / "a").run("pydtmc", "PyDTMC", data) == "fails: IndexError: index -1"
-    commands(monkeypatch, venv=(1, "ensurepip is not available\n", ""))
-    found = peers.PeerEnvironment(tmp_path / "b").run("pydtmc", "PyDTMC", data)
-    assert found == "no environment: ensurepip is not available"
-
-
-def test_the_limits_hold(tmp_path, data, monkeypatch):
-    monkeypatch.setattr(peers, "MAKE_SECONDS", 0.01)
-    assert "ended after 0 s" in peers.PeerEnvironment(tmp_path / "a").run("deeptime", "deeptime", data)
-    monkeypatch.setattr(peers, "ALL_SECONDS", 0.0)
-    assert "time was up" in peers.PeerEnvironment(tmp_path / "b").run("deeptime", "deeptime", data)
+def test_a_peer_answers_by_json(tmp_path, monkeypatch):
+    worker = tmp_path / "worker.py"
+    worker.write_text("print('loading')\nprint('{\"gaps\": [0.5]}')\n")
+    monkeypatch.setattr(peers, "WORKER", worker)
+    assert peers.answer_of("deeptime", environment(tmp_path), matrix=np.eye(2), wanted=2) == {"gaps": [0.5]}
 
 
 def test_every_solver_has_a_row_for_every_gap(tmp_path, monkeypatch):
-    monkeypatch.setattr(peers.PeerEnvironment, "run", lambda *_: "not here")
+    monkeypatch.setattr(peers, "answer_of", lambda *_, **__: "not here")
     monkeypatch.setattr(peers, "MAXWELL_GAPS", (0.5,))
-    rows = list(peers.solve_with_all(tmp_path, peers.PeerEnvironment(tmp_path / "environment")))
-    assert [row[3] for row in rows] == [0, "-", "-"]
-    assert [row[-1] for row in rows if row[3] == "-"] == ["not here"] * 2
+    rows = list(peers.solve_with_all(tmp_path))
+    assert [row[3] for row in rows] == [0, "-"]
+    assert [row[-1] for row in rows if row[3] == "-"] == ["not here"]
 
 
 def test_a_gap_that_is_missing_or_no_number_is_wrong():
@@ -75,11 +47,11 @@ def test_a_gap_that_is_missing_or_no_number_is_wrong():
 
 def test_every_tracer_has_a_row_for_every_polygon_and_the_picture_is_drawn(tmp_path, monkeypatch):
     answers = {"embree": {"version": "1", "rate": 1e6, "wrong": 0.1, "lost": 0.2, "error": 1e-6}, "mitsuba": "fails"}
-    monkeypatch.setattr(peers.PeerEnvironment, "run", lambda self, peer, *_: answers[peer])
+    monkeypatch.setattr(peers, "answer_of", lambda peer, *_, **__: answers[peer])
     monkeypatch.setattr(peers, "SIDES", (10,))
     monkeypatch.setattr(peers, "RAYS", 2**8)
     measured = []
-    rows = list(peers.trace_with_all(tmp_path, peers.PeerEnvironment(tmp_path / "environment"), measured))
+    rows = list(peers.trace_with_all(tmp_path, measured))
     assert [row[0] for row in rows] == [2, 2, 2, 10, 10, 10] and [row[3] for row in rows][2::3] == ["fails"] * 2
     assert [(sides, tracer) for sides, tracer, *_ in measured][1::2] == [(2, "embree"), (10, "embree")]
     assert measured[1][2:] == pytest.approx((1e6, 0.3))

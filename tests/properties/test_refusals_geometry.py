@@ -100,7 +100,6 @@ PROFILES = [
     (vertices([0, 1], ["a", "b"]), "height"),
     (vertices([0, 1], [0, nan]), r"height: .* index \(1,\)"),
     (vertices([0, 1], [0, 1], "glue"), "seam: expected 'mirror', 'step' or 'wrap', got 'glue'"),
-    (vertices([0, 1, 3], [0, -1, -2], "wrap"), "'wrap' expects equal steps"),
     (lambda: Wall.from_profile([0, 1, 2], np.ma.array([1, 7, 2], mask=[0, 1, 0])), "1 of 3 heights are undefined"),
     (random_wall(), "expected one of rms_slope and rms_height"),
     (random_wall(rms_slope=-1.0), "rms_slope: expected"),
@@ -133,7 +132,7 @@ def study(scales=(0.01,), **changed):
 
 DISKS = [
     (lambda: geo.Disk(mass=0.0), "mass"), (lambda: geo.Disk(inertia=-1.0), "inertia"),
-    (lambda: geo.Disk(mass=nan), "mass"), (lambda: geo.Disk(2.0, 1.0, 2.0), r"moves as Disk\(mass=2.0, inertia=0.25\)"),
+    (lambda: geo.Disk(mass=nan), "mass"),
     (lambda: DISK.to_angles([(1.0, 1.0, 0.0), (1.0, 0.0, 0.0)]), r"got v2 = 0\.0 at index \(1,\);"),
     (lambda: DISK.to_angles((1.0, -1.0, 0.0)), r"v2 > 0, got v2 = -1\.0;"),
     (lambda: DISK.to_angles([(1, 1, 0), (1, -0.5, 7), (1, 0, 0)]), r"got v2 = -0\.5 at index \(1,\);"),
@@ -206,7 +205,6 @@ TABLES = [
     (table(), "at least one curve"),
     (table(Arc((0.5, 1e6), 1e6, -pi / 2 - 5e-7, -pi / 2 + 5e-7).pinned((0, 0), (1, 0)), *UNIT[1:]), "almost straight"),
     (lambda: geo.Container.strip().area, "outer loop"), (lambda: geo.Container.sinai(1.0, 0.5), r"\(0, 0\.5\)"),
-    (played(CIRCLE, ker.specular()), r"specular\(\), a law of angles.*CollisionLaw\(law, disk\)"),
     (played(CIRCLE, ker.smooth(DISK), (2.0, 0.0)), "centres in the container"),
     (played(geo.Container.stadium(1.0, 0.5), [ker.smooth(DISK)]), "the 4 walls"),
     (lambda: geo.nested_reflection(TWO, [0], [0.5], [0.4]), "on openings"),
@@ -376,13 +374,14 @@ def test_a_file_is_refused_in_one_line_with_its_name(name, content, words, tmp_p
         ({"decimal": ";"}, "decimal"), ({"delimiter": ""}, "delimiter"),
         ({"delimiter": ",", "decimal": ","}, "delimiter"), ({"usecols": 3}, "usecols"),
         ({"usecols": (0, -1)}, "usecols"),
-        ({"skiprows": -1}, "skiprows"), ({"encoding": "klingon"}, "encoding"), ({"encoding": 3}, "encoding"),
+        ({"skiprows": -1}, "skiprows"), 
+        *(({"encoding": name}, "encoding") for name in ("undefined", "klingon", "hex", "idna", "\0", "", 3)),
         ({"units": ("um", "V")}, "units"), ({"units": ("um",)}, "units"), ({"units": 3}, "units"),
     ],
 )  # fmt: skip
 def test_unsuitable_options_of_a_profile_are_refused_by_name(options, name, tmp_path):
-    (tmp_path / "scan.txt").write_text("0,1\n1,2\n")
-    with pytest.raises(InputError, match=f"^{name}: expected"):
+    (tmp_path / "scan.txt").write_text("# ö\n0,1\n1,2\n", encoding="utf-8")
+    with pytest.raises(InputError, match=rf"^{name}: expected|pass {name}="):
         geo.read_profile(tmp_path / "scan.txt", **options)
 
 

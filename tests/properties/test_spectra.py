@@ -20,7 +20,7 @@ def test_its_matrix_in_polynomials_is_diagonal(diagonal) -> None:
 
 def test_its_largest_eigenvalues_come_with_errors_and_parities(diagonal) -> None:
     law, exact = diagonal
-    found = spec.spectrum(law, k=6, basis=ker.Legendre(24))
+    found = spec.spectrum(ker.discretise(law, ker.Legendre(24)), k=6)
     assert np.all(np.diff(found.values) <= 0.0) and found.convention == law.frame
     moduli = np.sort(np.abs(found.values))[::-1]
     assert np.all(np.abs(moduli - np.sort(np.abs(exact[:24]))[::-1][:6]) <= 1e-12) and found.residuals.max() < 1e-12

@@ -1,9 +1,8 @@
-"""Progress: bars on a terminal and in a notebook, lines elsewhere, and an end at Ctrl-C."""
+"""Progress: bars on a terminal and in a notebook, and lines elsewhere."""
 
 import io
 import multiprocessing
 import re
-import signal
 import sys
 import time
 from types import ModuleType
@@ -19,7 +18,6 @@ from asperity import spectral as spec
 from asperity.core import long_runs
 from asperity.core.long_runs import progress_bar
 from asperity.kernels.discretisation import discretisation
-from commands import started
 
 
 class Terminal(io.StringIO):
@@ -160,37 +158,3 @@ def test_short_work_and_a_quiet_process_report_nothing(monkeypatch):
     with long_runs.reported("matrix", 40.0):
         slow_parts()
     assert stream.getvalue() == ""
-
-
-INTERRUPTED = """
-import signal, time
-from asperity import geometry as geo, kernels as ker, spectral as spec
-# a background job ignores it from birth
-signal.signal(signal.SIGINT, signal.default_int_handler)
-wall = ker.WallLaw(geo.dispersing_arcs(1.0))
-print(flush=True)
-{call}
-"""
-CALLS = {
-    "rays": "ker.discretise(wall, ker.Bins(64), 'monte-carlo', samples=2**32)",
-    "quadrature": "ker.discretise(wall, ker.Bins(600), 'quadrature', 1e-12)",
-    "gap": "spec.spectral_gap(ker.WallLaw(geo.mushrooms(0.3, 0.2)), 1e-9, time_limit=1e4)",
-    "transmission": "spec.transmission(wall, 20.0, tolerance=1e-7)",
-    "proof": "spec.prove_gap(ker.CircularArcLaw(0.9), 1e-12)",
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
-def test_ctrl_c_ends_a_long_call_at_once(call):
-    with started("-c", INTERRUPTED.format(call=call)) as process:
-        process.stdout.readline()
-        time.sleep(3.0)
-        begun = time.monotonic()
-        process.send_signal(signal.SIGINT)
-        try:
-            _, errors = process.communicate(timeout=60.0)
-        finally:
-            process.kill()
-    # a second, and the end of the process on a busy machine
-    assert "KeyboardInterrupt" in errors and time.monotonic() - begun < 5.0

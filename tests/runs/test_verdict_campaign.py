@@ -104,7 +104,6 @@ def test_the_spectrum_of_a_law_carries_its_verdict():
     teeth = spec.spectrum(ker.TriangularTeethLaw(0.7), 4)
     assert (teeth.verdict, teeth.gap, teeth.slem, teeth.gap_error) == ("no gap", 0.0, 1.0, 0.0)
     assert "no gap" in repr(teeth) and teeth.evidence
-    assert spec.spectrum(ker.TriangularTeethLaw(0.7), 4, basis=ker.Bins(16)).verdict == "no gap"
     semicircle = spec.spectrum(ker.CircularArcLaw(np.pi / 2), 3, tolerance=1e-3)
     assert semicircle.verdict == "essential edge" and abs(semicircle.slem - 3 / 8 * np.log(9)) <= semicircle.gap_error
     matrix = spec.spectrum(ker.discretise(ARC, ker.Bins(8)), 3)
@@ -135,7 +134,7 @@ def test_a_wall_without_mirror_axis_says_at_once_that_it_is_not_self_adjoint():
                 ask(turned, 3)
     gap = spec.spectral_gap(ARROW.in_specular_frame())
     assert (gap.verdict, gap.value, gap.error, gap.self_adjoint) == ("no gap", 0.0, 0.0, False)
-    assert "is not self-adjoint" in gap.evidence[0] and "||P J f|| <= slem ||f||" in gap.evidence[1]
+    assert "not known to be self-adjoint" in gap.evidence[0] and "||P J f|| <= slem ||f||" in gap.evidence[1]
     assert ker.CircularArcLaw(1.2).in_specular_frame().reversible and spec.spectral_gap(ker.maxwell(0.5)).self_adjoint
 
 
@@ -154,4 +153,4 @@ def test_the_command_line_says_so_too(tmp_path):
     done = run("gap", path, "--specular", "--enclose", 2)
     assert done.exit_code == 0
     assert done.output.startswith("not known to be self-adjoint, 1 - norm on functions of mean 0: 0 ")
-    assert "is not self-adjoint" in done.output and "enclosures refused" in done.output
+    assert "not known to be self-adjoint" in done.output and "enclosures refused" in done.output

@@ -17,7 +17,7 @@ from asperity.errors import AccuracyError
 
 def test_laws_without_mirror_symmetry_have_no_parities():
     law = ker.MatrixLaw([[0.6, 0.3, 0.1], [0.3, 0.5, 0.2], [0.1, 0.2, 0.7]])
-    assert set(spec.spectrum(law, k=3, basis=ker.Bins(3)).parity) == {"none"}
+    assert set(spec.spectrum(law, k=3).parity) == {"none"}
 
 
 # ---- mixing -----------------------------------------------------------------------------------------------------
@@ -35,17 +35,6 @@ def test_mixing_times_bound_the_distance_that_powers_of_the_matrix_have():
         after = np.linalg.matrix_power(matrix.array, found.steps) @ density
         assert measure(after) <= 0.05
         assert found.earliest <= found.steps
-
-
-def test_a_point_needs_a_law_with_a_density():
-    found = spec.mixing_time(ker.henyey_greenstein(0.5), 0.01, start=1.0)
-    assert found.steps > 1
-
-
-def test_implied_time_scales_are_those_of_the_eigenvalues():
-    scales, intervals = spec.spectrum(ker.henyey_greenstein(0.5), k=4).implied_time_scales()
-    assert np.allclose(scales, 1 / (np.log(2) * np.arange(1, 4)))
-    assert np.all(intervals[:, 0] <= scales) and np.all(scales <= intervals[:, 1])
 
 
 def test_the_eigenfunctions_that_are_drawn_are_the_legendre_polynomials():

@@ -17,7 +17,7 @@ def test_published_gap_of_dispersing_bumps():
     assert abs(float(gap) - 0.0373) < 5e-5
     assert gap.error < 1e-4
     # a matrix of polynomials has no smaller one
-    assert spec.spectrum(law, k=2, basis=ker.Legendre(12)).gap >= float(gap) - gap.error
+    assert spec.spectrum(ker.discretise(law, ker.Legendre(12)), k=2).gap >= float(gap) - gap.error
 
 
 @pytest.mark.parametrize(
@@ -30,7 +30,7 @@ def test_published_gap_of_dispersing_bumps():
 )
 def test_an_eigenvalue_is_the_rayleigh_quotient_of_traced_rays(law, wall, degree):
     """1 - lambda = E (phi(theta) - phi(pi - theta'))^2 / 2 over the flux, by z-score over 8 nets of 2^15 rays."""
-    found = spec.spectrum(law.in_specular_frame(), k=2, basis=ker.Legendre(degree))
+    found = spec.spectrum(ker.discretise(law.in_specular_frame(), ker.Legendre(degree)), k=2)
     means = []
     for seed in range(8):
         x, u = np.clip(Sobol(2, rng=np.random.default_rng(seed)).random(2**15).T, 1e-15, 1 - 1e-15)
@@ -47,7 +47,7 @@ def test_an_eigenvalue_is_the_rayleigh_quotient_of_traced_rays(law, wall, degree
 def test_sampling_error_of_an_eigenvalue_is_calibrated(method, symmetrise):
     """z-scores of 60 seeds for lambda_2 of a bins matrix against the exact matrix: standard normal by size."""
     law, basis = ker.CircularArcLaw(1.0), ker.Bins(8)
-    exact = spec.spectrum(law, k=2, basis=basis).values[1]
+    exact = spec.spectrum(ker.discretise(law, basis), k=2).values[1]
     scores = []
     for seed in range(60):
         rng = np.random.default_rng(seed)
@@ -63,19 +63,19 @@ def test_sampling_error_of_an_eigenvalue_is_calibrated(method, symmetrise):
 
 
 def test_a_multiple_eigenvalue_one_is_not_mixed_up_with_constants():
-    found = spec.spectrum(ker.retroreflection(), k=6, basis=ker.Legendre(12))
+    found = spec.spectrum(ker.discretise(ker.retroreflection(), ker.Legendre(12)), k=6)
     assert np.allclose(found.values, 1.0, atol=1e-13)
     assert found.gap == pytest.approx(0.0, abs=1e-13)
 
 
 def test_a_small_matrix_has_fewer_eigenvalues_than_asked_for():
-    assert len(spec.spectrum(ker.specular(), k=10, basis=ker.Legendre(8)).values) == 8
+    assert len(spec.spectrum(ker.discretise(ker.specular(), ker.Legendre(8)), k=10).values) == 8
 
 
 @pytest.mark.parametrize("degree", [6, 8, 12, 16, 24, 32])
 def test_the_error_of_an_eigenvalue_holds_in_small_bases(degree):
     """Facts 10: the second eigenvalue of focusing arcs, xi = 1.2, is 0.3670253152(3)."""
-    found = spec.spectrum(ker.CircularArcLaw(1.2), k=2, basis=ker.Legendre(degree))
+    found = spec.spectrum(ker.discretise(ker.CircularArcLaw(1.2), ker.Legendre(degree)), k=2)
     low, high = found.intervals[1]
     assert low <= 0.3670253152 <= high
 

@@ -283,13 +283,6 @@ def test_one_small_change_is_not_taken_for_convergence():
     assert abs(float(rough) - float(fine)) + fine.error < rough.error
 
 
-def test_iterations_give_what_elimination_gives(monkeypatch):
-    matrix, flights = np.diag(0.8 ** np.arange(24.0)), clausing._planar_flights(24, 5.0)
-    found = clausing._solved(flights, matrix, 5.0, 8)[0]
-    monkeypatch.setattr(clausing, "MOST_DIRECT", 4000)
-    assert float(found) == pytest.approx(clausing._solved(flights, matrix, 5.0, 8)[0], abs=1e-9)
-
-
 def test_laws_that_keep_functions_of_all_degrees_are_left_to_flights():
     for law in (ker.retroreflection(), SAW, ker.RectangularTeethLaw(1.0)):
         assert clausing._by_polynomials(law, 4.0, 1e-2, np.random.default_rng(0)).error == math.inf

@@ -11,7 +11,8 @@ import numpy as np
 from ..core.checks import Floats
 from ..core.errors import InputError
 from ..spectral import ReferenceValue, WorkMethod, WorkProblem
-from ..spectral.work_diagrams.machine import on_few_cores
+from ..spectral.work_diagrams.machine import on_one_core
+from ..spectral.work_diagrams.report import WorkRow
 from ..spectral.work_diagrams.runs import measure, parts_of, solve_once
 from .quantities.collision import COLLISION, DISK, TRUE_DISK, by_true_disks
 from .quantities.matrix import DISTANCE, LAW, MOMENT, RESISTANCE
@@ -65,7 +66,7 @@ def prepare(scene: str) -> None:
     from ..geometry import trace
     from ..geometry.polygons.beams import beams_of
     from ..kernels import Legendre, WallLaw, discretise
-    from ..kernels.walls.conditionals import adaptive_conditionals
+    from ..kernels.walls.conditionals import WallConditionals
 
     if scene in DIFFUSE:
         return
@@ -75,7 +76,7 @@ def prepare(scene: str) -> None:
         trace(one, [0.3, 0.6], [1.0, 2.0])
         # rays towards corners require more than double precision
         trace(one, np.clip(one.vertices[:, 0], 0.0, np.nextafter(one.period, 0.0)), 0.5 * np.pi)
-        adaptive_conditionals(one, [1.0], 1e-2)
+        WallConditionals(one, 1, np.empty(0))(np.array([1.0]), 1e-2)
     if wall.is_polygonal:
         beams_of([(0.0, 0.0), (0.3, -0.5), (0.6, -0.4), (1.0, 0.0)])
     if scene in TRUE_DISK.scenes:
@@ -96,10 +97,10 @@ def _method(problem: str, name: str) -> WorkMethod:
 
 def measured(
     name: str, references: tuple[ReferenceValue, ...], method: str, budget: float, repeats: int, seconds: float
-) -> dict[str, object]:
-    """One row, measured in this process on one core, as a dictionary."""
-    with on_few_cores(1), np.errstate(all="ignore"):
-        return measure(WorkProblem(name, references), _method(name, method), budget, repeats, seconds).as_dict()
+) -> WorkRow:
+    """One row, measured in this process on one core."""
+    with on_one_core(), np.errstate(all="ignore"):
+        return measure(WorkProblem(name, references), _method(name, method), budget, repeats, seconds)
 
 
 def value_of(name: str, method: str, budget: float) -> tuple[Floats, float | None, str]:

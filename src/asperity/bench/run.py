@@ -1,124 +1,76 @@
-"""One run of the benchmark: its reports, summary, files and figures."""
+"""What a run of the benchmark writes: summary, tables, data and figures of its reports."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.errors import FileExistsRefusal, InputError
-from ..core.estimates import Summary
 from ..core.files import moved_when_complete
 from ..core.tables import table
 from ..spectral import WorkReport
+from ..spectral.work_diagrams.order import OrderVerdict
 from ..spectral.work_diagrams.report import WorkRow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMAT = 1
+FORMAT = 2
 SUMMARY, TABLES, DATA = "summary.md", "tables.md", "bench.json"
 # The library's choice is good if its time is within this factor of the best method's at equal error.
 GOOD_CHOICE = 2.0
 COLUMNS, WIDTH, HEIGHT = 3, 4.6, 3.8
 
 
-@dataclass(frozen=True, repr=False)
-class BenchRun(Summary):
-    """Reports on problems, in the order in which they were run.
+def summary(reports: Sequence[WorkReport]) -> str:
+    """The library's choice beside the best method for each problem; declared orders, references, the machine."""
+    heads = "problem | chosen | error | reported | seconds | times the best at equal error | front"
+    references = (
+        (report.problem, source, f"{floor:.1e}")
+        for report in reports
+        for source, floor in dict.fromkeys((record.reference, record.floor) for record in report.methods.values())
+    )
+    choices = [choice for report in reports if (choice := report.choice()) is not None]
+    good, orders = sum(choice <= GOOD_CHOICE for choice in choices), Counter(_order_verdicts(reports))
+    words = (
+        f"The library chooses within a factor {GOOD_CHOICE:g} of the best in {good} of the {len(choices)} problems "
+        f"where another method gets as far. Declared orders: {orders['agrees']} agree within 0.15, "
+        f"{orders['differs']} differ, {orders['not resolved']} are not resolved (their 95 % interval holds the "
+        "declared one, but is wide)."
+    )
+    parts = [table(heads, map(_cells, reports)), words, table("problem | reference | known to", references)]
+    parts += [f"Machine: {report.machine}." for report in reports[:1]]
+    return "\n\n".join(parts)
 
-    Attributes
-    ----------
-    reports : tuple of WorkReport
-    """
 
-    reports: tuple[WorkReport, ...]
-    _more = ".summary(), .tables(), .save(folder)"
+def _order_verdicts(reports: Sequence[WorkReport]) -> Iterator[OrderVerdict]:
+    """Whether each declared order that can be fitted agrees with the fit."""
+    for report in reports:
+        for name, record in report.methods.items():
+            fitted = report.order(name)
+            if record.declared_order is not None and fitted is not None:
+                yield fitted.verdict(record.declared_order)
 
-    def summary(self) -> str:
-        """The library's choice beside the best method for each problem; declared orders, references, the machine."""
-        heads = "problem | chosen | error | reported | seconds"
-        heads += " | times the best at equal error | at equal known error | front"
-        references = (
-            (report.problem, source, f"{floor:.1e}")
-            for report in self.reports
-            for source, floor in dict.fromkeys((record.reference, record.floor) for record in report.methods.values())
-        )
-        parts = [table(heads, map(_cells, self.reports)), *self._choices(), *self._orders()]
-        parts += [table("problem | reference | known to", references)]
-        parts += [f"Machine: {report.machine}." for report in self.reports[:1]]
-        return "\n\n".join(parts)
 
-    def _choices(self) -> list[str]:
-        """The number of good choices in words, and a list of the others."""
-        choosing = [report for report in self.reports if report.auto in report.methods]
-        done = [report for report in choosing if any(row.is_done for row in _chosen(report))]
-        choices = {report.problem: choice for report in done if (choice := report.choice()) is not None}
-        slow = [
-            f"- {problem}: {choice:.2g} times the best" for problem, choice in choices.items() if choice > GOOD_CHOICE
-        ]
-        known = [choice for report in done if (choice := report.choice(known=True)) is not None]
-        words = (
-            f"The library chooses in {len(choosing)} problems. It is within a factor {GOOD_CHOICE:g} of the best on "
-            f"{len(choices) - len(slow)} of the {len(choices)} where another method gets as far; on "
-            f"{len(done) - len(choices)} none does; on {len(choosing) - len(done)} it was not done in time. Where "
-            f"errors count as far as they are known, it is within that factor on "
-            f"{sum(choice <= GOOD_CHOICE for choice in known)} of {len(known)}."
-        )
-        return [words, "\n".join(slow)] if slow else [words]
-
-    def _orders(self) -> list[str]:
-        """The number of declared orders that the fits confirm in words, and a list of those that they contradict."""
-        verdicts, differ = [], []
-        for report in self.reports:
-            for name, record in report.methods.items():
-                fitted = report.order(name)
-                if record.declared_order is None or fitted is None:
-                    continue
-                verdicts.append(fitted.verdict(record.declared_order))
-                if verdicts[-1] == "differs":
-                    differ.append(f"- differs: {report.problem}, {name}: {fitted}, declared {record.declared_order:g}")
-        words = (
-            f"Declared orders: {verdicts.count('agrees')} agree within 0.15, {len(differ)} differ, "
-            f"{verdicts.count('not resolved')} are not resolved (their 95 % interval holds the declared one, but is "
-            "wide)."
-        )
-        return [words, "\n".join(differ)] if differ else [words]
-
-    def tables(self) -> str:
-        """Tables of all rows, one for each problem."""
-        return "\n\n".join(f"## {report.problem}\n\n{report.table()}" for report in self.reports)
-
-    def save(self, folder: Path) -> list[Path]:
-        """Write summary, tables, data and a figure for each scene; return the written paths."""
-        texts = {SUMMARY: self.summary(), TABLES: self.tables(), DATA: self.to_json()}
-        drawn = [report for report in self.reports if any(row.is_done for row in report.rows)]
-        drawn.sort(key=lambda report: scene_of(report.problem))
-        with moved_when_complete(folder) as beside:
-            for name, text in texts.items():
-                (beside / name).write_text(text + "\n", encoding="utf-8")
-            for scene, reports in groupby(drawn, key=lambda report: scene_of(report.problem)):
-                _draw(list(reports)).savefig(beside / f"{label(scene)}.png", dpi=100)
-            names = sorted(path.name for path in beside.iterdir() if path.name not in texts)
-        return [folder / name for name in (*texts, *names)]
-
-    def to_json(self) -> str:
-        """All reports as JSON."""
-        data = {"format": FORMAT, "reports": [json.loads(report.to_json()) for report in self.reports]}
-        return json.dumps(data, indent=1, allow_nan=False)
-
-    @classmethod
-    def of_json(cls, text: str) -> BenchRun:
-        """The run saved by `to_json`; an InputError for any other text."""
-        try:
-            data = json.loads(text)
-            return cls(tuple(WorkReport.of_json(json.dumps(report)) for report in data["reports"]))
-        except (ValueError, KeyError, TypeError, RecursionError) as reason:
-            raise InputError(f"JSON: expected what BenchRun.to_json() gives: {reason!r}") from reason
+def save(reports: Sequence[WorkReport], folder: Path) -> list[Path]:
+    """Write summary, tables, data and a figure for each scene; return the written paths."""
+    tables = "\n\n".join(f"## {report.problem}\n\n{report.table()}" for report in reports)
+    data = {"format": FORMAT, "reports": [json.loads(report.to_json()) for report in reports]}
+    texts = {SUMMARY: summary(reports), TABLES: tables, DATA: json.dumps(data, indent=1, allow_nan=False)}
+    drawn = [report for report in reports if any(row.is_done for row in report.rows)]
+    drawn.sort(key=lambda report: scene_of(report.problem))
+    with moved_when_complete(folder) as beside:
+        for name, text in texts.items():
+            (beside / name).write_text(text + "\n", encoding="utf-8")
+        for scene, some in groupby(drawn, key=lambda report: scene_of(report.problem)):
+            _draw(list(some)).savefig(beside / f"{label(scene)}.png", dpi=100)
+        names = sorted(path.name for path in beside.iterdir() if path.name not in texts)
+    return [folder / name for name in (*texts, *names)]
 
 
 def prepare_folder(folder: Path, names: Sequence[str], *, force: bool) -> None:
@@ -174,10 +126,10 @@ def file_stem(name: str) -> str:
 def _is_earlier(data: Path, names: Sequence[str]) -> bool:
     """Whether this is the file of a run of some of these problems and no others."""
     try:
-        run = BenchRun.of_json(data.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        reports = json.loads(data.read_text(encoding="utf-8"))["reports"]
+        return {report["problem"] for report in reports} <= set(names)
+    except (OSError, ValueError, LookupError, TypeError):
         return False
-    return {report.problem for report in run.reports} <= set(names)
 
 
 def _chosen(report: WorkReport) -> list[WorkRow]:
@@ -192,16 +144,11 @@ def _cells(report: WorkReport) -> tuple[str, ...]:
     if not rows:
         states = ", ".join(dict.fromkeys(row.status for row in _chosen(report)))
         words = states or ("not run" if report.auto in report.methods else "nothing to choose")
-        return report.problem, words, *"-----", front
-    best = min(rows, key=report.error)
-    numbers = (
-        (best.reported, ".1e"),
-        (best.least, ".2g"),
-        (report.choice(), ".2g"),
-        (report.choice(known=True), ".2g"),
-    )
+        return report.problem, words, *"----", front
+    best = min(rows, key=lambda row: row.error or 0.0)
+    numbers = ((best.reported, ".1e"), (best.least, ".2g"), (report.choice(), ".2g"))
     cells = ("-" if number is None else format(number, digits) for number, digits in numbers)
-    return report.problem, best.note, report.methods[best.method].in_words(report.error(best)), *cells, front
+    return report.problem, best.note, report.methods[best.method].in_words(best.error or 0.0), *cells, front
 
 
 def _draw(reports: Sequence[WorkReport]) -> Figure:

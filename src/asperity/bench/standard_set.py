@@ -133,7 +133,8 @@ def _run(name: str, effort: Effort, folder: Path | None, child: ChildProcess, wh
         more = RANDOM_FACTOR * repeats if method.is_random else repeats
         task = (name, references, method.name, budget, more, min(seconds, 0.5 * limit))
         try:
-            return WorkRow.of_dict(child.call(measured, *task, seconds=limit))
+            row: WorkRow = child.call(measured, *task, seconds=limit)
+            return row
         except OutOfTime:
             return WorkRow(method.name, budget, "timed out", note=f"ended after {limit:.2g} s")
         except ChildCrashed as reason:

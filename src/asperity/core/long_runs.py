@@ -13,12 +13,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, TypedDict, TypeVar
 
 from .checkpoints import Arrays, Checkpoint, Stored, packed_arrays, unpacked_arrays
 from .errors import AsperityError, InputError
+from .version import __version__
 from .workers import connected, results
 
 T = TypeVar("T")
@@ -127,6 +129,12 @@ def all_parts(
         lost = "without a checkpoint they are lost"
         raise KeyboardInterrupt(f"{done}; {lost if path is None else f'{path} has them: give the same call'}") from stop
     return [unpacked_arrays(packed[part]) for part in range(number)]
+
+
+def identity_of(computation: str, job: Any) -> dict[str, Any]:
+    """What tells a run from others: its name, the version, and the fields of the dataclass whose methods compute it."""
+    given = {one.name: getattr(job, one.name) for one in fields(job)}
+    return {"computation": computation, "version": __version__, **given}
 
 
 class OutOfTime(Exception):

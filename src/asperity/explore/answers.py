@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -76,9 +76,8 @@ class Histogram:
     no_slip: float
 
 
-# What an answer consists of, by the names of its attributes.
-QUANTITIES = {"gap": "gap", "accommodation": "accommodation", "matrix": "kernel", "eigenvalues": "spectrum",
-              "collision": "collision"}  # fmt: skip
+# The attributes of an answer that may be refused.
+QUANTITIES = ("gap", "accommodation", "kernel", "spectrum", "collision")
 
 
 @dataclass(frozen=True)
@@ -86,37 +85,35 @@ class Answer:
     """What is known of a question so far; None where nothing is known yet, or where ``refusals`` says why not."""
 
     stage: str
-    matrix: KernelMatrix | None = None
+    kernel: KernelMatrix | None = None
     gap: SpectralGap | None = None
-    eigenvalues: Eigenvalues | None = None
+    spectrum: Eigenvalues | None = None
     accommodation: Accommodation | None = None
     collision: Histogram | None = None
-    refusals: tuple[tuple[str, str], ...] = ()
+    refusals: Mapping[str, str] = field(default_factory=dict)
     finished: bool = False
 
     def missing(self, quantity: str) -> str:
         """Why a quantity is None, in a word."""
-        return "refused" if quantity in dict(self.refusals) else "computing"
+        return "refused" if quantity in self.refusals else "computing"
 
-    def refused(self, quantity: str, reason: object) -> Answer:
-        """The same with a reason why a quantity is missing."""
-        return replace(self, refusals=(*self._refusals_but(quantity), (quantity, str(reason))))
+    def refused(self, reason: object, *quantities: str) -> Answer:
+        """The same with a reason why quantities are missing."""
+        return replace(self, refusals={**self.refusals, **dict.fromkeys(quantities, str(reason))})
 
     def ended(self, reason: object) -> Answer:
         """The same with a reason for all that is still missing."""
-        known = {name for attribute, name in QUANTITIES.items() if self.__dict__[attribute] is not None}
-        missing = dict.fromkeys(set(QUANTITIES.values()) - known, str(reason)) | dict(self.refusals)
-        return replace(self, refusals=tuple(sorted(missing.items())))
+        missing = (name for name in QUANTITIES if getattr(self, name) is None and name not in self.refusals)
+        return self.refused(reason, *missing)
 
-    def improved(self, quantity: str, compute: Callable[[], dict[str, Any]], *, keep: bool = False) -> Answer:
-        """The same with the attributes that are computed, or with the reason why not, unless the old ones are kept."""
+    def improved(self, quantity: str, compute: Callable[[], Any]) -> Answer:
+        """The same with a quantity computed anew; if that fails, with the old one or the reason why there is none."""
         try:
-            return replace(self, refusals=self._refusals_but(quantity), **compute())
+            found = compute()
         except AsperityError as reason:
-            return self if keep else self.refused(quantity, reason)
-
-    def _refusals_but(self, quantity: str) -> tuple[tuple[str, str], ...]:
-        return tuple(refusal for refusal in self.refusals if refusal[0] != quantity)
+            return self if getattr(self, quantity) is not None else self.refused(reason, quantity)
+        others = {name: reason for name, reason in self.refusals.items() if name != quantity}
+        return replace(self, refusals=others, **{quantity: found})
 
 
 def answers_to(question: Question) -> Iterator[Answer]:
@@ -128,7 +125,7 @@ def answers_to(question: Question) -> Iterator[Answer]:
     --------
     >>> from asperity.geometry import triangular_teeth
     >>> first, *_, last = answers_to(Question(triangular_teeth(0.7), "teeth"))
-    >>> first.matrix.method, first.gap.verdict, last.finished
+    >>> first.kernel.method, first.gap.verdict, last.finished
     ('exact', 'no gap', True)
     """
     answer = first_answer(question)
@@ -162,14 +159,14 @@ def _reached(answer: Answer, tolerance: float) -> bool:
 def first_answer(question: Question) -> Answer:
     """A coarse answer: a small matrix, its eigenvalues, an upper limit of the gap, a small sample of collisions."""
     answer = _with_matrix(Answer("coarse"), question, FIRST_BINS, FIRST_TOLERANCE, FIRST_RAYS)
-    for _, reason in answer.refusals:
-        answer = answer.refused("gap", reason).refused("spectrum", reason)
+    for reason in answer.refusals.values():
+        answer = answer.refused(reason, "gap", "spectrum")
     answer = _with_eigenvalues_of_matrix(answer)
     if question.seen.is_polygonal and not question.seen.islands:
         # a theorem decides
         answer = _with_gap(answer, question, GAP_TOLERANCES[0])
-    elif answer.eigenvalues is not None and answer.matrix is not None:
-        answer = replace(answer, gap=largest_gap(answer.matrix))
+    elif answer.spectrum is not None and answer.kernel is not None:
+        answer = replace(answer, gap=largest_gap(answer.kernel))
     return _with_collision(answer, question, FIRST_COLLISIONS)
 
 
@@ -191,52 +188,45 @@ def largest_gap(matrix: KernelMatrix) -> SpectralGap:
 
 
 def _with_eigenvalues_of_matrix(answer: Answer) -> Answer:
-    matrix = answer.matrix
+    matrix = answer.kernel
     if matrix is None:
         return answer
 
-    def compute() -> dict[str, Any]:
+    def compute() -> Eigenvalues:
         found = spectrum(matrix, EIGENVALUES)
         parts = found.errors
         errors = parts.algebraic + parts.quantile * parts.sampling + (0.0 if matrix.samples else float(matrix.error))
-        return {"eigenvalues": Eigenvalues(found.values, errors, "the matrix")}
+        return Eigenvalues(found.values, errors, "the matrix")
 
     return answer.improved("spectrum", compute)
 
 
 def _with_eigenvalues_of_law(answer: Answer, question: Question) -> Answer:
-    def compute() -> dict[str, Any]:
+    def compute() -> Eigenvalues:
         found = spectrum(question.law, EIGENVALUES, tolerance=EIGENVALUE_TOLERANCE, rng=0)
-        return {"eigenvalues": Eigenvalues(found.values, found.errors.total(), "the law")}
+        return Eigenvalues(found.values, found.errors.total(), "the law")
 
     return answer.improved("spectrum", compute)
 
 
 def _with_gap(answer: Answer, question: Question, tolerance: float) -> Answer:
-    return answer.improved(
-        "gap", lambda: {"gap": spectral_gap(question.law, tolerance, 0)}, keep=answer.gap is not None
-    )
+    return answer.improved("gap", lambda: spectral_gap(question.law, tolerance, 0))
 
 
 def _with_accommodation(answer: Answer, question: Question, tolerance: float) -> Answer:
-    def compute() -> dict[str, Any]:
-        return {"accommodation": accommodation(question.law, tolerance, ONE_ANGLE, rng=0)}
-
-    return answer.improved("accommodation", compute, keep=answer.accommodation is not None)
+    return answer.improved("accommodation", lambda: accommodation(question.law, tolerance, ONE_ANGLE, rng=0))
 
 
 def _with_matrix(answer: Answer, question: Question, bins: int, tolerance: float, rays: int) -> Answer:
-    def compute() -> dict[str, Any]:
-        return {"matrix": discretise(question.law, Bins(bins), tolerance=tolerance, samples=rays, rng=0)}
-
-    return answer.improved("kernel", compute, keep=answer.matrix is not None)
+    return answer.improved(
+        "kernel", lambda: discretise(question.law, Bins(bins), tolerance=tolerance, samples=rays, rng=0)
+    )
 
 
 def _with_collision(answer: Answer, question: Question, number: int) -> Answer:
-    def compute() -> dict[str, Any]:
-        incoming = np.tile(INCOMING, (number, 1))
-        outgoing = question.collision.sample(incoming, np.random.default_rng(0))[:, 0]
-        return {"collision": histogram(outgoing, question.disk)}
+    def compute() -> Histogram:
+        outgoing = question.collision.sample(np.tile(INCOMING, (number, 1)), np.random.default_rng(0))[:, 0]
+        return histogram(outgoing, question.disk)
 
     return answer.improved("collision", compute)
 

@@ -217,7 +217,7 @@ class KernelFigure:
 
     def show(self, answer: Answer) -> None:
         """Draw the matrix with its error in the title; nothing where it is missing."""
-        matrix = answer.matrix
+        matrix = answer.kernel
         if matrix is None:
             _clear(self._image)
             self.plot.title.text = f"Kernel: {answer.missing('kernel')}"
@@ -255,7 +255,7 @@ class SpectrumFigure:
 
     def show(self, answer: Answer) -> None:
         """Draw eigenvalues and gap; nothing where they are missing."""
-        found, gap = answer.eigenvalues, answer.gap
+        found, gap = answer.spectrum, answer.gap
         if found is None:
             _clear(self._values)
             self.plot.title.text = f"Eigenvalues: {answer.missing('spectrum')}"

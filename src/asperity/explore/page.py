@@ -382,7 +382,7 @@ def answer_as_html(answer: Answer) -> str:
     >>> "computing" in answer_as_html(Answer("coarse"))
     True
     """
-    gap, momentum, matrix = answer.gap, answer.accommodation, answer.matrix
+    gap, momentum, matrix = answer.gap, answer.accommodation, answer.kernel
     rows = dict.fromkeys(("gap", "accommodation", "kernel", "collision"), "computing")
     if gap is not None and gap.verdict == "no gap":
         rows["gap"] = f"<b>0</b>, no gap ({html.escape(gap.evidence[0])}); {gap.convention} convention"
@@ -403,6 +403,6 @@ def answer_as_html(answer: Answer) -> str:
     if answer.collision is not None:
         mean = answer.collision.mean
         rows["collision"] = f"mean outgoing v1 <b>{html.escape(str(mean))}</b>, error {mean.error:.1e}, {mean.method}"
-    rows |= {quantity: f"refused: {html.escape(reason)}" for quantity, reason in answer.refusals}
+    rows |= {quantity: f"refused: {html.escape(reason)}" for quantity, reason in answer.refusals.items()}
     cells = "".join(f"<tr><td>{title}</td><td>{text}</td></tr>" for title, text in rows.items())
     return f"<table class='asperity-answers'>{cells}</table>"

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 from ..core.errors import AsperityError
-from ..core.estimates import Estimate, Summary, estimate_as_dict, finite, with_error
+from ..core.estimates import Estimate, Summary, estimate_as_dict, finite
 from ..geometry import Wall
 from ..kernels import Law
 from ..spectral import SpectralGap, Spectrum, mean_squared_slope
@@ -58,28 +57,6 @@ class Consequences(Summary):
             },
             "mean_squared_slope": finite(self.flatness),
         }  # fmt: skip
-
-    def lines(self) -> list[str]:
-        """One line a fact."""
-        lines = []
-        if self.slem is not None and self.relaxation_time is not None:
-            if math.isfinite(self.relaxation_time.error):
-                time = f"relaxation time {self.relaxation_time} steps"
-            else:
-                time = f"no relaxation time: slem {'is' if self.without_gap else 'may be'} 1"
-            lines.append(f"slem {self.slem} ({self.slem.kind}: {self.slem.method}), {time}")
-        if (found := self.diffusion) is None:
-            lines.append(f"diffusivity refused: {self.refusal}")
-        else:
-            lines.append(
-                f"channel of half-width 1, speed 1: D = {found}, not L^2/tau itself, which has a constant besides; "
-                f"eta = {with_error(found.eta, found.eta_error)}, "
-                f"zeta = {with_error(found.zeta, found.zeta_error)} ({found.kind}: {found.method})"
-            )
-        if math.isfinite(self.flatness):
-            use = "" if self.without_gap else "; for shallow walls the specular gap is about 4 h"
-            lines.append(f"mean squared slope h = {self.flatness:.6g}{use}")
-        return lines
 
 
 def consequences_of(

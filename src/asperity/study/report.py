@@ -9,79 +9,93 @@ from typing import Any
 
 import numpy as np
 
-from ..core.estimates import Estimate, estimate_as_dict, finite
+from ..core.estimates import Estimate, estimate_as_dict, finite, with_error
 from ..core.version import __version__
-from ..geometry import Wall
 from ..kernels import KernelMatrix
 from ..spectral import SpectralGap
 from ..spectral.bounds.enclosure import Enclosures
 from ..spectral.consequences.momentum_accommodation import Accommodation
 from ..spectral.plotting import CONVENTIONS
+from .consequences import Consequences
 from .result import StudyResult, TracerCheck
 
 AVERAGES = ("tangential", "normal", "maxwell_fraction", "misfit")
 # Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
 KAC_Z = 4.5
-# Characters; the detailed report has the whole reason.
+# Characters; with ``verbose`` the whole reason is shown.
 LONGEST_REFUSAL = 110
 # Pieces of a curved wall, above which it is a profile: the named curved walls have at most five.
 MOST_PIECES = 8
 
 
-def summary_of(study: StudyResult, by_angle: bool) -> str:
+def report_of(study: StudyResult, by_angle: bool, verbose: bool) -> str:
     """What was found, one fact a line; an error in brackets belongs to the last digits.
 
-    A disk that was given comes first. Of a profile the momentum that it takes on comes before its gap.
+    With ``verbose`` the lines below a fact say how it was found. A disk that was given comes first. Of a profile the
+    momentum that it takes on comes before its gap.
     """
     wall, disk, found = study.wall, study.disk, study.consequences
     unit = f" {wall.unit}" if wall.unit else ""
-    lines = {
-        "wall": f"{study.name}: period {wall.period:g}{unit}, depth {wall.depth:.6g}{unit}, "
-        f"{counted(len(wall.pieces), 'piece')}, {_symmetry(wall)}",
+    cells = counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell"
+    islands = f", {counted(len(wall.islands), 'island')}" if wall.islands else ""
+    symmetry = "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
+    # of every block the first line is the fact
+    blocks = {
+        "wall": [
+            f"{study.name}: period {wall.period:g}{unit}, depth {wall.depth:.6g}{unit}, "
+            f"{counted(len(wall.pieces), 'piece')}, {symmetry}",
+            f"length {wall.arc_length:.6g}{unit}, {cells}{islands}",
+        ],
     }
     of_disk = {
-        "disk": f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
-        "as deep",
-        "collision": f"gap of that wall {_gap_words(study, 'collision_gap')}",
-        "conserved": f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
-        f"{study.conservation['rolling_momentum_defect']:.0e}",
+        "disk": [
+            f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
+            "as deep"
+        ],
+        "collision": _gap_lines(study, "collision_gap", "gap of that wall ")
+        + [f"law of that wall {line}" for line in _matrix_lines(study.collision_matrix)],
+        "conserved": [
+            f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
+            f"{study.conservation['rolling_momentum_defect']:.0e}"
+        ],
     }
     of_profile = wall.is_polygonal or len(wall.pieces) > MOST_PIECES
-    lines |= of_disk if study.disk_given else {}
-    lines |= _momentum_lines(study, verbose=False) if of_profile or by_angle else {}
-    lines |= {
-        "rays": _rays(study.tracer),
-        "law": _law_line(study.matrix),
-        "gap": _gap_words(study, "gap"),
-        "": _gap_words(study, "specular_gap"),
-        "relaxation": _relaxation(found.relaxation_time, found.without_gap),
-        "diffusion": _refused(found.refusal)
-        if found.diffusion is None
-        else f"D = {found.diffusion}; r = 1, speed 1, tau the exit time",
+    blocks |= of_disk if study.disk_given else {}
+    blocks |= _momentum_lines(study) if of_profile or by_angle or verbose else {}
+    blocks |= {
+        "rays": _ray_lines(study.tracer),
+        "law": _matrix_lines(study.matrix),
+        "gap": _gap_lines(study, "gap"),
+        "": _gap_lines(study, "specular_gap"),
     }
-    lines |= {} if study.disk_given or of_profile else of_disk
-    titled = {title: [line] for title, line in lines.items()}
-    return _joined({**titled, "by angle": _at_angles(study.accommodation) if by_angle else []})
-
-
-def _joined(blocks: dict[str, list[str]]) -> str:
+    blocks |= {"spectrum": _spectrum_lines(study), "enclosed": _enclosed_lines(study)} if verbose else {}
+    blocks |= {"relaxation": _relaxation_lines(found), "diffusion": _diffusion_lines(found)}
+    blocks |= of_disk if verbose or not (study.disk_given or of_profile) else {}
+    shown = {title: lines if verbose else [_short(lines[0])] for title, lines in blocks.items()}
+    shown |= {"by angle": _at_angles(study.accommodation)} if by_angle else {}
     return "\n".join(
-        f"{'' if number else title:11s}{line}" for title, lines in blocks.items() for number, line in enumerate(lines)
+        f"{'' if number else title:11s}{line}" for title, lines in shown.items() for number, line in enumerate(lines)
     )
 
 
-def _momentum_lines(study: StudyResult, verbose: bool) -> dict[str, str]:
+def _short(line: str) -> str:
+    return shorten(line, LONGEST_REFUSAL, placeholder=" ...") if line.startswith("refused: ") else line
+
+
+def _momentum_lines(study: StudyResult) -> dict[str, list[str]]:
     """The momentum of a gas that the wall takes on, and the resistance of a body with it."""
     found, flatness = study.accommodation, study.consequences.flatness
     if found is None:
-        return {"momentum": _refused(study.refusals["accommodation"])}
-    method = f" ({found.tangential.kind}: {found.tangential.method})" if verbose else ""
+        return {"momentum": [f"refused: {study.refusals['accommodation']}"]}
     best = "has" if 0.0 < found.maxwell_fraction.value < 1.0 else "has, of those from 0 to 1,"
     slope = f"; mean squared slope {flatness:.6g}" if math.isfinite(flatness) else ""
     return {
-        "momentum": f"accommodation tangential {found.tangential}, normal {found.normal}{method}",
-        "resistance": f"{study.resistance} times that of a smooth tumbling body{slope}",
-        "Maxwell": f"fraction {found.maxwell_fraction} {best} the nearest mean velocities, misfit {found.misfit}",
+        "momentum": [
+            f"accommodation tangential {found.tangential}, normal {found.normal}",
+            f"{found.tangential.kind}: {found.tangential.method}",
+        ],
+        "resistance": [f"{study.resistance} times that of a smooth tumbling body{slope}"],
+        "Maxwell": [f"fraction {found.maxwell_fraction} {best} the nearest mean velocities, misfit {found.misfit}"],
     }
 
 
@@ -89,106 +103,16 @@ def _at_angles(found: Accommodation | None) -> list[str]:
     return [] if found is None else [f"{angle}: {words}" for angle, words in found.by_angle().items()]
 
 
-def _symmetry(wall: Wall) -> str:
-    return "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
-
-
-def _refused(reason: str) -> str:
-    return shorten(f"refused: {reason}", LONGEST_REFUSAL, placeholder=" ...")
-
-
-def _rays(tracer: TracerCheck | None) -> str:
+def _ray_lines(tracer: TracerCheck | None) -> list[str]:
     if tracer is None:
-        return "not tested: the wall is flat or open"
+        return ["not tested: the wall is flat or open"]
     total, escaped = sum(tracer.counts.values()), tracer.counts.get("escaped", 0)
     count = f"all {total}" if escaped == total else f"{escaped} of {total}"
-    return (
-        f"{count} left the wall after {tracer.mean_collisions} collisions on average, "
-        f"Kac's formula {tracer.expected_collisions:.6g}"
-    )
-
-
-def _law_line(matrix: KernelMatrix) -> str:
-    met = "" if matrix.tolerance_met is not False else f", tolerance {matrix.requested_tolerance:g} NOT met"
-    return f"{matrix.basis!r} by {matrix.method}, Frobenius error {float(matrix.error):.2g}{met}"
-
-
-def _gap_words(study: StudyResult, which: str) -> str:
-    gap: SpectralGap | None = getattr(study, which)
-    if gap is None:
-        return _refused(study.refusals[which])
-    words = CONVENTIONS[gap.convention]
-    if not gap.self_adjoint:
-        return f"norm {_norm(gap)} on functions of mean 0, not self-adjoint ({words})"
-    number = "0" if gap.verdict == "no gap" else gap
-    return f"{number} {gap.verdict} ({words})"
-
-
-def _norm(gap: SpectralGap) -> Estimate:
-    """The norm on functions of mean 0 of a law that is not self-adjoint."""
-    return Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method)
-
-
-def _relaxation(time: Estimate | None, without_gap: bool) -> str:
-    if time is None:
-        return "refused with the gap"
-    if time.error == float("inf"):
-        return "infinite: a modulus in the spectrum is 1" if without_gap else "not known: slem may be 1"
-    return f"{time} steps"
-
-
-def details_of(study: StudyResult, by_angle: bool) -> str:
-    """The study as text, with methods, errors and evidence."""
-    wall, disk = study.wall, study.disk
-    cells = counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell"
-    islands = f", {counted(len(wall.islands), 'island')}" if wall.islands else ""
-    first, *more = _matrix_lines(study.collision_matrix)
-    blocks = {
-        "wall": [
-            f"{study.name}: period {wall.period:g}, depth {wall.depth:.6g}, length {wall.arc_length:.6g}, "
-            f"{counted(len(wall.pieces), 'piece')}, {cells}{islands}, {_symmetry(wall)}"
-        ],
-        "rays": [] if study.tracer is None else _tracer_lines(study.tracer),
-        "law P~": _matrix_lines(study.matrix),
-        "gap": [_gap_line(study, "gap"), _gap_line(study, "specular_gap")],
-        "spectrum": _spectrum_lines(study),
-        "enclosed": [f"refused: {study.refusals['enclosures']}"]
-        if study.enclosures is None
-        else enclosures_as_text(study.enclosures),
-        "follows": study.consequences.lines(),
-        **{title: [line] for title, line in _momentum_lines(study, verbose=True).items()},
-        "by angle": _at_angles(study.accommodation) if by_angle else [],
-        "disk": [
-            f"mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, "
-            f"so it feels the wall {1.0 / disk.foreshortening:.6g} times as deep"
-        ],
-        "collision": [
-            f"K = delta x P~ x delta(pi - psi) with P~ of that deeper wall, {first}",
-            *more,
-            f"gap of that P~: {_gap_line(study, 'collision_gap')}",
-            f"energy kept to {study.conservation['energy_defect']:.1e}, rolling momentum -m v1 + J omega "
-            f"to {study.conservation['rolling_momentum_defect']:.1e} (relative)",
-        ],
-    }
-    return _joined(blocks)
-
-
-def _accommodation(found: Accommodation) -> dict[str, Any]:
-    """Plain values; a coefficient that is not defined is None."""
-    averages = {name: estimate_as_dict(getattr(found, name)) for name in AVERAGES}
-    columns = found.incidence_deg, found.tangential_at, found.tangential_errors, found.normal_at, found.normal_errors
-    names = "incidence_deg", "tangential", "tangential_error", "normal", "normal_error"
-    rows = [dict(zip(names, map(finite, row), strict=True)) for row in np.transpose(columns).tolist()]
-    return {**averages, "at": rows, "kind_at": found.kind_at}
-
-
-def _tracer_lines(tracer: TracerCheck) -> list[str]:
-    total = sum(tracer.counts.values())
-    flagged = [f"{n} {status.replace('_', ' ')}" for status, n in tracer.counts.items() if n and status != "escaped"]
     found, expected = tracer.mean_collisions, tracer.expected_collisions
+    flagged = [f", {n} {status.replace('_', ' ')}" for status, n in tracer.counts.items() if n and status != "escaped"]
     lines = [
-        f"{total} into the hollows; " + (f"not escaped: {', '.join(flagged)}" if flagged else "all escaped"),
-        f"mean collisions {found}, length of boundary over opening (Kac) {expected:.6g}, z = {tracer.z_score:+.2f}",
+        f"{count} left the wall after {found} collisions on average, Kac's formula {expected:.6g}",
+        f"length of boundary over opening (Kac): z = {tracer.z_score:+.2f}{''.join(flagged)}",
     ]
     if tracer.z_score < -KAC_Z:
         lines.append(
@@ -203,40 +127,50 @@ def _tracer_lines(tracer: TracerCheck) -> list[str]:
 
 def _matrix_lines(matrix: KernelMatrix) -> list[str]:
     symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
-    rays = f" of {matrix.samples} rays" if matrix.samples else ""
+    missed = f", tolerance {matrix.requested_tolerance:g} NOT met" if matrix.tolerance_met is False else ""
+    rays = f", {matrix.samples} rays" if matrix.samples else ""
     noise = "" if symmetry.z_score is None else f" (z = {symmetry.z_score:+.2f} against the sampling noise)"
     return [
-        f"{matrix.basis!r} by {matrix.method}{rays}: Frobenius error {float(matrix.error):.2g} "
-        f"({matrix.error.kind}), {_met(matrix.tolerance_met, matrix.requested_tolerance)}",
-        f"asymmetry {float(symmetry):.2g}{noise}, rows sum to 1 within {float(rows):.2g}",
+        f"{matrix.basis!r} by {matrix.method}, Frobenius error {float(matrix.error):.2g}{missed}",
+        f"{matrix.error.kind}{rays}; asymmetry {float(symmetry):.2g}{noise}, rows sum to 1 within {float(rows):.2g}",
     ]
 
 
-def _gap_line(study: StudyResult, which: str) -> str:
+def _gap_lines(study: StudyResult, which: str, name: str = "") -> list[str]:
     gap: SpectralGap | None = getattr(study, which)
     if gap is None:
-        return f"refused: {study.refusals[which]}"
-    words = f"{gap.convention} convention: "
-    if not gap.self_adjoint:
-        return words + _contraction(gap, study.tolerance)
-    if gap.verdict == "no gap":
-        return words + "0 (no gap): " + gap.evidence[0].split(":")[0]
-    met = _met(gap.error <= study.tolerance, study.tolerance)
-    # rounding to its error would leave nothing of some numbers
-    unknown = gap.verdict == "undecided" and gap.error >= abs(gap.value)
-    number = f"not decided; {gap.value:.4g} at the finest basis, error up to {gap.error:.2g}"
-    return f"{words}{number if unknown else f'{gap}, {gap.verdict}'} ({gap.kind}: {gap.method}), {met}"
+        return [f"refused: {study.refusals[which]}"]
+    words = CONVENTIONS[gap.convention]
+    if gap.self_adjoint:
+        fact = f"{'0' if gap.verdict == 'no gap' else gap} {gap.verdict} ({words})"
+    else:
+        norm = Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method)
+        fact = f"norm {norm} on functions of mean 0, not self-adjoint ({words})"
+    met = "met" if gap.error <= study.tolerance else "NOT met"
+    # in brackets an error as large as the gap leaves none of its digits
+    how = f"{gap.value:.4g} with error {gap.error:.2g}, tolerance {study.tolerance:g} {met}; {gap.kind}: {gap.method}"
+    return [f"{name}{fact}", how, *gap.evidence]
 
 
-def _contraction(gap: SpectralGap, tolerance: float) -> str:
-    """What is true where there are no real eigenvalues to speak of."""
-    words = "P_F is not known to be self-adjoint, the cell has no mirror axis; "
-    if gap.verdict == "no gap":
-        return words + "its norm on functions of mean 0 is 1 (no gap)"
-    return (
-        f"{words}a step shrinks functions of mean 0 by the factor {_norm(gap)} at most, its norm there and "
-        f"the slem of P~ ({gap.kind}: {gap.method}), {_met(gap.error <= tolerance, tolerance)}"
-    )
+def _relaxation_lines(found: Consequences) -> list[str]:
+    slem, time = found.slem, found.relaxation_time
+    if slem is None or time is None:
+        return ["refused with the gap"]
+    fact = f"{time} steps"
+    if not math.isfinite(time.error):
+        fact = "infinite: a modulus in the spectrum is 1" if found.without_gap else "not known: slem may be 1"
+    return [fact, f"slem {slem} ({slem.kind}: {slem.method})"]
+
+
+def _diffusion_lines(consequences: Consequences) -> list[str]:
+    found = consequences.diffusion
+    if found is None:
+        return [f"refused: {consequences.refusal}"]
+    return [
+        f"D = {found}; r = 1, speed 1, tau the exit time",
+        f"eta = {with_error(found.eta, found.eta_error)}, zeta = {with_error(found.zeta, found.zeta_error)} "
+        f"({found.kind}: {found.method})",
+    ]
 
 
 def _spectrum_lines(study: StudyResult) -> list[str]:
@@ -257,20 +191,28 @@ def _spectrum_lines(study: StudyResult) -> list[str]:
     ]
 
 
+def _enclosed_lines(study: StudyResult) -> list[str]:
+    found = study.enclosures
+    return [f"refused: {study.refusals['enclosures']}"] if found is None else enclosures_as_text(found)
+
+
 def enclosures_as_text(found: Enclosures) -> list[str]:
     """One line an enclosure, to paste into a paper, and one line of what they have in common."""
     return [f"{found.convention} convention; {found.method}", *map(str, found)]
 
 
-def _met(met: bool | None, tolerance: float | None) -> str:
-    if met is None or tolerance is None:
-        return "no tolerance asked"
-    return f"tolerance {tolerance:g} {'met' if met else 'NOT met'}"
-
-
 def counted(number: int, word: str) -> str:
     """A number of things."""
     return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def _accommodation(found: Accommodation) -> dict[str, Any]:
+    """Plain values; a coefficient that is not defined is None."""
+    averages = {name: estimate_as_dict(getattr(found, name)) for name in AVERAGES}
+    columns = found.incidence_deg, found.tangential_at, found.tangential_errors, found.normal_at, found.normal_errors
+    names = "incidence_deg", "tangential", "tangential_error", "normal", "normal_error"
+    rows = [dict(zip(names, map(finite, row), strict=True)) for row in np.transpose(columns).tolist()]
+    return {**averages, "at": rows, "kind_at": found.kind_at}
 
 
 def study_as_dict(study: StudyResult) -> dict[str, Any]:

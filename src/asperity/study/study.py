@@ -31,7 +31,7 @@ from ..spectral.gap.law_spectrum import with_gap
 from ..spectral.gap.methods import law_eigenvalues
 from .consequences import consequences_of
 from .pictures import RESOLUTION, save_pictures
-from .report import details_of, study_as_dict, summary_of
+from .report import report_of, study_as_dict
 from .result import StudyResult, TracerCheck
 
 BINS = 128
@@ -72,7 +72,7 @@ class Study(StudyResult):
 
         With ``by_angle`` also the accommodation of momentum at each angle.
         """
-        return details_of(self, by_angle) if verbose else summary_of(self, by_angle)
+        return report_of(self, by_angle, verbose)
 
     _more = ".summary(verbose=True), .refusals, .to_json(), .save(folder)"
 

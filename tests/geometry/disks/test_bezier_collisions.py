@@ -9,7 +9,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.collisions.compiled import graph_table as graphs
 from asperity.geometry.collisions.records import ground_of
-from disk_shapes import BEZIERS, DISK, PARABOLAS, WAVES, states
+from disk_shapes import BEZIERS, DISK, PARABOLAS, states
 
 
 def test_straight_bezier_pieces_collide_like_segments():
@@ -44,18 +44,6 @@ def test_the_parts_of_a_piece_are_graphs_within_their_bounds():
             along, up = row[graphs.ALONG_X], row[graphs.ALONG_Y]
             np.testing.assert_allclose(row[0] + along * xi - up * eta, x, atol=1e-14)
             np.testing.assert_allclose(row[1] + up * xi + along * eta, y, atol=1e-14)
-
-
-def test_satellites_on_the_cylinder_follow_the_foreshortened_plane_law():
-    position, velocity = states(WAVES, 1.0, 2000)
-    out = geo.collide_cylinder(DISK, WAVES, 1.0, position, velocity)
-    theta, _ = DISK.to_angles(-velocity)
-    plane = geo.trace(WAVES.foreshorten(DISK), position.sum(axis=1), theta)
-    both = out.escaped & plane.escaped
-    assert both.mean() > 0.999
-    angles, _ = DISK.to_angles(out.velocity)
-    assert np.quantile(np.abs(angles - plane.theta)[both], 0.99) < 1e-9
-    assert np.mean(out.contacts[both] == plane.collisions[both]) > 0.999
 
 
 def test_double_parabolas_of_shrinking_scale_approach_no_slip():

@@ -1,7 +1,6 @@
 """The configuration space of disk and wall, against brute force and the true disk; the disk inside the satellites."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from campaigns.judges.differentiation import complex_steps
 
 from asperity import geometry as geo
 from asperity.geometry.disk import rolling
+from wall_shapes import square
 
 WALLS = [
     geo.triangular_teeth(1.2),
@@ -82,11 +82,9 @@ def test_islands_are_solid_and_what_is_under_them_is_free():
 
 
 def test_the_boundary_of_an_island_is_free_also_from_below():
-    corners = [(0.25, -0.25), (0.75, -0.25), (0.75, -0.75), (0.25, -0.75), (0.25, -0.25)]
-    island = [geo.Segment(a, b) for a, b in pairwise(corners)]
-    wall = geo.Wall([geo.Segment((0.0, -1.0), (1.0, -1.0))], islands=[island])
+    wall = geo.Wall([geo.Segment((0.0, -1.0), (1.0, -1.0))], islands=[square(0.25, -0.75, 0.5)])
     space = geo.ConfigurationSpace(wall, geo.Disk(), scale=0.5**8)
-    sides = [(0.5, -0.25), (0.5, -0.75), (0.25, -0.5), (0.75, -0.5), *corners]
+    sides = [(0.5, -0.25), (0.5, -0.75), (0.25, -0.5), (0.75, -0.5), *wall.island_vertices[0].tolist()]
     assert space.cylinder_contains([[space.scale * x, space.scale * y, 0.0] for x, y in sides]).all()
     assert not space.cylinder_contains([0.5 * space.scale, -0.5 * space.scale, 0.0])
 

@@ -7,6 +7,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity.geometry.collisions.transversality import CollisionConstants
+from disk_shapes import states
 
 DISKS = geo.Disk(1.0, 0.5), geo.Disk(2.0, 0.3)
 WALLS = {
@@ -22,13 +23,8 @@ LICIT = {
 }  # fmt: skip
 
 
-def states(space: geo.ConfigurationSpace, n: int, seed: int = 0):
-    """States of the invariant measure over one period and one spacing."""
-    rng = np.random.default_rng(seed)
-    position = rng.uniform([0, -0.5], [1, 0.5], (n, 2)) * [space.scale * space.wall.period, space.spacing]
-    up, turn = np.sqrt(rng.uniform(0, 1, n)), rng.uniform(0, 2 * np.pi, n)
-    side = np.sqrt(1 - up**2)
-    return position, np.stack([side * np.cos(turn), -up, side * np.sin(turn)], axis=1) @ space.disk.frame
+def states_over(space: geo.ConfigurationSpace, n: int, seed: int = 0):
+    return states(space.wall, space.scale, n, seed, space.disk, space.spacing)
 
 
 @pytest.mark.parametrize("disk", DISKS, ids=str)
@@ -36,7 +32,7 @@ def states(space: geo.ConfigurationSpace, n: int, seed: int = 0):
 def test_licit_pairs_have_the_same_contacts_and_velocities_within_the_bound(name, disk):
     scale, least = LICIT[name]
     space = geo.ConfigurationSpace(WALLS[name], disk, scale)
-    position, velocity = states(space, 25)
+    position, velocity = states_over(space, 25)
     pairs = [geo.shadow(space, x, w) for x, w in zip(position, velocity, strict=True)]
     licit = np.array([pair.is_licit for pair in pairs])
     hit = geo.collide(disk, WALLS[name], scale, position, velocity, space.spacing)
@@ -53,7 +49,7 @@ def test_licit_pairs_have_the_same_contacts_and_velocities_within_the_bound(name
 def test_contacts_of_the_true_disk_are_within_their_reaches(name):
     space = geo.ConfigurationSpace(WALLS[name], DISKS[0], 1e-6)
     found = 0
-    for x, w in zip(*states(space, 40, 2), strict=True):
+    for x, w in zip(*states_over(space, 40, 2), strict=True):
         pair = geo.shadow(space, x, w)
         if pair.is_licit:
             path = geo.collision_path(space.disk, space.wall, space.scale, x, w, space.spacing)
@@ -92,7 +88,7 @@ def test_the_radius_of_a_vertical_flight_into_teeth_is_known():
 
 def test_parallel_flights_within_the_radius_and_the_reach_meet_the_same_pieces():
     space = geo.ConfigurationSpace(WALLS["triangular"], DISKS[0], 1e-9)
-    for x, w in zip(*states(space, 30, 3), strict=True):
+    for x, w in zip(*states_over(space, 30, 3), strict=True):
         pair = geo.shadow(space, [x[0], 0.0], w)
         steps = np.diff(pair.points, axis=0)
         widest = 0.99 * pair.radii[0] * pair.sines[0] / (1.0 + pair.sines[0]) if len(pair.sines) else 0.0
@@ -129,7 +125,7 @@ def test_the_constants_of_the_paper_are_larger_than_the_bounds():
     constants = CollisionConstants.of(disk)
     space = geo.ConfigurationSpace(WALLS["focusing"], disk, 1e-9)
     tested = 0
-    for x, w in zip(*states(space, 60, 5), strict=True):
+    for x, w in zip(*states_over(space, 60, 5), strict=True):
         pair = geo.shadow(space, x, w)
         kappa = max(1.0, WALLS["focusing"].largest_curvature.value)
         if pair.is_licit and len(pair.sines) == 1 and space.spacing <= kappa * pair.reaches[0]:

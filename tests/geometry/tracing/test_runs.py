@@ -5,8 +5,8 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 import pytest
+from campaigns.judges.plain_tracer import trace_precisely
 from campaigns.judges.precise_rays import unfold
-from campaigns.judges.precise_tracer import trace_precisely
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -92,13 +92,13 @@ def test_rays_that_pass_an_apex_at_any_distance_are_those_of_the_unfolded_wedge(
 
 def test_flagged_rays_with_long_runs_along_an_arc_are_traced_in_one_step_too():
     rng = np.random.default_rng(10)
-    scene = geo.focusing_arcs(np.pi / 2).scene
+    wall = geo.focusing_arcs(np.pi / 2)
     x, theta = rng.uniform(1e-12, 2e-12, 40), np.pi / 2 - rng.uniform(0.5e-6, 1e-6, 40)
-    refined = refined_trace(scene, x, theta)
+    refined = refined_trace(wall.scene, x, theta)
     assert np.count_nonzero(refined.status == 0) >= 38 and refined.collisions.min() > 10 * REFINED_SEGMENTS
     for i in np.flatnonzero(refined.status == 0):
-        ray = trace_precisely(scene, x[i], theta[i], 10**9)
-        assert ray.bounces == refined.collisions[i]
+        ray = trace_precisely(wall, x[i], theta[i], 10**9)
+        assert ray.hits == refined.collisions[i]
         with mp.workdps(50):
             miss = [abs(mp.fsum(found[i]) - true) for found, true in ((refined.x, ray.x), (refined.theta, ray.theta))]
         assert max(miss) <= 2 * refined.rounding[i] < 1e-14

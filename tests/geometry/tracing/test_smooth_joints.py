@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from campaigns.judges.precise_tracer import trace_precisely
+from campaigns.judges.plain_tracer import trace_precisely
 
 from asperity import geometry as geo
 from asperity.geometry.tracing import tracing
@@ -106,7 +106,7 @@ def test_rays_along_the_tangent_at_a_smooth_joint_hit_what_50_digits_say(kinds, 
             monkeypatch.setattr(tracing, "_goes_in_waves", lambda scene, rays, waves=in_waves: waves)
             found.append(geo.trace(wall, x, theta, max_collisions=MOST_HITS))
         for i in np.flatnonzero(found[0].escaped | found[1].escaped):
-            bounces = trace_precisely(wall.scene, x[i], theta[i], MOST_HITS).bounces
+            bounces = trace_precisely(wall, x[i], theta[i], MOST_HITS).hits
             assert all(one.collisions[i] == bounces for one in found if one.escaped[i])
 
 
@@ -127,4 +127,4 @@ def test_a_ray_that_leaves_a_line_away_from_the_curve_joined_to_it_does_not_hit_
         ]
     )
     x, theta = 0.7716582203553766, 0.36610638681898505
-    assert geo.trace(wall, x, theta).collisions == trace_precisely(wall.scene, x, theta, MOST_HITS).bounces == 2
+    assert geo.trace(wall, x, theta).collisions == trace_precisely(wall, x, theta, MOST_HITS).hits == 2

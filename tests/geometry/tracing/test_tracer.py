@@ -6,8 +6,6 @@ import copy
 import os
 import pickle
 import platform
-import subprocess
-import sys
 import threading
 import time
 import weakref
@@ -17,6 +15,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity.geometry.tracing.threads import in_blocks, interruptibly
+from commands import ended
 
 EPS = np.finfo(float).eps
 RAYS = 100_000
@@ -118,18 +117,6 @@ def test_shapes_broadcast_and_results_are_read_only():
         traced.x[0, 0] = 1.0
 
 
-def test_foreshortened_ellipses_are_circles():
-    disk = geo.Disk(2.0, 0.7)
-    found = geo.elliptical_arcs(0.8, disk).foreshorten(disk)
-    assert all(piece.is_circular for piece in found.pieces)
-    x, theta = rays(12, 20_000)
-    circle = geo.trace(geo.focusing_arcs(0.8), x, theta)
-    traced = geo.trace(found, x, theta)
-    same = traced.collisions == circle.collisions
-    assert same.mean() > 0.9999
-    assert np.max(np.abs(traced.theta - circle.theta)[same]) < 1e-10
-
-
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="processes cannot be pinned here")
 def test_a_process_that_is_pinned_to_one_core_traces_on_one_thread():
     before = os.sched_getaffinity(0)
@@ -212,7 +199,7 @@ assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes cannot be forked here")
 def test_a_forked_process_starts_threads_of_its_own():
     # Python 3.12 warns of every fork of a process with threads
-    subprocess.run([sys.executable, "-W", "ignore", "-c", FORKED], check=True, timeout=60)
+    ended("-W", "ignore", "-c", FORKED, check=True)
 
 
 FAULTS = """
@@ -236,8 +223,7 @@ def test_a_trace_takes_the_memory_of_the_results_before():
     # settings in the environment, which would hold instead; dask leaves one there when it starts a worker
     settings = ("MALLOC_", "GLIBC_TUNABLES", "LD_PRELOAD")
     environment = {name: value for name, value in os.environ.items() if not name.startswith(settings)}
-    command = [sys.executable, "-c", FAULTS]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=60)
+    done = ended("-c", FAULTS, env=environment, check=True)
     # the results have 1,600 pages
     assert int(done.stdout) < 400
 

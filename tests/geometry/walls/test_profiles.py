@@ -19,6 +19,11 @@ def vertices_of_profile(x, height, seam="mirror"):
     return profiles.vertices_of_profile(geo.Profile(x, height), seam)
 
 
+def profile_of(folder, text, **options):
+    (folder / "scan.txt").write_text(text, encoding="utf-8")
+    return geo.read_profile(folder / "scan.txt", **options)
+
+
 # ---- from positions and heights to vertices ----------------------------------------------------------------------
 EXACT = {
     "two rows, mirrored": ([2, 3], [0, 4], "mirror", [[0, 0], [1, -4], [2, 0]]),
@@ -70,41 +75,33 @@ def test_a_period_has_the_heights_of_the_profile_and_of_its_mirror_image(rows):
 
 
 # ---- files of instruments ----------------------------------------------------------------------------------------
-def test_instrument_files_ask_for_the_extra(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
-    file = tmp_path / "scan.opd"
-    file.write_bytes(b"\xff\xfe\x00\x01" * 20)
-    with pytest.raises(InputError, match=r"asperity\[profiles\]"):
-        geo.read_profile(file)
-
-
 @pytest.fixture
-def reads(monkeypatch):
-    """Put a stand-in in the place of SurfaceTopography: it opens files by this function."""
+def reads(monkeypatch, tmp_path):
+    """Put a stand-in in the place of SurfaceTopography, which opens files by this function; and a file."""
+    (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
 
     def put(read_topography):
         package = ModuleType("SurfaceTopography")
         package.read_topography = read_topography
         monkeypatch.setitem(sys.modules, "SurfaceTopography", package)
+        return tmp_path / "scan.opd"
 
     return put
 
 
 @pytest.fixture
 def instrument(reads):
-    """A stand-in whose one file is what the test puts there."""
-
-    def gives(heights, positions):
-        reads(lambda path: SimpleNamespace(heights=lambda: heights, positions=lambda: positions, unit=None))
-
-    return gives
+    """A file of a stand-in, which holds what the test gives."""
+    return lambda heights, positions: reads(
+        lambda path: SimpleNamespace(heights=lambda: heights, positions=lambda: positions, unit=None)
+    )
 
 
 def test_line_scans_of_instruments_are_read_from_files_that_are_no_columns(instrument, tmp_path):
-    instrument(np.ma.array([1.0, 3.0, 2.0]), np.array([0.0, 0.5, 2.0]))
-    for name, content in (("scan.opd", b"\xff\xfe\x00"), ("scan.xyz", b"some words first\n1 2 3")):
-        (tmp_path / name).write_bytes(content)
-        x, height = geo.read_profile(tmp_path / name)
+    scan = instrument(np.ma.array([1.0, 3.0, 2.0]), np.array([0.0, 0.5, 2.0]))
+    (tmp_path / "scan.xyz").write_text("some words first\n1 2 3")
+    for file in (scan, tmp_path / "scan.xyz"):
+        x, height = geo.read_profile(file)
         assert x.tolist() == [0.0, 0.5, 2.0] and height.tolist() == [1.0, 3.0, 2.0]
         assert x.dtype == height.dtype == np.float64
     # whatever its suffix says, a file of columns with a fault is not given away
@@ -115,54 +112,48 @@ def test_line_scans_of_instruments_are_read_from_files_that_are_no_columns(instr
     assert geo.read_profile(tmp_path / "map.TXT", row=0).height.tolist() == [1.0, 3.0, 2.0]
 
 
-def test_of_a_map_one_row_along_x_is_taken(instrument, tmp_path):
+def test_of_a_map_one_row_along_x_is_taken(instrument):
     heights = np.array([[0.0, 1.0, 2.0, 8.0, 6.0], [3.0, 1.0, 0.0, 9.0, 7.0]])
     along = np.array([[0.0, 0.1, 0.2, 0.3, 0.4], [1.0, 1.1, 1.2, 1.3, 1.4]])
-    instrument(heights, (along, -along))
-    (tmp_path / "map.opd").write_bytes(b"\xff\xfe\x00")
-    assert [part.tolist() for part in geo.read_profile(tmp_path / "map.opd")] == [[0.2, 1.2], [2.0, 0.0]]
+    file = instrument(heights, (along, -along))
+    assert [part.tolist() for part in geo.read_profile(file)] == [[0.2, 1.2], [2.0, 0.0]]
     for row in range(5):
-        x, height = geo.read_profile(tmp_path / "map.opd", row=row)
+        x, height = geo.read_profile(file, row=row)
         assert x.tolist() == along[:, row].tolist() and height.tolist() == heights[:, row].tolist()
     for row in (-1, 5):
         with pytest.raises(InputError, match=f"row: expected a whole number from 0 to 4, got {row}"):
-            geo.read_profile(tmp_path / "map.opd", row=row)
+            geo.read_profile(file, row=row)
 
 
-def test_undefined_heights_are_counted_refused_and_interpolated(instrument, tmp_path):
-    instrument(np.ma.array([1.0, np.inf, 2.0, 4.0], mask=[True, False, False, False]), np.arange(4.0))
-    (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
-    profile = geo.read_profile(tmp_path / "scan.opd")
+def test_undefined_heights_are_counted_refused_and_interpolated(instrument):
+    file = instrument(np.ma.array([1.0, np.inf, 2.0, 4.0], mask=[True, False, False, False]), np.arange(4.0))
+    profile = geo.read_profile(file)
     assert profile.undefined == 2
     with pytest.raises(InputError, match=r"2 of 4 .* the first at index \(0,\); use Profile\.interpolated"):
         geo.Wall.from_profile(profile)
     with pytest.raises(InputError, match=r"scan\.opd: height: 2 of 4 heights are undefined.*interpolate=yes"):
-        geo.wall_from_text(str(tmp_path / "scan.opd"))
+        geo.wall_from_text(str(file))
     assert profile.interpolated().height.tolist() == [2.0, 2.0, 2.0, 4.0]
-    assert geo.wall_from_text(f"{tmp_path / 'scan.opd'}:interpolate=yes").depth == 2.0
+    assert geo.wall_from_text(f"{file}:interpolate=yes").depth == 2.0
 
 
 @pytest.mark.parametrize(
     ("failure", "words"), [(ValueError("first\nsecond"), r"\(first\)"), (ValueError(), r"\(ValueError\)")]
 )
-def test_what_a_reader_of_instruments_says_is_told_in_one_line(failure, words, reads, tmp_path):
+def test_what_a_reader_of_instruments_says_is_told_in_one_line(failure, words, reads):
     def fails(path):
         raise failure
 
-    reads(fails)
-    (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match=rf"scan\.opd: SurfaceTopography cannot read it {words}"):
-        geo.read_profile(tmp_path / "scan.opd")
+        geo.read_profile(reads(fails))
 
 
-def test_warnings_of_an_instruments_package_are_not_passed_on(reads, tmp_path):
+def test_warnings_of_an_instruments_package_are_not_passed_on(reads):
     def warns(path):
         warnings.warn("old format", DeprecationWarning, stacklevel=1)
         return SimpleNamespace(heights=lambda: np.arange(3.0), positions=lambda: np.arange(3.0), unit=None)
 
-    reads(warns)
-    (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
-    assert geo.read_profile(tmp_path / "scan.opd")[1].tolist() == [0.0, 1.0, 2.0]
+    assert geo.read_profile(reads(warns))[1].tolist() == [0.0, 1.0, 2.0]
 
 
 def test_instrument_files_are_read_with_the_extra(tmp_path):
@@ -188,17 +179,16 @@ def test_instrument_files_are_read_with_the_extra(tmp_path):
     ],
 )  # fmt: skip
 def test_units_in_the_header_are_honoured(head, tmp_path):
-    (tmp_path / "scan.txt").write_text(f"{head}\n0 1000\n1 2000\n3 0\n", encoding="utf-8")
-    profile = geo.read_profile(tmp_path / "scan.txt")
+    profile = profile_of(tmp_path, f"{head}\n0 1000\n1 2000\n3 0\n")
     assert profile.x.tolist() == [0, 1, 3] and profile.height.tolist() == [1, 2, 0]
     assert profile.unit in ("um", "µm")
 
 
 def test_units_that_are_given_count_more_than_the_header(tmp_path):
-    (tmp_path / "scan.txt").write_text("x [um], height [nm]\n0 1\n1 2\n")
-    profile = geo.read_profile(tmp_path / "scan.txt", units=("mm", "um"))
+    text = "x [um], height [nm]\n0 1\n1 2\n"
+    profile = profile_of(tmp_path, text, units=("mm", "um"))
     assert profile.unit == "mm" and profile.height == pytest.approx([1e-3, 2e-3], rel=1e-12)
-    assert geo.read_profile(tmp_path / "scan.txt", units="um").height.tolist() == [1.0, 2.0]
+    assert profile_of(tmp_path, text, units="um").height.tolist() == [1.0, 2.0]
     assert profile.in_unit("um").x.tolist() == [0.0, 1000.0]
 
 
@@ -242,8 +232,7 @@ def test_a_slope_above_a_hundred_is_taken_for_mixed_units():
     ],
 )
 def test_columns_are_read_as_the_options_say(text, options, tmp_path):
-    (tmp_path / "scan.txt").write_text(text, encoding="utf-8")
-    x, height = geo.read_profile(tmp_path / "scan.txt", **options)
+    x, height = profile_of(tmp_path, text, **options)
     assert x.tolist() == [0, 1] and height.tolist() == [1.5, 2.5]
 
 
@@ -256,8 +245,7 @@ def test_a_text_in_another_encoding_is_refused_with_its_name(tmp_path):
 
 
 def test_an_empty_field_is_an_undefined_height(tmp_path):
-    (tmp_path / "scan.csv").write_text("0;1\n1;\n2;nan\n3;4\n")
-    assert geo.read_profile(tmp_path / "scan.csv", delimiter=";").undefined == 2
+    assert profile_of(tmp_path, "0;1\n1;\n2;nan\n3;4\n", delimiter=";").undefined == 2
 
 
 def test_every_option_has_its_word_in_the_text_of_a_wall(tmp_path):
@@ -299,11 +287,6 @@ def test_a_map_in_a_text_is_given_to_the_package_that_reads_it(tmp_path):
 
 
 # ---- what the columns are ----------------------------------------------------------------------------------------
-def profile_of(folder, text, **options):
-    (folder / "scan.txt").write_text(text, encoding="utf-8")
-    return geo.read_profile(folder / "scan.txt", **options)
-
-
 def advised(refused):
     """The options that a message says to pass, as a dict and as on the command line."""
     found = re.search(r"pass (.*?) \(on the command line (.*?)\)", str(refused.value))

@@ -1,14 +1,11 @@
 """Random walls: their heights are normal, with the given correlations, heights and slopes."""
 
-import sys
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from asperity import InputError
 from asperity import geometry as geo
 
 pytest.importorskip("SurfaceTopography")
@@ -142,9 +139,3 @@ def test_generators_and_seeds_are_numpys():
     assert wall(4) == wall(np.random.default_rng(4)) != wall(5)
     state = np.random.get_state()[1].tolist()  # noqa: NPY002 - which must not be used
     assert wall(None) != wall(None) and np.random.get_state()[1].tolist() == state  # noqa: NPY002
-
-
-def test_what_makes_the_heights_is_named_where_it_is_missing(monkeypatch):
-    monkeypatch.setitem(sys.modules, "SurfaceTopography.Generation", None)
-    with pytest.raises(InputError, match=r"asperity\[profiles\]"):
-        geo.random_wall(geo.HeightCorrelation(0.1), 16, rms_slope=0.1)

@@ -28,8 +28,6 @@ def test_a_wall_may_be_written_by_hand(tmp_path):
 
 
 def test_walls_are_found_by_name_and_parameters():
-    for name, entry in geo.WALLS.items():
-        assert geo.wall_from_text(name) == entry.build()
     assert geo.wall_from_text("focusing-arcs:half_angle=0.9") == geo.focusing_arcs(0.9)
     assert geo.wall_from_text("Focusing_Arcs: half-angle = 0.9") == geo.focusing_arcs(0.9)
     assert geo.wall_from_text("mushrooms:stem_to_cap=.3,stem_aspect=1,generations=2") == geo.mushrooms(0.3, 1.0, 2)

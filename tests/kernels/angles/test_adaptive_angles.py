@@ -14,7 +14,7 @@ from asperity.kernels.bases.measure import SINE
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import KRONROD_FRACTION, traced_matrix
 from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES, NULL_RULES, STUDENT, AnglePanels
-from asperity.kernels.walls.conditionals import WallConditionals, adaptive_conditionals
+from asperity.kernels.walls.conditionals import WallConditionals
 from asperity.spectral.bounds.images import is_costly
 
 ARCS = geo.focusing_arcs(1.2)
@@ -25,7 +25,7 @@ ANGLES = np.array([0.003, 0.4, 1.0, 1.7, 2.9])
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
 def test_rows_of_a_focusing_arc_lie_within_their_errors_of_the_closed_form(tolerance: float) -> None:
-    rows = adaptive_conditionals(ARCS, ANGLES, tolerance)
+    rows = WallConditionals(ARCS, 1, np.empty(0))(ANGLES, tolerance)[0]
     exact = ker.CircularArcLaw(1.2).apply(np.cos, ANGLES)
     assert np.all(rows.error <= 2.0 * tolerance)
     assert np.all(np.abs(rows.mean(np.cos) - exact) <= rows.error + 1e-13)
@@ -36,7 +36,7 @@ def test_rows_of_a_focusing_arc_lie_within_their_errors_of_the_closed_form(toler
 def test_cell_masses_of_a_focusing_arc_lie_within_their_errors_of_the_closed_form(tolerance, half_angle) -> None:
     """Functions that jump at the edges: the change of cell counts as error although the angle hardly changes."""
     edges = np.linspace(0.0, np.pi, 18)
-    rows = adaptive_conditionals(geo.focusing_arcs(half_angle), ANGLES, tolerance, 0, edges[1:-1])
+    rows = WallConditionals(geo.focusing_arcs(half_angle), 0, edges[1:-1])(ANGLES, tolerance)[0]
     masses = rows.mean(lambda angle: (np.digitize(angle, edges[1:-1])[:, None] == np.arange(17)).astype(float))
     exact = ker.CircularArcLaw(half_angle).conditionals(ANGLES, 1e-9, 0, edges[1:-1])
     assert np.all(rows.error <= 2.0 * tolerance)
@@ -114,7 +114,7 @@ def test_rows_of_a_wall_with_an_island_agree_with_traced_rays():
     bowl = geo.Arc((0.5, -0.05), (0.5, 0.4), np.pi, 2.0 * np.pi)
     wall = geo.Wall([bowl], islands=[[geo.Arc((0.5, -0.1), 0.02, 0.0, -2.0 * np.pi)]])
     theta, x = np.array([1.0, 1.9]), (np.arange(20_000) + 0.5) / 20_000
-    rows = adaptive_conditionals(wall, theta, 1e-6)
+    rows = WallConditionals(wall, 1, np.empty(0))(theta, 1e-6)[0]
     traced = geo.trace(wall, x, theta[:, None])
     # a midpoint sum over some hundred changes of itinerary, each of which shifts at most one point by a value of 2
     assert np.all(traced.escaped) and np.all(rows.error < 1e-4)

@@ -71,7 +71,7 @@ def test_too_many_words_are_left_as_they_are() -> None:
     "law", [HG(0.6) @ TEETH @ HG(0.6), CREVICES @ HG(0.7) @ CREVICES, (BACK @ HG(0.6)) ** 2], ids=repr
 )
 def test_palindromes_are_symmetric_for_spectral_tools(law: ker.Law) -> None:
-    found = spec.spectrum(law, basis=ker.Legendre(64))
+    found = spec.spectrum(ker.discretise(law, ker.Legendre(64)))
     assert found.values[0] == pytest.approx(1.0, abs=1e-12) and found.gap > 0.0
 
 

@@ -74,8 +74,9 @@ def test_the_mean_square_in_a_straight_channel_grows_twice_as_fast_as_the_varian
     times = np.array([25.0, 100.0, 400.0])
     found = spec.channel_paths(ker.lambertian(), times, 8000, 3, radius=0.5, speed=2.0)
     expected = np.array([mean_square_of_diffuse_walls(time, 0.5, 2.0) for time in times])
-    spread = (found.positions**2).std(axis=0) / math.sqrt(8000)
-    assert np.all(np.abs(found.mean_squares - expected) < 4.0 * spread + 0.01 * expected)
+    squares = found.positions**2
+    spread = squares.std(axis=0) / math.sqrt(8000)
+    assert np.all(np.abs(squares.mean(axis=0) - expected) < 4.0 * spread + 0.01 * expected)
     slopes = np.diff(expected / times) / np.diff(np.log(times))
     assert abs(slopes[-1] * math.pi / (4.0 * 0.5 * 2.0) - 1.0) < 0.05
 

@@ -1,7 +1,6 @@
 """Lemma 5.1 as measured numbers: symmetry of the true law, decay with the scale, honest errors."""
 
 import numpy as np
-import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -65,14 +64,6 @@ def test_reported_errors_hold_in_repeated_runs():
         misses += np.sum(np.abs(run.limit - exact.limit) > run.limit_error + exact.limit_error)
     # 80 intervals of 95 %; those of one run are correlated
     assert misses <= 10
-
-
-def test_entries_are_estimates_and_a_frame():
-    found = ker.weak_limit(DISK, TEETH, 1e-2, rng=0, samples=64)
-    number = found.estimate(0, 1, of="limit")
-    assert (number.value, number.error) == (found.limit[0, 1], found.limit_error[0, 1])
-    pytest.importorskip("pandas")
-    assert list(found.to_frame()["pair"]) == list(found.names)
 
 
 def test_a_limit_study_over_several_psi_is_the_mean_of_its_parts():

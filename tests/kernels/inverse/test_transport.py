@@ -74,9 +74,7 @@ def test_henyey_greenstein_laws_have_the_resistance_of_their_eigenvalues(g):
 def test_any_cost_and_any_incoming_distribution():
     # theta weighted by 2 theta/pi, cost theta'^2 after retroreflection: int (2/pi) theta^3 sin(theta)/2
     exact = quad(lambda t: t**3 * np.sin(t) / np.pi, 0, np.pi)[0]
-    found = ker.resistance(
-        ker.retroreflection(), cost=lambda _, out: out**2, incoming=lambda theta: 2 * theta / np.pi, tolerance=1e-9
-    )
+    found = ker.resistance(ker.retroreflection(), cost=lambda theta, out: 2 * theta / np.pi * out**2, tolerance=1e-9)
     assert abs(found.value - exact) <= found.error < 1e-8
     # a cost that jumps needs its breakpoint
     step = ker.resistance(ker.lambertian(), cost=lambda _, out: out > 1.0, breakpoints=[1.0], tolerance=1e-9)

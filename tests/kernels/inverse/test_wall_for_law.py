@@ -8,7 +8,6 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.kernels.inverse import wall_for_law
-from asperity.kernels.inverse.design import hollow_radius
 from asperity.kernels.inverse.hull import few_weights, nearest_weights, possible_gain
 
 MOMENTS = 5
@@ -169,29 +168,6 @@ def test_the_gap_is_an_objective():
     )
     # the gap of Maxwell's law in the paper's convention is that of its odd functions below 1, and its even ones
     assert float(spec.spectral_gap(ker.maxwell(float(found.parameters[0])))) == pytest.approx(0.3, abs=1e-4)
-
-
-def test_limits_keep_deep_walls_out():
-    free = ker.design_wall(ker.resistance, geo.triangular_teeth, [(0.3, 3.0)])
-    shallow = ker.design_wall(ker.resistance, geo.triangular_teeth, [(0.3, 3.0)], most_depth=0.2)
-    assert free.member.depth > 0.2 >= shallow.member.depth
-    assert float(shallow.value) < float(free.value)
-    assert np.isnan(shallow.tried[:, -1]).any()
-    # the resistance of teeth falls with the apex angle beyond the best one: the best within the limit lies on it
-    assert shallow.member.depth == pytest.approx(0.2, abs=2e-3)
-
-
-def test_the_smallest_radius_is_that_of_the_hollow_side():
-    assert hollow_radius(geo.flat()) == np.inf
-    assert hollow_radius(geo.rectangular_teeth(1.0)) == 0.0
-    for half_angle in (0.3, 1.2):
-        arcs = geo.focusing_arcs(half_angle)
-        assert hollow_radius(arcs) == pytest.approx(0.5 / np.sin(half_angle), rel=1e-12)
-    # bumps meet in a sharp valley, whatever their own radius
-    assert hollow_radius(geo.dispersing_arcs(0.5)) == 0.0
-    # an ellipse as the image of a circle: b^2/a at the ends of its long axis, here at the bottom
-    deep = geo.Wall([geo.Arc((0.5, 0.0), (0.5, 1.0), np.pi, 2.0 * np.pi)])
-    assert hollow_radius(deep) == pytest.approx(0.25, rel=1e-3)
 
 
 DISK, DISK_MOMENTS = geo.Disk(1.0, 0.4), 4

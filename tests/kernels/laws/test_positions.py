@@ -33,7 +33,7 @@ def test_a_joined_wall_consists_of_its_cells():
 def test_a_joined_wall_tends_to_its_position_law():
     """Theorem 1.7, measured: the distance of states falls with the size of the cells."""
     parts = [geo.triangular_teeth(1.2), geo.focusing_arcs(1.2)]
-    law = ker.PositionLaw.of_walls(parts)
+    law = ker.PositionLaw([0.0, 1.0, 2.0], [ker.WallLaw(part) for part in parts])
     found = []
     for fineness in (1, 4, 32):
         wall = geo.join_walls([part.scaled(1.0 / fineness) for part in parts], fineness)
@@ -84,12 +84,6 @@ def test_a_position_law_is_symmetric_and_keeps_the_position():
     drawn = law.sample(np.linspace(0.0, 2.0, 20_000), incoming, rng=RNG)
     mean = float(law.mean().apply(np.cos, 1.0))
     assert abs(np.cos(drawn).mean() - mean) < 4.5 * np.cos(drawn).std() / np.sqrt(20_000)
-
-
-def test_a_family_of_walls_gives_the_laws_at_the_middles():
-    law = ker.PositionLaw.from_family(lambda x: geo.triangular_teeth(0.5 + x), 0.0, 1.0, 4)
-    assert law.at(0.3) == ker.WallLaw(geo.triangular_teeth(0.875))
-    assert law.edges.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
 
 
 def test_the_displacement_over_a_floor_has_its_exact_law():

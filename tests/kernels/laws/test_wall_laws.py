@@ -9,7 +9,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import AccuracyError
 from asperity.kernels.laws.law import Combination, sum_of
-from asperity.kernels.walls.conditionals import adaptive_conditionals
+from asperity.kernels.walls.conditionals import WallConditionals
 from asperity.kernels.walls.wall_law import made_of_isometries
 from asperity.spectral.bounds.images import is_traced
 from wall_shapes import polygon
@@ -164,7 +164,7 @@ def wall(request):
 
 def test_the_hollows_together_have_the_cell_masses_of_quadrature_over_the_whole_wall(wall):
     law, theta, edges = ker.WallLaw(wall), np.array([0.2, 0.9, 1.7, 2.9]), np.linspace(0.0, np.pi, 8)
-    whole = adaptive_conditionals(wall, theta, 1e-9, 0, edges[1:-1])
+    whole = WallConditionals(wall, 0, edges[1:-1])(theta, 1e-9)[0]
     found = law.conditionals(theta, 1e-9, 0, edges[1:-1])
     wrong = np.abs(found.masses(edges) - whole.masses(edges)).sum(axis=1)
     assert np.all(wrong <= 1e-12 + found.error + whole.error)

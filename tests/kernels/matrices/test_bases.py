@@ -273,13 +273,11 @@ def test_panels_for_an_arc_follow_five_kinks_and_are_graded_to_where_they_gather
 def test_angles_that_nearly_coincide_are_one_edge() -> None:
     # pi/3 (1 + 1/2) is pi/2 up to rounding; at pi/2 both critical angles are one
     for half_angle in (np.pi / 3, 0.5 * np.pi, 0.5 * np.pi - 1e-7, 1e-3):
-        edges = Panels.for_arc(half_angle).edges
+        edges = Panels.for_wall(geo.focusing_arcs(half_angle)).edges
         assert np.diff(edges).min() > 1e-5 - 1e-12 and edges[-1] == np.pi
         assert np.abs(edges - half_angle).min() < 1e-5
     plain = Panels.for_wall(geo.flat())
-    assert (
-        Panels.for_wall(geo.focusing_arcs(0.5 * np.pi)) == Panels.for_arc(0.5 * np.pi) != plain == Panels.for_arc(None)
-    )
+    assert Panels.for_wall(geo.focusing_arcs(0.5 * np.pi)) != plain
     # no circular arc of at most a quarter turn either way: nothing to follow
     two = geo.Wall(
         [piece.stretched(0.5, 0.5).moved(x, 0.0) for x in (0.0, 0.5) for piece in geo.focusing_arcs(1.2).pieces]
@@ -390,8 +388,18 @@ def test_magnitudes_are_exceeded_nowhere(basis: Basis) -> None:
 
 @pytest.mark.parametrize("basis", BASES, ids=repr)
 def test_derivative_norms_are_those_of_differences(basis: Basis) -> None:
-    # the default of all bases, against the closed forms of polynomials, panels and bins
+    # the default of all bases, against the closed forms of polynomials and bins
     assert basis.derivative_norm() == pytest.approx(Basis.derivative_norm(basis), rel=1e-7, abs=1e-12)
+
+
+def test_the_derivative_norm_of_panels_is_that_of_the_derivatives_of_their_polynomials() -> None:
+    # on one panel the sums over e_i of the squared slopes are the trace of the Gram matrix of the slopes of powers
+    basis = Panels([0.0, np.pi], 2)
+    angle, weight = basis.measure.quadrature(basis.edges, 20)
+    powers = np.stack([np.ones_like(angle), angle, angle**2], axis=1)
+    slopes = np.stack([np.zeros_like(angle), np.ones_like(angle), 2.0 * angle], axis=1)
+    gram, of_slopes = (table.T @ (weight[:, None] * table) for table in (powers, slopes))
+    assert basis.derivative_norm() == pytest.approx(np.trace(np.linalg.solve(gram, of_slopes)) ** 0.5, rel=1e-8)
 
 
 def test_the_derivative_norm_of_polynomials_is_the_root_of_their_eigenvalues() -> None:

@@ -1,8 +1,6 @@
 """Matrices from pairs of angles, at once and in streams, of which chunks, sources and stops change no bit."""
 
 import tracemalloc
-from contextlib import contextmanager
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -80,21 +78,6 @@ def test_the_bits_depend_neither_on_the_chunks_nor_on_the_source(basis, invarian
     assert len(set(all_bits.values())) == 1
 
 
-def test_blocks_that_come_early_wait(monkeypatch):
-    whole = bits(ker.estimate_stream(pairs(), BASES[1]))
-
-    def backwards(function, tasks, client, backlog):
-        return [(task, function(task)) for task in reversed(list(tasks))]
-
-    @contextmanager
-    def no_workers(client):
-        yield SimpleNamespace(nthreads=dict)
-
-    monkeypatch.setattr(streams, "results", backwards)
-    monkeypatch.setattr(streams, "connected", no_workers)
-    assert bits(ker.estimate_stream(pairs(), BASES[1])) == whole
-
-
 @pytest.mark.parametrize("basis", BASES, ids=repr)
 def test_pairs_that_do_not_follow_the_measure_are_weighted_as_in_estimate(basis):
     # the matrix of the law itself, from pairs that have another distribution
@@ -108,36 +91,31 @@ def test_pairs_that_do_not_follow_the_measure_are_weighted_as_in_estimate(basis)
 
 
 @pytest.mark.parametrize(("basis", "invariant", "stop"), [(BASES[0], True, 1), (BASES[1], False, 6)])
-@pytest.mark.parametrize("source", ["arrays", "chunks", "chunks, to workers"])
-def test_a_stream_that_stopped_goes_on_to_the_same_bits(source, basis, invariant, stop, workers, tmp_path, monkeypatch):
-    """With workers it stops while later blocks are with them, and goes on here."""
+@pytest.mark.parametrize("source", ["arrays", "chunks"])
+def test_a_stream_that_stopped_goes_on_to_the_same_bits(source, basis, invariant, stop, tmp_path, monkeypatch):
     theta, image = pairs(invariant=invariant)
-    distributed = source == "chunks, to workers"
 
     def given(size=97):
         return (theta, image) if source == "arrays" else chunks(theta, image, size)
 
     asked = {"basis": basis, "invariant": invariant}
     whole = bits(ker.estimate_stream(given(), **asked))
-    step = "_merge" if distributed else "_add"
-    made, original = [], getattr(streams._Sums, step)
+    made, original = [], streams._Sums._add
 
     def stops(self, *block):
         made.append(block)
-        if len(made) != stop + 1:
-            return original(self, *block)
-        if not distributed:
-            # half a block is in the sums
-            original(self, *block)
-        raise KeyboardInterrupt
+        # half a block is in the sums where it stops
+        original(self, *block)
+        if len(made) == stop + 1:
+            raise KeyboardInterrupt
 
-    monkeypatch.setattr(streams._Sums, step, stops)
+    monkeypatch.setattr(streams._Sums, "_add", stops)
     asked["checkpoint"] = tmp_path / "a"
     with pytest.raises(KeyboardInterrupt, match=rf"a has {stop * BLOCK} of them: give the same call"):
-        ker.estimate_stream(given(), client=workers if distributed else None, **asked)
+        ker.estimate_stream(given(), **asked)
     assert bits(ker.estimate_stream(given(301), **asked)) == whole
     count = len(made)
-    assert distributed or count == -(-NUMBER // BLOCK) + 1
+    assert count == -(-NUMBER // BLOCK) + 1
     # nothing is left to do
     assert bits(ker.estimate_stream(given(), **asked)) == whole and len(made) == count
 

@@ -66,8 +66,7 @@ def test_replicates_average_to_the_matrix_and_number_eight(bounce) -> None:
     for basis in (ker.Bins(12), ker.Bins(300), ker.Legendre(6)):
         found = ker.discretise(bounce(), basis, "qmc", samples=2**15)
         assert len(found.replicates) == PARTS
-        mean = sum(np.asarray(part.todense() if hasattr(part, "todense") else part) for part in found.replicates) / 8
-        assert np.abs(mean - found.symmetric).max() < 1e-12
+        assert np.abs(np.mean(found.replicates, axis=0) - found.symmetric).max() < 1e-12
 
 
 def test_quasi_monte_carlo_rounds_up_and_beats_monte_carlo(bounce) -> None:
@@ -173,7 +172,7 @@ def test_counts_of_large_partitions_grow_into_wider_integers(monkeypatch) -> Non
 
 def test_a_sample_that_goes_on_leaves_earlier_matrices_as_they_are(bounce) -> None:
     sampler = SobolSampler(bounce(), ker.Bins(4), np.random.default_rng(0))
-    first, *_ = sampler.sampled(2**12, symmetrise=False)
+    first = sampler.sampled(2**12, symmetrise=False)
     before = np.array(first.replicates)
     sampler.sampled(2**14, symmetrise=False)
     assert np.array_equal(np.array(first.replicates), before)

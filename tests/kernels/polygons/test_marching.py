@@ -5,7 +5,6 @@ import pytest
 from campaigns.cases.random_hollows import random_hollow, wall_with
 from campaigns.judges.interval_marching import exact_row, exact_rows
 
-from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.polygons.beams import beams_of
@@ -26,7 +25,7 @@ def test_rows_of_triangular_teeth_are_the_closed_law(angle):
     rows = exact_rows(geo.triangular_teeth(angle).vertices, theta)
     probability, outgoing = law.branches(theta)
     for k in range(len(theta)):
-        row = rows.row(k)
+        row = rows[k]
         measured = cosine_moments(np.diff(row.edges), row.outgoing)
         assert row.unresolved == 0.0
         assert np.abs(measured - cosine_moments(probability[k], outgoing[k])).max() < ROW_DEFECT
@@ -52,7 +51,7 @@ def test_rows_and_beams_are_one_law_by_two_methods(seed):
     theta = np.random.default_rng(seed).uniform(0.05, np.pi - 0.05, 6)
     rows = exact_rows(hollow, theta, max_bounces=100_000)
     for k, angle in enumerate(theta):
-        row, cotangent = rows.row(k), 1.0 / np.tan(angle)
+        row, cotangent = rows[k], 1.0 / np.tan(angle)
         here = (beams.low <= angle) & (angle < beams.high)
         open_here = (beams.unresolved_low <= angle) & (angle < beams.unresolved_high)
         missing = (beams.unresolved_sine + beams.unresolved_cosine * cotangent)[open_here].sum() + row.unresolved
@@ -83,8 +82,3 @@ def test_limits_leave_a_fraction_unresolved_and_never_hang():
     row = exact_row(random_hollow(1), 1.0, max_intervals=2)
     assert len(row.sign) == 2
     assert 0.0 < row.unresolved < 1.0
-
-
-def test_an_angle_outside_the_half_turn_is_refused():
-    with pytest.raises(InputError, match="theta"):
-        exact_row([(0, 0), (0.5, -1), (1, 0)], 4.0)
