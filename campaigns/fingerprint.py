@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import json
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
@@ -34,20 +33,37 @@ ENCLOSED = ("henyey-greenstein", "triangular", "arcs", "arcs of scatter", "wall:
 
 def digest(result: Any) -> str:
     """The first 16 digits of the sha256 of all numbers and texts in a result, in order."""
-    return hashlib.sha256(json.dumps(result, default=_plain).encode()).hexdigest()[:16]
+    sha = hashlib.sha256()
+    for part in _parts(result):
+        sha.update(part)
+    return sha.hexdigest()[:16]
 
 
-def _plain(part: Any) -> Any:
-    """What JSON has for the part of a result: floats by the digits that make them out, arrays as lists."""
-    if isinstance(part, np.ndarray | np.generic):
-        return part.tolist()
-    if isinstance(part, geo.Wall | complex):
-        return repr(part)
-    if dataclasses.is_dataclass(part):
+def _parts(result: Any) -> Iterator[bytes]:
+    if dataclasses.is_dataclass(result) and not isinstance(result, type):
         # measured times differ from run to run
-        names = (field.name for field in dataclasses.fields(part))
-        return {name: getattr(part, name) for name in names if name not in ("seconds", "machine")}
-    return dict(part) if isinstance(part, Mapping) else type(part).__name__
+        for field in dataclasses.fields(result):
+            if field.name not in ("seconds", "machine"):
+                yield field.name.encode()
+                yield from _parts(getattr(result, field.name))
+    elif isinstance(result, np.ndarray) and result.dtype != object:
+        yield str(result.shape).encode()
+        yield np.ascontiguousarray(result).tobytes()
+    elif isinstance(result, Mapping):
+        for key, value in result.items():
+            yield str(key).encode()
+            yield from _parts(value)
+    elif isinstance(result, list | tuple):
+        for value in result:
+            yield from _parts(value)
+    elif isinstance(result, float | np.floating):
+        yield float(result).hex().encode()
+    elif isinstance(result, geo.Wall):
+        yield repr(result).encode()
+    elif result is None or isinstance(result, str | int | bool | np.generic):
+        yield str(result).encode()
+    else:
+        yield type(result).__name__.encode()
 
 
 def walls() -> dict[str, geo.Wall]:

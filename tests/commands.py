@@ -21,6 +21,15 @@ def run(*words: object) -> Result:
     return CliRunner().invoke(main, [str(word) for word in words])
 
 
+def refused(*words: object) -> str:
+    """The single line on standard error of a command that must end with exit code 1 and print no result."""
+    result = run(*words)
+    lines = result.stderr.splitlines()
+    assert (result.exit_code, result.stdout, len(lines)) == (1, "", 1), result.output
+    assert lines[0].startswith("asperity: ")
+    return lines[0]
+
+
 def environment(*folders: Path, **variables: str) -> dict[str, str]:
     """That of a fresh interpreter, which imports from these folders too."""
     path = [*map(str, (*folders, *HERE)), *filter(None, [os.environ.get("PYTHONPATH")])]

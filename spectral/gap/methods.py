@@ -163,7 +163,7 @@ def _raised(found: Spectrum, exponent: int, k: int) -> Spectrum:
         gap=gap,
         gap_errors=discretisation_only(np.array([grown])),
         slem=found.slem**exponent,
-        method=f"{_ordinal(exponent)} powers of the eigenvalues; {found.method}",
+        method=f"powers {exponent} of the eigenvalues; {found.method}",
         matrix_error=exponent * found.matrix_error,
     )
 
@@ -185,8 +185,3 @@ def gap_of_power(gap: float, error: float, exponent: int) -> tuple[float, float]
     least, most = max(gap - error, 0.0), min(gap + error, 2.0 if exponent % 2 else 1.0)
     value = grown(gap)
     return value, max(grown(most) - value, value - grown(least), 0.0) + 4.0 * EPS * abs(value)
-
-
-def _ordinal(number: int) -> str:
-    ending = {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th") if number % 100 not in (11, 12, 13) else "th"
-    return f"{number}{ending}"

@@ -67,20 +67,14 @@ def gap_of_exact(matrix: KernelMatrix, modulus: bool = False) -> SpectralGap:
     value, kind = 1.0 - found.slem if modulus else found.gap, matrix.error.kind
     chain = matrix.symmetric @ matrix.symmetric if modulus else matrix.symmetric
     parts, _ = _separate_parts(chain)
-    if matrix.size == 1:
-        reason = (
-            f"the spectrum off the constants consists of two isolated eigenvalues of infinite multiplicity, "
-            f"{even:.12g} on even functions of cos(theta) and {odd:.12g} on odd ones"
-        )
-        if even == odd == 0.0:
-            reason = "the law is Lambertian: of rank 1, its spectrum off the constants is 0"
-    else:
-        rest = "0" if even == odd == 0.0 else f"{even:.12g} on even and {odd:.12g} on odd functions of cos(theta)"
-        reason = f"the law maps step functions on {matrix.size} bins to such: beyond these its spectrum is {rest}"
+    reason = (
+        f"the law maps functions that are constant on {matrix.size} bins to such: beyond these its spectrum is "
+        f"{even:.12g} on even and {odd:.12g} on odd functions of cos(theta), each of infinite multiplicity"
+    )
     if parts > 1 and matrix.norm_bound == 1.0:
         double = (
             f"{'the square of ' if modulus else ''}the law has no transitions between {parts} sets of bins: "
-            f"1 is its eigenvalue of multiplicity {parts}" + ", a double eigenvalue" * (parts == 2)
+            f"1 is its eigenvalue of multiplicity {parts}"
         )
         return SpectralGap(0.0, 0.0, kind, "structure of the law", "no gap", (double, reason), matrix.frame, found)
     method = made_from(found, "algebraic error and rounding; the basis is exact")

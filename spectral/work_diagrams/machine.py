@@ -21,20 +21,13 @@ class Machine(Summary):
 
     Attributes
     ----------
-    processor : str
-    cores : int
-    pinned_to : int or None
-        Number of the core that the process was pinned to; None if the system cannot pin.
-    system, python : str
+    hardware : str
+        Processor and number of cores; times on others are not comparable.
     software : str
-        Versions of asperity, numpy, scipy and numba, and the BLAS library behind numpy.
+        Pinning, system, and the versions of Python, asperity, numpy, scipy, numba and the BLAS library behind numpy.
     """
 
-    processor: str
-    cores: int
-    pinned_to: int | None
-    system: str
-    python: str
+    hardware: str
     software: str
 
     @classmethod
@@ -42,18 +35,18 @@ class Machine(Summary):
         """This machine."""
         from threadpoolctl import threadpool_info
 
+        core = _last_core()
         pools = {
             f"{pool['internal_api']} {pool['version']}" for pool in threadpool_info() if pool["user_api"] == "blas"
         }
-        software = [*(f"{name} {_version(name)}" for name in PACKAGES), *sorted(pools)]
-        return cls(
-            _processor(), os.cpu_count() or 1, _last_core(), platform.platform(), platform.python_version(),
-            ", ".join(software),
+        software = (
+            "1 thread", "not pinned" if core is None else f"pinned to core {core}", platform.platform(),
+            f"Python {platform.python_version()}", *(f"{name} {_version(name)}" for name in PACKAGES), *sorted(pools),
         )  # fmt: skip
+        return cls(f"{_processor()}, {os.cpu_count() or 1} cores", ", ".join(software))
 
     def __str__(self) -> str:
-        pinned = "not pinned" if self.pinned_to is None else f"pinned to core {self.pinned_to}"
-        return f"{self.processor}, {self.cores} cores; 1 thread, {pinned}; Python {self.python}, {self.software}"
+        return f"{self.hardware}; {self.software}"
 
 
 @contextmanager

@@ -108,10 +108,11 @@ def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = Non
         return None
     x, y = np.log(sizes), np.log(errors) - np.log(errors[0])
     weight = np.ones(x.size) if number is None else 4.0 / polygamma(1, 0.5 * number)
-    (slope, level), covariance = np.polyfit(x, y, 1, w=np.sqrt(weight), cov="unscaled")
+    (slope, level), ((variance, _), _) = np.polyfit(x, y, 1, w=np.sqrt(weight), cov="unscaled")
     spread = float(np.sqrt(weight @ (y - slope * x - level) ** 2 / (x.size - 2)))
     if number is None:
-        half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, x.size - 2)) * spread * covariance[0, 0] ** 0.5
+        half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, x.size - 2) * spread * variance**0.5)
     else:
-        half = float(norm.ppf(0.5 + 0.5 * CONFIDENCE)) * max(spread, 1.0) * covariance[0, 0] ** 0.5
-    return FittedOrder(-slope, -slope - half, -slope + half, len(sizes))
+        half = float(norm.ppf(0.5 + 0.5 * CONFIDENCE) * max(spread, 1.0) * variance**0.5)
+    order = -float(slope)
+    return FittedOrder(order, order - half, order + half, len(sizes))

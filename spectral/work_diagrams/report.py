@@ -202,7 +202,7 @@ class WorkReport(Summary):
         """
         if earlier.problem != self.problem:
             raise InputError(f"path: expected rows of {self.problem!r}, got {earlier.problem!r}; name another file")
-        if (earlier.machine.processor, earlier.machine.cores) != (self.machine.processor, self.machine.cores):
+        if earlier.machine.hardware != self.machine.hardware:
             raise InputError(f"path: its times are of {earlier.machine}, not of {self.machine}; name another file")
         methods = {**earlier.methods, **self.methods}
         rows = tuple(row for row in earlier.rows if earlier.methods.get(row.method) == methods.get(row.method))

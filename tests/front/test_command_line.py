@@ -12,20 +12,10 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.cli import main
 from asperity.study import DATA, PICTURES
-from commands import ended, run
+from commands import ended, refused, run
 from wall_shapes import over_floor, square
 
 FILES = sorted((*PICTURES, *DATA))
-
-
-def refused(*arguments):
-    """The single line on standard error of a run that must end with exit code 1 and print no result."""
-    result = run(*arguments)
-    assert result.exit_code == 1, result.output
-    assert result.stdout == ""
-    lines = result.stderr.splitlines()
-    assert len(lines) == 1 and lines[0].startswith("asperity: ")
-    return lines[0]
 
 
 @pytest.fixture(scope="module")
@@ -82,18 +72,12 @@ def test_incidence_and_table_are_refused_before_the_work(tmp_path, monkeypatch):
     assert (tmp_path / "law.csv").read_text() == "mine"
 
 
-def test_force_replaces_an_earlier_study(tmp_path):
+def test_force_replaces_an_earlier_study_and_json_goes_alone_to_standard_output(tmp_path):
     (tmp_path / "study.json").write_text("old")
-    result = run("study", "flat", "--bins", 8, "--out", tmp_path, "--force")
-    assert result.exit_code == 0
-    assert json.loads((tmp_path / "study.json").read_text())["wall"]["name"] == "flat"
-
-
-def test_json_goes_alone_to_standard_output(tmp_path):
-    result = run("study", "flat", "--bins", 8, "--json", "--out", tmp_path)
+    result = run("study", "flat", "--bins", 8, "--json", "--out", tmp_path, "--force")
+    assert result.exit_code == 0 and "wrote" in result.stderr
     printed = json.loads(result.stdout)
-    assert printed == json.loads((tmp_path / "study.json").read_text())
-    assert "wrote" in result.stderr
+    assert printed == json.loads((tmp_path / "study.json").read_text()) and printed["wall"]["name"] == "flat"
 
 
 def test_mass_and_inertia_reach_the_disk():
@@ -145,20 +129,14 @@ def test_a_gap_is_printed_with_its_evidence_and_as_json(convention):
     assert gap["verdict"] == "no gap" and len(gap["evidence"]) == 1
 
 
-def test_the_named_walls_are_listed_and_drawn(tmp_path):
-    result = run("walls", "--out", tmp_path / "walls.png")
-    assert result.exit_code == 0
-    listed = [line.split()[0] for line in result.stdout.splitlines()]
-    assert listed == [*geo.WALLS, "wrote"]
-    assert (tmp_path / "walls.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_the_picture_of_the_walls_is_not_overwritten(tmp_path):
+def test_the_named_walls_are_listed_and_drawn_and_no_picture_is_overwritten(tmp_path):
     picture = tmp_path / "walls.png"
     picture.write_text("mine")
-    assert "--force" in refused("walls", "--out", picture)
-    assert picture.read_text() == "mine"
-    assert run("walls", "--out", picture, "--force").exit_code == 0
+    assert "--force" in refused("walls", "--out", picture) and picture.read_text() == "mine"
+    result = run("walls", "--out", picture, "--force")
+    assert result.exit_code == 0
+    assert [line.split()[0] for line in result.stdout.splitlines()] == [*geo.WALLS, "wrote"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(("wall", "words"), [("focusing-arc", "Did you mean focusing-arcs"), ("flat:angle", "=value")])

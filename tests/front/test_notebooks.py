@@ -97,7 +97,7 @@ def test_an_estimate_has_no_arithmetic():
                 spec.WorkProblem("a", spec.ReferenceValue(0.0, 0.0, "by hand")), [spec.WorkMethod("b", float)], [1, 2],
                 repeats=1,
             ),
-            ["method", "budget", "status", "least", "absolute error"], 2,
+            ["method", "budget", "status", "least", "error"], 2,
         ),
         (
             lambda: ker.limit_study(

@@ -199,7 +199,7 @@ def test_a_file_of_another_problem_or_machine_is_refused(tmp_path):
     with pytest.raises(InputError, match="another file"):
         spec.work_precision(other, [DECLARED["trapezoid"]], [8], repeats=1, path=path)
     data = json.loads(path.read_text())
-    data["machine"]["processor"] = "a slide rule"
+    data["machine"]["hardware"] = "a slide rule"
     path.write_text(json.dumps(data))
     with pytest.raises(InputError, match="slide rule"):
         spec.work_precision(problem(), [DECLARED["trapezoid"]], [8], repeats=1, path=path)
@@ -210,8 +210,8 @@ def test_a_file_of_another_problem_or_machine_is_refused(tmp_path):
 
 def test_the_machine_and_its_software_are_named():
     machine = Machine.here()
-    assert machine.processor and f"numpy {np.__version__}" in machine.software
-    assert "1 thread" in str(machine) and machine.software in str(machine)
+    assert machine.hardware.endswith(" cores") and f"numpy {np.__version__}" in machine.software
+    assert str(machine) == f"{machine.hardware}; {machine.software}" and machine.software.startswith("1 thread")
 
 
 def test_the_picture_shows_every_method_and_the_chosen_one_in_black():

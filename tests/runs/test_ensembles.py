@@ -15,7 +15,7 @@ from asperity import spectral as spec
 from asperity.spectral.sweeps.quantities import name_of
 from asperity.spectral.sweeps.row import COLUMNS
 from asperity.spectral.sweeps.statistics import mean_estimate, spread_estimate
-from commands import run
+from commands import refused, run
 
 # Of 400 trials 95 % succeed, give or take four standard deviations.
 TRIALS, LEAST, MOST = 400, 0.906, 0.994
@@ -249,6 +249,6 @@ def test_the_folder_of_another_ensemble_is_refused_with_the_difference(changed, 
      "gaussian:hurst=0.5"],
 )  # fmt: skip
 def test_other_spectra_are_refused_with_those_that_there_are(spectrum, tmp_path):
-    found = run("ensemble", spectrum, "--rms-slope", 0.1, "--out", tmp_path / "a")
-    assert found.exit_code == 1 and "self-affine:hurst=NUMBER,longest=NUMBER" in found.stderr
+    words = refused("ensemble", spectrum, "--rms-slope", 0.1, "--out", tmp_path / "a")
+    assert "self-affine:hurst=NUMBER,longest=NUMBER" in words
     assert not (tmp_path / "a").exists()

@@ -21,6 +21,10 @@ def test_named_walls_have_period_one_and_touch_the_opening_at_both_ends(name):
     assert geo.Wall(wall.pieces) == wall
     assert wall.is_mirror_symmetric
     assert geo.WALLS[name].summary and geo.WALLS[name].name == name
+    # a function without arguments returns the wall of the command line
+    assert wall == getattr(geo, name.replace("-", "_"))() == geo.wall_from_text(name)
+    written = ",".join(f"{key}={value!r}" for key, value in geo.WALLS[name].defaults.items())
+    assert geo.wall_from_text(f"{name}:{written}") == wall
 
 
 @pytest.mark.parametrize("angle", [1e-4, 0.7, pi / 2, 2.5, pi - 1e-4])
@@ -164,11 +168,3 @@ def test_a_koch_wall_of_65536_pieces_is_validated():
     wall = geo.koch(8)
     assert len(wall.pieces) == 65536
     assert wall.arc_length == pytest.approx((4 / 3) ** 8, rel=1e-11)
-
-
-@pytest.mark.parametrize("name", geo.WALLS)
-def test_a_function_without_arguments_returns_the_wall_of_the_command_line(name):
-    wall = getattr(geo, name.replace("-", "_"))()
-    assert wall == geo.WALLS[name].build() == geo.wall_from_text(name)
-    written = ",".join(f"{key}={value!r}" for key, value in geo.WALLS[name].defaults.items())
-    assert geo.wall_from_text(f"{name}:{written}") == wall
