@@ -112,7 +112,7 @@ def test_a_vertical_side_of_a_shallow_hollow_is_looked_at_from_its_own_scale():
     assert all(0.01 * depth**2 < grazed(wall).scale < depth**2 for depth, wall in walls.items())
     limits = [grazing_symbol(ker.WallLaw(wall)) for wall in walls.values()]
     roots = [limit.root for limit in limits]
-    assert all(limit.error < 1e-3 for limit in limits) and roots == sorted(roots, reverse=True)
+    assert all(limit.error < 1e-3 for limit in limits) and 1.0 > roots[0] > roots[1] > roots[2] > 0.0
 
 
 def open_wall(lowered, *island):

@@ -60,7 +60,6 @@ def test_equal_isometries_left_and_right_are_merged_where_the_apex_angle_divides
 
 
 # ---- extreme arguments ----------------------------------------------------------------------------------------------
-EXTREME = np.array([1e-12, 1e-9, 1e-5, 0.3, 1.5, 2.8, math.pi - 1e-5, math.pi - 1e-9, math.pi - 1e-12])
 EXTREME_LAWS = [
     *(ker.TriangularTeethLaw(angle) for angle in (1e-4, 1.0, math.pi - 1e-4)),
     *(ker.RectangularTeethLaw(ratio) for ratio in (1e-6, 1.0, 1e8)),
