@@ -145,7 +145,8 @@ class Panels(Basis):
         """The panel of each angle and the angle's position in it, from -1 to 1."""
         panel = self._cells.index(angle)
         low, high = self.edges[panel], self.edges[panel + 1]
-        return panel, np.asarray((2.0 * angle - low - high) / (high - low))
+        position: Floats = (2.0 * angle - low - high) / (high - low)
+        return panel, position
 
     def of_legendre(self, moments: Floats) -> Floats:
         """Integrals of the functions, shape (..., size), from the integrals of the panels' Legendre polynomials.
