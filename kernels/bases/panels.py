@@ -134,7 +134,7 @@ class Panels(Basis):
         angle = finite_array("angle", angle)
         panel, position = self.positions(angle)
         polynomials, owner = np.polynomial.legendre.legvander(position.ravel(), self.degree), panel.ravel()
-        values = np.empty_like(polynomials)
+        values = np.empty(polynomials.shape)
         # in parts whose coefficients fit into the processor's cache
         for start in range(0, owner.size, AT_ONCE):
             part = slice(start, start + AT_ONCE)
@@ -145,8 +145,7 @@ class Panels(Basis):
         """The panel of each angle and the angle's position in it, from -1 to 1."""
         panel = self._cells.index(angle)
         low, high = self.edges[panel], self.edges[panel + 1]
-        position: Floats = (2.0 * angle - low - high) / (high - low)
-        return panel, position
+        return panel, np.asarray((2.0 * angle - low - high) / (high - low))
 
     def of_legendre(self, moments: Floats) -> Floats:
         """Integrals of the functions, shape (..., size), from the integrals of the panels' Legendre polynomials.
