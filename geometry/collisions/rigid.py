@@ -222,5 +222,5 @@ def checked_states(position: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Fl
             f"({int(away.sum())} such)"
         )
     n = max(len(at), len(moving))
-    rows = np.broadcast_to(at, (n, 2)), np.broadcast_to(moving, (n, 3))
-    return np.ascontiguousarray(rows[0]), np.ascontiguousarray(rows[1])
+    # copies, because compiled functions are compiled once more for arrays that are read-only
+    return np.broadcast_to(at, (n, 2)).copy(), np.broadcast_to(moving, (n, 3)).copy()
