@@ -231,7 +231,7 @@ UNCALLED = {
 }  # fmt: skip
 # Functions of the user, what is handed on, how a matrix was made, and angles of which one gives no number, stay away.
 UNREPLACED = {
-    "engine", "client", "checkpoint", "key", "runner", "norms", "metadata", "counts", "replicates", "symmetrised",
+    "engine", "client", "checkpoint", "key", "runner", "metadata", "counts", "replicates", "symmetrised",
     "reversible", "mirror_symmetric", "frame", "requested_tolerance", "unresolved", "norm_bound", "raw_defect",
     "beyond", "cost", "incoming", "accommodation.incidence_deg", "study_wall.incidence_deg",
 }  # fmt: skip
