@@ -615,15 +615,16 @@ class _Chain(Law):
         if len(laws) > LONGEST_CHAIN:
             raise InputError(f"apply: expected at most {LONGEST_CHAIN} factors; use discretise(law, basis) ** n")
         found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)))
-        for index, law in enumerate(laws):
-            cuts = edges if index + 1 == len(laws) else _breakpoints_of_start(laws[index + 1 :])
-            each = law._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
-            if each * found.nodes.size > MOST_VALUES:
+        cuts = [*(_breakpoints_of_start(laws[k:]) for k in range(1, len(laws))), edges]
+        rules = [_conditionals_of(law, tolerance, degree, cut) for law, cut in zip(laws, cuts, strict=True)]
+        each = [rule(theta[:1]).nodes.size for rule in rules]
+        for index, rule in enumerate(rules):
+            if math.prod(each[index:], start=found.nodes.size) > MOST_VALUES:
                 raise InputError(
                     f"apply: {self!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
                     "discretise() and compose the matrices, or fewer angles at a time"
                 )
-            found = found.followed_by(_conditionals_of(law, tolerance, degree, cuts), index <= self._atomic_factors)
+            found = found.followed_by(rule, index <= self._atomic_factors)
         return found
 
 
