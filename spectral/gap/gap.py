@@ -38,8 +38,8 @@ ENCLOSED, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS = 3, 8, 1e-2, 2
 # Enclosures slightly wider than the tolerance are computed again with CLOSER times the tolerance. A gap whose error
 # exceeds the tolerance is accepted if its relative error is at most LARGEST_MISS.
 CLOSER, LARGEST_MISS = 0.25, 1e-3
-# Where enclosures for a smaller tolerance take too long, this one is tried.
-SURE_TOLERANCE = 1e-9
+# Where enclosures for a smaller tolerance take too long, these are tried.
+SURE_TOLERANCES = 1e-9, 1e-6
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
 PLANAR = 1e-2
 # Number of eigenvalues computed to find the least one.
@@ -283,7 +283,7 @@ def _by_matrices(
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
-    for wanted in dict.fromkeys((tolerance, max(tolerance, SURE_TOLERANCE))):
+    for wanted in dict.fromkeys((tolerance, *(max(tolerance, sure) for sure in SURE_TOLERANCES))):
         with suppress(OutOfTime), time_limited((1.0 - RAYS_FRACTION) * seconds):
             enclosed = enclosed_gap(law, wanted, edge)
             if enclosed is not None:
