@@ -98,10 +98,12 @@ setting_at = reader_of(SETTING)
 
 def setting_of(scene: Scene, hollow: int, limits: Limits, degree: int, edges: Floats, sizes: Floats) -> Struct:
     """Return the setting of hollow number ``hollow``, for use by one thread at a time."""
-    rays = Struct(Rays(*np.empty((2, BLOCK)), *results_for(BLOCK), np.zeros(1, np.int64)))
+    entries, angles = np.empty((2, BLOCK))
+    rays = Struct(Rays(entries, angles, *results_for(BLOCK), np.zeros(1, np.int64)))
     tracer = TRACE.slot, rays, scene.tables, details_for(BLOCK), SLOTS, np.zeros(1, np.int64)
     edges, sizes = (np.require(values, np.float64, ["C", "A", "W"]) for values in (edges, sizes))
-    return Struct(Setting(scene.tables.values.hollows[hollow], *limits, degree, len(edges), edges, sizes, *tracer))
+    own = scene.tables.values.hollows[hollow], *limits, degree, len(edges), edges, sizes
+    return Struct(Setting._make((*own, *tracer)))
 
 
 def empty_chain() -> Chain:
