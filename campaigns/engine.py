@@ -15,7 +15,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import import_module
@@ -129,23 +128,27 @@ class Campaign:
                 return [Judged("exception", fault=f"{type(reason).__name__}: {reason}")]
             return found
 
-        def end() -> None:
-            for child in children:
-                child.end()
-
-        with ExitStack() as ends, ThreadPoolExecutor(jobs) as pool:
-            ends.callback(end)
-            numbers = list(numbers)
+        with ThreadPoolExecutor(jobs) as pool:
+            cases = [(number, pool.submit(one, number)) for number in numbers]
             try:
-                for number, found in zip(numbers, pool.map(one, numbers), strict=True):
+                for number, case in cases:
+                    found = case.result()
                     if record is not None and number not in done:
                         with record.open("a", encoding="utf-8") as file:
                             file.write(json.dumps([number, [asdict(each) for each in found]]) + "\n")
                     yield number, found
             finally:
-                # of an unfinished run: the judges at work end, and no other case begins
+                # of an unfinished run: no other case begins, and the judges at work end, also those that just begin
                 pool.shutdown(wait=False, cancel_futures=True)
-                end()
+                while not all(case.done() for _, case in cases):
+                    _end(children)
+                    time.sleep(0.01)
+                _end(children)
+
+
+def _end(children: Iterable[ChildProcess]) -> None:
+    for child in children:
+        child.end()
 
 
 def _recorded(record: Path | None) -> dict[int, list[Judged]]:

@@ -184,7 +184,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Profile.in_unit": {"unit": "nm"},
     "Profile.detrended": {"degree": 1},
     "RollingCharts": {"spacing": np.pi / 30.0, "scale": 1.0},
-    "RoughBody": {"lengths": [1.0, 1.0, 1.0]},
+    "RoughBody": {"normals": 2.0 * np.pi * np.arange(3) / 3.0, "lengths": [1.0, 1.0, 1.0]},
     "SatelliteDisk": {"size": 0.1, "angles": [0.0, 1.0, 3.0, 5.0]},
     "SatelliteLaw.draw_limit": {"samples": 4},
     "TriangularTeethLaw": {"angle": 1.0},
@@ -231,7 +231,7 @@ UNCALLED = {
 }  # fmt: skip
 # Functions of the user, what is handed on, how a matrix was made, and angles of which one gives no number, stay away.
 UNREPLACED = {
-    "engine", "client", "checkpoint", "key", "runner", "norms", "metadata", "counts", "replicates", "symmetrised",
+    "engine", "client", "checkpoint", "key", "runner", "metadata", "counts", "replicates", "symmetrised",
     "reversible", "mirror_symmetric", "frame", "requested_tolerance", "unresolved", "norm_bound", "raw_defect",
     "beyond", "cost", "incoming", "accommodation.incidence_deg", "study_wall.incidence_deg",
 }  # fmt: skip

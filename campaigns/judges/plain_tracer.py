@@ -44,6 +44,8 @@ from asperity.geometry.scene.columns import (
 DIGITS, GUARD = 50, 25
 # A segment is looked at unless doubles, off by this fraction of the cell, show that its ends are on one side.
 ROOM = 1e-9
+# Rounding of the ends of an arc in doubles, as a fraction of its radius.
+ROOM_OF_ARCS = 1e-15
 # Determinant, as a fraction of the cell, from which on doubles know the time to a segment within ROOM / STEEP.
 STEEP = 1e-3
 # Copies of the cell that are looked at together; after the last ones a ray without a hit is given up.
@@ -100,7 +102,10 @@ class Arc(NamedTuple):
     half: Any
 
     def span(self):
-        return float(self.center[0] - self.semi_axes[0]), float(self.center[0] + self.semi_axes[0])
+        low, high, radius = self.middle - self.half, self.middle + self.half, self.semi_axes[0]
+        turns = (low, high, *(k * math.pi for k in range(math.ceil(low / math.pi), math.floor(high / math.pi) + 1)))
+        ends = [float(self.center[0] + radius * mp.cos(turn)) for turn in turns]
+        return min(ends) - ROOM_OF_ARCS * float(radius), max(ends) + ROOM_OF_ARCS * float(radius)
 
     def hits(self, tracer, p, v):
         maths, (a, b) = tracer.maths, self.semi_axes

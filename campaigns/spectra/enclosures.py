@@ -1,4 +1,4 @@
-"""Enclosures of the eigenvalues of five curved walls, against far finer ones and against a second method.
+"""Enclosures of the eigenvalues of six curved walls, against far finer ones and against a second method.
 
 The second method is the matrix in Legendre polynomials, whose eigenvalues can only have too small a modulus.
 """
@@ -17,14 +17,15 @@ LISTED = 3
 DEGREES, MATRIX_TOLERANCE = 24, 1e-6
 
 
-# Walls with the tolerances of a coarse and a fine run: two with a closed form, and three that are traced, the last
-# without mirror symmetry.
+# Walls with the tolerances of a coarse and a fine run: two with a closed form, and four that are traced; one is so
+# shallow that it smooths jumps of trial functions over less than the distance of nodes, one has no mirror symmetry.
 Case = tuple[str, geo.Wall, float, float]
 SKEW = geo.Wall([geo.Bezier([(0, 0), (0.2, -0.5), (0.7, -0.3), (1, 0)])], period=1.0)
 CASES: tuple[Case, ...] = (
     ("focusing arcs, 1.2", geo.focusing_arcs(1.2), 1e-5, 1e-9),
     ("focusing arcs, 0.6", geo.focusing_arcs(0.6), 1e-5, 1e-9),
     ("dispersing arcs, 1.0", geo.dispersing_arcs(1.0), 1e-4, 1e-8),
+    ("dispersing arcs, 0.001", geo.dispersing_arcs(1e-3), 1e-10, 1e-12),
     ("elliptical arcs, 1.2", geo.elliptical_arcs(1.2, geo.Disk()), 1e-4, 1e-6),
     ("cubic Bezier, skew", SKEW, 1e-3, 1e-5),
 )

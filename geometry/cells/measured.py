@@ -70,12 +70,6 @@ class Profile(Summary):
     def __iter__(self) -> Iterator[Floats]:
         return iter((self.x, self.height))
 
-    def __getitem__(self, index: int) -> Floats:
-        return (self.x, self.height)[index]
-
-    def __len__(self) -> int:
-        return 2
-
     @property
     def undefined(self) -> int:
         """The number of undefined heights, which are nan."""

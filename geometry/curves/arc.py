@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, number_between
+from ...core.checks import Floats, number_between
 from ...core.errors import WallError
 from ...core.rounding import EPS
-from .curve import LARGEST_COORDINATE, Curve, Point, as_point, stretch_factors, uniform_parameters
+from .curve import LARGEST_COORDINATE, Curve, Point, as_point, parameters, stretch_factors, uniform_parameters
 
 # Up to this span (radians) the points of an arc are computed from its chord and semi-axes. The difference of two
 # angles near pi/2 has an error of eps, so the angles give a span of 1e-8 with 8 digits only, the chord with 16.
@@ -134,7 +134,7 @@ class Arc(Curve):
 
     def point(self, s: ArrayLike) -> Floats:
         """Return the points at the parameters ``s`` in [0, 1] (uniform in t), shape ``s.shape + (2,)``."""
-        s = finite_array("s", s)
+        s = parameters(s)
         if abs(self.end_angle - self.start_angle) > CHORD_SPAN:
             return self._point_by_angle(s)
         dx, dy, chord = self._chord
@@ -166,7 +166,7 @@ class Arc(Curve):
 
     def tangent(self, s: ArrayLike) -> Floats:
         """Return the unit tangents at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
-        s = finite_array("s", s)
+        s = parameters(s)
         a, b = self.semi_axes
         if abs(self.end_angle - self.start_angle) > CHORD_SPAN:
             t = self.start_angle + s * (self.end_angle - self.start_angle)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, number_between, sequence
+from ...core.checks import Floats, number_between, sequence
 from ...core.errors import WallError
 from ...core.rounding import EPS
-from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
+from .curve import Curve, Point, as_point, parameters, stretch_factors, uniform_parameters
 
 # Distance (in the parameter) from the minimum of the speed to [0, 1] above which the closed formula for the length of
 # a quadratic curve cancels. There 24 Gauss nodes are exact to rounding: the branch points are at least as far away.
@@ -77,7 +77,7 @@ class Bezier(Curve):
 
     def point(self, s: ArrayLike) -> Floats:
         """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
-        return _bernstein(np.array(self.control_points), finite_array("s", s))
+        return _bernstein(np.array(self.control_points), parameters(s))
 
     def _derivative(self) -> Floats:
         """Return the control points of the derivative."""
@@ -85,7 +85,7 @@ class Bezier(Curve):
 
     def tangent(self, s: ArrayLike) -> Floats:
         """Return the unit tangents at the parameters ``s`` in [0, 1]; at a stationary point, one from 1e-6 inside."""
-        s = finite_array("s", s)
+        s = parameters(s)
         velocity = _bernstein(self._derivative(), s)
         speed = np.hypot(velocity[..., 0], velocity[..., 1])
         still = speed <= 8.0 * EPS * float(np.abs(self._derivative()).max())

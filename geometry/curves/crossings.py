@@ -65,15 +65,6 @@ class Crossing:
 
 
 @dataclass(frozen=True)
-class _Turn:
-    """A joint at which a path turns back along itself: the point, the two pieces, points on their left, then right."""
-
-    point: tuple[float, float]
-    pieces: tuple[int, int]
-    beside: Floats
-
-
-@dataclass(frozen=True)
 class _Loop:
     """A closed polyline: points, shape (n + 1, 2), and the label index of each edge (-1 on the closing path)."""
 
@@ -101,7 +92,7 @@ def find_crossing(
     for island in islands:
         loops.append(_flatten(island, size, first))
         first += len(island)
-    turns = _turns((pieces, *islands), size)
+    turns = _turns((pieces, *islands), labels, size)
     if len(loops) == 1 and not turns and shapely.LinearRing(_without_repeats(loops[0].points)).is_simple:
         return None
     straight = np.concatenate([straight_in(loop) for loop in (pieces, *islands)])
@@ -111,10 +102,10 @@ def find_crossing(
         face = _worst_face(some, straight)
         if face is not None:
             return _describe(face, some, labels, size)
-    for turn in turns:
-        beside = np.sum([_winding_numbers(loop.points, turn.beside) for loop in loops], axis=0)
-        if np.any(beside.reshape(2, -1).max(axis=0) < 1):
-            return Crossing(turn.point, tuple(labels[k] for k in turn.pieces), True)
+    for slit, beside in turns:
+        winding = np.sum([_winding_numbers(loop.points, beside) for loop in loops], axis=0)
+        if np.any(winding.reshape(2, -1).max(axis=0) < 1):
+            return slit
     return None
 
 
@@ -136,8 +127,13 @@ def _worst_face(loops: Sequence[_Loop], straight: NDArray[np.bool_]) -> object |
     return None
 
 
-def _turns(paths: Sequence[Sequence[Curve]], size: tuple[float, float]) -> list[_Turn]:
-    """Return the joints at which paths turn back along themselves; the first path is open, the others are closed."""
+def _turns(
+    paths: Sequence[Sequence[Curve]], labels: Sequence[str], size: tuple[float, float]
+) -> list[tuple[Crossing, Floats]]:
+    """Return the joints at which paths turn back along themselves, as slits; the first path is open, others are closed.
+
+    Each with points on the left of the two pieces, then on their right.
+    """
     found, first = [], 0
     for number, path in enumerate(paths):
         into, out = directions_of(path)
@@ -153,7 +149,8 @@ def _turns(paths: Sequence[Sequence[Curve]], size: tuple[float, float]) -> list[
                 points, along = short.point(ASKED) / size, short.tangent(ASKED) / size
                 left = along[:, ::-1] * [-1.0, 1.0] / np.hypot(along[:, 0], along[:, 1])[:, np.newaxis]
                 beside = np.concatenate([points + 2.0 * width * left, points - 2.0 * width * left])
-                found.append(_Turn(before.end, (first + k, first + (k + 1) % len(path)), beside))
+                names = labels[first + k], labels[first + (k + 1) % len(path)]
+                found.append((Crossing(before.end, names, is_slit=True), beside))
         first += len(path)
     return found
 

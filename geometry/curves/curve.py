@@ -11,13 +11,15 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_number, numbers, shortened
-from ...core.errors import WallError
+from ...core.checks import Floats, finite_array, finite_number, numbers, shortened
+from ...core.errors import InputError, WallError
 
 # Of a coordinate; products of three lengths stay far below the largest double.
 LARGEST_COORDINATE = 1e100
 # Steps of a flattened curve.
 MOST_STEPS = 1e7
+# Rounding takes parameters at most this far beyond the ends.
+BEYOND_ENDS = 1e-9
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -125,6 +127,14 @@ def stretch_factors(x_factor: float, y_factor: float) -> tuple[float, float]:
     if 0.0 in factors:
         raise WallError(f"stretched: expected two finite factors other than 0, got {factors}")
     return factors
+
+
+def parameters(s: ArrayLike) -> Floats:
+    """Return parameters of a curve as an array; raise InputError unless they are in [0, 1], up to rounding."""
+    array = finite_array("s", s)
+    if array.size and not -BEYOND_ENDS <= array.min() <= array.max() <= 1.0 + BEYOND_ENDS:
+        raise InputError(f"s: expected numbers in [0, 1], got {shortened(s)}")
+    return array
 
 
 def uniform_parameters(tolerance: float, steps: float) -> Floats:

@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, shaped
+from ...core.checks import Floats, shaped
 from ...core.errors import WallError
-from .curve import Box, Curve, Point, as_point, stretch_factors
+from .curve import Box, Curve, Point, as_point, parameters, stretch_factors
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Segment(Curve):
 
     def point(self, s: ArrayLike) -> Floats:
         """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
-        along = finite_array("s", s)[..., np.newaxis]
+        along = parameters(s)[..., np.newaxis]
         points: Floats = (1.0 - along) * np.array(self.start) + along * np.array(self.end)
         return points
 
@@ -78,7 +78,7 @@ class Segment(Curve):
         dx, dy = self.end[0] - self.start[0], self.end[1] - self.start[1]
         speed = math.hypot(dx, dy)
         direction = np.array([dx / speed, dy / speed])
-        return np.array(np.broadcast_to(direction, (*finite_array("s", s).shape, 2)), dtype=np.float64)
+        return np.array(np.broadcast_to(direction, (*parameters(s).shape, 2)), dtype=np.float64)
 
     @property
     def length(self) -> float:

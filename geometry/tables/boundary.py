@@ -102,8 +102,9 @@ def loops_of(curves: Sequence[Piece]) -> list[list[int]]:
     starts, ends = (np.array([getattr(curve, end) for curve in curves]) for end in ("start", "end"))
     gaps = np.hypot(*np.moveaxis(ends[:, None] - starts[None, :], -1, 0))
     joined = gaps <= JOIN_TOLERANCE * size
-    open_ends = np.flatnonzero((joined.sum(axis=1) != 1) | (joined.sum(axis=0) != 1))
-    if len(open_ends):
+    # ends first, of which the message says the nearest start
+    open_ends = [*np.flatnonzero(joined.sum(axis=1) != 1), *np.flatnonzero(joined.sum(axis=0) != 1)]
+    if open_ends:
         index = int(open_ends[0])
         nearest = int(np.argmin(gaps[index]))
         raise InputError(

@@ -90,7 +90,7 @@ class RoughBody(Summary):
         if gap > 1e-9 * lengths.sum():
             raise InputError(f"normals: expected the boundary of a body, got one that misses itself by {gap:.3g}")
         laws = self.law
-        if isinstance(laws, Law):
+        if isinstance(laws, Law) or not (callable(laws) or np.iterable(laws)):
             each = (laws,) * normals.size
         else:
             each = tuple(map(laws, normals.tolist())) if callable(laws) else tuple(laws)

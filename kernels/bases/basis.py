@@ -9,7 +9,7 @@ from typing import Literal, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, whole_number
+from ...core.checks import Floats, finite_array
 from .given import Vectorised
 from .intervals import cell_among
 from .measure import AngularMeasure, gauss_rule
@@ -100,7 +100,7 @@ class Basis(ABC):
         return hash((type(self).__name__, self.key()))
 
     def index(self, angle: ArrayLike) -> NDArray[np.int64]:
-        """The index of the interval between edges that contains each angle."""
+        """The index of the interval between edges that contains each angle: its left edge, and the last one also pi."""
         return cell_among(self.edges, finite_array("angle", angle))
 
     def magnitudes(self) -> tuple[Floats, Floats]:
@@ -132,10 +132,9 @@ class Basis(ABC):
         ``None`` if there is no such subspace. The subspace has the Galerkin matrix R S R^T, so S serves two grids.
         """
 
-    def project(self, function: Callable[[Floats], Floats], order: int | None = None) -> Floats:
+    def project(self, function: Callable[[Floats], Floats]) -> Floats:
         """Coefficients <e_i, f> of a vectorised function of the angle, shape (n,)."""
-        order = self.nodes_per_interval if order is None else whole_number("order", order, 1)
-        angle, weight = self.measure.quadrature(self.edges, order)
+        angle, weight = self.measure.quadrature(self.edges, self.nodes_per_interval)
         return np.asarray(self.evaluate(angle).T @ (weight * Vectorised(function, scalar=True)(angle)))
 
 

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, check_memory, finite_array, frozen, whole_number
 from ...core.errors import InputError
 from .basis import Basis
-from .intervals import cell_among
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
 # Numbers of Gauss nodes that integrate a smooth function times the weight to rounding on cells of width up to NARROW
@@ -100,18 +99,6 @@ class Bins(Basis):
 
     def key(self) -> tuple[object, ...]:
         return (self._measure.name, self._edges.tobytes())
-
-    def index(self, angle: ArrayLike) -> NDArray[np.int64]:
-        """Index of the bin that contains each angle; a bin contains its left edge, and the last bin contains pi."""
-        angle = finite_array("angle", angle)
-        if not self._equal or self._measure != SINE:
-            return cell_among(self._edges, angle)
-        # Bins of equal measure: the cdf gives the bin up to rounding; the comparison with the edges corrects it.
-        guess = (np.sin(0.5 * angle) ** 2 * self.size).astype(np.int64)
-        guess = np.minimum(guess, self.size - 1)
-        guess += (angle >= self._edges[guess + 1]) & (guess < self.size - 1)
-        guess -= angle < self._edges[guess]
-        return np.maximum(guess, 0)
 
     def evaluate(self, angle: ArrayLike) -> Floats:
         index = self.index(angle)

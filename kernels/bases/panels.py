@@ -9,18 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import (
-    Floats,
-    check_memory,
-    common_shape,
-    finite_array,
-    frozen,
-    indices,
-    instance,
-    number_between,
-    shaped,
-    whole_number,
-)
+from ...core.checks import Floats, check_memory, finite_array, frozen, instance, number_between, shaped, whole_number
 from .basis import Basis
 from .bins import Bins
 from .measure import SINE, AngularMeasure, WeightName
@@ -143,9 +132,9 @@ class Panels(Basis):
     def local(self, angle: ArrayLike) -> tuple[NDArray[np.int64], Floats]:
         """The panel of each angle and the values of this panel's functions, shape ``angle.shape + (degree + 1,)``."""
         angle = finite_array("angle", angle)
-        panel = self._cells.index(angle)
-        polynomials, owner = self.legendre(angle, panel).reshape(-1, self.degree + 1), panel.ravel()
-        values = np.empty_like(polynomials)
+        panel, position = self.positions(angle)
+        polynomials, owner = np.polynomial.legendre.legvander(position.ravel(), self.degree), panel.ravel()
+        values = np.empty(polynomials.shape)
         # in parts whose coefficients fit into the processor's cache
         for start in range(0, owner.size, AT_ONCE):
             part = slice(start, start + AT_ONCE)
@@ -155,17 +144,8 @@ class Panels(Basis):
     def positions(self, angle: Floats) -> tuple[NDArray[np.int64], Floats]:
         """The panel of each angle and the angle's position in it, from -1 to 1."""
         panel = self._cells.index(angle)
-        return panel, self._position(angle, panel)
-
-    def _position(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
         low, high = self.edges[panel], self.edges[panel + 1]
-        return np.asarray((2.0 * angle - low - high) / (high - low))
-
-    def legendre(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
-        """The Legendre polynomials of the given panels at the angles, shape ``angle.shape + (degree + 1,)``."""
-        angle, panel = finite_array("angle", angle), indices("panel", panel, self._cells.size)
-        common_shape(angle=angle, panel=panel)
-        return np.asarray(np.polynomial.legendre.legvander(self._position(angle, panel), self.degree))
+        return panel, np.asarray((2.0 * angle - low - high) / (high - low))
 
     def of_legendre(self, moments: Floats) -> Floats:
         """Integrals of the functions, shape (..., size), from the integrals of the panels' Legendre polynomials.
@@ -204,9 +184,8 @@ class Panels(Basis):
         """The upper triangular matrix of each panel that turns Legendre polynomials into orthonormal functions."""
         angle, weight = self.measure.quadrature(self.edges, self.nodes_per_interval)
         shape = (self._cells.size, self.nodes_per_interval)
-        panel = np.repeat(np.arange(shape[0]), shape[1])
-        root = np.sqrt(weight)
-        table = (root[:, None] * self.legendre(angle, panel)).reshape((*shape, self.degree + 1))
+        polynomials = np.polynomial.legendre.legvander(self.positions(angle)[1], self.degree)
+        table = (np.sqrt(weight)[:, None] * polynomials).reshape((*shape, self.degree + 1))
         triangle = np.linalg.qr(table, mode="r")
         inverse = np.linalg.inv(triangle)
         signs = np.sign(np.diagonal(triangle, axis1=-2, axis2=-1))

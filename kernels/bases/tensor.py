@@ -93,9 +93,9 @@ class TensorBasis(BasisOfPoints):
             values = product.reshape((*angle.shape[:-1], -1))
         return values
 
-    def project(self, function: Callable[[Floats], Floats], order: int | None = None) -> Floats:
+    def project(self, function: Callable[[Floats], Floats]) -> Floats:
         """Coefficients, shape (n,), of a function of points whose last axis holds one angle per factor."""
-        rules = [f.measure.quadrature(f.edges, order or f.nodes_per_interval) for f in self.factors]
+        rules = [f.measure.quadrature(f.edges, f.nodes_per_interval) for f in self.factors]
         grid = np.stack(np.meshgrid(*[rule[0] for rule in rules], indexing="ij"), axis=-1)
         # a function of points: its values have the shape of one of their coordinates
         values = Vectorised(lambda *_: function(grid), scalar=True)(grid[..., 0])

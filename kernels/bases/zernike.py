@@ -77,9 +77,9 @@ class Zernike(BasisOfPoints):
         """Values of all functions, shape ``(..., n)``, at points of the disc, whose last axis holds (v_x, v_y)."""
         return zernike_functions(shaped("angle", angle, "...", 2), self.degrees, self.orders)
 
-    def project(self, function: Callable[[Floats], Floats], order: int | None = None) -> Floats:
+    def project(self, function: Callable[[Floats], Floats]) -> Floats:
         """Coefficients <f_i, g>, shape (n,), of a function of points of the disc, whose last axis holds (v_x, v_y)."""
-        number = self.degree + 1 if order is None else whole_number("order", order, 1)
+        number = self.degree + 1
         square, weight = np.polynomial.legendre.leggauss(number)
         phi = np.pi * np.arange(2 * number) / number
         radius = np.sqrt(0.5 + 0.5 * square)[:, None]

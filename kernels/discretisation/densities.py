@@ -15,7 +15,7 @@ from ..bases.bins import Bins
 from ..bases.intervals import bisected
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
-from ..laws.density import DensityLaw, cut_by_edges
+from ..laws.density import DensityLaw, cut_by_edges, split_panels
 from ..laws.involution import InvolutionLaw, jumps_of_map
 from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.phase_function import HenyeyGreensteinLaw
@@ -171,8 +171,7 @@ def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: f
 def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floats) -> Iterator[Floats]:
     pieces = 4
     while pieces == 4 or pieces * edges.size * basis.nodes_per_interval <= MOST_MAP_POINTS:
-        fraction = np.arange(pieces) / pieces
-        fine = np.concatenate(((edges[:-1, None] + fraction * np.diff(edges)[:, None]).ravel(), [np.pi]))
+        fine = split_panels(edges, pieces)
         if not basis.is_polynomial:
             fine = np.unique(np.concatenate((fine, _crossings(map_angle, basis, fine))))
         if basis.is_partition:

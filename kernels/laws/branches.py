@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 
@@ -19,7 +18,7 @@ SAME_ANGLE = 16.0 * EPS
 # Merging compares all pairs, and the number of branches of a composition grows exponentially unless they merge.
 MOST_BRANCHES = 64
 
-# Probabilities and outgoing angles, shape theta.shape + (branches,).
+# Probabilities and outgoing angles, shape theta.shape + (branches,); None if there are no branches, or too many.
 Branches = Callable[[Floats], "tuple[Floats, Floats] | None"]
 
 
@@ -28,16 +27,6 @@ def joined(parts: Sequence[tuple[Floats, float]]) -> tuple[Floats, float]:
     left_out = sum(left for _, left in parts)
     found = np.unique(np.concatenate([points for points, _ in parts]))
     return found, left_out if math.isinf(left_out) else min(left_out, 1.0)
-
-
-class Branching(Protocol):
-    """The methods of a law that `chained` and `chained_breakpoints` use."""
-
-    def _branches(self, theta: Floats, /) -> tuple[Floats, Floats] | None:
-        """Probabilities and outgoing angles at incoming angles; None if there are no branches, or too many."""
-
-    def breakpoints(self, limit: int, /) -> tuple[Floats, float]:
-        """Angles where the branches change, about ``limit`` at most, and the measure with breakpoints left out."""
 
 
 def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
@@ -57,11 +46,11 @@ def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
     return probability, np.where(probability > 0.0, outgoing, first)
 
 
-def chained(laws: Sequence[Branching], theta: Floats) -> tuple[Floats, Floats] | None:
+def chained(laws: Sequence[Branches], theta: Floats) -> tuple[Floats, Floats] | None:
     """The branches of a composition of laws, merged after each law; None if a law has none, or if they are too many."""
     probability, outgoing = np.ones((*theta.shape, 1)), theta[..., None]
     for law in laws:
-        found = law._branches(outgoing)
+        found = law(outgoing)
         if found is None:
             return None
         step, angle = found
@@ -74,14 +63,13 @@ def chained(laws: Sequence[Branching], theta: Floats) -> tuple[Floats, Floats] |
     return probability, outgoing
 
 
-def chained_breakpoints(laws: Sequence[Branching], limit: int) -> tuple[Floats, float]:
-    """Breakpoints of a composition, and the measure where breakpoints were left out; inf unless all laws know theirs.
+def chained_breakpoints(laws: Sequence[Branches], each: Sequence[tuple[Floats, float]]) -> tuple[Floats, float]:
+    """Breakpoints of a composition from ``each`` law's, and the measure without them; inf unless all laws know theirs.
 
     These are the breakpoints of the first law and the angles that its branches map to breakpoints of later laws.
     """
     if not laws:
         return np.empty(0), 0.0
-    each = [law.breakpoints(limit) for law in laws]
     left_out = sum(left for _, left in each)
     if math.isinf(left_out):
         return np.empty(0), math.inf

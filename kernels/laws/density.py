@@ -15,7 +15,7 @@ from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.given import Vectorised
-from ..bases.measure import SINE, gauss_on_intervals
+from ..bases.measure import SINE, gauss_rule
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from .law import Law, set_properties
 
@@ -76,7 +76,6 @@ class DensityLaw(Law):
     asperity.errors.InputError: density: expected rows that integrate to 1, got 2 at theta = 0.015...
     """
 
-    outgoing_breakpoints: Floats = frozen(())
     sampling_error: float = 0.0
     _function: DensityFunction
     _panel_count: int = PANEL_COUNTS[0]
@@ -183,16 +182,9 @@ class DensityLaw(Law):
 
     def _cells(self) -> Floats:
         edges = self._grid(self._panel_count)
-        fraction = np.arange(CELLS_PER_PANEL) / CELLS_PER_PANEL
-        inner = (edges[:-1, None] + fraction * np.diff(edges)[:, None]).ravel()
         # Both sides of each jump of the density.
         gap, jumps = 4.0 * EPS, self.outgoing_breakpoints
-        return np.unique(np.concatenate([inner, [np.pi], jumps - gap, jumps + gap]))
-
-    def _conditional_quadrature(self, edges: Floats, order: int) -> tuple[Floats, Floats]:
-        outgoing, weight = gauss_on_intervals(edges[..., :-1].ravel(), edges[..., 1:].ravel(), order)
-        shape = (*edges.shape[:-1], -1)
-        return outgoing.reshape(shape), weight.reshape(shape)
+        return np.unique(np.concatenate([split_panels(edges, CELLS_PER_PANEL), jumps - gap, jumps + gap]))
 
     def _panels_needed(self) -> tuple[int, float]:
         """The number of panels, and the largest total of the differences of two quadratures on all panels.
@@ -205,7 +197,7 @@ class DensityLaw(Law):
         for panels in PANEL_COUNTS:
             edges, moments = self._grid(panels), []
             for order in (CHECK_NODES, GAUSS_NODES):
-                outgoing, weight = self._conditional_quadrature(edges, order)
+                outgoing, weight = gauss_rule(edges, order)
                 masses = (self.density(probes[:, None], outgoing) * weight).reshape(PROBES, edges.size - 1, order)
                 local = np.polynomial.legendre.leggauss(order)[0]
                 moments.append(masses @ np.stack([np.ones(order), local], axis=1))
@@ -234,7 +226,7 @@ class DensityLaw(Law):
 
     def _measured_sampling_error(self) -> float:
         edges, probes = self._cells(), _probes()
-        outgoing, weight = self._conditional_quadrature(edges, CHECK_NODES)
+        outgoing, weight = gauss_rule(edges, CHECK_NODES)
         mass = (self.density(probes[:, None], outgoing) * weight).reshape(PROBES, edges.size - 1, CHECK_NODES)
         exact = np.cumsum(mass.sum(axis=-1), axis=-1)
         table = np.cumsum(_cell_masses(edges, self.density(probes[:, None], clipped_inside(edges))), axis=-1)
@@ -242,16 +234,15 @@ class DensityLaw(Law):
 
 
 def split_panels(edges: Floats, parts: int) -> Floats:
-    """The edges in the last axis, with each interval cut into ``parts`` equal parts.
+    """The edges, with each interval cut into ``parts`` equal parts.
 
     Examples
     --------
     >>> split_panels(np.array([0.0, 1.0, 3.0]), 2).tolist()
     [0.0, 0.5, 1.0, 2.0, 3.0]
     """
-    fraction = np.arange(parts) / parts
-    fine = (edges[..., :-1, None] + fraction * np.diff(edges, axis=-1)[..., None]).reshape(*edges.shape[:-1], -1)
-    return np.concatenate([fine, edges[..., -1:]], axis=-1)
+    fine = edges[:-1, None] + np.arange(parts) / parts * np.diff(edges)[:, None]
+    return np.append(fine, edges[-1])
 
 
 def cut_by_edges(panels: Floats, edges: Floats) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:

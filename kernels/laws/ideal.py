@@ -19,14 +19,10 @@ class LambertianLaw(DensityLaw):
 
     reversible = True
     mirror_symmetric = True
+    is_lambertian = True
 
     def __init__(self) -> None:
         """Takes no arguments."""
-
-    @property
-    def is_lambertian(self) -> bool:
-        """Always True."""
-        return True
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """sin(theta')/2, in the shape to which the two arguments broadcast."""

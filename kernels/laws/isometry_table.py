@@ -24,8 +24,6 @@ COLUMNS = "sign", "offset", "low", "high", "start", "end"
 SAME_OFFSET = 64.0 * np.pi * EPS
 # Sums of probabilities that differ from 1 by less than this differ by rounding; they are normalised.
 ROUNDED_SUM = 1e-9
-# Number of angles up to which all pieces are compared with the angles, before there is an index.
-FEW_ANGLES = 4
 # Approximate number of entries in the index for each piece.
 ENTRIES_PER_PIECE = 4.0
 
@@ -93,9 +91,6 @@ class IsometryTable:
 
     def __post_init__(self) -> None:
         columns = [np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64)) for name in COLUMNS]
-        shapes = {column.shape for column in columns}
-        if len(shapes) != 1 or columns[0].ndim != 1:
-            raise InputError(f"table: expected columns of the same length, got shapes {sorted(shapes)}")
         columns[4:] = (_fixed(np.maximum(column, 0.0)) for column in columns[4:])
         used = (columns[3] > columns[2]) & ((columns[4] > 0.0) | (columns[5] > 0.0))
         if np.any(columns[3] - columns[2] > 0.5 * np.pi * (1.0 + 1e-15)):
@@ -153,8 +148,6 @@ class IsometryTable:
     def joined(cls, tables: Iterable[IsometryTable]) -> IsometryTable:
         """The sum of tables, whose probabilities should sum to 1."""
         parts = list(tables)
-        if not parts:
-            raise InputError("tables: expected at least one, got none")
         columns = [np.concatenate([getattr(table, name) for table in parts]) for name in COLUMNS]  # names of this class
         crevices: dict[tuple[float, bool], float] = {}
         for crevice in (crevice for table in parts for crevice in table.crevices):
@@ -263,11 +256,7 @@ class IsometryTable:
     def _entries(self, theta: Floats) -> tuple[Whole, Whole, Floats]:
         """All (angle, isometry, probability); pieces with the same isometry are not yet merged."""
         number = self.isometries[2]
-        if theta.size <= FEW_ANGLES and "_index" not in self.__dict__:
-            # all pieces in one bucket, which is faster than their distribution
-            first, members = np.array([0, self.low.size]), np.arange(self.low.size)
-        else:
-            first, members = self._index
+        first, members = self._index
         buckets = first.size - 1
         found: list[tuple[Whole, Whole, Floats]] = []
         bucket = np.clip((theta * (buckets / np.pi)).astype(np.int64), 0, buckets - 1)

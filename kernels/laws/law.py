@@ -20,6 +20,7 @@ from ...core.checks import (
     finite_array,
     finite_number,
     foreign,
+    frozen,
     generator,
     instance,
     number_between,
@@ -39,8 +40,6 @@ from .branches import MOST_BRANCHES, chained, chained_breakpoints, joined, merge
 from .isometry_table import IsometryTable
 from .tables import Table, WithAtoms, tabulated
 
-# Half the spacing of rng.random(). It replaces draws of exactly 0, for which the ray would enter at a tip of the wall.
-SMALLEST_DRAW = 2.0**-54
 # Smallest and largest float64 in (0, 1), up to subnormal numbers.
 SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 # Decimal weights such as 0.1, ..., 0.4 sum to 1 within a few roundings; a sum with a forgotten term differs by more.
@@ -60,10 +59,9 @@ CUTS = 64
 # Incoming angle, tolerance, and degrees with edges of the test whether conditional distributions depend on these.
 PROBE, PROBE_TOLERANCE = np.array([1.0]), 1e-2
 PROBE_FUNCTIONS = (0, np.empty(0)), (64, np.linspace(0.05, 3.09, 32))
-# Limit on nested calls of `apply`; more would exceed Python's recursion limit.
-DEEPEST_POWER = 100
-# Limits on the exponents of powers of which branches are listed, and of which rays are drawn, some seconds of work.
-LONGEST_CHAIN, LONGEST_SAMPLE = 10**4, 10**5
+# Limit on the exponents of powers, some seconds of work, and on the factors that are no isometries or whose breakpoints
+# are asked for: the work grows like the square of their number, or faster.
+LARGEST_POWER, LONGEST_CHAIN = 10**5, 100
 
 T = TypeVar("T")
 # A map from uniform numbers and incoming angles to the outgoing angles and, for traced rays, whether each ray escaped.
@@ -83,6 +81,10 @@ class Law(ABC):
         Whether P~ commutes with J f(theta) = f(pi - theta); None if unknown.
     frame : {"paper", "specular"}
         ``"specular"`` after `in_specular_frame`, where specular reflection is the identity (Feres' convention).
+    is_lambertian : bool
+        Whether the outgoing angle has the density sin(theta')/2 for every incoming angle.
+    outgoing_breakpoints : ndarray
+        The known outgoing angles at which densities jump or have a kink for every incoming angle.
 
     Notes
     -----
@@ -95,6 +97,8 @@ class Law(ABC):
     reversible: bool | None = None
     mirror_symmetric: bool | None = None
     frame: Frame = "paper"
+    is_lambertian: bool = False
+    outgoing_breakpoints: Floats = frozen(())
     # A law is an operator, not an array: with None, numpy leaves ``np.float64(0.3) * law`` to this class.
     __array_ufunc__ = None
 
@@ -250,11 +254,6 @@ class Law(ABC):
         """
         return ((1.0, self),)
 
-    @property
-    def is_lambertian(self) -> bool:
-        """Whether the outgoing angle has the density sin(theta')/2 for every incoming angle."""
-        return False
-
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Increasing incoming angles in (0, pi) between which P~(theta, .) varies smoothly, about ``limit`` at most.
 
@@ -262,11 +261,6 @@ class Law(ABC):
         the law does not know all its breakpoints.
         """
         return np.empty(0), math.inf
-
-    @property
-    def outgoing_breakpoints(self) -> Floats:
-        """The known outgoing angles at which densities jump or have a kink for every incoming angle."""
-        return np.empty(0)
 
     def random_map(self) -> RandomMap | None:
         """The law as a map of a uniform number in (0, 1) and the incoming angle; None if it needs more randomness."""
@@ -368,7 +362,7 @@ class DrivenLaw(Law):
         return self.reflect_with_status
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        return self.reflect(np.maximum(rng.random(theta.shape), SMALLEST_DRAW), theta)
+        return self.reflect(entry_inside(rng.random(theta.shape)), theta)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         outgoing = self.reflect((np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS, theta[:, None])
@@ -586,42 +580,51 @@ class _Chain(Law):
     """Laws applied one after the other."""
 
     @abstractmethod
-    def _factors(self) -> tuple[Law, ...]:
-        """The laws in their order of application."""
+    def factors(self) -> tuple[Law, ...]:
+        """The laws in their order of application; raises InputError if they are too many."""
 
     def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
-        return chained(self._factors(), theta)
+        return chained([law._branches for law in self.factors()], theta)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        return chained_breakpoints(self._factors(), limit)
+        return _breakpoints_of_chain(self.factors(), limit)
+
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        theta = theta.copy()
+        for law in self.factors():
+            theta = law.sample(theta, rng)
+        return theta
 
     @cached_property
     def _error_of_atoms(self) -> float:
         """The sum of the errors of the laws, if all are made of isometries."""
-        return sum(float(_probe(law).error[0]) for law in self._factors())
+        return sum(float(_probe(law).error[0]) for law in self.factors())
 
     @cached_property
     def _atomic_factors(self) -> int:
         """The number of laws with finitely many atoms before the first other one."""
-        laws = self._factors()
+        laws = self.factors()
         return next((k for k, law in enumerate(laws) if not is_atomic(law)), len(laws))
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """The conditional distributions; means under a law are cut at the next law's breakpoints."""
-        laws = self._factors()
+        laws = self.factors()
         branches = self._branches(theta)
         if branches is not None:
             return Conditionals.of_atoms(branches[1], branches[0], self._error_of_atoms)
+        if len(laws) > LONGEST_CHAIN:
+            raise InputError(f"apply: expected at most {LONGEST_CHAIN} factors; use discretise(law, basis) ** n")
         found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)))
-        for index, law in enumerate(laws):
-            cuts = edges if index + 1 == len(laws) else _breakpoints_of_start(laws[index + 1 :])
-            each = law._conditionals(found.nodes[:1], tolerance, degree, cuts).nodes.size
-            if each * found.nodes.size > MOST_VALUES:
+        cuts = [*(_breakpoints_of_start(laws[k:]) for k in range(1, len(laws))), edges]
+        rules = [_conditionals_of(law, tolerance, degree, cut) for law, cut in zip(laws, cuts, strict=True)]
+        each = [rule(theta[:1]).nodes.size for rule in rules]
+        for index, rule in enumerate(rules):
+            if math.prod(each[index:], start=found.nodes.size) > MOST_VALUES:
                 raise InputError(
                     f"apply: {self!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
                     "discretise() and compose the matrices, or fewer angles at a time"
                 )
-            found = found.followed_by(_conditionals_of(law, tolerance, degree, cuts), index <= self._atomic_factors)
+            found = found.followed_by(rule, index <= self._atomic_factors)
         return found
 
 
@@ -680,13 +683,8 @@ class Composition(_Chain):
         """(P Q)* = Q* P*."""
         return self if self.reversible else Composition(tuple(law.adjoint() for law in reversed(self.laws)))
 
-    def _factors(self) -> tuple[Law, ...]:
+    def factors(self) -> tuple[Law, ...]:
         return self.laws
-
-    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        for law in self.laws:
-            theta = law.sample(theta, rng)
-        return theta
 
     def __repr__(self) -> str:
         return " @ ".join(as_factor(law) for law in self.laws)
@@ -716,8 +714,8 @@ class Power(_Chain):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
     The number of outgoing angles of its conditional distributions grows like a power with exponent n, unless isometries
-    merge. `apply` and `conditionals` raise InputError above 10^8 in all, or for n > 100; use
-    ``discretise(law, basis) ** n`` then.
+    merge. `apply` and `conditionals` raise InputError above 10^8 in all, or for n > 100 if the law has no `branches`,
+    and every method does for n > 10^5; use ``discretise(law, basis) ** n`` then.
 
     Examples
     --------
@@ -741,25 +739,16 @@ class Power(_Chain):
         """(P^n)* = (P*)^n."""
         return self if self.reversible else Power(self.law.adjoint(), self.exponent)
 
-    def _factors(self) -> tuple[Law, ...]:
+    def factors(self) -> tuple[Law, ...]:
+        if self.exponent > LARGEST_POWER:
+            raise InputError(
+                f"law: expected a power of at most {LARGEST_POWER}, got {self.exponent}; "
+                "use discretise(law, basis) ** n"
+            )
         return (self.law,) * self.exponent
 
-    def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
-        _check_length("branches", self.exponent, LONGEST_CHAIN)
-        return super()._branches(theta)
-
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        return (np.empty(0), math.inf) if self.exponent > DEEPEST_POWER else super().breakpoints(limit)
-
-    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        _check_length("sample", self.exponent, LONGEST_SAMPLE)
-        for _ in range(self.exponent):
-            theta = self.law.sample(theta, rng)
-        return theta.copy() if self.exponent == 0 else theta
-
-    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        _check_length("apply", self.exponent, DEEPEST_POWER)
-        return super()._conditionals(theta, tolerance, degree, edges)
+        return (np.empty(0), math.inf) if self.exponent > LONGEST_CHAIN else super().breakpoints(limit)
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)} ** {self.exponent}"
@@ -799,10 +788,14 @@ def _with_atoms(law: Law, tolerance: float) -> WithAtoms:
     return given_and_atoms
 
 
+def _breakpoints_of_chain(laws: Sequence[Law], limit: int) -> tuple[Floats, float]:
+    return chained_breakpoints([law._branches for law in laws], [law.breakpoints(limit) for law in laws])
+
+
 def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
     """Breakpoints of the first of the composed laws, of as many as know theirs together."""
     for number in range(len(laws), 0, -1):
-        found, left_out = chained_breakpoints(laws[:number], CUTS)
+        found, left_out = _breakpoints_of_chain(laws[:number], CUTS)
         if math.isfinite(left_out):
             return found
     return laws[0].breakpoints(CUTS)[0]
@@ -819,13 +812,6 @@ def _probe(law: Law) -> Conditionals:
 
 def _conditionals_of(law: Law, tolerance: float, degree: int, edges: Floats) -> Callable[[Floats], Conditionals]:
     return lambda theta: law._conditionals(theta, tolerance, degree, edges)
-
-
-def _check_length(method: str, exponent: int, most: int) -> None:
-    if exponent > most:
-        raise InputError(
-            f"{method}: expected a power of at most {most}, got {exponent}; use discretise(law, basis) ** n"
-        )
 
 
 @dataclass(frozen=True, repr=False)
@@ -851,7 +837,8 @@ class SpecularFrame(Law):
         instance("law", self.law, Law, "ker.lambertian()")
         mirror = self.law.mirror_symmetric
         set_properties(self, frame=_other_frame(self.law.frame), mirror_symmetric=mirror)
-        set_properties(self, reversible=mirror if self.law.reversible else None)
+        set_properties(self, reversible=mirror if self.law.reversible else None, is_lambertian=self.law.is_lambertian)
+        set_properties(self, outgoing_breakpoints=frozen(np.pi - self.law.outgoing_breakpoints[::-1]))
 
     @staticmethod
     def of(law: Law) -> Law:
@@ -875,16 +862,8 @@ class SpecularFrame(Law):
         found = self.law._branches(theta)
         return None if found is None else (found[0], mirrored_angle(found[1]))
 
-    @property
-    def is_lambertian(self) -> bool:
-        return self.law.is_lambertian
-
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return self.law.breakpoints(limit)
-
-    @property
-    def outgoing_breakpoints(self) -> Floats:
-        return np.asarray(np.pi - self.law.outgoing_breakpoints[::-1])
 
     def random_map(self) -> RandomMap | None:
         inner = self.law.random_map()

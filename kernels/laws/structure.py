@@ -13,7 +13,6 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from ...core.errors import InputError
 from .law import (
     Combination,
     Composition,
@@ -35,8 +34,6 @@ MOST_WORDS = 24
 LONGEST_WORD = 100
 # Breakpoint limit and incoming angle (in radians) of the test whether a law lists isometries.
 FEW_BREAKPOINTS, PROBE = 8, np.array([1.0])
-# Limit on the factors of a power whose facts are combined.
-MOST_FACTORS = 10**6
 
 
 @dataclass(frozen=True)
@@ -76,11 +73,7 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     if isinstance(law, Composition):
         return rules.chain([fold(part, rules) for part in law.laws])
     if isinstance(law, Power):
-        if law.exponent > MOST_FACTORS:
-            raise InputError(
-                f"law: expected a power of at most {MOST_FACTORS}, got {law.exponent}; use discretise(law, basis) ** n"
-            )
-        return rules.chain([fold(law.law, rules)] * law.exponent)
+        return rules.chain([fold(law.law, rules)] * len(law.factors()))
     if isinstance(law, SpecularFrame):
         return rules.mirrored(fold(law.law, rules))
     parts = law.parts

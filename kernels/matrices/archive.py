@@ -177,5 +177,5 @@ def _basis_from(described: dict[str, Any], arrays: Stored, most: int) -> Basis:
     if kind != "Bins":
         raise ValueError(f"basis: expected Bins, Legendre, Panels, TensorBasis or Zernike, got {kind!r}")
     equal = Bins(edges.size - 1, described["weight"])
-    # equal bins are known by their number, which also makes finding a bin faster
+    # equal bins are shown by their number
     return equal if np.array_equal(equal.edges, edges) else Bins(edges, described["weight"])

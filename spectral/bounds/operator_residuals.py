@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError, InputError
@@ -29,6 +30,10 @@ FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
 HALF_ROUNDING = 1e-12
 # Default error of conditional expectations.
 MEAN_TOLERANCE = 1e-8
+# Two points just inside the ends of a panel, and the values there of the polynomial through the values at the nodes.
+ENDS = (1.0 - 1e-6) * np.array([-1.0, 1.0])
+AT_ENDS = legvander(ENDS, len(NODES) - 1) @ np.linalg.inv(legvander(NODES, len(NODES) - 1))
+POINTS = np.append(NODES, ENDS)
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,9 @@ def residuals(
 
     ``values``, shape (k,), are approximate eigenvalues. ||P v - rho v||^2 is integrated directly; the difference
     <P v, P v> - rho^2 would lose half of the digits. Panels in the incoming angle are halved where the Gauss and
-    Kronrod rules differ most for the ``leading`` functions (by default all); their difference counts as error.
+    Kronrod rules differ most for the ``leading`` functions (by default all); their difference counts as error, and so
+    does what they do not see between the ends of a panel and the nodes: a law that hardly changes angles smooths the
+    jumps of v over less than this distance.
     ``mirrored``: each function is even or odd, and the law is mirror-symmetric. Quotients are refined until their error
     is below ``quotient_error``.
     """
@@ -99,7 +106,7 @@ def residuals(
     angles_used = 0
     while low.size:
         fresh = _integrals(here_and_images, values, low, high, 2.0 if mirrored else 1.0)
-        angles_used += low.size * len(NODES)
+        angles_used += low.size * len(POINTS)
         ends = np.concatenate([ends, [low, high]], axis=1)
         total, error, uncertainty = (
             np.concatenate(both) for both in zip((total, error, uncertainty), fresh, strict=True)
@@ -113,7 +120,7 @@ def residuals(
             ]
         )
         fraction = (error / wanted)[..., :leading].max(axis=(1, 2))
-        affordable = max(most_angles - angles_used, 0) // (2 * len(NODES))
+        affordable = max(most_angles - angles_used, 0) // (2 * len(POINTS))
         worst = np.argsort(-fraction)[:affordable]
         worst = worst[(fraction[worst] * len(fraction) > 1.0) & (np.diff(ends[:, worst], axis=0)[0] > NARROWEST)]
         if np.all((error.sum(axis=0) <= wanted)[:, :leading]):
@@ -148,13 +155,13 @@ def _integrals(
     high: Floats,
     copies: float,
 ) -> tuple[Floats, Floats, Floats]:
-    """Integrals of v (P v - rho v) and (P v - rho v)^2 over each panel, differences of two rules, and error effects.
+    """Integrals of v (P v - rho v) and (P v - rho v)^2 over each panel, their errors, and effects of those of means.
 
     The function gives v, P v, shape (angles, k), and the errors of P v. An error e of P v adds e v to the first
     integrand and 2 e (P v - rho v) + e^2 to the second.
     """
     half = 0.5 * (high - low)
-    angle = (0.5 * (low + high))[:, None] + half[:, None] * NODES
+    angle = (0.5 * (low + high))[:, None] + half[:, None] * POINTS
     here, image, mean_error = function(angle.ravel())
     rest, uncertainty = image - here * values, mean_error[:, None]
     shape = (*angle.shape, len(values))
@@ -166,11 +173,13 @@ def _integrals(
         ],
         2,
     )
-    density = copies * half[:, None] * SINE.density(angle)
+    weight = copies * half[:, None, None, None] * SINE.density(angle)[..., None, None]
+    at_nodes, at_ends = np.split(weight * parts, [len(NODES)], axis=1)
+    beyond = (1.0 - NODES.max()) * np.abs(at_ends - np.einsum("eq,pqjk->pejk", AT_ENDS, at_nodes)).sum(axis=1)
     return (
-        np.einsum("pq,pqjk->pjk", density * KRONROD, parts),
-        np.abs(np.einsum("pq,pqjk->pjk", density * (KRONROD - GAUSS), parts)),
-        np.einsum("pq,pqjk->pjk", density * KRONROD, uncertainties),
+        np.einsum("q,pqjk->pjk", KRONROD, at_nodes),
+        np.abs(np.einsum("q,pqjk->pjk", KRONROD - GAUSS, at_nodes)) + beyond,
+        np.einsum("q,pqjk->pjk", KRONROD, (weight * uncertainties)[:, : len(NODES)]),
     )
 
 

@@ -37,7 +37,7 @@ Arrangement = Literal["mirror", "half-turn"]
 SMALLEST = float(np.spacing(np.pi))
 # Limit on the flights of a particle; a law that retroreflects for ever reaches it.
 MOST_FLIGHTS = 1_000_000
-# Larger radii and speeds overflow in products with lengths.
+# Larger radii and speeds overflow in products with lengths, as do their inverses.
 LARGEST = 1e150
 # Particles of a part: their random numbers depend on its number alone.
 TOGETHER = 4096
@@ -168,7 +168,8 @@ def simulated_times(
     """`exit_times` at ``least`` lengths or more."""
     paper, levels = checked(law, "lengths", lengths, arrangement, particles, least)
     refuse_kept_sines(paper)
-    half, pace = number_between("radius", radius, 0.0, LARGEST), number_between("speed", speed, 0.0, LARGEST)
+    half = number_between("radius", radius, 1.0 / LARGEST, LARGEST)
+    pace = number_between("speed", speed, 1.0 / LARGEST, LARGEST)
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     job = _Particles(paper, levels, particles, root, half, pace, arrangement)
     parts = all_parts(job.times, -(-particles // TOGETHER), identity_of("exit times", job), engine, job.stored)

@@ -66,7 +66,8 @@ def test_the_processes_of_a_run_end_with_it(leave, monkeypatch):
     run = dataclasses.replace(CAMPAIGN, name=()).run([0, 0, 0] if leave is list else [0, 100, 0, 100], 2)
     next(run)
     leave(run)
-    assert len(processes) == 2 and all(process.poll() is not None for process in processes)
+    # a third one, if a case began as the run was left
+    assert len(processes) in (2, 3) and all(process.poll() is not None for process in processes)
     assert time.monotonic() - begun < 60.0
 
 

@@ -72,6 +72,8 @@ WALLS = [
 ]  # fmt: skip
 
 NAMED = [
+    *((lambda s=s: ARC.tangent(s), r"s: expected numbers in \[0, 1\]") for s in (1e308, [0.5, -0.1])),
+    (lambda: geo.Segment((0, 0), (1, 0)).point(1e308), r"s: expected numbers in \[0, 1\]"),
     (lambda: ARC.split(1e308), "s: expected a number in"), (lambda: ARC.split(-0.1), "s: expected a number in"),
     (lambda: geo.triangular_teeth(0.0), "expected"), (lambda: geo.triangular_teeth(pi), "expected"),
     (lambda: geo.rectangular_teeth(-1.0), "expected"), (lambda: geo.focusing_arcs(70), "angles are in radians"),

@@ -31,6 +31,14 @@ def test_enclosures_of_curved_walls_hold_against_a_finer_run(wall):
     assert coarse[1].low - slack <= fine.values[1] <= coarse[1].high + slack
 
 
+@pytest.mark.parametrize("tolerance", [1e-10, 1e-12])
+def test_jumps_of_trial_functions_that_a_shallow_wall_smooths_between_nodes_are_seen(tolerance):
+    law = ker.WallLaw(geo.dispersing_arcs(1e-3)).in_specular_frame()
+    _, found = spec.enclosures(law, 2, tolerance=tolerance)
+    # 1 - K^2/3 + O(K^4), four times the mean square of the slope
+    assert found.label == "indexed" and found.low - 1e-12 <= 1.0 - 1e-6 / 3.0 <= found.high + 1e-12
+
+
 def test_nothing_is_indexed_below_the_essential_spectrum():
     found = spec.enclosures(ker.CircularArcLaw(np.pi / 2), 2, basis=ker.Legendre(12))
     assert found[1].label == "contains-spectrum" and found[1].index is None

@@ -9,6 +9,7 @@ from campaigns.rays.true_disks import standing_plate
 
 from asperity import geometry as geo
 from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, Path, Span, flight, next_root
+from asperity.geometry.collisions.rigid import checked_states
 from asperity.geometry.disk.satellites import Satellites
 from disk_shapes import DISK, WALLS, states
 
@@ -162,3 +163,10 @@ def test_a_disk_that_hardly_rises_still_meets_the_teeth_that_its_satellites_pass
     hit = geo.collide(geo.Disk(), geo.triangular_teeth(0.7), 0.1, states, [velocity] * len(states))
     assert hit.contacts.tolist() == [3] * len(states) and hit.escaped.all()
     assert np.abs(hit.velocity - hit.velocity[0]).max() < 1e-4
+
+
+def test_states_of_one_disk_and_of_many_are_arrays_of_one_kind():
+    # functions are compiled once more for arrays that are read-only
+    for rows in (1, 2):
+        states_of = checked_states([[0.3, 0.1]] * rows, [[0.2, -1.0, 0.1]])
+        assert all(array.flags.writeable and array.flags.c_contiguous for array in states_of)

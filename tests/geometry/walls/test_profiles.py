@@ -153,7 +153,7 @@ def test_warnings_of_an_instruments_package_are_not_passed_on(reads):
         warnings.warn("old format", DeprecationWarning, stacklevel=1)
         return SimpleNamespace(heights=lambda: np.arange(3.0), positions=lambda: np.arange(3.0), unit=None)
 
-    assert geo.read_profile(reads(warns))[1].tolist() == [0.0, 1.0, 2.0]
+    assert geo.read_profile(reads(warns)).height.tolist() == [0.0, 1.0, 2.0]
 
 
 def test_instrument_files_are_read_with_the_extra(tmp_path):
@@ -162,7 +162,7 @@ def test_instrument_files_are_read_with_the_extra(tmp_path):
     topography.Topography(heights, (2.0, 1.5), unit="um").to_netcdf(str(tmp_path / "map.nc"))
     x, height = geo.read_profile(tmp_path / "map.nc")
     assert x == pytest.approx([0.0, 0.5, 1.0, 1.5]) and height == pytest.approx(heights[:, 1])
-    assert geo.read_profile(tmp_path / "map.nc", row=2)[1] == pytest.approx(heights[:, 2])
+    assert geo.read_profile(tmp_path / "map.nc", row=2).height == pytest.approx(heights[:, 2])
     with pytest.raises(InputError, match="row"):
         geo.read_profile(tmp_path / "map.nc", row=3)
     (tmp_path / "broken.opd").write_bytes(b"\xff\xfe\x00\x01" * 20)

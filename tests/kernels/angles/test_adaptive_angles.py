@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
 from campaigns.errors import adaptive
+from campaigns.judges.plain_tracer import trace_plainly
 from campaigns.judges.reference_rows import references
 
 from asperity import geometry as geo
@@ -18,8 +19,8 @@ from asperity.kernels.walls.conditionals import WallConditionals
 from asperity.spectral.bounds.images import is_costly
 
 ARCS = geo.focusing_arcs(1.2)
-# <u, P u>/<u, u> of ARCS, from an independent tracer and high-precision quadrature.
-FIRST_MOMENT = 0.327558333378
+# <u, P u>/<u, u> of ARCS, from an independent tracer and high-precision quadrature; its last digit rounds.
+FIRST_MOMENT, LAST_DIGIT = 0.327558333378, 1e-12
 ANGLES = np.array([0.003, 0.4, 1.0, 1.7, 2.9])
 
 
@@ -43,6 +44,13 @@ def test_cell_masses_of_a_focusing_arc_lie_within_their_errors_of_the_closed_for
     assert np.all(np.abs(masses - exact.masses(edges)).sum(axis=1) <= rows.error + exact.error + 1e-12)
 
 
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+def test_the_first_moment_of_a_focusing_arc_lies_within_its_error(tolerance: float) -> None:
+    matrix, error, _ = traced_matrix(ARCS, ker.Legendre(2), Budget(tolerance))
+    assert error <= tolerance
+    assert abs(matrix[1, 1] - FIRST_MOMENT) <= error + LAST_DIGIT
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("basis", [ker.Legendre(8), ker.Bins(6), ker.Panels(np.linspace(0.0, np.pi, 4), 2)], ids=repr)
 def test_matrices_of_a_focusing_arc_lie_within_their_errors_in_every_basis(basis: ker.Basis) -> None:
@@ -50,6 +58,17 @@ def test_matrices_of_a_focusing_arc_lie_within_their_errors_in_every_basis(basis
     matrix, error, _ = traced_matrix(ARCS, basis, Budget(3e-3))
     assert error <= 3e-3
     assert np.linalg.norm(matrix - exact.symmetric) <= error + float(exact.error)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [0, 5])
+def test_rows_of_random_walls_agree_with_a_plain_tracer(kind: int) -> None:
+    wall, entries = random_curved_wall(kind), 400
+    x = (np.arange(entries) + 0.5) / entries * wall.period
+    rows = WallConditionals(wall, 1, np.empty(0))(np.array([1.1]), 1e-7)[0]
+    plain = np.mean([math.cos(trace_plainly(wall, place, 1.1)[1]) for place in x.tolist()])
+    # a midpoint sum over some twenty changes of itinerary, each of which shifts at most one point by a value of 2
+    assert abs(rows.mean(np.cos)[0] - plain) < 20 * 2.0 / entries
 
 
 def test_a_matrix_that_runs_out_of_rays_says_by_how_much_it_fell_short() -> None:

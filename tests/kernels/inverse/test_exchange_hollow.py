@@ -7,6 +7,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
 from asperity.kernels.inverse.aplanats import MirrorPair
+from asperity.kernels.inverse.mirror_layout import CLEARANCE, arranged, mirror_groups
 
 
 def exchange_of(law, cells):
@@ -150,3 +151,33 @@ def test_generations_approach_the_exchange():
     copies = 1.0 - 1.002 * first.covered
     second = hollow.generations(2, neck=1e-3)
     assert second.covered == pytest.approx(first.covered * (1.0 + copies))
+
+
+def test_no_beam_meets_a_third_mirror():
+    exchange = exchange_of(ker.lambertian(), 5)
+    ends = np.concatenate([[0.0], ker.SINE.quantile(exchange.starts[1:]), [np.pi]])
+    groups = mirror_groups(ends, exchange.partner.tolist(), 1e-3, 1e-6)
+    factors = arranged(groups)
+    assert factors.min() == 1.0
+    beams = 0
+    for beam, scale in zip(groups, factors, strict=True):
+        if beam.pair is None:
+            continue
+        t = np.linspace(*beam.pair.ends, 50)
+        near, far = (scale * beam.pair.curve(which, t).position for which in (0, 1))
+        theta, image = beam.pair.angles(t)
+        for other, factor in zip(groups, factors, strict=True):
+            for angles, distance in () if other is beam else other.points:
+                between = (angles[0] >= theta.max() - 1e-12) & (angles[-1] <= image.min() + 1e-12)
+                if not between:
+                    assert angles[-1] <= theta.max() + 1e-12 or angles[0] >= image.min() - 1e-12
+                    continue
+                # where the line from near to far crosses the ray at each angle
+                ray = -np.stack([np.cos(angles), np.sin(angles)], axis=1)
+                join = far - near
+                numerator = near[:, 0] * join[:, 1] - near[:, 1] * join[:, 0]
+                crossing = numerator[:, None] / (ray[:, 0] * join[:, 1:] - ray[:, 1] * join[:, :1])
+                quotient = crossing / (factor * distance)
+                assert quotient.max() < 1.0 / (1.0 + 0.9 * CLEARANCE) or quotient.min() > 1.0 + 0.9 * CLEARANCE
+                beams += 1
+    assert beams > 20
