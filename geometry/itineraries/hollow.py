@@ -124,13 +124,13 @@ class HollowConditionals:
     @property
     def _setting(self) -> Struct:
         """Data of the compiled functions, new for each call: an interrupted call continues to use its own."""
-        from .compiled.changes import Limits, setting_of
+        from .compiled.changes import setting_of
 
         scene = self.scene
         has_channels = len(scene.pairs) > 0
         has_runs = has_channels or bool(np.any(scene.circles[:, RUN_SINE] > 0.0))
         most = NO_LIMIT if has_channels else MOST_COLLISIONS
-        limits = Limits(most, has_runs, self.most_segments)
+        limits = most, has_runs, self.most_segments
         return setting_of(scene, self.hollow, limits, self.degree, self.edges, self.sizes)
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Conditional], set[float]]:
@@ -170,7 +170,7 @@ class HollowConditionals:
 
     def _count(self, rays: int, setting: Struct) -> None:
         """Add the rays and ray segments of a compiled call to those of the hollow."""
-        self.rays, self.segments = self.rays + rays, self.segments + int(setting.values.tracer.spent[0])
+        self.rays, self.segments = self.rays + rays, self.segments + int(setting.values.spent[0])
 
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
         from .compiled.march import marched_angles, nested_rules

@@ -1,8 +1,8 @@
-"""A tree of boxes about the straight pieces of a hollow: a ray is tested against eight boxes at once.
+"""A tree of boxes about the straight pieces of a hollow: a ray is tested against up to eight boxes in one loop.
 
 Pieces that follow each other along the wall are close to each other, so eight consecutive lines make a leaf, eight
-consecutive leaves a node, and so on up to the root. A row of the tree has eight lines with their ends, or eight boxes
-with their middles and half their widths and heights.
+consecutive leaves a node, and so on up to the root. A row of the tree has up to eight lines with their ends, or
+boxes with their middles and half their widths and heights.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from ...core.checks import Floats
 from .tolerances import BOX_MARGIN
 
-# Boxes, or lines, in a row; the length of the vectors of AVX-512.
+# Most boxes, or lines, in a row.
 BOXES = 8
 # Columns of a row. Of a line the start and the end, of a box the middle and half of its width and height.
 ANCHOR_X = 0
@@ -21,7 +21,8 @@ OTHER_X = 2 * BOXES
 OTHER_Y = 3 * BOXES
 CONTENT = 4 * BOXES  # row of the first box's own row; of a leaf the joint at which the first line starts
 PARENT = 4 * BOXES + 1  # row of the node that contains this one
-TREE_COLUMNS = 4 * BOXES + 2
+COUNT = 4 * BOXES + 2  # number of boxes, or lines, in the row
+TREE_COLUMNS = 4 * BOXES + 3
 
 
 def tree_of(starts: Floats, ends: Floats, first: int, base: int, size: float) -> tuple[Floats, int]:
@@ -53,11 +54,11 @@ def tree_of(starts: Floats, ends: Floats, first: int, base: int, size: float) ->
     """
     leaf = np.concatenate([starts, ends], axis=1)
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-    levels = [_rows(leaf, np.nan)]
+    levels = [_rows(leaf)]
     while True:
         firsts = np.arange(0, len(low), BOXES)
         low, high = np.minimum.reduceat(low, firsts), np.maximum.reduceat(high, firsts)
-        levels.append(_rows(np.concatenate([0.5 * (low + high), 0.5 * (high - low) + BOX_MARGIN * size], axis=1), -1.0))
+        levels.append(_rows(np.concatenate([0.5 * (low + high), 0.5 * (high - low) + BOX_MARGIN * size], axis=1)))
         if len(levels[-1]) == 1:
             break
     row = base
@@ -69,11 +70,12 @@ def tree_of(starts: Floats, ends: Floats, first: int, base: int, size: float) ->
     return np.concatenate(levels[::-1]), len(levels)
 
 
-def _rows(entries: Floats, empty: float) -> Floats:
-    """Return rows of eight entries of four numbers each; ``empty`` fills the places that are left."""
+def _rows(entries: Floats) -> Floats:
+    """Return rows of eight entries of four numbers each, the last row of those that are left."""
     count = -(-len(entries) // BOXES)
-    padded = np.full((count * BOXES, 4), empty)
+    padded = np.zeros((count * BOXES, 4))
     padded[: len(entries)] = entries
     rows = np.zeros((count, TREE_COLUMNS))
     rows[:, : 4 * BOXES] = padded.reshape(count, BOXES, 4).transpose(0, 2, 1).reshape(count, 4 * BOXES)
+    rows[:, COUNT] = np.minimum(BOXES, len(entries) - BOXES * np.arange(count))
     return rows

@@ -104,24 +104,10 @@ MIDDLE_Y = 13
 REACH = 14  # its radius, with a margin of NEARBY_MARGIN times the extent of the piece
 BEZIER_COLUMNS = 15
 
-# Arcs in double-double arithmetic, made by `refined_arcs`: the ends, then numbers in two parts.
-REFINED_NORMAL_X = 4  # unit normal at the start
-REFINED_NORMAL_X_LOW = 5
-REFINED_NORMAL_Y = 6
-REFINED_NORMAL_Y_LOW = 7
-REFINED_CURVATURE = 8
-REFINED_CURVATURE_LOW = 9
-REFINED_CHORD_X = 10  # unit vector from the start to the end
-REFINED_CHORD_X_LOW = 11
-REFINED_CHORD_Y = 12
-REFINED_CHORD_Y_LOW = 13
-REFINED_CHORD = 14  # length of the chord
-REFINED_CHORD_LOW = 15
-IS_SHORT = 16  # 1 if the position along the chord decides whether a point is on the arc
-REFINED_STRETCH = 17  # a double
-REFINED_SPAN = 18  # angle of the arc, a double
-REFINED_RUN_SINE = 19  # RUN_SINE of the arc
-REFINED_ARC_COLUMNS = 20
+# Arcs in double-double arithmetic, made by `refined_arcs`: the low part of a number from NORMAL_X to SHORT_CHORD is so
+# many columns behind its high part.
+LOWS = 9
+REFINED_ARC_COLUMNS = 21
 
 # closed: one row for each hollow, see `closed_forms`.
 FORM = 0  # NO_FORM, WEDGE or CIRCULAR

@@ -293,9 +293,10 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         from .compiled.rays import trace_into
+        from .compiled.records import Rays
 
         _check_rays(x, theta)
-        trace_into(results, x, theta, scene.tables, max_collisions, stop)
+        trace_into(Rays._make((x, theta, *results, stop)), scene.tables, max_collisions)
 
     rooms: list[Any] = []
 
@@ -369,7 +370,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     [[0.5, 0.0], [0.5, 0.0], [0.5, 0.0]]
     """
     from .compiled.rays import trace_into
-    from .compiled.records import details_for, results_for
+    from .compiled.records import Rays, details_for, results_for
 
     _check_wall(wall)
     position = finite_number("x", x)
@@ -387,8 +388,8 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
         points = np.array([[entry, 0.0]] * 3)
     else:
         start, angle = np.array([entry - base]), np.array([incoming])
-        details, given = details_for(path=limit + 2), (start, angle, scene.tables, limit, new_flag())
-        interruptibly(lambda: trace_into(results_for(1), *given, details))
+        details, rays = details_for(path=limit + 2), Rays(start, angle, *results_for(1), new_flag())
+        interruptibly(lambda: trace_into(rays, scene.tables, limit, details))
         path = details.values.path
         points = path[np.isfinite(path[:, 0])]
         points[:, 0] += base

@@ -34,9 +34,10 @@ import numpy as np
 
 from ...scene import columns as c
 from ...tracing.compiled.options import compiled, inlined, inner
-from ...tracing.compiled.pieces import near_end, on_arc
+from ...tracing.compiled.pieces import arc_form, line_at, near_end, on_arc
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
+from ...tracing.double_double.formulas import arc_normal
 from ...tracing.double_double.numbers import extended
 from ...tracing.double_double.records import ARC as CURVED
 from ...tracing.double_double.records import BEZIER as SPLINE
@@ -325,21 +326,6 @@ def is_in_front(kind, number, own, x, y, slack, ground):
 
 
 @inlined
-def line_of(ground, k):
-    """-> line: the start of a line and its normal."""
-    joints, lines = ground.joints, ground.lines
-    return joints[k, c.JOINT_X], joints[k, c.JOINT_Y], lines[k, c.LINE_NORMAL_X], lines[k, c.LINE_NORMAL_Y]
-
-
-@inlined
-def arc_of(ground, k):
-    """-> arc: the start of an arc, its normal there, curvature and stretch."""
-    arc = ground.arcs[k]
-    x, y, curvature, stretch = arc[c.START_X], arc[c.START_Y], arc[c.CURVATURE], arc[c.STRETCH]
-    return x, y, arc[c.NORMAL_X], arc[c.NORMAL_Y], curvature, stretch
-
-
-@inlined
 def piece_after(kind, line, conic, graph, t, rotation, path):
     """-> (F, F', F'', abscissa): of a piece of any kind on a path after the time t; the abscissa is that of a graph."""
     if kind == LINE:
@@ -406,15 +392,16 @@ def piece_form(kind, number, own, path, size, ground):
     line, conic, patience, reach = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf, path.slack
     begin = Start(0.0, 0.0, 0.0, 0.0)
     if kind == LINE:
-        x0, y0, g1, g2 = line_of(ground, number)
-        level = 0.0 if is_own else g1 * (path.x - x0) + g2 * (path.y - y0)
-        line = towards_line(level, g1, g2, path.turn, path.motion)
+        face = line_at(ground, number)
+        level = 0.0 if is_own else face.normal_x * (path.x - face.x0) + face.normal_y * (path.y - face.y0)
+        line = towards_line(level, face.normal_x, face.normal_y, path.turn, path.motion)
     else:
         patience = 2.0 * size / path.motion.fastest
         if kind == ARC:
-            x0, y0, n1, n2, curvature, stretch = arc_of(ground, number)
-            rx, ry = path.x - x0, stretch * (path.y - y0)
-            g1, g2 = n1 - curvature * rx, n2 - curvature * ry
+            arc, stretch = ground.arcs[number], ground.arcs[number, c.STRETCH]
+            rx, ry = path.x - arc[c.START_X], stretch * (path.y - arc[c.START_Y])
+            form = n1, n2, curvature = arc_form(arc)
+            g1, g2 = arc_normal(form, 1.0, rx, ry)
             conic = 0.0 if is_own else 0.5 * ((n1 + g1) * rx + (n2 + g2) * ry), g1, g2, curvature, stretch
             reach = path.slack * max(1.0, stretch)
         else:

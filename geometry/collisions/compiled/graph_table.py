@@ -89,26 +89,19 @@ def _graph(curve: Floats, low: float, high: float, size: float) -> Floats | None
     span = high - low
     chord = span * (c1 + span * (c2 + span * c3))
     width = float(np.hypot(*chord))
-    row = row_of(GRAPH_COLUMNS, {c.START_X: start[0], c.START_Y: start[1], FIRST_S: low})
+    along = chord / width if width > 0.0 else np.array([1.0, 0.0])
+    values = {c.START_X: start[0], c.START_Y: start[1], FIRST_S: low}
+    values |= {ALONG_X: along[0], ALONG_Y: along[1], WIDTH: width}
     if width <= STRAIGHT * size or span <= EPS:
-        along = chord / width if width > 0.0 else np.array([1.0, 0.0])
-        values = {XI1: width / span or EPS * size, MOST_SIGMA: span, STEEPNESS: 1.0}
-        return _filled(row, along, width, values)
-    along = chord / width
+        return row_of(GRAPH_COLUMNS, values | {XI1: width / span or EPS * size, MOST_SIGMA: span, STEEPNESS: 1.0})
     frame = np.array([along, [-along[1], along[0]]])
     c1, c2, c3 = frame @ c1, frame @ c2, frame @ c3
     least, most = max(-OVERLAP * span, -low), min(span + OVERLAP * span, 1.0 - low)
     bounds = _bounds(c1, c2, c3, least, most)
     if bounds is None:
         return None
-    values = {XI1: c1[0], XI2: c2[0], XI3: c3[0], ETA1: c1[1], ETA2: c2[1], ETA3: c3[1]}
-    return _filled(row, along, width, values | {LEAST_SIGMA: least, MOST_SIGMA: most} | bounds)
-
-
-def _filled(row: Floats, along: Floats, width: float, values: dict[int, float]) -> Floats:
-    for column, value in {ALONG_X: along[0], ALONG_Y: along[1], WIDTH: width, **values}.items():
-        row[column] = value
-    return row
+    values |= {XI1: c1[0], XI2: c2[0], XI3: c3[0], ETA1: c1[1], ETA2: c2[1], ETA3: c3[1]}
+    return row_of(GRAPH_COLUMNS, values | {LEAST_SIGMA: least, MOST_SIGMA: most} | bounds)
 
 
 def _bounds(c1: Floats, c2: Floats, c3: Floats, low: float, high: float) -> dict[int, float] | None:

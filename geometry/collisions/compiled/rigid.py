@@ -12,29 +12,13 @@ import numpy as np
 
 from ...scene import columns as c
 from ...tracing.compiled.options import compiled, inlined, inner
+from ...tracing.compiled.pieces import arc_point, line_at
 from ...tracing.compiled.pointers import is_raised
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
-from ...tracing.double_double.formulas import last_hollow
-from .contact import (
-    CLEAR,
-    NO,
-    NOTHING,
-    WIDEST_SLACK,
-    ZERO,
-    Path,
-    Span,
-    Touch,
-    Touching,
-    arc_of,
-    first_in_hollow,
-    flight,
-    line_of,
-    next_root,
-    satellite_after,
-    towards_line,
-    turning,
-)
+from ...tracing.double_double.formulas import opening_at
+from . import contact
+from .contact import CLEAR, NO, NOTHING, WIDEST_SLACK, ZERO, Path, Span, Touch, Touching, turning
 from .shapes import graph_surface
 
 # Columns of the positions of disks, in units of the radius: x of the centre and angle; and of their velocities.
@@ -52,7 +36,7 @@ FOREVER = 1e30
 
 
 class Below(NamedTuple):
-    """A satellite below the tops: its number, its hollow (-1: no such satellite), and the left end of its cell."""
+    """A satellite below the tops: its number, its hollow (negative: none such), and the left end of its cell."""
 
     number: int
     hollow: int
@@ -66,13 +50,6 @@ class Chosen(NamedTuple):
     x: float
     y: float
     turn: tuple[float, float]
-
-
-@inlined
-def hollow_at(hollows, entry):
-    """Return the hollow whose opening contains a position of the cell, or -1 at a flat top."""
-    h = last_hollow(entry, hollows, hollows.shape[0])
-    return h if h >= 0 and entry < hollows[h, c.RIGHT] else -1
 
 
 @inlined
@@ -90,19 +67,19 @@ def near_edge(hollows, entry, slack):
 def descent(path, span, ground):
     """-> (t, rotation, h, base, code): the time at which a satellite comes below the tops in the span, or inf.
 
-    Also the `turning` until t, the hollow (-1 at a flat top), and the left end of its cell.
+    Also the `turning` until t, the hollow (negative at a flat top), and the left end of its cell.
     """
     x, y, turn, motion, slack = path
     t, end, rotation = span
-    dx, dy, sine, _ = satellite_after(t, rotation, turn, motion)
+    dx, dy, sine, _ = contact.satellite_after(t, rotation, turn, motion)
     if y + dy > 0.0:
-        tops = towards_line(y, 0.0, 1.0, turn, motion)
-        t, rotation, code = next_root(1.0, NO, tops, None, None, span, path, np.inf)
+        tops = contact.towards_line(y, 0.0, 1.0, turn, motion)
+        t, rotation, code = contact.next_root(1.0, NO, tops, None, None, span, path, np.inf)
         if t >= end or code == GRAZING:
             return np.inf, rotation, -1, 0.0, CLEAR
         if code != CLEAR:
             return t, rotation, -1, 0.0, code
-        dx, dy, sine, _ = satellite_after(t, rotation, turn, motion)
+        dx, dy, sine, _ = contact.satellite_after(t, rotation, turn, motion)
     base = math.floor((x + dx) / ground.cell) * ground.cell
     if ground.is_open:
         return t, rotation, 0, base, CLEAR
@@ -110,8 +87,9 @@ def descent(path, span, ground):
     rising = motion.v2 + motion.omega * sine
     # at shallow incidence a rounding error of the height is a larger error along the tops
     near = near_edge(ground.hollows, entry, slack * max(1.0, motion.fastest / abs(rising)))
+    h = opening_at(entry, ground.hollows, ground.hollows.shape[0])
     # a satellite that rises below the tops did not enter from above: it and another one touch at the same time
-    return t, rotation, hollow_at(ground.hollows, entry), base, CORNER if near or rising >= 0.0 else CLEAR
+    return t, rotation, h, base, CORNER if near or rising >= 0.0 else CLEAR
 
 
 @inner
@@ -122,14 +100,14 @@ def first_contact(own, base, path, t, end, ground):
     """
     x, y, turn, motion, slack = path
     rotation = turning(motion.spin * t) if t > 0.0 else (0.0, 0.0)
-    state = satellite_after(t, rotation, turn, motion)
+    state = contact.satellite_after(t, rotation, turn, motion)
     h = own.hollow
     if own.kind == TOP:
         # the satellite rises, and its path is convex
         return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
     if h < 0:
         t, rotation, h, base, code = descent(path, Span(t, end, rotation), ground)
-        state = satellite_after(t, rotation, turn, motion)
+        state = contact.satellite_after(t, rotation, turn, motion)
         if t >= end:
             return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
         if h < 0 or code != CLEAR:
@@ -139,7 +117,7 @@ def first_contact(own, base, path, t, end, ground):
         if cell & (CELLS_A_CHECK - 1) == CELLS_A_CHECK - 1 and is_raised(ground.stop):
             break
         shifted = Path(x - base, y, turn, motion, slack)
-        touch = first_in_hollow(h, own, came_from, shifted, Span(t, end, rotation), ground)
+        touch = contact.first_in_hollow(h, own, came_from, shifted, Span(t, end, rotation), ground)
         t, state = touch.time, touch.state
         if touch.kind != SIDE or touch.code == BOUNCE_LIMIT:
             return touch, h, base
@@ -155,27 +133,12 @@ def first_contact(own, base, path, t, end, ground):
 @inlined
 def on_line(k, x, y, ground):
     """Return the point (x, y) projected onto a line, and the unit normal towards the free side."""
-    joints, lines = ground.joints, ground.lines
-    x0, y0, n1, n2 = line_of(ground, k)
-    ex, ey, length = lines[k, c.EDGE_X], lines[k, c.EDGE_Y], lines[k, c.LENGTH]
-    fraction = ((x - x0) * ex + (y - y0) * ey) / (length * length)
-    if fraction > 0.5:
-        # from the nearer end
-        x0, y0, fraction = joints[k + 1, c.JOINT_X], joints[k + 1, c.JOINT_Y], fraction - 1.0
-    return x0 + fraction * ex, y0 + fraction * ey, n1, n2
-
-
-@inlined
-def on_conic(k, x, y, ground):
-    """Return the point (x, y) projected onto an arc, and the unit normal towards the free side."""
-    x0, y0, n1, n2, curvature, stretch = arc_of(ground, k)
-    qx, qy = x - x0, stretch * (y - y0)
-    m1, m2 = n1 - curvature * qx, n2 - curvature * qy
-    f = 0.5 * ((n1 + m1) * qx + (n2 + m2) * qy)
-    qx, qy = qx - f * m1, qy - f * m2
-    m1, m2 = n1 - curvature * qx, stretch * (n2 - curvature * qy)
-    norm = 1.0 / math.sqrt(m1 * m1 + m2 * m2)
-    return x0 + qx, y0 + qy / stretch, m1 * norm, m2 * norm
+    line = line_at(ground, k)
+    fraction = ((x - line.x0) * line.edge_x + (y - line.y0) * line.edge_y) / (line.length * line.length)
+    # from the nearer end
+    late = fraction > 0.5
+    x0, y0, fraction = (line.x1, line.y1, fraction - 1.0) if late else (line.x0, line.y0, fraction)
+    return x0 + fraction * line.edge_x, y0 + fraction * line.edge_y, line.normal_x, line.normal_y
 
 
 @inlined
@@ -183,7 +146,10 @@ def surface(kind, index, x, y, ground):
     """Return the point (x, y) projected onto the piece that is hit, and the unit normal towards the free side."""
     if kind == BEZIER:
         return graph_surface(ground.graphs[index], x, y)
-    return on_line(index, x, y, ground) if kind == LINE else on_conic(index, x, y, ground)
+    if kind == LINE:
+        return on_line(index, x, y, ground)
+    arc = ground.arcs[index]
+    return arc_point(arc, 0.0, x, y, 0.0, 0.0, arc[c.STRETCH])
 
 
 @inlined
@@ -353,7 +319,7 @@ def collide_disk(entry, angle, velocity, disk, ring, limit, ground):
     own, below = Touching(ZERO, NOTHING, NOTHING), Below(ZERO, NOTHING, 0.0)
     status = BOUNCE_LIMIT
     while not is_raised(ground.stop):
-        path = Path(x, y, (sine, 1.0 - versed), flight(v1, v2, omega, scale), ring.slack)
+        path = Path(x, y, (sine, 1.0 - versed), contact.flight(v1, v2, omega, scale), ring.slack)
         end = longest_flight(height, path.motion, ring)
         if end == -np.inf:
             break
@@ -434,7 +400,7 @@ def roll_disk(entry, velocity, disk, rolling, limit, ground):
     x, y = entry, 0.0
     own, status = Touching(ZERO, NOTHING, NOTHING), BOUNCE_LIMIT
     while not is_raised(ground.stop):
-        path = Path(x, y, (0.0, 1.0), flight(v1 + omega, v2, 0.0, 1.0), rolling.slack)
+        path = Path(x, y, (0.0, 1.0), contact.flight(v1 + omega, v2, 0.0, 1.0), rolling.slack)
         end = FOREVER
         if v2 > 0.0:
             end = -y / v2

@@ -96,9 +96,5 @@ def graph_surface(graph, x, y):
     # along the normal (-slope, 1)
     xi, eta = xi + f * slope / square, eta - f / square
     ux, uy, norm = graph[g.ALONG_X], graph[g.ALONG_Y], 1.0 / math.sqrt(square)
-    return (
-        graph[c.START_X] + ux * xi - uy * eta,
-        graph[c.START_Y] + uy * xi + ux * eta,
-        (-slope * ux - uy) * norm,
-        (ux - slope * uy) * norm,
-    )
+    nx, ny = (-slope * ux - uy) * norm, (ux - slope * uy) * norm
+    return graph[c.START_X] + ux * xi - uy * eta, graph[c.START_Y] + uy * xi + ux * eta, nx, ny

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
-from ...scene.compiled.tables import ROW, Table, named, reader_of
+from ...scene.compiled.tables import ROW, named, reader_of
 from ...scene.scene import Scene
 from ...scene.structs import Struct
 from ...tracing.compiled.options import compiled, inlined, linked
 from ...tracing.compiled.pointers import call_late
-from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, TRACE
+from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, TRACE, details_at, rays_at
 from ...tracing.compiled.records import Rays, details_for, results_for
 
 # Start integers as np.int64(0): a literal 0 has its own type in numba, and each function that receives it would be
@@ -50,52 +50,34 @@ BLOCK = 32
 DEAR_STEPS, MANY_STEPS, CHEAP_STEPS = np.int64(9), np.int64(1024), np.int64(32)
 
 
-class Limits(NamedTuple):
-    """Limits at one angle: collisions of a ray, and segments of all rays.
-
-    They are `Details.segments`, of which few count on long rays if ``has_runs``.
-    """
-
-    collisions: int
-    has_runs: bool
-    segments: int
-
-
-class Tracer(NamedTuple):
-    """What `trace_block` needs: addresses, and the arrays for a block of rays.
-
-    The addresses are those of the slot of `trace_rays`, the `Rays`, the tables, the details and `SLOTS`. ``spent``,
-    with one entry, counts ray segments.
-    """
-
-    trace: int
-    rays: Struct
-    tables: Struct
-    details: Struct
-    slots: Struct
-    entries: Floats
-    angles: Floats
-    exits: Floats
-    status: NDArray[np.uint8]
-    velocity: Floats
-    itinerary: NDArray[np.uint64]
-    segments: NDArray[np.int64]
-    spent: NDArray[np.int64]
+# Limits of the collisions of a ray and of the segments of all rays; whether there are runs of hits between them.
+Limits = tuple[int, bool, int]
 
 
 class Setting(NamedTuple):
     """The data common to all angles: row of the hollow, limits, degree of the functions, outgoing cells, tracer.
 
-    ``edges`` are the edges between the cells, and ``sizes`` bounds of the functions to integrate in each cell.
+    The limits at one angle are those of the collisions of a ray and of the segments of all rays. These are
+    `Details.segments`, of which few count on long rays if ``has_runs``. ``edges`` are the edges between the cells, and
+    ``sizes`` bounds of the functions to integrate in each cell. Of the tracer there are the addresses of the slot of
+    `trace_rays`, of the `Rays` of a block, of the tables, of the details of a block and of `SLOTS`. ``spent``, with one
+    entry, counts ray segments.
     """
 
     hollow: Floats
-    limits: Limits
+    collisions: int
+    has_runs: bool
+    segments: int
     degree: int
     edge_count: int
     edges: Floats
     sizes: Floats
-    tracer: Tracer
+    trace: int
+    rays: Struct
+    tables: Struct
+    details: Struct
+    slots: Struct
+    spent: NDArray[np.int64]
 
 
 class Chain(NamedTuple):
@@ -109,26 +91,19 @@ class Chain(NamedTuple):
     fresh: NDArray[np.int64]
 
 
-INTEGERS, LABELS = types.CPointer(types.int64), types.CPointer(types.uint64)
-TRACER = named(
-    Tracer, *[types.int64] * 5, ROW, ROW, ROW, types.CPointer(types.uint8), Table(2), LABELS, INTEGERS, INTEGERS
-)
-SETTING = named(
-    Setting, ROW, named(Limits, types.int64, types.boolean, types.int64), types.int64, types.int64, ROW, ROW, TRACER
-)
-CHAIN = named(Chain, ROW, ROW, LABELS, INTEGERS, INTEGERS, INTEGERS)
+INTEGER, INTEGERS = types.int64, types.CPointer(types.int64)
+SETTING = named(Setting, ROW, INTEGER, types.boolean, INTEGER, INTEGER, INTEGER, ROW, ROW, *[INTEGER] * 5, INTEGERS)
 setting_at = reader_of(SETTING)
 
 
 def setting_of(scene: Scene, hollow: int, limits: Limits, degree: int, edges: Floats, sizes: Floats) -> Struct:
     """Return the setting of hollow number ``hollow``, for use by one thread at a time."""
     entries, angles = np.empty((2, BLOCK))
-    results, details = results_for(BLOCK), details_for(BLOCK)
-    rays, (exits, _, _, status) = Struct(Rays(entries, angles, *results, np.zeros(1, np.int64))), results
-    arrays = entries, angles, exits, status, *details.values[:3], np.zeros(1, np.int64)
-    tracer = Tracer(TRACE.slot, rays, scene.tables, details, SLOTS, *arrays)
+    rays = Struct(Rays(entries, angles, *results_for(BLOCK), np.zeros(1, np.int64)))
+    tracer = TRACE.slot, rays, scene.tables, details_for(BLOCK), SLOTS, np.zeros(1, np.int64)
     edges, sizes = (np.require(values, np.float64, ["C", "A", "W"]) for values in (edges, sizes))
-    return Struct(Setting(scene.tables.values.hollows[hollow], limits, degree, len(edges), edges, sizes, tracer))
+    own = scene.tables.values.hollows[hollow], *limits, degree, len(edges), edges, sizes
+    return Struct(Setting._make((*own, *tracer)))
 
 
 def empty_chain() -> Chain:
@@ -140,16 +115,16 @@ def empty_chain() -> Chain:
 @inlined
 def set_angle(theta, setting):
     """Set the incoming angle of the rays of a block."""
+    angles = rays_at(setting.rays).theta
     for k in range(BLOCK):
-        setting.tracer.angles[k] = theta
+        angles[k] = theta
 
 
 @inlined
 def trace_block(count, setting):
-    """Trace the first rays, at most `BLOCK`, of the tracer."""
-    tracer = setting.tracer
-    arguments = count, tracer.rays, tracer.tables, setting.limits.collisions, tracer.details, tracer.slots
-    call_late(tracer.trace, None, arguments)
+    """Trace the first rays, at most `BLOCK`, of the block."""
+    arguments = count, setting.rays, setting.tables, setting.collisions, setting.details, setting.slots
+    call_late(setting.trace, None, arguments)
 
 
 @inlined
@@ -172,24 +147,24 @@ def outcome(k, setting):
 
     The label combines the itinerary and the outgoing bin. The segments of the ray are added to those spent.
     """
-    tracer = setting.tracer
-    steps = tracer.segments[k]
-    if setting.limits.has_runs:
+    rays, details = rays_at(setting.rays), details_at(setting.details)
+    steps = details.segments[k]
+    if setting.has_runs:
         steps = min(steps, DEAR_STEPS) + max(steps - MANY_STEPS, 0) // CHEAP_STEPS
-    tracer.spent[0] += steps
-    if tracer.status[k] != ESCAPED:
-        return tracer.angles[k], np.uint64(tracer.status[k])
+    setting.spent[0] += steps
+    if rays.status[k] != ESCAPED:
+        return rays.theta[k], np.uint64(rays.status[k])
     # clipped for a ray along y = 0 within rounding
-    velocity = tracer.velocity
+    velocity = details.velocity
     out = min(max(math.atan2(velocity[k, POINT_Y], velocity[k, POINT_X]), 0.0), math.pi)
     cell = cell_of(out, setting.edges, setting.edge_count)
-    return out, HASH_FACTOR * (tracer.itinerary[k] + np.uint64(16)) + np.uint64(cell)
+    return out, HASH_FACTOR * (details.itinerary[k] + np.uint64(16)) + np.uint64(cell)
 
 
 @inlined
 def probe(x, setting):
     """-> (angle, label): `outcome` of one ray."""
-    setting.tracer.entries[0] = x
+    rays_at(setting.rays).x[0] = x
     trace_block(1, setting)
     return outcome(np.int64(0), setting)
 
@@ -197,7 +172,7 @@ def probe(x, setting):
 @inlined
 def is_spent(setting):
     """Whether the limit of ray segments is reached."""
-    return setting.tracer.spent[0] >= setting.limits.segments
+    return setting.spent[0] >= setting.segments
 
 
 @inlined
@@ -321,7 +296,7 @@ def sample_entries(entries, setting, chain, goal):
     Returns the number of samples, and the sample of largest position.
     """
     xs, outs, labels, follow, gaps = chain.entries, chain.angles, chain.labels, chain.successors, chain.gaps
-    left, right = setting.hollow[LEFT], setting.hollow[RIGHT]
+    left, right, rays = setting.hollow[LEFT], setting.hollow[RIGHT], rays_at(setting.rays)
     count, gap_count = np.int64(0), np.int64(0)
     for x in entries:
         if x <= left or x >= right or (count > 0 and x <= xs[count - 1]):
@@ -333,7 +308,7 @@ def sample_entries(entries, setting, chain, goal):
     while end < count:
         first, end = end, min(end + BLOCK, count)
         for k in range(first, end):
-            setting.tracer.entries[k - first] = xs[k]
+            rays.x[k - first] = xs[k]
         trace_block(end - first, setting)
         for k in range(first, end):
             outs[k], labels[k] = outcome(k - first, setting)
@@ -367,12 +342,12 @@ def trace_points(entries, angles, setting, outs, exits, labels):
     Of the setting the address is given. The outgoing angle is 0 for rays that do not escape.
     """
     setting = setting_at(setting)
-    tracer = setting.tracer
+    rays = rays_at(setting.rays)
     for first in range(0, entries.shape[0], BLOCK):
         last = min(first + BLOCK, entries.shape[0])
         for n in range(first, last):
-            tracer.entries[n - first], tracer.angles[n - first] = entries[n], angles[n]
+            rays.x[n - first], rays.theta[n - first] = entries[n], angles[n]
         trace_block(last - first, setting)
         for n in range(first, last):
             out, labels[n] = outcome(n - first, setting)
-            outs[n], exits[n] = 0.0 if labels[n] < FIRST_LABEL else out, tracer.exits[n - first]
+            outs[n], exits[n] = 0.0 if labels[n] < FIRST_LABEL else out, rays.out_x[n - first]

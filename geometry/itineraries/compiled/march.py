@@ -17,29 +17,12 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT, SIZE
-from ...scene.compiled.tables import ROW, Table, named, reader_of
+from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.structs import Struct
 from ...tracing.compiled.options import compiled, linked
-from .changes import (
-    BLOCK,
-    CHAIN,
-    FIRST_LABEL,
-    LABELS,
-    MOST_SAMPLES,
-    Chain,
-    add_change,
-    empty_chain,
-    is_spent,
-    outcome,
-    probe,
-    sample_entries,
-    set_angle,
-    setting_at,
-    size_at,
-    spread,
-    trace_block,
-    undecided,
-)
+from ...tracing.compiled.rays import rays_at
+from . import changes
+from .changes import BLOCK, FIRST_LABEL, MOST_SAMPLES, Chain
 
 # Number of rules, and of the positions of the finest.
 LEVELS = 5
@@ -87,7 +70,6 @@ class Nodes(NamedTuple):
     masses: Floats
 
 
-NODES = named(Nodes, ROW, ROW)
 rules_at = reader_of(named(Rules, ROW, Table(MOST_POSITIONS), types.int64))
 
 
@@ -119,7 +101,7 @@ def apply_rules(ends, label, goal, rules, setting, nodes, filled, strict):
     low, high = ends
     positions, weights, least = rules.positions, rules.weights, rules.least
     node, mass = nodes.angles, nodes.masses
-    degree, entries = setting.degree, setting.tracer.entries
+    degree, entries = setting.degree, rays_at(setting.rays).x
     width = high - low
     old0, old1, old2, old_step = 0.0, 0.0, 0.0, 0.0
     k = max(degree, 1)
@@ -127,16 +109,16 @@ def apply_rules(ends, label, goal, rules, setting, nodes, filled, strict):
     traced, used = np.int64(0), np.int64(0)
     for level in range(LEVELS):
         count = (4 << level) - 1
-        if count > MOST_NODES - filled - 2 or is_spent(setting):
+        if count > MOST_NODES - filled - 2 or changes.is_spent(setting):
             break
         for first in range(traced, count, BLOCK):
             last = min(first + BLOCK, count)
             for n in range(first, last):
                 entries[n - first] = low + width * positions[n]
-            trace_block(last - first, setting)
+            changes.trace_block(last - first, setting)
             for n in range(first, last):
                 x = entries[n - first]
-                out, here = outcome(n - first, setting)
+                out, here = changes.outcome(n - first, setting)
                 if strict and here != label:
                     return used, error, x, np.int64(last)
                 node[filled + n] = out
@@ -177,12 +159,12 @@ def integrate_piece(ends, sample, goal, rules, setting, nodes, filled, strict):
     node[STACK], mass[STACK] = ends
     if setting.degree == 0 and ends[1] - ends[0] < NARROW * whole and strict and MOST_NODES - filled > 2:
         middle = 0.5 * (ends[0] + ends[1])
-        out, here = probe(middle, setting)
+        out, here = changes.probe(middle, setting)
         if here != label:
             return filled, 0.0, middle, np.int64(1)
         node[filled], mass[filled] = out, ends[1] - ends[0]
         return filled + 1, 0.0, np.nan, np.int64(1)
-    size = size_at(out, setting)
+    size = changes.size_at(out, setting)
     depth, error, rays = np.int64(1), 0.0, np.int64(0)
     while depth > 0:
         depth -= 1
@@ -192,7 +174,7 @@ def integrate_piece(ends, sample, goal, rules, setting, nodes, filled, strict):
         rays += spent
         if not math.isnan(other):
             return filled, error, other, rays
-        able = MOST_NODES - filled - 2 >= MOST_POSITIONS and not is_spent(setting)
+        able = MOST_NODES - filled - 2 >= MOST_POSITIONS and not changes.is_spent(setting)
         if miss > allowed and depth < MOST_HALVINGS and high - low > NARROWEST * whole and able:
             middle = 0.5 * (low + high)
             node[STACK + depth], mass[STACK + depth] = middle, high
@@ -238,7 +220,14 @@ class Found(NamedTuple):
     segments: int
 
 
-room_at = reader_of(named(Room, CHAIN, NODES, named(Pieces, ROW, ROW, LABELS, ROW)))
+def new_room() -> Room:
+    """Return the work space for the angles of one call."""
+    low, high, out = np.empty((3, MOST_SAMPLES))
+    pieces = Pieces(low, high, np.empty(MOST_SAMPLES, np.uint64), out)
+    return Room(changes.empty_chain(), Nodes(*np.empty((2, NODE_ROOM))), pieces)
+
+
+room_at = reader_of(kind_of(new_room()))
 
 
 @compiled
@@ -249,8 +238,8 @@ def march_angle(theta, goal, setting, rules, entries, room):
     limit of ray segments is reached, the error includes the gaps that remain. ``entries`` are the first samples, which
     increase; of the setting, the rules and the room the addresses are given.
     """
-    setting, rules, room = setting_at(setting), rules_at(rules), room_at(room)
-    set_angle(theta, setting)
+    setting, rules, room = changes.setting_at(setting), rules_at(rules), room_at(room)
+    changes.set_angle(theta, setting)
     chain, nodes, pieces = room.chain, room.nodes, room.pieces
     xs, outs, labels, follow = chain.entries, chain.angles, chain.labels, chain.successors
     node, mass = nodes.angles, nodes.masses
@@ -258,8 +247,8 @@ def march_angle(theta, goal, setting, rules, entries, room):
     hollow = setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]
     whole = right - left
-    setting.tracer.spent[0] = 0
-    count, last = sample_entries(entries, setting, chain, GAP_FRACTION * goal)
+    setting.spent[0] = 0
+    count, last = changes.sample_entries(entries, setting, chain, GAP_FRACTION * goal)
     rays = np.int64(0)
     # the first and the last sample represent the margins
     node[0], mass[0] = outs[0], xs[0] - left
@@ -269,7 +258,8 @@ def march_angle(theta, goal, setting, rules, entries, room):
     for cell in range(setting.edge_count + 1):
         largest = max(largest, setting.sizes[cell])
     error = ROUNDING * largest * whole
-    error += mass[0] * spread(outs[0], outs[1], setting) + mass[1] * spread(outs[last], outs[last - 1], setting)
+    first_change = mass[0] * changes.spread(outs[0], outs[1], setting)
+    error += first_change + mass[1] * changes.spread(outs[last], outs[last - 1], setting)
     i = np.int64(0)
     while i >= 0:
         j = i
@@ -278,12 +268,12 @@ def march_angle(theta, goal, setting, rules, entries, room):
         if j != i:
             ready, miss, other, spent = integrate_piece(
                 (xs[i], xs[j]), (outs[i], labels[i]), RULE_FRACTION * goal, rules, setting, nodes, filled,
-                count < MOST_SAMPLES - 4 and not is_spent(setting),
+                count < MOST_SAMPLES - 4 and not changes.is_spent(setting),
             )  # fmt: skip
             rays += spent
             if not math.isnan(other):
                 # a missed change: add it to the samples, and repeat the piece
-                count = add_change(other, i, setting, chain, count, LATE_FRACTION * GAP_FRACTION * goal)
+                count = changes.add_change(other, i, setting, chain, count, LATE_FRACTION * GAP_FRACTION * goal)
                 continue
             filled, error = ready, error + miss
             if labels[i] < FIRST_LABEL:
@@ -301,8 +291,8 @@ def march_angle(theta, goal, setting, rules, entries, room):
             else:
                 mass[filled - 1] += width
                 error += 2.0 * largest * width
-            change = EDGE_ROUNDING * hollow[SIZE] * spread(outs[j], outs[following], setting)
-            error += undecided(j, setting, chain) + change
+            change = EDGE_ROUNDING * hollow[SIZE] * changes.spread(outs[j], outs[following], setting)
+            error += changes.undecided(j, setting, chain) + change
         i = following
     return filled, error, unresolved, number, rays + count
 
@@ -311,16 +301,13 @@ def marched_angles(
     thetas: Floats, tolerances: Floats, setting: Struct, rules: Struct, seeds: list[Floats]
 ) -> list[Found]:
     """Compute the conditional distributions at incoming angles. The seeds are the first samples, which increase."""
-    nodes = Nodes(*np.empty((2, NODE_ROOM)))
-    low, high, out = np.empty((3, MOST_SAMPLES))
-    pieces = Pieces(low, high, np.empty(MOST_SAMPLES, np.uint64), out)
-    room, found = Struct(Room(empty_chain(), nodes, pieces)), []
-    hollow, spent = setting.values.hollow, setting.values.tracer.spent
+    room, found = Struct(new_room()), []
+    hollow, spent = setting.values.hollow, setting.values.spent
     places = setting.address, rules.address
     for theta, tolerance, entries in zip(thetas.tolist(), tolerances.tolist(), seeds, strict=True):
         goal = tolerance * float(hollow[RIGHT] - hollow[LEFT])
         filled, error, unresolved, number, rays = march_angle(theta, goal, *places, entries, room.address)
-        own_nodes = Nodes._make(part[:filled].copy() for part in nodes)
-        own_pieces = Pieces._make(part[:number].copy() for part in pieces)
+        own_nodes = Nodes._make(part[:filled].copy() for part in room.values.nodes)
+        own_pieces = Pieces._make(part[:number].copy() for part in room.values.pieces)
         found.append(Found(own_nodes, own_pieces, error, unresolved, rays, int(spent[0])))
     return found

@@ -61,8 +61,7 @@ class Cells(NamedTuple):
 class Room(NamedTuple):
     """Work space: crossings, their cells and slopes; cuts of a panel; values at positions, at nodes, and in cells.
 
-    ``marks``, of shape (2, positions + 4), are those of `set_marks`. The values in cells are 0 but between the cells
-    ``span``, the first and the last one used.
+    ``marks``, of shape (2, positions + 4), are those of `set_marks`.
     """
 
     marks: Floats
@@ -73,7 +72,6 @@ class Room(NamedTuple):
     values: Floats
     edge_values: Floats
     samples: Floats
-    span: NDArray[np.int64]
     stack: Floats
 
 
@@ -84,7 +82,7 @@ def room_for(cells: int, nodes: int, positions: int) -> Room:
     return Room(
         marks,
         np.empty(most), np.empty(most + 1, np.int64), np.empty(most), np.empty(2 * most + 2), np.empty(positions),
-        np.empty(nodes), np.zeros((max(NUMBERS), cells)), np.array([cells, -1]), np.empty((MOST_DEPTH + 2, 3)),
+        np.empty(nodes), np.empty((max(NUMBERS), cells)), np.empty((MOST_DEPTH + 2, 3)),
     )  # fmt: skip
 
 
@@ -236,7 +234,7 @@ def row_masses(ends, grid, values, cells, masses, room):
     """Add the widths of the entry points that lead to the cells at one angle.
 
     Returns the change of the masses by a shift of the outgoing angle of 1 / (4 s (1 - s)) at position s, and the error
-    due to the gaps at the ends, both as norms of the functions' integrals, and the number of crossings of edges.
+    due to the gaps at the ends, both as norms of the functions' integrals.
     ``ends`` are the middle of the gap before the piece, its first and last sample, and the middle of the gap after it.
     """
     start, low, high, end = ends
@@ -251,8 +249,7 @@ def row_masses(ends, grid, values, cells, masses, room):
         last = x
         change += 1.5 * room.slopes[k] * (high - low) * math.hypot(sizes[before], sizes[after])
     masses[room.cells[count]] += end - last
-    gaps = (low - start) * sizes[room.cells[0]] + (end - high) * sizes[room.cells[count]]
-    return change, gaps, count
+    return change, (low - start) * sizes[room.cells[0]] + (end - high) * sizes[room.cells[count]]
 
 
 @compiled
@@ -260,7 +257,7 @@ def masses_of_rows(grid, ends, outs, owners, uncertainties, cells, masses, error
     """Add the masses of pieces, each at one angle, to those of the angles' numbers ``owners``, and their errors."""
     for i in range(owners.shape[0]):
         k = owners[i]
-        change, gaps, _ = row_masses(ends_at(ends[i], ALONE), grid, outs[i, ALONE], cells, masses[k], room)
+        change, gaps = row_masses(ends_at(ends[i], ALONE), grid, outs[i, ALONE], cells, masses[k], room)
         errors[k] += uncertainties[i] * change + gaps
 
 
@@ -311,45 +308,26 @@ def cut_patch(row_grid, grid, outs, edges, room):
 
 
 @linked
-def clear_samples(room):
-    """Set the values in cells to 0."""
-    for j in range(room.span[0], room.span[1] + 1):
-        for k in range(room.samples.shape[0]):
-            room.samples[k, j] = 0.0
-    room.span[0], room.span[1] = room.samples.shape[1], -1
-
-
-@linked
-def sample_masses(k, four, grid, values, cells, room):
-    """Add the widths at one angle to row k of the values in cells; return the change of `row_masses`."""
-    change, _, count = row_masses(four, grid, values, cells, room.samples[k], room)
-    for i in range(count + 1):
-        room.span[0], room.span[1] = min(room.span[0], room.cells[i]), max(room.span[1], room.cells[i])
-    return change
-
-
-@linked
 def gauss_masses(rule, begin, end, panel, row_grid, grid, ends, outs, cells, room):
     """Compute the masses per position at Gauss's nodes on a part of the panel, times the weight of the measure.
 
-    Returns the squared error of the rule, and the integral of the change by a shift of the outgoing angle. The values
-    in cells were 0.
+    Returns the squared error of the rule, and the integral of the change by a shift of the outgoing angle.
     """
     low, high = panel
-    samples, sizes, span = room.samples, cells.sizes, room.span
-    moved = 0.0
+    samples, sizes, moved = room.samples, cells.sizes, 0.0
+    samples[:, :] = 0.0
     for k in range(NUMBERS[rule]):
         s = begin + (end - begin) * GAUSS_NODES[rule, k]
         four = interpolate(s, row_grid.nodes, row_grid.weights, ends, outs, room.values)
-        change = sample_masses(k, four, grid, room.values, cells, room)
+        change, _ = row_masses(four, grid, room.values, cells, samples[k], room)
         # the density of the measure is sin(theta) / 2
         theta = low + (high - low) * s * s * (3.0 - 2.0 * s)
         weight = 3.0 * (high - low) * s * (1.0 - s) * math.sin(theta) * (end - begin)
         moved += GAUSS_WEIGHTS[rule, k] * weight * change
-        for j in range(span[0], span[1] + 1):
+        for j in range(sizes.shape[0]):
             samples[k, j] *= weight
     fine, coarse = 0.0, 0.0
-    for j in range(span[0], span[1] + 1):
+    for j in range(sizes.shape[0]):
         first, second = 0.0, 0.0
         for k in range(NUMBERS[rule]):
             first += FINE_NULL[rule, k] * samples[k, j]
@@ -362,7 +340,7 @@ def gauss_masses(rule, begin, end, panel, row_grid, grid, ends, outs, cells, roo
 @linked
 def patch_masses(panel, row_grid, grid, ends, outs, cells, goal, masses, room):
     """Add the integrals over a patch to ``masses``; return the squared error, and the change as in `gauss_masses`."""
-    samples, stack, span = room.samples, room.stack, room.span
+    samples, stack = room.samples, room.stack
     squares, moved = 0.0, 0.0
     number = cut_patch(row_grid, grid, outs, cells.edges, room)
     for part in range(number - 1):
@@ -386,10 +364,9 @@ def patch_masses(panel, row_grid, grid, ends, outs, cells, goal, masses, room):
             else:
                 squares += error
                 moved += change
-                for j in range(span[0], span[1] + 1):
+                for j in range(masses.shape[0]):
                     for k in range(NUMBERS[rule]):
                         masses[j] += GAUSS_WEIGHTS[rule, k] * samples[k, j]
-            clear_samples(room)
     return squares, moved
 
 
@@ -411,8 +388,7 @@ def masses_of_patches(panels, row_grid, grid, strips, uncertainties, limits, goa
     for i in range(owners.shape[0]):
         p = owners[i]
         ends, outs = all_ends[i], all_outs[i]
-        change = sample_masses(0, ends_at(ends, middle), grid, outs[middle], cells, room)
-        clear_samples(room)
+        change, _ = row_masses(ends_at(ends, middle), grid, outs[middle], cells, room.samples[0], room)
         first, last = sizes_at_ends(grid, outs[middle], cells)
         at_ends = of_ends[i] * (first + last)
         if (at_nodes[i] + between[i]) * change + at_ends <= limits[p]:
@@ -425,6 +401,6 @@ def masses_of_patches(panels, row_grid, grid, strips, uncertainties, limits, goa
                 node_squares[p, k] += (at_nodes[i] * moved / measures[p]) ** 2
         else:
             for k in range(row_grid.nodes.shape[0]):
-                change, gaps, _ = row_masses(ends_at(ends, k), grid, outs[k], cells, rest[p, k], room)
+                change, gaps = row_masses(ends_at(ends, k), grid, outs[k], cells, rest[p, k], room)
                 errors[p, k] += gaps
                 node_squares[p, k] += (at_nodes[i] * change) ** 2

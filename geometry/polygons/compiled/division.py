@@ -11,32 +11,10 @@ from ....core.checks import Floats
 from ...tracing.compiled.options import compiled, inlined
 from ...tracing.double_double.numbers import double_double
 from . import columns as c
-from .polygon import (
-    Frame,
-    Pieces,
-    clip,
-    cut_rounding,
-    leaving_offset,
-    polygon_flux,
-    put_pieces,
-    set_angles,
-    set_frame,
-    side_of,
-    signs_of,
-)
-from .unfolding import (
-    MEMORY,
-    Course,
-    Hollow,
-    apex_of,
-    crossed,
-    lag_of,
-    period_between,
-    periods_without_split,
-    repeated,
-    set_drift,
-    unfolded,
-)
+from . import polygon as polygons
+from . import unfolding
+from .polygon import Frame, Pieces
+from .unfolding import MEMORY, Course, Hollow, apex_of
 
 # What becomes of a beam: it is split, has left the hollow, is left for later, or is divided next.
 SPLIT, LEFT, STOPPED, GOES_ON = range(4)
@@ -90,14 +68,11 @@ def put_beam(store, beam, polygon, count, rank, course):
 def course_of(store, beam):
     """-> Course: where a beam is."""
     real, whole = store.real, store.whole
-    isometry = unfolded(
-        float(whole[beam, c.SIGN]),
-        double_double(real[beam, c.TURN], real[beam, c.TURN_LOW]),
-        double_double(real[beam, c.T_X], real[beam, c.T_X_LOW]),
-        double_double(real[beam, c.T_Y], real[beam, c.T_Y_LOW]),
-        real[beam, c.ERROR_X],
-        real[beam, c.ERROR_Y],
-    )
+    turn = double_double(real[beam, c.TURN], real[beam, c.TURN_LOW])
+    x = double_double(real[beam, c.T_X], real[beam, c.T_X_LOW])
+    y = double_double(real[beam, c.T_Y], real[beam, c.T_Y_LOW])
+    sign, errors = float(whole[beam, c.SIGN]), (real[beam, c.ERROR_X], real[beam, c.ERROR_Y])
+    isometry = unfolding.unfolded(sign, turn, x, y, *errors)
     return Course(whole[beam, c.EDGE], whole[beam, c.BOUNCES], isometry)
 
 
@@ -145,14 +120,14 @@ def passed(course, desk, count, flux, hollow, most_steps):
     as many as it can.
     """
     polygon, frame, history = desk.polygon, desk.frame, desk.history
-    mark, period, most, due, reflections = course, period_between(course, course), 0.0, 0, 0
+    mark, period, most, due, reflections = course, unfolding.period_between(course, course), 0.0, 0, 0
     put_course(history, 0, course)
-    rounding, uncertainty = 0.0, set_frame(frame, polygon, count, course.unfolding)
+    rounding, uncertainty = 0.0, polygons.set_frame(frame, polygon, count, course.unfolding)
     for step in range(most_steps):
         edge = course.edge
-        side = side_of(frame, count, hollow.apex_x[edge], hollow.apex_y[edge], uncertainty)
+        side = polygons.side_of(frame, count, hollow.apex_x[edge], hollow.apex_y[edge], uncertainty)
         if side == 0:
-            positive, negative, misplaced = signs_of(polygon, count, apex_of(course, hollow), desk.values)
+            positive, negative, misplaced = polygons.signs_of(polygon, count, apex_of(course, hollow), desk.values)
             if positive and negative:
                 return course, SPLIT, step + 1, rounding
             rounding += misplaced
@@ -160,29 +135,29 @@ def passed(course, desk, count, flux, hollow, most_steps):
                 rounding += abs(flux)
             side = -1 if negative else 1
         if most >= 1.0:
-            most = min(most, periods_without_split(frame, count, side, uncertainty, period))
+            most = min(most, unfolding.periods_without_split(frame, count, side, uncertainty, period))
         way = 2 * edge + ((side < 0) != (course.unfolding.sign < 0.0))
         code = hollow.behind[way]
         if code >= 0:
             course = Course(code, course.bounces, course.unfolding)
             continue
-        course, left = crossed(hollow.exits[way], course, hollow)
+        course, left = unfolding.crossed(hollow.exits[way], course, hollow)
         if left:
             return course, LEFT, step + 1, rounding
         reflections += 1
         if reflections == due:
             if most >= 1.0 and course.edge == mark.edge:
-                course, repeats = repeated(mark, course, period, most)
+                course, repeats = unfolding.repeated(mark, course, period, most)
                 reflections = 0 if repeats else reflections
             most, due = 0.0, 0
         if due == 0:
-            lag = lag_of(course, history, reflections)
+            lag = unfolding.lag_of(course, history, reflections)
             if lag > 0:
-                period = period_between(course_of(history, (reflections - lag) % MEMORY), course)
+                period = unfolding.period_between(course_of(history, (reflections - lag) % MEMORY), course)
                 mark, due, most = course, reflections + lag, period.most
-                set_drift(frame, polygon, count, period)
+                unfolding.set_drift(frame, polygon, count, period)
         put_course(history, reflections % MEMORY, course)
-        uncertainty = set_frame(frame, polygon, count, course.unfolding)
+        uncertainty = polygons.set_frame(frame, polygon, count, course.unfolding)
     return course, STOPPED, most_steps, rounding
 
 
@@ -226,11 +201,13 @@ def put(tables, polygon, count, rank, course, fate, width):
     counts, angles, cuts = tables.counts, tables.desk.angles, tables.desk.cuts
     priority = rank.priority
     if fate == LEFT:
-        set_angles(polygon, count, angles, cuts)
-        offset, upwards = leaving_offset(cuts[0], cuts[count - 1], course.unfolding)
+        polygons.set_angles(polygon, count, angles, cuts)
+        offset, upwards = polygons.leaving_offset(cuts[0], cuts[count - 1], course.unfolding)
         if upwards:
             tag = counts[LEAVES], int(course.unfolding.sign), course.bounces
-            counts[PIECES] = put_pieces(tables.pieces, counts[PIECES], polygon, count, angles, cuts, offset, tag, width)
+            counts[PIECES] = polygons.put_pieces(
+                tables.pieces, counts[PIECES], polygon, count, angles, cuts, offset, tag, width
+            )
             counts[LEAVES] += 1
             return
         # no ray leaves downwards: this is a sliver within rounding of a corner
@@ -245,10 +222,10 @@ def cut(tables, count, apex):
     """Cut the beam on the desk at an apex."""
     desk = tables.desk
     for k in range(2):
-        desk.sizes[k] = clip(desk.polygon, count, desk.values, 1.0 - 2.0 * k, apex, desk.parts[k])
-        desk.fluxes[k] = polygon_flux(desk.parts[k], desk.sizes[k])
+        desk.sizes[k] = polygons.clip(desk.polygon, count, desk.values, 1.0 - 2.0 * k, apex, desk.parts[k])
+        desk.fluxes[k] = polygons.polygon_flux(desk.parts[k], desk.sizes[k])
     tables.counts[SPLITS] += 1
-    tables.rounding[0] += cut_rounding(desk.parts[0], desk.sizes[0], apex)
+    tables.rounding[0] += polygons.cut_rounding(desk.parts[0], desk.sizes[0], apex)
 
 
 @inlined
@@ -289,7 +266,7 @@ def work(tables, hollow, store, stride, threshold, limits):
         cut(tables, count, apex)
         for k in range(2):
             part = part_ranked(rank, desk.fluxes[k], desk.fluxes[1 - k])
-            beyond, left = crossed(apex.left if k == 0 else apex.right, course, hollow)
+            beyond, left = unfolding.crossed(apex.left if k == 0 else apex.right, course, hollow)
             fate = LEFT if left else (GOES_ON if part.priority > threshold else STOPPED)
             put(tables, desk.parts[k], desk.sizes[k], part, beyond, fate, hollow.width)
     return False

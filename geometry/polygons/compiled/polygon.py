@@ -117,12 +117,8 @@ def cut_rounding(polygon, count, apex):
     for i in range(count):
         if polygon[i, CUT_X] == apex.x and polygon[i, CUT_Y] == apex.y:
             j = i + 1 if i + 1 < count else 0
-            here_s, here_c, there_s, there_c = (
-                polygon[i, LINE_S],
-                polygon[i, LINE_C],
-                polygon[j, LINE_S],
-                polygon[j, LINE_C],
-            )
+            here_s, here_c = polygon[i, LINE_S], polygon[i, LINE_C]
+            there_s, there_c = polygon[j, LINE_S], polygon[j, LINE_C]
             p, s, c = max(polygon[i, LINE_P], polygon[j, LINE_P]), max(here_s, there_s), max(abs(here_c), abs(there_c))
             uncertainty = apex.error_x * s + apex.error_y * c + FUNCTIONAL_ULPS * EPS * p
             rounding += 0.5 * math.pi * uncertainty * abs(here_s * there_c - here_c * there_s)

@@ -149,14 +149,9 @@ def apex_of(course, hollow):
     left, right = hollow.exits[2 * edge], hollow.exits[2 * edge + 1]
     if isometry.sign < 0.0:
         left, right = right, left
-    return Apex(
-        xx + xy + isometry.x.high,
-        yx + yy + isometry.y.high,
-        FUNCTIONAL_ULPS * EPS * (abs(xx) + abs(xy) + abs(isometry.x.high)) + isometry.error_x,
-        FUNCTIONAL_ULPS * EPS * (abs(yx) + abs(yy) + abs(isometry.y.high)) + isometry.error_y,
-        left,
-        right,
-    )
+    error_x = FUNCTIONAL_ULPS * EPS * (abs(xx) + abs(xy) + abs(isometry.x.high)) + isometry.error_x
+    error_y = FUNCTIONAL_ULPS * EPS * (abs(yx) + abs(yy) + abs(isometry.y.high)) + isometry.error_y
+    return Apex(xx + xy + isometry.x.high, yx + yy + isometry.y.high, error_x, error_y, left, right)
 
 
 # Angle up to which a period counts as a translation, and limit on the angle of all skipped periods together.

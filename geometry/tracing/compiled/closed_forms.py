@@ -29,10 +29,8 @@ from .work import NATURAL, ROOM, WORK
 UNDECIDED = 255
 ESCAPED = 0
 RAYS = 512
-# Rows of `Room.numbers`: the left ends of the cells of rays, and the numbers of hollows before them.
-BASES, PLACES = 6, 4
-# Number of hollows up to which their left ends are compared with many rays at once, without a search for each ray.
-FEW_HOLLOWS = 16
+# Row of `Room.numbers`: the left ends of the cells of rays.
+BASES = 6
 # Numbers in a line of the cache.
 LINE = 8
 # Adding and then subtracting this number rounds a number below 2^51 to an integer.
@@ -128,14 +126,8 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
     The sign of ``turn``, the moment of the apex about the ray, selects the line that is met first. The number of hits
     is the number of consecutive unfolded ends of the opening on the side of the ray opposite to the apex.
     """
-    left, right, uncertainty, apex_x, apex_y = (
-        form[c.FORM_LEFT],
-        form[c.FORM_RIGHT],
-        form[c.UNCERTAINTY],
-        form[c.WEDGE_X],
-        form[c.WEDGE_Y],
-    )
-    copies = int(form[c.COPIES])
+    left, right, uncertainty = form[c.FORM_LEFT], form[c.FORM_RIGHT], form[c.UNCERTAINTY]
+    apex_x, apex_y, copies = form[c.WEDGE_X], form[c.WEDGE_Y], int(form[c.COPIES])
     mirrored = c.LINK_COLUMNS * (copies + 2)
     for i in range(entry.shape[0]):
         sine, cosine = sine_cosine(angle[i])
@@ -173,16 +165,9 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
         entry[i] = exit
 
 
-def _crossings() -> tuple[Late, Late, Late]:
-    numbers, integer = types.float64[::1], types.int64
-    return (
-        Late(cross_wedge, *[numbers] * 7),
-        Late(cross_arc, *[numbers] * 6),
-        Late(cross_simple, TABLES, integer, integer, *[numbers] * 4, integer[::1]),
-    )
-
-
-WEDGES, ARCS, SIMPLE = _crossings()
+NUMBERS, INTEGER = types.float64[::1], types.int64
+WEDGES, ARCS = Late(cross_wedge, *[NUMBERS] * 7), Late(cross_arc, *[NUMBERS] * 6)
+SIMPLE = Late(cross_simple, TABLES, INTEGER, INTEGER, *[NUMBERS] * 4, INTEGER[::1])
 # The slots of `cross_wedge`, `cross_arc` and `cross_simple`; 0 in place of the last one leaves its hollows undecided.
 CROSSINGS = WEDGES.slot, ARCS.slot, SIMPLE.slot
 
@@ -240,16 +225,9 @@ def put_into_hollows(starts, theta, tables, results, room):
         bounces[j] = 1
     for j in range(count):
         status[j] = ESCAPED
-    # of a few hollows the left ends before each ray are counted, for many rays at once
-    places, searched = room.numbers[PLACES], flat > FEW_HOLLOWS
-    for k in range(1, 0 if searched else flat):
-        for j in range(count):
-            found = places[j] if k > 1 else 0.0
-            places[j] = found + 1.0 if starts[j] - bases[j] >= hollows[k, c.LEFT] else found
     for j in range(count if flat > 0 else 0):
-        entry, h = starts[j] - bases[j], 0
-        if flat > 1:
-            h = max(last_hollow(entry, hollows, flat), 0) if searched else int(places[j]) & NATURAL
+        entry = starts[j] - bases[j]
+        h = max(last_hollow(entry, hollows, flat), 0) if flat > 1 else FIRST_HOLLOW
         left, right = hollows[h, c.LEFT], hollows[h, c.RIGHT]
         place = h if (left < entry) & (entry < right) else flat
         if (entry == left) | (entry == right):

@@ -50,12 +50,9 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
 
     At least one of the pieces is a curve.
     """
-    return in_front_at(
-        tables.joints,
-        face_of(tables, hit.kind, hit.number, hit.s),
-        face_of(tables, own.kind, own.number, own.s),
-        extended(px), extended(py), vx, vy, Arrival(own.flown, slack, slack),
-    )  # fmt: skip
+    piece, start = face_of(tables, hit.kind, hit.number, hit.s), face_of(tables, own.kind, own.number, own.s)
+    arrival = Arrival(own.flown, slack, slack)
+    return in_front_at(tables.joints, piece, start, extended(px), extended(py), vx, vy, arrival)
 
 
 @inner

@@ -9,19 +9,14 @@ takes as long to compile as the function.
 
 from __future__ import annotations
 
-from typing import Any
-
 from ....core.compilation import jit
 
-OPTIONS: dict[str, Any] = {"_nrt": False}
-compiled = jit(**OPTIONS)
-# Options of functions that only compiled functions call.
-INNER: dict[str, Any] = {**OPTIONS, "no_cpython_wrapper": True}
-inner = jit(**INNER)
-inlined = jit(**INNER, forceinline=True)
+compiled = jit(_nrt=False)
+# For functions that only compiled functions call.
+inner = jit(_nrt=False, no_cpython_wrapper=True)
+inlined = jit(_nrt=False, forceinline=True)
 # With numba's run time, for functions that allocate; numba applies the option to all called functions.
-ALLOCATING: dict[str, Any] = {**INNER, "_nrt": True}
-allocating = jit(**ALLOCATING)
+allocating = jit(_nrt=True, no_cpython_wrapper=True)
 # Functions that no call by address reaches become machine code within their callers only.
-linked = jit(linked=True, **INNER)
-linked_allocating = jit(linked=True, **ALLOCATING)
+linked = jit(_nrt=False, linked=True)
+linked_allocating = jit(_nrt=True, linked=True)

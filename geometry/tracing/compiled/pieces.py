@@ -23,19 +23,10 @@ import numpy as np
 
 from ....core.rounding import EPS
 from ...scene import columns as c
-from ...scene.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
+from ...scene.tolerances import JOINT_ULPS, NEARBY_MARGIN, NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
+from ..double_double import formulas
 from ..double_double.beziers import curve_size
-from ..double_double.formulas import (
-    arc_normal,
-    arc_root,
-    arc_terms,
-    back_on_arc,
-    bezier_sides,
-    bezier_time,
-    cubic,
-    quadratic_roots,
-    where,
-)
+from ..double_double.formulas import where
 from .options import inlined, inner
 from .records import LINE
 
@@ -50,14 +41,6 @@ NO_BEZIER_HIT = np.inf, -1, 0.0, np.inf, -1.0
 # Size, in eps times that of its products, from which on g is not 0: twice that of a contact. Each value of g has about
 # eight rounding errors.
 NO_ZERO_ULPS = 2.0 * TANGENT_ULPS
-
-
-@inlined
-def opening_met(left, right, px, py, vx, vy):
-    """-> (t, is_met): time to the level of the opening, and whether the ray passes between its ends upwards."""
-    c_right, c_left = (right - px) * vy + py * vx, (left - px) * vy + py * vx
-    t = -py / vy
-    return where(t > 0.0, t, 0.0), (vy > 0.0) & (c_right >= 0.0) & (c_left <= 0.0)
 
 
 @inlined
@@ -192,18 +175,18 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
     """
     form, curvature = arc_form(arc), arc[c.CURVATURE]
     rx, ry = px - arc[c.START_X], stretch * (py - arc[c.START_Y])
-    b, f, d, speed2 = arc_terms(form, rx, ry, vx, stretch * vy)
+    b, f, d, speed2 = formulas.arc_terms(form, rx, ry, vx, stretch * vy)
     if own:
         if curvature <= 0.0 or b <= 0.0:
             return np.inf, 0, np.inf
-        return arc_root(form, own, b, f, 0.0, speed2), 0, np.inf
+        return formulas.arc_root(form, own, b, f, 0.0, speed2), 0, np.inf
     tangent = 0
     if is_nearly_tangent(arc, b, d, speed2) and abs(d) <= tangent_error(arc, b, rx, ry, speed2):
         tangent = 1
         d = 0.0
     if d < 0.0 or (b >= 0.0 and curvature <= 0.0):
         return np.inf, 0, np.inf
-    return arc_root(form, own, b, f, math.sqrt(d), speed2), tangent, np.inf if b >= 0.0 else f
+    return formulas.arc_root(form, own, b, f, math.sqrt(d), speed2), tangent, np.inf if b >= 0.0 else f
 
 
 @inlined
@@ -233,19 +216,8 @@ def on_arc(arc, qx, qy, slack):
 
 @inlined
 def beyond_end(arc, qx, qy):
-    """-> float: how far the point q of the full circle, relative to the first joint, is beyond an end of the arc.
-
-    The distance is along or across the chord, inf on the far side of the circle, and at most 0 on the arc.
-    """
-    # up to a half angle of pi/4: by the position along the chord, on the arc's side of the circle
-    along, short = qx * arc[c.CHORD_X] + qy * arc[c.CHORD_Y], arc[c.SHORT_CHORD]
-    nx, ny = arc_normal(arc_form(arc), 1.0, qx, qy)
-    facing = ny * arc[c.CHORD_X] - nx * arc[c.CHORD_Y]
-    beyond = where(-along > along - short, -along, along - short)
-    # larger half angles: by the side of the chord; the arc curves away from its free side exactly if it is focusing
-    height = qy * arc[c.CHORD_X] - qx * arc[c.CHORD_Y]
-    height = where(arc[c.CURVATURE] > 0.0, height, -height)
-    return where(short > 0.0, where(facing > 0.0, beyond, np.inf), height)
+    """-> float: how far the point q of the full circle, relative to the first joint, is beyond an end of the arc."""
+    return formulas.beyond_end(arc_form(arc), (arc[c.CHORD_X], arc[c.CHORD_Y], arc[c.SHORT_CHORD]), qx, qy)
 
 
 @inlined
@@ -272,7 +244,7 @@ def may_touch_arc(arc, t, px, py, vx, vy, stretch, slack):
     The hits that rounding does not distinguish from a tangent one lie up to sqrt(D) / (kappa |v|) beside it.
     """
     rx, ry, wy = px - arc[c.START_X], stretch * (py - arc[c.START_Y]), stretch * vy
-    b, _, _, speed2 = arc_terms(arc_form(arc), rx, ry, vx, wy)
+    b, _, _, speed2 = formulas.arc_terms(arc_form(arc), rx, ry, vx, wy)
     reach = math.sqrt(tangent_error(arc, b, rx, ry, speed2) / speed2) / abs(arc[c.CURVATURE])
     return on_arc(arc, rx + t * vx, ry + t * wy, slack * max(1.0, stretch) + reach)
 
@@ -289,8 +261,8 @@ def near_end(curve, px, py, slack):
 def arc_point(arc, t, px, py, vx, vy, stretch):
     """-> (x, y, nx, ny): the position on the arc after the time t, and the unit normal there."""
     qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
-    qx, qy = back_on_arc(arc_form(arc), qx, qy)
-    nx, ny = arc_normal(arc_form(arc), stretch, qx, qy)
+    qx, qy = formulas.back_on_arc(arc_form(arc), qx, qy)
+    nx, ny = formulas.arc_normal(arc_form(arc), stretch, qx, qy)
     scale = 1.0 / math.sqrt(nx * nx + ny * ny)
     return arc[c.START_X] + qx, arc[c.START_Y] + qy / stretch, nx * scale, ny * scale
 
@@ -299,14 +271,8 @@ def arc_point(arc, t, px, py, vx, vy, stretch):
 def arc_incidence(arc, t, px, py, vx, vy, stretch):
     """-> float: sine of the angle between the velocity and the arc after the time t."""
     qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
-    nx, ny = arc_normal(arc_form(arc), stretch, qx, qy)
+    nx, ny = formulas.arc_normal(arc_form(arc), stretch, qx, qy)
     return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)
-
-
-@inlined
-def bezier_slope(a1, a2, a3, s):
-    """-> float: the derivative of the cubic at s."""
-    return (3.0 * a3 * s + 2.0 * a2) * s + a1
 
 
 @inlined
@@ -355,17 +321,15 @@ def meets_circle(curve, px, py, vx, vy, time):
 @inlined
 def bezier_coefficients(curve):
     """-> (ax, ay): the coefficients of both coordinates."""
-    return (
-        (curve[c.START_X], curve[c.X1], curve[c.X2], curve[c.X3]),
-        (curve[c.START_Y], curve[c.Y1], curve[c.Y2], curve[c.Y3]),
-    )
+    ax = curve[c.START_X], curve[c.X1], curve[c.X2], curve[c.X3]
+    return ax, (curve[c.START_Y], curve[c.Y1], curve[c.Y2], curve[c.Y3])
 
 
 @inlined
 def bezier_point(curve, s):
     """-> (x, y): b(s)."""
     ax, ay = bezier_coefficients(curve)
-    return cubic(ax, s), cubic(ay, s)
+    return formulas.cubic(ax, s), formulas.cubic(ay, s)
 
 
 @inlined
@@ -382,8 +346,8 @@ def root_step(g, s, low, high):
 
     It is the last one if the next step would be below one rounding error.
     """
-    _, a1, a2, a3 = g
-    value, slope = cubic(g, s), bezier_slope(a1, a2, a3, s)
+    _, _, a2, a3 = g
+    value, slope = formulas.cubic(g, s), formulas.cubic_slope(g, s)
     bend = 3.0 * a3 * s + a2
     low, high = where(value > 0.0, s, low), where(value < 0.0, s, high)
     step = s - value * slope / (slope * slope - value * bend)
@@ -399,7 +363,7 @@ def root_step(g, s, low, high):
 def root_start(g, low, high, value_low, value_high):
     """-> float: the root of the quadratic with the same values as a cubic at low, at high and in the middle."""
     span = high - low
-    middle = cubic(g, low + 0.5 * span)
+    middle = formulas.cubic(g, low + 0.5 * span)
     rise, bend = 4.0 * middle - 3.0 * value_low - value_high, 2.0 * (value_low + value_high) - 4.0 * middle
     return low + span * quadratic_root(value_low, rise, bend)
 
@@ -418,8 +382,8 @@ def falling_root(g, low, high, value_low, value_high):
 @inlined
 def bezier_tangent(curve, s):
     """-> (tx, ty): b'(s)."""
-    x = bezier_slope(curve[c.X1], curve[c.X2], curve[c.X3], s)
-    return x, bezier_slope(curve[c.Y1], curve[c.Y2], curve[c.Y3], s)
+    ax, ay = bezier_coefficients(curve)
+    return formulas.cubic_slope(ax, s), formulas.cubic_slope(ay, s)
 
 
 @inlined
@@ -432,7 +396,7 @@ def contact_time(curve, bend, s, px, py, vx, vy):
     tx, ty = bezier_tangent(curve, s)
     if bend * (tx * vx + ty * vy) <= 0.0:
         return np.inf
-    return bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
+    return formulas.bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
 
 
 @inlined
@@ -443,12 +407,11 @@ def joint_contact_time(curve, g, s, px, py, vx, vy, room):
     were certain, hit and miss would be, because the next piece has the same number g and nearly the same slope. Else an
     extremum of g lies at the joint within rounding, on either piece or, where their tangents differ, on none.
     """
-    _, a1, a2, a3 = g
     tx, ty = bezier_tangent(curve, s)
-    is_steep = abs(bezier_slope(a1, a2, a3, s)) > SMOOTH_JOINT * (abs(tx) + abs(ty)) + room
+    is_steep = abs(formulas.cubic_slope(g, s)) > SMOOTH_JOINT * (abs(tx) + abs(ty)) + room
     if is_steep or curve[c.START_CORNER if s == 0.0 else c.END_CORNER] > 0.0:
         return np.inf
-    return bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
+    return formulas.bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
 
 
 @inlined
@@ -458,8 +421,8 @@ def own_terms(curve, g, own_s):
     Here sigma = s - own_s, and ``g`` are the coefficients of g. ``error`` bounds the rounding error of b1^2 - 4 b2 b0:
     each b has up to ten rounding errors of the size of the piece.
     """
-    _, a1, a2, a3 = g
-    b0, b1, b2 = bezier_slope(a1, a2, a3, own_s), 3.0 * a3 * own_s + a2, a3
+    _, _, a2, a3 = g
+    b0, b1, b2 = formulas.cubic_slope(g, own_s), 3.0 * a3 * own_s + a2, a3
     size = curve_size(curve) * (abs(b0) + abs(b1) + abs(2.0 * b2))
     error = TANGENT_ULPS * EPS * (b1 * b1 + abs(4.0 * b2 * b0) + size)
     return b0, b1, b2, b1 * b1 - 4.0 * b2 * b0, error
@@ -468,18 +431,17 @@ def own_terms(curve, g, own_s):
 @inlined
 def own_point(g, own_s, sigma):
     """-> (s, is_front): the point own_s + sigma, and whether it is on the piece and a ray may hit it from its front."""
-    _, a1, a2, a3 = g
     s, slack = own_s + sigma, JOINT_ULPS * EPS
     on_piece = (s >= -slack) & (s <= 1.0 + slack)
     s = squeezed(s)
-    return s, on_piece & (bezier_slope(a1, a2, a3, s) <= 0.0)
+    return s, on_piece & (formulas.cubic_slope(g, s) <= 0.0)
 
 
 @inlined
 def own_hit(curve, g, own_s, sigma, px, py, vx, vy):
     """-> (t, s): time to the point own_s + sigma of the piece on which a ray started, inf if it is no front hit."""
     s, is_front = own_point(g, own_s, sigma)
-    t = bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
+    t = formulas.bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
     return where(is_front & (t > 0.0), t, np.inf), s
 
 
@@ -498,39 +460,13 @@ def hit_from_own(curve, g, own_s, px, py, vx, vy, slack):
                 return t, s, 1
     if disc < 0.0:
         return np.inf, 0.0, 0
-    first, second = quadratic_roots(b0, b1, b2, disc)
+    first, second = formulas.quadratic_roots(b0, b1, b2, disc)
     t, s = own_hit(curve, g, own_s, second, px, py, vx, vy)
     if b2 != 0.0:
         other_t, other_s = own_hit(curve, g, own_s, first, px, py, vx, vy)
         if other_t <= t:
             t, s = other_t, other_s
     return t, s, 0
-
-
-@inlined
-def extrema(a1, a2, a3):
-    """-> (first, second): the extrema of the cubic g in increasing order; those outside (0, 1) may be any numbers."""
-    disc = a2 * a2 - 3.0 * a3 * a1
-    root = math.sqrt(disc)
-    q = -(a2 + (where(a2 >= 0.0, root, -root)))
-    one, other = q / (3.0 * a3), a1 / q
-    first, second = where(one < other, one, other), where(one < other, other, one)
-    return where(disc > 0.0, first, 2.0), where(disc > 0.0, second, 2.0)
-
-
-@inlined
-def is_close_by(curve, s, t, vx, vy, spread, slack):
-    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start.
-
-    A hit behind the start is not if the start lies beyond an end of the piece: the ray has left the next piece, and
-    rounding across the two pieces does not change the end that it has passed.
-    """
-    tx, ty = bezier_tangent(curve, s)
-    size = math.sqrt(tx * tx + ty * ty)
-    # the height in front of the curve is t times the sine of incidence
-    close = abs(t) <= NEARBY * spread and abs(t * (ty * vx - tx * vy)) <= slack * size
-    behind = t * (tx * vx + ty * vy)
-    return close and (t >= 0.0 or -slack * size <= s * size * size - behind <= size * size + slack * size)
 
 
 @inlined
@@ -543,7 +479,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
     if max(min(a0, b1, b2, b3), -max(a0, b1, b2, b3)) > NO_ZERO_ULPS * EPS * spread:
         return np.inf, 0.0, 0, -1.0
     # g can fall through zero once on each part of [0, 1] between its extrema
-    c1, c2 = extrema(a1, a2, a3)
+    c1, c2 = formulas.extrema(g)
     best_t, best_s, tangent, near_s = np.inf, 0.0, 0, -1.0
     room = TANGENT_ULPS * EPS * spread
     low, touches = 0.0, False
@@ -568,7 +504,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
                 if touches and t < best_t:
                     best_t, best_s, tangent = t, 1.0, 1
         else:
-            value_high = cubic(g, high)
+            value_high = formulas.cubic(g, high)
             if abs(value_high) <= room:
                 t = contact_time(curve, 6.0 * a3 * high + 2.0 * a2, high, px, py, vx, vy)
                 touches = t > slack and t < np.inf
@@ -580,9 +516,9 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
                 s = quadratic_root(a0, a1, a2)
             else:
                 s = falling_root(g, low, high, value_low, value_high)
-            t = bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
+            t = formulas.bezier_time(bezier_coefficients(curve), s, px, py, vx, vy)
             if t < best_t:
-                if is_close_by(curve, s, t, vx, vy, spread, slack):
+                if formulas.is_close_by(bezier_tangent(curve, s), s, t, vx, vy, spread, slack):
                     near_s = s
                 elif t > 0.0:
                     best_t, best_s, tangent = t, s, 0
@@ -597,7 +533,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
     ``tangent`` is 1 if hit and miss are not distinguished. ``own_s`` is below 0 if the ray does not start on the piece.
     A hit within the slack of the start is not counted: ``near_s`` is its parameter, -1 if there is none.
     """
-    g = bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
+    g = formulas.bezier_sides(bezier_coefficients(curve), px, py, vx, vy)
     if own_s >= 0.0:
         t, s, tangent = hit_from_own(curve, g, own_s, px, py, vx, vy, slack)
         return t, s, tangent, -1.0

@@ -12,41 +12,22 @@ stable, and no epsilon decides which piece is hit:
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
-from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene import columns as c
 from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.scene import NO_TABLES
 from ...scene.structs import Struct
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
-from ..double_double.formulas import FLAT_TOP, TOP_CORNER, arc_normal, mirror, opening_at, with_length_one
-from . import pieces
+from ..double_double.formulas import FLAT_TOP, TOP_CORNER, arc_normal, mirror, opening_at, opening_met, with_length_one
+from . import pieces, records
 from .nearby import UNCERTAIN, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined, inner
 from .pointers import Late, call_late, checked, is_raised
-from .records import (
-    BEZIER,
-    CIRCLE,
-    ELLIPSE,
-    LINE,
-    NO_DETAILS,
-    NO_PIECE,
-    NO_RAYS,
-    OPENING,
-    SIDE,
-    Hit,
-    Own,
-    Rays,
-    Scope,
-    Slots,
-    Tree,
-)
+from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_DETAILS, NO_PIECE, NO_RAYS, OPENING, SIDE, Hit, Own, Rays
 from .runs import skip_chords, skip_crossings
 from .tree import NO_LINE_HIT, nearest_line_in_boxes
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
@@ -66,19 +47,13 @@ BEND_SHIFT = 40
 def scope_of(tables, h, slots):
     """-> Scope: hollow number h."""
     hollow = tables.hollows[h]
-    return Scope(
-        tables,
-        hollow,
-        hollow[c.LEFT],
-        hollow[c.RIGHT],
-        JOINT_ULPS * EPS * hollow[c.SIZE],
-        (np.int64(hollow[c.FIRST_JOINT]), np.int64(hollow[c.JOINTS_END])),
-        (np.int64(hollow[c.FIRST_CIRCLE]), np.int64(hollow[c.CIRCLES_END])),
-        (np.int64(hollow[c.FIRST_ELLIPSE]), np.int64(hollow[c.ELLIPSES_END])),
-        (np.int64(hollow[c.FIRST_BEZIER]), np.int64(hollow[c.BEZIERS_END])),
-        hollow[c.TREE_LEVELS] > 0.0,
-        slots,
-    )
+    joints = np.int64(hollow[c.FIRST_JOINT]), np.int64(hollow[c.JOINTS_END])
+    circles = np.int64(hollow[c.FIRST_CIRCLE]), np.int64(hollow[c.CIRCLES_END])
+    ellipses = np.int64(hollow[c.FIRST_ELLIPSE]), np.int64(hollow[c.ELLIPSES_END])
+    beziers = np.int64(hollow[c.FIRST_BEZIER]), np.int64(hollow[c.BEZIERS_END])
+    left, right, slack = hollow[c.LEFT], hollow[c.RIGHT], JOINT_ULPS * EPS * hollow[c.SIZE]
+    has_tree = hollow[c.TREE_LEVELS] > 0.0
+    return records.Scope(tables, hollow, left, right, slack, joints, circles, ellipses, beziers, has_tree, slots)
 
 
 @inlined
@@ -130,8 +105,7 @@ def nearest_piece(scope, own, px, py, vx, vy):
     """-> (Hit, corner): the first hit on a piece, and the time to the first corner within the slack of the ray."""
     hit, contact, nearby = nearest_curve(scope, own, px, py, vx, vy)
     if scope.has_tree:
-        tree = Tree(scope.tables, scope.hollow, scope.slack)
-        arguments = tree, own.number if own.kind == LINE else -1, own.bounces, px, py, vx, vy, hit.time
+        arguments = scope, own, px, py, vx, vy, hit.time
         t, line, fraction, corner, near = call_late(scope.slots.boxes, NO_LINE_HIT, arguments)
     else:
         t, line, fraction, corner, near = pieces.nearest_line(scope, own, px, py, vx, vy, hit.time)
@@ -183,7 +157,7 @@ def exit_time(scope, own, px, py, vx, vy, time):
     left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
     kind = NO_PIECE
     if vy > 0.0:
-        t, is_met = pieces.opening_met(left, right, px, py, vx, vy)
+        t, is_met = opening_met(left, right, px, py, vx, vy)
         if (is_met or is_open) and own.kind != OPENING and (time - t) * vy > slack:
             time, kind = t, OPENING
     if is_open and vx != 0.0:
@@ -378,19 +352,10 @@ def trace_rays(count, rays, tables, limit, details, slots):
             details.velocity[i, c.POINT_X], details.velocity[i, c.POINT_Y] = vx, vy
 
 
-def trace_into(
-    results: tuple[NDArray[Any], ...],
-    x: Floats,
-    theta: Floats,
-    tables: Struct,
-    limit: int,
-    stop: NDArray[np.int64],
-    details: Struct = NO_DETAILS,
-) -> None:
-    """Trace rays: see `Rays` for the arrays to fill, x, theta, collisions and status, and for ``stop``."""
-    out_x, out_theta, collisions, status = results
-    rays = Struct(Rays(x, theta, out_x, out_theta, collisions, status, stop))
-    checked(lambda: trace_rays(len(x), rays.address, tables.address, limit, details.address, SLOTS.address))
+def trace_into(rays: Rays, tables: Struct, limit: int, details: Struct = NO_DETAILS) -> None:
+    """Trace rays: see `Rays` and `Details` for the arrays to fill."""
+    block = Struct(rays)
+    checked(lambda: trace_rays(len(rays.x), block.address, tables.address, limit, details.address, SLOTS.address))
 
 
 def _late_functions() -> tuple[Late, ...]:
@@ -398,22 +363,23 @@ def _late_functions() -> tuple[Late, ...]:
     number, integer, truth = types.float64, types.int64, types.boolean
     own = named(Own, integer, integer, number, number, integer, integer)
     hit = named(Hit, number, integer, integer, number, integer)
-    scope = named(Scope, TABLES, ROW, *[number] * 3, *[types.UniTuple(integer, 2)] * 4, truth, kind_of(NO_SLOTS))
+    ranges = [types.UniTuple(integer, 2)] * 4
+    scope = named(records.Scope, TABLES, ROW, *[number] * 3, *ranges, truth, kind_of(NO_SLOTS))
     ray = number, number, number, number
     return (
         Late(hit_nearby, scope, own, *ray),
         Late(starts_in_front, TABLES, hit, own, *ray, number),
         Late(line_starts_in_front, Table(c.JOINT_COLUMNS), integer, own, *ray, number),
-        Late(nearest_line_in_boxes, named(Tree, TABLES, ROW, number), integer, integer, *ray, number),
+        Late(nearest_line_in_boxes, scope, own, *ray, number),
         Late(skip_run, scope, hit, own, *ray, integer),
         Late(pieces.nearest_bezier, Table(c.BEZIER_COLUMNS), integer, integer, integer, number, *ray, number, number),
     )
 
 
-TABLES, NO_SLOTS = kind_of(NO_TABLES.values), Slots(0, 0, 0, 0, 0, 0)
+TABLES, NO_SLOTS = kind_of(NO_TABLES.values), records.Slots(0, 0, 0, 0, 0, 0)
 LATE = _late_functions()
 # For functions that are compiled apart from `trace_rays`.
 TRACE = Late(trace_rays, *[types.int64] * 6)
-SLOTS = Struct(Slots(*(function.slot for function in LATE)))
+SLOTS = Struct(records.Slots(*(function.slot for function in LATE)))
 tables_at, slots_at = reader_of(TABLES), reader_of(kind_of(NO_SLOTS))
 rays_at, details_at = reader_of(kind_of(NO_RAYS)), reader_of(kind_of(NO_DETAILS.values))

@@ -50,14 +50,6 @@ class Scope(NamedTuple):
     slots: Any
 
 
-class Tree(NamedTuple):
-    """What the search in a tree of boxes needs of a scope: few numbers to pass in a call by address."""
-
-    tables: Any
-    hollow: Any
-    slack: float
-
-
 class Own(NamedTuple):
     """The start of a ray segment.
 

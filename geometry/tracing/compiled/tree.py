@@ -1,13 +1,10 @@
 """The first hit of a ray on the lines of a hollow with many: a search in a tree of boxes.
 
-Loads numba. A ray is tested against the eight boxes, or the eight lines, in a row of the tree at once, in a vector of
-eight numbers, because the compiler does not vectorise such short loops. Comparisons with NaN, as in an empty place, are
-false.
+Loads numba. A ray is tested against the boxes, or the lines, in a row of the tree in a loop without branches. Their
+number is read from the row, because the compiler would take a loop of a constant number of steps apart.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -15,88 +12,48 @@ from numba import types
 from numba.extending import intrinsic
 
 from ...scene import columns as c
-from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, OTHER_X, OTHER_Y, PARENT
+from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, COUNT, OTHER_X, OTHER_Y, PARENT
 from ...scene.tolerances import NEARBY_SLACKS
 from .options import inlined, inner
 from .pieces import is_ahead, joint_side, line_at, line_hit, line_sides, side
+from .records import LINE
 
 # No hit on a line, for `nearest_line`.
 NO_LINE_HIT = np.inf, -1, 0.0, np.inf, False
 # Mask of all boxes of a row.
 ALL_BOXES = (1 << BOXES) - 1
-WORD, NUMBER, BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
+WORD, BIT = ir.IntType(64), ir.IntType(1)
 
 
-def _operation(name: str, *how: str) -> Any:
-    return lambda one, other: Vector(one.builder, getattr(one.builder, name)(*how, one.value, other.value))
-
-
-class Vector:
-    """Eight numbers or truth values in compiled code, with the operations of arithmetic."""
-
-    kind = ir.VectorType(NUMBER, BOXES)
-    __add__, __sub__, __mul__ = _operation("fadd"), _operation("fsub"), _operation("fmul")
-    __and__, __or__ = _operation("and_"), _operation("or_")
-    __le__, __ge__, __gt__ = (_operation("fcmp_ordered", how) for how in ("<=", ">=", ">"))
-
-    def __init__(self, builder: Any, value: Any) -> None:
-        self.builder, self.value = builder, value
-
-    def __abs__(self) -> Vector:
-        name, kind = f"llvm.fabs.v{BOXES}f64", ir.FunctionType(self.kind, [self.kind])
-        function = self.builder.module.declare_intrinsic(name, (), kind)
-        return Vector(self.builder, self.builder.call(function, [self.value]))
-
-    def mask(self) -> Any:
-        """Return the truth values as bits of a whole number."""
-        return self.builder.zext(self.builder.bitcast(self.value, ir.IntType(BOXES)), WORD)
-
-
-def _vectors(builder: Any, row: Any, *numbers: Any) -> list[Vector]:
-    """Return the four vectors of a row of a tree, and eight times each of some numbers."""
-    vectors = []
-    for column in (ANCHOR_X, ANCHOR_Y, OTHER_X, OTHER_Y):
-        place = builder.bitcast(builder.gep(row, [WORD(column)]), Vector.kind.as_pointer())
-        vectors.append(builder.load(place, align=8))
-    for number in numbers:
-        one = builder.insert_element(ir.Constant(Vector.kind, ir.Undefined), number, ir.IntType(32)(0))
-        places = ir.Constant(ir.VectorType(ir.IntType(32), BOXES), [0] * BOXES)
-        vectors.append(builder.shuffle_vector(one, one, places))
-    return [Vector(builder, vector) for vector in vectors]
-
-
-@intrinsic
-def boxes_met(typing, row, px, py, vx, vy, least, most):
+@inlined
+def boxes_met(row, px, py, vx, vy, least, most):
     """-> int: mask of the boxes in a row of a tree that a ray meets between the times ``least`` and ``most``.
 
     Bit k tells about box k.
     """
-
-    def met(context, builder, signature, values):
-        x, y, width, height, px, py, vx, vy, least, most = _vectors(builder, *values)
+    mask = np.int64(0)
+    for k in range(int(row[COUNT])):
+        x, y, width, height = row[ANCHOR_X + k], row[ANCHOR_Y + k], row[OTHER_X + k], row[OTHER_Y + k]
         # of the middle: its distance from the ray's line and its position along it; and those of the box about it
-        middle, along = abs(side.py_func(x, y, px, py, vx, vy)), (x - px) * vx + (y - py) * vy
+        middle, along = abs(side(x, y, px, py, vx, vy)), (x - px) * vx + (y - py) * vy
         reach, length = width * abs(vy) + height * abs(vx), width * abs(vx) + height * abs(vy)
-        return ((middle <= reach) & (along + length >= least) & (along - length <= most)).mask()
+        mask |= np.int64((middle <= reach) & (along + length >= least) & (along - length <= most)) << k
+    return mask
 
-    return types.int64(row, *[types.float64] * 6), met
 
+@inlined
+def lines_met(row, px, py, vx, vy, slack):
+    """-> (met, at_end): mask of the lines in a row of a tree that a ray's line crosses from their free side.
 
-@intrinsic
-def lines_met(typing, row, px, py, vx, vy, slack):
-    """-> int: mask of the lines in a row of a tree that a ray's line crosses from their free side.
-
-    Bits 8 to 15 tell whether an end of the line is within the slack of the ray's line.
+    And of those with an end within the slack of the ray's line.
     """
-
-    def met(context, builder, signature, values):
-        x0, y0, x1, y1, px, py, vx, vy, slack = _vectors(builder, *values)
-        before, after, zero = side.py_func(x0, y0, px, py, vx, vy), side.py_func(x1, y1, px, py, vx, vy), px - px
-        crossed = (before >= zero) & (zero >= after) & (before > after)
-        at_end = (abs(before) <= slack) | (abs(after) <= slack)
-        return builder.or_(crossed.mask(), builder.shl(at_end.mask(), WORD(BOXES)))
-
-    return types.int64(row, *[types.float64] * 5), met
+    met, at_end = np.int64(0), np.int64(0)
+    for k in range(int(row[COUNT])):
+        before = side(row[ANCHOR_X + k], row[ANCHOR_Y + k], px, py, vx, vy)
+        after = side(row[OTHER_X + k], row[OTHER_Y + k], px, py, vx, vy)
+        met |= np.int64((before >= 0.0) & (after <= 0.0) & (before > after)) << k
+        at_end |= np.int64((abs(before) <= slack) | (abs(after) <= slack)) << k
+    return met, at_end
 
 
 @intrinsic
@@ -176,24 +133,20 @@ def corner_at_ends(joints, first, at_end, at_entry, px, py, vx, vy, slack):
 
 
 @inner
-def nearest_line_in_boxes(tree, own_line, bounces, px, py, vx, vy, time):
-    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the boxes along the ray.
-
-    ``own_line`` is the line that the ray leaves after so many bounces, or -1.
-    """
-    tables, slack = tree.tables, tree.slack
+def nearest_line_in_boxes(scope, own, px, py, vx, vy, time):
+    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the boxes along the ray."""
+    tables, slack, own_line = scope.tables, scope.slack, own.number if own.kind == LINE else -1
     boxes, close, most = tables.boxes, NEARBY_SLACKS * slack, time + 2.0 * slack
     best, found, best_fraction = np.inf, -1, 0.0
     corner_time, nearby = np.inf, False
-    search = first_boxes(tree, px, py, vx, vy, -close, most)
+    search = first_boxes(scope, px, py, vx, vy, -close, most)
     while True:
-        leaf, search = next_leaf(tree, search, vx > 0.0, px, py, vx, vy, -close, most)
+        leaf, search = next_leaf(scope, search, vx > 0.0, px, py, vx, vy, -close, most)
         if leaf < 0:
             return best, found, best_fraction, corner_time, nearby
-        met, first = lines_met(boxes[leaf], px, py, vx, vy, slack), int(boxes[leaf, CONTENT])
-        at_end, met = met >> BOXES, met & ALL_BOXES
+        (met, at_end), first = lines_met(boxes[leaf], px, py, vx, vy, slack), int(boxes[leaf, CONTENT])
         if at_end != 0:
-            ahead = corner_at_ends(tables.joints, first, at_end, bounces == 0, px, py, vx, vy, slack)
+            ahead = corner_at_ends(tables.joints, first, at_end, own.bounces == 0, px, py, vx, vy, slack)
             corner_time = min(corner_time, ahead)
         while met != 0:
             j = first + first_bit(met)

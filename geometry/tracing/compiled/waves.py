@@ -18,22 +18,13 @@ import numpy as np
 from ....core.rounding import EPS
 from ...scene import columns as c
 from ...scene.tolerances import NEARBY, NEARBY_SLACKS, TANGENT_ULPS
-from ..double_double.formulas import (
-    arc_root,
-    arc_terms,
-    bezier_sides,
-    bezier_time,
-    cubic,
-    mirror,
-    quadratic_roots,
-    where,
-    with_length_one,
-)
+from ..double_double import formulas
+from ..double_double.formulas import where
 from . import pieces
 from . import work as w
 from .options import inlined, inner, linked
-from .rays import scope_of
-from .runs import skip_chords, skip_crossings
+from .rays import scope_of, skip_run
+from .records import CIRCLE, LINE, Hit, Own
 from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
 from .work import NATURAL, ray_at
 
@@ -104,9 +95,8 @@ def meet_corner(work, count, x, y, slack):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         at_entry = work[w.OWN + i] == w.OPENING
-        is_met = (abs(pieces.side(x, y, px, py, vx, vy)) <= slack) & pieces.is_faced(
-            x - px, y - py, at_entry, vx, vy, slack
-        )
+        is_faced = pieces.is_faced(x - px, y - py, at_entry, vx, vy, slack)
+        is_met = (abs(pieces.side(x, y, px, py, vx, vy)) <= slack) & is_faced
         work[w.UNCERTAIN + i] += where(is_met, 1.0, 0.0)
 
 
@@ -137,9 +127,9 @@ def meet_arc(work, count, arc, number, close):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         is_own, is_other = work[w.OWN + i] == number, work[w.OWN + i] != number
-        b, f, d, speed2 = arc_terms(form, px - arc[c.START_X], py - arc[c.START_Y], vx, vy)
+        b, f, d, speed2 = formulas.arc_terms(form, px - arc[c.START_X], py - arc[c.START_Y], vx, vy)
         from_afar = is_other & (d >= 0.0) & (b < most)
-        t = arc_root(form, is_own, b, f, math.sqrt(d), speed2)
+        t = formulas.arc_root(form, is_own, b, f, math.sqrt(d), speed2)
         is_uncertain = (is_other & pieces.is_nearly_tangent(arc, b, d, speed2)) | (from_afar & (abs(t) <= close))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
         is_met = from_afar | (is_own & (b > least))
@@ -158,17 +148,16 @@ def meet_parabola(work, count, curve, number):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         is_own, is_other = work[w.OWN + i] == number, work[w.OWN + i] != number
-        a0, a1, a2, _ = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
+        a0, a1, a2, _ = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
         spread, last = pieces.side_spread(curve, px, py, vx, vy), pieces.end_side(curve, px, py, vx, vy)
-        turn, own_s = a1 / (-2.0 * a2), work[w.BEFORE + i]
-        value, room = cubic((a0, a1, a2, 0.0), turn), (TANGENT_ULPS * EPS) * spread
+        g, turn, own_s = (a0, a1, a2, 0.0), a1 / (-2.0 * a2), work[w.BEFORE + i]
+        value, room = formulas.cubic(g, turn), (TANGENT_ULPS * EPS) * spread
         is_inside = (turn > 0.0) & (turn < 1.0)
         touches = (abs(a0) <= room) | (abs(last) <= room) | (is_inside & (abs(value) <= room))
         falls = pieces.is_falling(a0, where(is_inside, value, last)) | (is_inside & pieces.is_falling(value, last))
-        sigma = pieces.bezier_slope(a1, a2, 0.0, own_s) / -a2
-        own_root, is_front = pieces.own_point((a0, a1, a2, 0.0), own_s, sigma)
+        own_root, is_front = pieces.own_point(g, own_s, formulas.cubic_slope(g, own_s) / -a2)
         s = where(is_own, own_root, pieces.quadratic_root(a0, a1, a2))
-        t = bezier_time(pieces.bezier_coefficients(curve), s, px, py, vx, vy)
+        t = formulas.bezier_time(pieces.bezier_coefficients(curve), s, px, py, vx, vy)
         is_near = is_other & pieces.meets_circle(curve, px, py, vx, vy, work[w.TIME + i])
         is_uncertain = is_near & (touches | (falls & (abs(t) <= NEARBY * spread)))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
@@ -213,14 +202,12 @@ def find_fall(some, count, curve, turn):
     both = 0
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
-        a0, a1, a2, a3 = g
-        last, room = (
-            pieces.end_side(curve, px, py, vx, vy),
-            (TANGENT_ULPS * EPS) * pieces.side_spread(curve, px, py, vx, vy),
-        )
-        low, high = pieces.extrema(a1, a2, a3)
-        value_low, value_high = cubic(g, low), cubic(g, high)
+        g = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
+        a0, _, _, _ = g
+        last = pieces.end_side(curve, px, py, vx, vy)
+        room = (TANGENT_ULPS * EPS) * pieces.side_spread(curve, px, py, vx, vy)
+        low, high = formulas.extrema(g)
+        value_low, value_high = formulas.cubic(g, low), formulas.cubic(g, high)
         has_low, has_high = (low > 0.0) & (low < 1.0), (high > 0.0) & (high < 1.0)
         touches = (abs(a0) <= room) | (abs(last) <= room)
         touches = touches | (has_low & (abs(value_low) <= room)) | (has_high & (abs(value_high) <= room))
@@ -245,7 +232,7 @@ def start_roots(some, count, curve):
     """Begin the search of the roots of g."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
+        g = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
         ends = some[w.LOW + j], some[w.HIGH + j], some[w.VALUE_LOW + j], some[w.VALUE_HIGH + j]
         some[w.ROOT + j] = pieces.root_start(g, *ends)
 
@@ -256,7 +243,7 @@ def improve_roots(some, count, curve):
     more = 0
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
+        g = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
         old, low, high = kept(some, w.ROOT + j), kept(some, w.LOW + j), kept(some, w.HIGH + j)
         s, low, high, is_last = pieces.root_step(g, old, low, high)
         is_sought = some[w.SOUGHT + j] > 0.0
@@ -272,9 +259,9 @@ def find_own_root(some, count, curve):
     """Find the front hits of rays that start on a Bezier piece themselves."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g, own_s = bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy), some[w.BEFORE + j]
+        g, own_s = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy), some[w.BEFORE + j]
         b0, b1, b2, disc, error = pieces.own_terms(curve, g, own_s)
-        one, other = quadratic_roots(b0, b1, b2, disc)
+        one, other = formulas.quadratic_roots(b0, b1, b2, disc)
         t, s = pieces.own_hit(curve, g, own_s, one, px, py, vx, vy)
         other_t, other_s = pieces.own_hit(curve, g, own_s, other, px, py, vx, vy)
         is_uncertain = (abs(disc) <= error) & (b2 != 0.0)
@@ -288,10 +275,8 @@ def time_roots(some, count, curve, number):
     """Compute the times of the hits at the roots, inf for those that are none."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        t, is_met = (
-            bezier_time(pieces.bezier_coefficients(curve), some[w.ROOT + j], px, py, vx, vy),
-            some[w.FALLS + j] > 0.0,
-        )
+        t = formulas.bezier_time(pieces.bezier_coefficients(curve), some[w.ROOT + j], px, py, vx, vy)
+        is_met = some[w.FALLS + j] > 0.0
         is_close = (some[w.OWN + j] != number) & (abs(t) <= NEARBY * pieces.side_spread(curve, px, py, vx, vy))
         some[w.UNCERTAIN + j] += where(is_met & is_close, 1.0, 0.0)
         some[w.TIME + j] = where(is_met & (t > 0.0), t, np.inf)
@@ -406,20 +391,16 @@ def place_hits(scope, work, places, count):
 
 
 @inlined
-def begins_run(tables, work, i, slack, limit):
+def begins_run(scope, work, i, limit):
     """-> bool: whether ray i of a wave makes a run of hits after its hit, which is computed in one step elsewhere."""
     px, py, nx, ny = work[w.HIT_X + i], work[w.HIT_Y + i], work[w.HIT_NX + i], work[w.HIT_NY + i]
-    vx, vy = mirror(work[w.VX + i], work[w.VY + i], nx, ny)
-    piece, most = work[w.PIECE + i], np.int64(limit - work[w.BOUNCES + i] - 1)
-    if piece < w.LINES:
-        _, _, _, _, hits = skip_chords(tables.circles[int(piece - w.CIRCLES)], px, py, vx, vy, most)
-        return hits > 0
-    line = int(piece - w.LINES)
-    for row in range(int(tables.lines[line, c.FIRST_PAIR]), int(tables.lines[line, c.PAIRS_END])):
-        if w.LINES + tables.pairs[row, c.PARTNER] == work[w.OWN + i]:
-            _, _, _, _, hits = skip_crossings(tables.pairs[row], (nx, ny), px, py, vx, vy, slack, most)
-            return hits > 0
-    return False
+    vx, vy = formulas.mirror(work[w.VX + i], work[w.VY + i], nx, ny)
+    piece, own = work[w.PIECE + i], work[w.OWN + i]
+    kind, first = (CIRCLE, w.CIRCLES) if piece < w.LINES else (LINE, w.LINES)
+    hit, start = Hit(0.0, kind, int(piece - first), 0.0, 0), Own(LINE, int(own - w.LINES), -1.0, 0.0, -1, 0)
+    most = np.int64(limit - work[w.BOUNCES + i] - 1)
+    _, _, _, _, hits = skip_run(scope, hit, start, px, py, vx, vy, most)
+    return hits > 0
 
 
 @inlined
@@ -435,12 +416,12 @@ def reflect_rays(work, count, opening, slack, limit):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         time, own, piece, bounces = work[w.TIME + i], work[w.OWN + i], work[w.PIECE + i], work[w.BOUNCES + i]
-        t, leaves = pieces.opening_met(left, right, px, py, vx, vy)
+        t, leaves = formulas.opening_met(left, right, px, py, vx, vy)
         is_certain = work[w.UNCERTAIN + i] == 0.0
         leaves = leaves & ((time - t) * vy > slack)
         stays = is_certain & (not leaves) & (work[w.NEED + i] == 0.0) & (time < np.inf) & (bounces < limit)
-        wx, wy = mirror(vx, vy, work[w.HIT_NX + i], work[w.HIT_NY + i])
-        wx, wy = with_length_one(wx, wy)
+        wx, wy = formulas.mirror(vx, vy, work[w.HIT_NX + i], work[w.HIT_NY + i])
+        wx, wy = formulas.with_length_one(wx, wy)
         before = where(own >= w.LINES, own, w.OPENING)
         work[w.GONE + i] = where(stays, 0.0, 1.0)
         work[w.PX + i], work[w.PY + i] = where(stays, work[w.HIT_X + i], px + t * vx), work[w.HIT_Y + i]
@@ -521,7 +502,7 @@ def cross_simple(tables, h, limit, entry, angle, hits, work, places):
         place_hits(scope, work, places, count)
         for k in range(list_rays(work, places, count, w.NEED, w.BEFORE_RUN, w.BEFORE_RUN, 0)):
             i = places[k] & NATURAL
-            if not begins_run(tables, work, i, slack, limit):
+            if not begins_run(scope, work, i, limit):
                 work[w.NEED + i] = 0.0
         reflect_rays(work, count, opening, slack, most)
         done = list_rays(work, places, count, w.GONE, 1.0, 1.0, 0)

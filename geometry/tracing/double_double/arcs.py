@@ -6,19 +6,24 @@ import numpy as np
 
 from ....core.compilation import jit
 from ...scene import columns as c
-from .formulas import arc_normal, arc_root, arc_terms, back_on_arc, form_value
-from .numbers import LOCAL_ERROR, cross, dot, double_double, extended, root, scaled, sine_cosine, two_sum
+from .formulas import arc_normal, arc_root, arc_terms, back_on_arc, beyond_end, form_value
+from .numbers import LOCAL_ERROR, dot, double_double, extended, root, scaled, sine_cosine, two_sum
 
 _compile = jit(linked=True, _nrt=False)
 
 
 @jit()
 def refined_arcs(arcs):
-    """Return the table of arcs that go through both joints exactly and subtend their span exactly."""
+    """Return the table of arcs that go through both joints exactly and subtend their span exactly.
+
+    It has the columns of arcs, then the low parts of the numbers from NORMAL_X to SHORT_CHORD.
+    """
     # at least one row, because `face_of` passes a row also for a wall without arcs
     table = np.zeros((max(1, arcs.shape[0]), c.REFINED_ARC_COLUMNS))
     for k in range(arcs.shape[0]):
         arc, row = arcs[k], table[k]
+        for column in range(c.ARC_COLUMNS):
+            row[column] = arc[column]
         cx, cy = two_sum(arc[c.END_X], -arc[c.START_X]), arc[c.STRETCH] * two_sum(arc[c.END_Y], -arc[c.START_Y])
         length = root(dot(cx, cy, cx, cy))
         ex, ey = cx / length, cy / length
@@ -28,30 +33,22 @@ def refined_arcs(arcs):
         # n0 = (s ex - c ey, s ey + c ex), kappa = 2 s / length
         nx, ny = sine * ex - cosine * ey, sine * ey + cosine * ex
         curvature = scaled(2.0, sine) / length
-        row[c.START_X], row[c.START_Y], row[c.END_X], row[c.END_Y] = arc[: c.END_Y + 1]
-        row[c.REFINED_NORMAL_X], row[c.REFINED_NORMAL_X_LOW] = nx.high, nx.low
-        row[c.REFINED_NORMAL_Y], row[c.REFINED_NORMAL_Y_LOW] = ny.high, ny.low
-        row[c.REFINED_CURVATURE], row[c.REFINED_CURVATURE_LOW] = curvature.high, curvature.low
-        row[c.REFINED_CHORD_X], row[c.REFINED_CHORD_X_LOW] = ex.high, ex.low
-        row[c.REFINED_CHORD_Y], row[c.REFINED_CHORD_Y_LOW] = ey.high, ey.low
-        row[c.REFINED_CHORD], row[c.REFINED_CHORD_LOW] = length.high, length.low
-        row[c.IS_SHORT] = 1.0 if arc[c.SHORT_CHORD] > 0.0 else 0.0
-        row[c.REFINED_STRETCH], row[c.REFINED_SPAN], row[c.REFINED_RUN_SINE] = (
-            arc[c.STRETCH],
-            arc[c.SPAN],
-            arc[c.RUN_SINE],
-        )
+        numbers = nx, ny, curvature, ex, ey, length if arc[c.SHORT_CHORD] > 0.0 else extended(0.0)
+        for j in range(len(numbers)):
+            row[c.NORMAL_X + j], row[c.NORMAL_X + j + c.LOWS] = numbers[j].high, numbers[j].low
     return table
 
 
 @_compile
+def number_at(arc, column):
+    """-> number: the double-double in a column of a row of `refined_arcs`."""
+    return double_double(arc[column], arc[column + c.LOWS])
+
+
+@_compile
 def arc_form(arc):
-    """-> (n0x, n0y, curvature): the numbers of F, see `compiled/arcs`, from a row of `refined_arcs`."""
-    return (
-        double_double(arc[c.REFINED_NORMAL_X], arc[c.REFINED_NORMAL_X_LOW]),
-        double_double(arc[c.REFINED_NORMAL_Y], arc[c.REFINED_NORMAL_Y_LOW]),
-        double_double(arc[c.REFINED_CURVATURE], arc[c.REFINED_CURVATURE_LOW]),
-    )
+    """-> (n0x, n0y, curvature): the numbers of F, see `compiled/pieces`, from a row of `refined_arcs`."""
+    return number_at(arc, c.NORMAL_X), number_at(arc, c.NORMAL_Y), number_at(arc, c.CURVATURE)
 
 
 @_compile
@@ -60,7 +57,7 @@ def arc_hit(arc, own, px, py, vx, vy, error):
 
     For ``height`` see `arc_time` in `compiled/pieces`. ``error`` bounds the transversal error of the ray at the arc.
     """
-    form, stretch, undecided = arc_form(arc), arc[c.REFINED_STRETCH], np.inf
+    form, stretch, undecided = arc_form(arc), arc[c.STRETCH], np.inf
     rx, ry, wy = px - arc[c.START_X], stretch * (py - arc[c.START_Y]), stretch * vy
     b, f, d, speed2 = arc_terms(form, rx, ry, vx, wy)
     _, _, curvature = form
@@ -84,22 +81,14 @@ def arc_hit(arc, own, px, py, vx, vy, error):
 @_compile
 def on_arc(arc, qx, qy, slack):
     """Whether the point q of the full circle, relative to the first joint, is on the arc."""
-    ex = double_double(arc[c.REFINED_CHORD_X], arc[c.REFINED_CHORD_X_LOW])
-    ey = double_double(arc[c.REFINED_CHORD_Y], arc[c.REFINED_CHORD_Y_LOW])
-    if arc[c.IS_SHORT] > 0.0:
-        along = dot(qx, qy, ex, ey)
-        nx = arc[c.REFINED_NORMAL_X] - arc[c.REFINED_CURVATURE] * qx.high
-        ny = arc[c.REFINED_NORMAL_Y] - arc[c.REFINED_CURVATURE] * qy.high
-        beyond = along - double_double(arc[c.REFINED_CHORD], arc[c.REFINED_CHORD_LOW])
-        return -slack <= along.high and beyond.high <= slack and ny * ex.high - nx * ey.high > 0.0
-    height = cross(ex, ey, qx, qy).high
-    return height <= slack if arc[c.REFINED_CURVATURE] > 0.0 else height >= -slack
+    chord = number_at(arc, c.CHORD_X), number_at(arc, c.CHORD_Y), number_at(arc, c.SHORT_CHORD)
+    return beyond_end(arc_form(arc), chord, qx, qy).high <= slack
 
 
 @_compile
 def arc_height(arc, px, py):
     """-> (height, nx, ny): distance of a position close to an arc, positive on the free side; unit normal."""
-    form, stretch = arc_form(arc), arc[c.REFINED_STRETCH]
+    form, stretch = arc_form(arc), arc[c.STRETCH]
     qx, qy = px - arc[c.START_X], stretch * (py - arc[c.START_Y])
     nx, ny = arc_normal(form, stretch, qx, qy)
     size = root(dot(nx, ny, nx, ny))
@@ -109,11 +98,11 @@ def arc_height(arc, px, py):
 @_compile
 def arc_point(arc, t, px, py, vx, vy):
     """-> (x, y, nx, ny, bent): the position on the arc after the time t, unit normal, and curvature (a double)."""
-    form, stretch = arc_form(arc), arc[c.REFINED_STRETCH]
+    form, stretch = arc_form(arc), arc[c.STRETCH]
     qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
     qx, qy = back_on_arc(form, qx, qy)
     nx, ny = arc_normal(form, stretch, qx, qy)
     size = root(dot(nx, ny, nx, ny))
     nx, ny = nx / size, ny / size
-    bent = arc[c.REFINED_CURVATURE] * (ny.high * ny.high + (stretch * nx.high) ** 2) / size.high
+    bent = arc[c.CURVATURE] * (ny.high * ny.high + (stretch * nx.high) ** 2) / size.high
     return arc[c.START_X] + qx, arc[c.START_Y] + (qy / stretch if stretch != 1.0 else qy), nx, ny, bent

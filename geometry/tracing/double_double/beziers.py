@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ....core.compilation import jit
 from ...scene import columns as c
-from ...scene.tolerances import NEARBY
-from .formulas import bezier_sides, bezier_time, cubic, quadratic_roots
+from .formulas import bezier_sides, bezier_time, cubic, cubic_slope, extrema, is_close_by, quadratic_roots
 from .numbers import LOCAL_ERROR, cross, dot, extended, root, scaled
 
 # Limit on bisections, more than the search for neighbouring doubles needs.
 ROOT_STEPS = 200
 
 _compile = jit(linked=True, _nrt=False)
-
-
-@_compile
-def cubic_slope(a, s):
-    """Return the derivative of the cubic with the coefficients a at s."""
-    _, a1, a2, a3 = a
-    return (3.0 * (a3 * s) + scaled(2.0, a2)) * s + a1
 
 
 @_compile
@@ -89,58 +79,25 @@ def hit_from_own(coefficients, g, own_s, px, py, vx, vy):
 
 
 @_compile
-def extrema(g):
-    """-> (c1, c2): the extrema of the cubic g in increasing order; 2 in place of a missing one.
-
-    Double precision suffices, because g changes in second order at an extremum.
-    """
-    _, a1, a2, a3 = g
-    c1, c2 = 2.0, 2.0
-    disc = a2 * a2 - 3.0 * (a3 * a1)
-    if disc > 0.0:
-        q = -(a2 + (root(disc) if a2 >= 0.0 else -root(disc)))
-        if a3.high != 0.0:
-            c1 = (q / (3.0 * a3)).high
-        if q.high != 0.0:
-            c2 = (a1 / q).high
-        if c1 > c2:
-            c1, c2 = c2, c1
-    return c1, c2
-
-
-@_compile
-def is_close_by(coefficients, s, t, vx, vy, size, slack):
-    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start.
-
-    A hit behind the start is not if the start lies beyond an end of the piece, see `compiled/pieces`.
-    """
-    ax, ay = coefficients
-    tx, ty = cubic_slope(ax, s), cubic_slope(ay, s)
-    speed = math.hypot(tx.high, ty.high)
-    close = abs(t.high) <= NEARBY * size and abs(t.high * cross(tx, ty, vx, vy).high) <= slack * speed
-    behind = t.high * dot(tx, ty, vx, vy).high
-    return close and (t >= 0.0 or -slack * speed <= s.high * speed * speed - behind <= speed * (speed + slack))
-
-
-@_compile
 def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
     """-> (t, s, undecided, near_s): time to the first front hit on a Bezier piece, inf if none, and its parameter.
 
     ``undecided`` is the time of an undecided contact, or inf. ``near_s`` is the parameter of a hit within the slack of
     the start, which is not counted, or -1. ``error`` bounds the transversal error of the ray.
     """
-    coefficients = bezier_coefficients(curve)
+    coefficients = ax, ay = bezier_coefficients(curve)
     g = bezier_sides(coefficients, px, py, vx, vy)
     best_t, best_s, undecided, near_s = extended(np.inf), extended(0.0), np.inf, extended(-1.0)
     if own_s >= 0.0:
         best_t, best_s = hit_from_own(coefficients, g, own_s, px, py, vx, vy)
         return best_t, best_s, undecided, near_s
     size = abs(curve[c.START_X] - px.high) + abs(curve[c.START_Y] - py.high) + curve_size(curve)
+    # double precision suffices, because g changes in second order at an extremum
     c1, c2 = extrema(g)
     low, value_low = 0.0, g[0]
     for part in range(3):
-        high = 1.0 if part == 2 else (c1 if part == 0 else c2)
-        if high <= low or high > 1.0:
+        high = 1.0 if part == 2 else (c1.high if part == 0 else c2.high)
+        if not low < high <= 1.0:
             if part < 2:
                 continue
             high = 1.0
@@ -156,7 +113,8 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
             s = falling_root(g, low, high)
             t = bezier_time(coefficients, s, px, py, vx, vy)
             if t < best_t:
-                if is_close_by(coefficients, s, t, vx, vy, size, slack):
+                tangent = cubic_slope(ax, s).high, cubic_slope(ay, s).high
+                if is_close_by(tangent, s.high, t.high, vx.high, vy.high, size, slack):
                     near_s = s
                 elif t > 0.0:
                     best_t, best_s = t, s

@@ -6,12 +6,16 @@ branches.
 
 from __future__ import annotations
 
+import math
+from functools import partial
+
 from numba import types
 from numba.extending import intrinsic
 
 from ....core.compilation import jit
 from ...scene import columns as c
-from .numbers import DOUBLE_DOUBLE, cross, dot, root, scaled
+from ...scene.tolerances import NEARBY
+from .numbers import DOUBLE_DOUBLE, cross, dot, extend, root, scaled
 
 # In place of a hollow's number: a flat top, and a corner at an end of an opening.
 FLAT_TOP, TOP_CORNER = -1, -2
@@ -20,17 +24,26 @@ _formula = jit(forceinline=True, _nrt=False)
 
 @intrinsic
 def where(typing, condition, yes, no):
-    """-> number: one of two numbers of the same type, both of which are computed, without a branch.
+    """-> number: one of two numbers, a double-double if one of them is; both are computed, and there is no branch.
 
     A conditional expression is a branch at first. The compiler would join those of one condition, and then write to the
     columns of a wave with a mask, which is slow on many processors, or not vectorise at all.
     """
-    number = DOUBLE_DOUBLE if yes == DOUBLE_DOUBLE else types.float64
+    if DOUBLE_DOUBLE not in (yes, no):
+        return types.float64(types.boolean, types.float64, types.float64), lambda *given: given[1].select(*given[3])
 
     def select(context, builder, signature, values):
-        return builder.select(*values)
+        return builder.select(values[0], *map(partial(extend, context, builder), (yes, no), values[1:]))
 
-    return number(types.boolean, number, number), select
+    return DOUBLE_DOUBLE(types.boolean, yes, no), select
+
+
+@_formula
+def opening_met(left, right, px, py, vx, vy):
+    """-> (t, is_met): time to the level of the opening, and whether the ray passes between its ends upwards."""
+    c_right, c_left = (right - px) * vy + py * vx, (left - px) * vy + py * vx
+    t = -py / vy
+    return where(t > 0.0, t, 0.0), (vy > 0.0) & (c_right >= 0.0) & (c_left <= 0.0)
 
 
 @_formula
@@ -69,6 +82,23 @@ def back_on_arc(form, x, y):
 
 
 @_formula
+def beyond_end(form, chord, x, y):
+    """-> number: how far a point of the full circle, relative to the first joint, is beyond an end of the arc.
+
+    The distance is along or across the chord, inf on the far side of the circle, and at most 0 on the arc. ``chord`` is
+    the unit vector along it, and its length, 0 for half angles beyond pi/4.
+    """
+    (_, _, curvature), (ex, ey, short) = form, chord
+    # up to a half angle of pi/4: by the position along the chord, on the arc's side of the circle
+    along, (nx, ny) = dot(x, y, ex, ey), arc_normal(form, 1.0, x, y)
+    beyond = where(-along > along - short, -along, along - short)
+    # larger half angles: by the side of the chord; the arc curves away from its free side exactly if it is focusing
+    height = cross(ex, ey, x, y)
+    height = where(curvature > 0.0, height, -height)
+    return where(short > 0.0, where(cross(ex, ey, nx, ny) > 0.0, beyond, float("inf")), height)
+
+
+@_formula
 def arc_terms(form, x, y, vx, vy):
     """-> (b, f, d, speed2): the numbers B, F, D and |v|^2 of a ray, in coordinates with a circular arc."""
     nx, ny, curvature = form
@@ -92,6 +122,40 @@ def cubic(a, s):
     """-> number: the cubic with the coefficients a at s."""
     a0, a1, a2, a3 = a
     return ((a3 * s + a2) * s + a1) * s + a0
+
+
+@_formula
+def cubic_slope(a, s):
+    """-> number: the derivative of the cubic with the coefficients a at s."""
+    _, a1, a2, a3 = a
+    return (3.0 * a3 * s + scaled(2.0, a2)) * s + a1
+
+
+@_formula
+def extrema(a):
+    """-> (first, second): the extrema of a cubic in increasing order; those outside (0, 1) may be any numbers."""
+    _, a1, a2, a3 = a
+    disc = a2 * a2 - 3.0 * a3 * a1
+    half = root(disc)
+    q = -(a2 + where(a2 >= 0.0, half, -half))
+    one, other = q / (3.0 * a3), a1 / q
+    first, second = where(one < other, one, other), where(one < other, other, one)
+    return where(disc > 0.0, first, 2.0), where(disc > 0.0, second, 2.0)
+
+
+@_formula
+def is_close_by(tangent, s, t, vx, vy, spread, slack):
+    """-> bool: whether a hit at s on a Bezier piece after the time t (of either sign) is within the slack of the start.
+
+    All numbers are doubles. A hit behind the start is not if the start lies beyond an end of the piece: the ray has
+    left the next piece, and rounding across the two pieces does not change the end that it has passed.
+    """
+    tx, ty = tangent
+    size = math.sqrt(tx * tx + ty * ty)
+    # the height in front of the curve is t times the sine of incidence
+    close = abs(t) <= NEARBY * spread and abs(t * (ty * vx - tx * vy)) <= slack * size
+    behind = t * (tx * vx + ty * vy)
+    return close and (t >= 0.0 or -slack * size <= s * size * size - behind <= size * size + slack * size)
 
 
 @_formula

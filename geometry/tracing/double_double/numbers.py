@@ -74,13 +74,18 @@ def extended(typing, x):
     """Return a number of either type as a double-double."""
 
     def make(context, builder, signature, parts):
-        if x == DOUBLE_DOUBLE:
-            return parts[0]
-        made = cgutils.create_struct_proxy(DOUBLE_DOUBLE)(context, builder)
-        made.high, made.low = parts[0], context.get_constant(types.float64, 0.0)
-        return made._getvalue()
+        return extend(context, builder, x, parts[0])
 
     return DOUBLE_DOUBLE(x if x == DOUBLE_DOUBLE else types.float64), make
+
+
+def extend(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """Return a value of either type in compiled code as a double-double."""
+    if kind == DOUBLE_DOUBLE:
+        return value
+    made = cgutils.create_struct_proxy(DOUBLE_DOUBLE)(context, builder)
+    made.high, made.low = value, context.get_constant(types.float64, 0.0)
+    return made._getvalue()
 
 
 @_compile

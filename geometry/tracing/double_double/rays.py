@@ -32,7 +32,7 @@ from ...scene import columns as c
 from ...scene.tolerances import JOINT_ULPS
 from .arcs import arc_hit, arc_point
 from .beziers import bezier_hit, bezier_point
-from .formulas import TOP_CORNER, mirror, opening_at, with_length_one
+from .formulas import TOP_CORNER, mirror, opening_at, opening_met, with_length_one
 from .numbers import LOCAL_ERROR, cross, direction_angle, dot, extended, sine_cosine, two_product, two_sum
 from .records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit, Scope, Sizes
 from .runs import LAST_HITS, crossings, skip_chords
@@ -148,17 +148,11 @@ def after_chords(sizes, chords, length):
     """
     j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
     jj, ja, aj, aa = 1.0 - 2.0 * chords, -chords * length, 4.0 * chords / length, 1.0 + 2.0 * chords
-    return Sizes(
-        jj * j1 + ja * a1,
-        aj * j1 + aa * a1,
-        jj * j2 + ja * a2,
-        aj * j2 + aa * a2,
-        jj * jj * c_jj + 2.0 * jj * ja * c_ja + ja * ja * c_aa,
-        jj * aj * c_jj + (jj * aa + ja * aj) * c_ja + ja * aa * c_aa,
-        aj * aj * c_jj + 2.0 * aj * aa * c_ja + aa * aa * c_aa,
-        errors,
-        half_ulp,
-    )
+    j1, a1, j2, a2 = jj * j1 + ja * a1, aj * j1 + aa * a1, jj * j2 + ja * a2, aj * j2 + aa * a2
+    after_jj = jj * jj * c_jj + 2.0 * jj * ja * c_ja + ja * ja * c_aa
+    after_ja = jj * aj * c_jj + (jj * aa + ja * aj) * c_ja + ja * aa * c_aa
+    after_aa = aj * aj * c_jj + 2.0 * aj * aa * c_ja + aa * aa * c_aa
+    return Sizes(j1, a1, j2, a2, after_jj, after_ja, after_aa, errors, half_ulp)
 
 
 @_compile
@@ -209,7 +203,7 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
         (tables.first_ellipse, hollow[c.FIRST_ELLIPSE], hollow[c.ELLIPSES_END]),
     ):
         for k in range(before + int(first), before + int(end)):
-            widest = max(1.0, tables.arcs[k, c.REFINED_STRETCH])
+            widest = max(1.0, tables.arcs[k, c.STRETCH])
             is_own = own.kind == ARC and own.number == k
             t, undecided, height = arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
             graze = min(graze, undecided)
@@ -238,11 +232,8 @@ def exit_time(scope, own, hit, px, py, vx, vy):
     left, right, slack, is_open = scope.hollow[c.LEFT], scope.hollow[c.RIGHT], scope.slack, scope.tables.is_open
     time, kind = hit.time, hit.kind
     if vy > 0.0 and own.kind != OPENING and py.high + time.high * vy.high > slack:
-        t = -py / vy
-        inside = is_open
-        if not is_open:
-            inside = (right - px) * vy + py * vx >= 0.0 and (left - px) * vy + py * vx <= 0.0
-        if inside:
+        t, is_met = opening_met(left, right, px, py, vx, vy)
+        if is_met or is_open:
             time, kind = t, OPENING
     if is_open and vx.high != 0.0:
         t = ((right if vx > 0.0 else left) - px) / vx

@@ -64,14 +64,14 @@ def skip_chords(arc, px, py, vx, vy, most):
     qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
     nx, ny = arc_normal(form, 1.0, qx, qy)
     sine, cosine = dot(vx, vy, nx, ny), cross(vx, vy, nx, ny)
-    if sine <= 0.0 or sine > arc[c.REFINED_RUN_SINE]:
+    if sine <= 0.0 or sine > arc[c.RUN_SINE]:
         return 0, px, py, vx, vy
     forward = cosine > 0.0
     half_chord = direction_angle(cosine if forward else -cosine, sine)
     phi = 2.0 * math.atan2(dot(qx, qy, n0x, n0y).high, cross(qx, qy, n0x, n0y).high)
     if phi < 0.0:
         phi += 2.0 * math.pi
-    room = arc[c.REFINED_SPAN] - phi if forward else phi
+    room = arc[c.SPAN] - phi if forward else phi
     count = 0.5 * room / half_chord.high - LAST_HITS
     if not LONGEST_FOLLOWED < count < most:
         return 0, px, py, vx, vy

@@ -27,8 +27,8 @@ from ....core.compilation import jit
 from ....core.rounding import EPS, UNIT_ROUNDOFF
 from ...scene import columns as c
 from .arcs import arc_height
-from .beziers import bezier_coefficients, bezier_point, cubic_slope
-from .formulas import cubic
+from .beziers import bezier_coefficients, bezier_point
+from .formulas import cubic, cubic_slope
 from .numbers import DoubleDouble, dot, root, two_product, two_sum
 from .records import ARC, LINE
 
@@ -100,12 +100,8 @@ def orientation(ax, ay, bx, by, cx, cy):
 @_compile
 def line_ends(joints, index):
     """-> (x0, y0, x1, y1): the joints of the line that starts at joint ``index``."""
-    return (
-        joints[index, c.JOINT_X],
-        joints[index, c.JOINT_Y],
-        joints[index + 1, c.JOINT_X],
-        joints[index + 1, c.JOINT_Y],
-    )
+    start, end = joints[index], joints[index + 1]
+    return start[c.JOINT_X], start[c.JOINT_Y], end[c.JOINT_X], end[c.JOINT_Y]
 
 
 @_compile

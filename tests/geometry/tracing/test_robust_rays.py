@@ -10,7 +10,7 @@ from campaigns.rays.aimed_rays import WALLS, explained, follow_twin
 
 from asperity import geometry as geo
 from asperity.geometry.tracing.compiled.rays import trace_into
-from asperity.geometry.tracing.compiled.records import results_for
+from asperity.geometry.tracing.compiled.records import Rays, results_for
 from asperity.geometry.tracing.refinement import refined_trace
 from asperity.geometry.tracing.threads import new_flag
 
@@ -31,7 +31,7 @@ def test_rays_over_many_bezier_pieces_hit_what_the_double_double_twin_hits():
     rng = np.random.default_rng(12)
     x, theta = rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
     found = results_for(RAYS)
-    trace_into(found, x, theta, wall.scene.tables, 1000, new_flag())
+    trace_into(Rays(x, theta, *found, new_flag()), wall.scene.tables, 1000)
     _, out_theta, collisions, status = found
     twin = refined_trace(wall.scene, x, theta)
     assert (status == geo.Status.ESCAPED).all() and collisions.max() > 3
