@@ -57,7 +57,9 @@ LINE_NORMAL_Y = 3
 LENGTH = 4
 FIRST_PAIR = 5  # row of the line's first entry in `pairs`
 PAIRS_END = 6  # row after the last entry
-LINE_COLUMNS = 7
+ESCAPE_RIGHT = 7  # of a line in a tree of boxes, with ESCAPE_LEFT: the directions in which a ray escapes, see `escapes`
+ESCAPE_LEFT = 8
+LINE_COLUMNS = 9
 
 # pairs: for each line of two that face each other with nothing in between one row, sorted by line.
 PARTNER = 0  # row of the other line in `lines`

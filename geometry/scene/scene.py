@@ -25,6 +25,7 @@ from . import columns as c
 from .boxes import TREE_COLUMNS, tree_of
 from .closed_forms import MOST_PIECES, closed_form_of, closed_table
 from .columns import row_of, table_of
+from .escapes import escape_sectors
 from .facing import facing_pairs
 from .structs import Struct
 from .tolerances import NEARBY_MARGIN, SMOOTH_JOINT
@@ -290,6 +291,8 @@ class _Tables:
             self._mark_pairs(joints, lines, chains, size)
         if np.count_nonzero(joints[:, c.STARTS_LINE]) >= TREE_LINES:
             self._add_tree(joints, size)
+            if is_closed and chains[0].is_line.all():
+                lines[:-1, [c.ESCAPE_RIGHT, c.ESCAPE_LEFT]] = escape_sectors(chains[0].vertices, size)
         self.joints.append(joints)
         self.lines.append(lines)
         self.circles.append(circles)

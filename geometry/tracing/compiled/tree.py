@@ -13,6 +13,7 @@ from numba.extending import intrinsic
 
 from ...scene import columns as c
 from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, COUNT, OTHER_X, OTHER_Y, PARENT
+from ...scene.escapes import ESCAPE_ROOM
 from ...scene.tolerances import NEARBY_SLACKS
 from .options import inlined, inner
 from .pieces import is_ahead, joint_side, line_at, line_hit, line_sides, side
@@ -132,10 +133,22 @@ def corner_at_ends(joints, first, at_end, at_entry, px, py, vx, vy, slack):
     return time
 
 
+@inlined
+def escapes(tables, j, room, px, py, vx, vy):
+    """-> bool: whether a ray that starts on line ``j``, at least ``room`` from its ends, surely meets no piece."""
+    joints, lines = tables.joints, tables.lines
+    x0, y0 = abs(joints[j, c.JOINT_X] - px), abs(joints[j, c.JOINT_Y] - py)
+    x1, y1 = abs(joints[j + 1, c.JOINT_X] - px), abs(joints[j + 1, c.JOINT_Y] - py)
+    is_inside = (max(x0, y0) > room) & (max(x1, y1) > room)
+    return is_inside & (vx < lines[j, c.ESCAPE_RIGHT] * vy) & (-vx < lines[j, c.ESCAPE_LEFT] * vy)
+
+
 @inner
 def nearest_line_in_boxes(scope, own, px, py, vx, vy, time):
     """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the boxes along the ray."""
     tables, slack, own_line = scope.tables, scope.slack, own.number if own.kind == LINE else -1
+    if own_line >= 0 and escapes(tables, own_line, ESCAPE_ROOM * slack, px, py, vx, vy):
+        return NO_LINE_HIT
     boxes, close, most = tables.boxes, NEARBY_SLACKS * slack, time + 2.0 * slack
     best, found, best_fraction = np.inf, -1, 0.0
     corner_time, nearby = np.inf, False
