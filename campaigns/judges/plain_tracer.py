@@ -171,7 +171,7 @@ def table_pieces(scene):
     """The pieces that the tables of a scene define."""
     for j in np.flatnonzero(scene.joints[:-1, STARTS_LINE] > 0):
         yield Line(*(tuple(end) for end in scene.joints[j : j + 2, :2].tolist()))
-    for row in (row for table in (scene.circles, scene.ellipses) for row in table):
+    for row in scene.arcs:
         stretch, half = mp.mpf(row[STRETCH]), mp.mpf(row[SPAN]) / 2
         x0, y0, x1, y1 = (mp.mpf(row[column]) for column in (START_X, START_Y, END_X, END_Y))
         ex, ey, direction = x1 - x0, stretch * (y1 - y0), 1 if row[CURVATURE] > 0 else -1

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from asperity import geometry as geo
 from asperity.core.checks import Floats
 from asperity.core.rounding import EPS
+from asperity.geometry.tracing.compiled.refined_tracing import UNRESOLVED
 from asperity.geometry.tracing.double_double.numbers import EPS_DOUBLE_DOUBLE
-from asperity.geometry.tracing.double_double.rays import UNRESOLVED
 from asperity.geometry.tracing.refinement import RefinedTrace, refined_trace
 from asperity.geometry.tracing.tracing import Trace
 from campaigns.engine import Campaign, Judged

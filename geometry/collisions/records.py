@@ -96,16 +96,14 @@ def results_for(count: int) -> DiskResults:
 
 
 def ground_of(scene: Scene) -> Ground:
-    """Return the tables of a wall, with circles and ellipses, which have the same columns, in one table."""
-    from ..tracing.double_double.arcs import refined_arcs
+    """Return the tables of a wall."""
+    from ..tracing.compiled.pieces.arcs import refined_arcs
 
     hollows = scene.hollows.copy()
-    hollows[:, (c.FIRST_ELLIPSE, c.ELLIPSES_END)] += len(scene.circles)
-    arcs = np.concatenate([scene.circles, scene.ellipses])
     graphs = graphs_of(scene.beziers, hollows)
     return Ground(
-        scene.cell, scene.is_open, hollows, scene.joints, scene.lines, arcs, refined_arcs(arcs), scene.beziers, graphs,
-        new_flag(),
+        scene.cell, scene.is_open, hollows, scene.joints, scene.lines, scene.arcs, refined_arcs(scene.arcs),
+        scene.beziers, graphs, new_flag(),
     )  # fmt: skip
 
 

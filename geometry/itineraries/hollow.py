@@ -85,7 +85,7 @@ def first_nodes(theta: float, left: float, right: float, goal: float) -> Floats:
 
 def compiled_result(call: Callable[[], Result]) -> Result:
     """Return the result of a compiled call that may take seconds."""
-    from ..tracing.compiled.pointers import checked
+    from ..tracing.compiled.pieces.pointers import checked
     from ..tracing.threads import interruptibly
 
     return interruptibly(lambda: checked(call))
@@ -128,7 +128,7 @@ class HollowConditionals:
 
         scene = self.scene
         has_channels = len(scene.pairs) > 0
-        has_runs = has_channels or bool(np.any(scene.circles[:, RUN_SINE] > 0.0))
+        has_runs = has_channels or bool(np.any(scene.arcs[:, RUN_SINE] > 0.0))
         most = NO_LIMIT if has_channels else MOST_COLLISIONS
         limits = most, has_runs, self.most_segments
         return setting_of(scene, self.hollow, limits, self.degree, self.edges, self.sizes)

@@ -28,17 +28,15 @@ RIGHT = 1  # x of the right end
 SIZE = 2  # maximum of the width of the opening and the extents of the joints in x and y
 FIRST_JOINT = 3  # row of the first joint in `joints`
 JOINTS_END = 4  # row after the last joint
-FIRST_CIRCLE = 5  # row of the first piece in `circles`
-CIRCLES_END = 6  # row after the last piece
-FIRST_ELLIPSE = 7  # the same in `ellipses`
-ELLIPSES_END = 8
-FIRST_BEZIER = 9  # the same in `beziers`
-BEZIERS_END = 10
-LEFT_EDGE = 11  # the left end of the opening: NO_EDGE, SMOOTH_EDGE or CORNER_EDGE
-RIGHT_EDGE = 12  # the right end
-TREE_ROOT = 13  # row of the root in `boxes`, of the tree over the lines of a hollow that has many
-TREE_LEVELS = 14  # number of levels of the tree, 0 without a tree
-HOLLOW_COLUMNS = 15
+FIRST_ARC = 5  # row of the first piece in `arcs`
+ARCS_END = 6  # row after the last piece
+FIRST_BEZIER = 7  # the same in `beziers`
+BEZIERS_END = 8
+LEFT_EDGE = 9  # the left end of the opening: NO_EDGE, SMOOTH_EDGE or CORNER_EDGE
+RIGHT_EDGE = 10  # the right end
+TREE_ROOT = 11  # row of the root in `boxes`, of the tree over the lines of a hollow that has many
+TREE_LEVELS = 12  # number of levels of the tree, 0 without a tree
+HOLLOW_COLUMNS = 13
 # Kinds of ends of an opening; NO_EDGE for an open wall.
 NO_EDGE, SMOOTH_EDGE, CORNER_EDGE = 0.0, 1.0, 2.0
 
@@ -82,7 +80,7 @@ END_Y = 3
 START_CORNER = 4  # 1 if the start is a corner of the wall
 END_CORNER = 5  # 1 if the end is a corner
 
-# circles and ellipses: columns 6 to 13 are in coordinates with y multiplied by STRETCH, in which the arc is circular.
+# arcs: columns 6 to 13 are in coordinates with y multiplied by STRETCH, in which the arc is circular.
 NORMAL_X = 6  # unit normal at the start, towards the free side
 NORMAL_Y = 7
 CURVATURE = 8  # positive if the arc is focusing
@@ -91,7 +89,7 @@ CHORD_Y = 10
 SHORT_CHORD = 11  # length of the chord, 0 for half angles beyond pi/4
 RUN_SINE = 12  # sine of the angle of incidence below which a run of hits is computed in one step, 0 if never
 SPAN = 13  # angle of the arc
-STRETCH = 14  # 1 for circles
+STRETCH = 14  # 1 for circular arcs
 ARC_COLUMNS = 15
 
 # beziers: b(s) = start + s (X1, Y1) + s^2 (X2, Y2) + s^3 (X3, Y3).

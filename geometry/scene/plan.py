@@ -77,7 +77,7 @@ def plan_of(wall: Cell, scene: Scene, is_mirror_symmetric: bool) -> TracePlan:
     """Return the plan of a wall that is its own cell, read from the tables of the tracer."""
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     traced = sum(h.last - h.first for h in wall.hollows) if wall.closes else pieces
-    runs = int((scene.circles[:, c.RUN_SINE] > 0.0).sum())
+    runs = int((scene.arcs[:, c.RUN_SINE] > 0.0).sum())
     # every pair has two rows, one for each line
     parallel = int((scene.pairs[:, c.PAIR_ANGLE] == 0.0).sum()) // 2
     return TracePlan(

@@ -63,7 +63,7 @@ def corners_of(pieces: Sequence[Curve]) -> NDArray[np.bool_]:
 
 
 def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
-    """Return a row of ``circles`` or ``ellipses`` from its first columns ``ends``; RUN_SINE is set later."""
+    """Return a row of ``arcs`` from its first columns ``ends``; RUN_SINE is set later."""
     a, b = arc.semi_axes
     stretch = a / b
     turn = arc.end_angle - arc.start_angle
@@ -107,8 +107,7 @@ class Tables(NamedTuple):
     hollows: Floats
     joints: Floats
     lines: Floats
-    circles: Floats
-    ellipses: Floats
+    arcs: Floats
     beziers: Floats
     pairs: Floats
     boxes: Floats
@@ -123,7 +122,6 @@ NO_TABLES = Struct(
         np.empty((0, c.HOLLOW_COLUMNS)),
         np.empty((0, c.JOINT_COLUMNS)),
         np.empty((0, c.LINE_COLUMNS)),
-        np.empty((0, c.ARC_COLUMNS)),
         np.empty((0, c.ARC_COLUMNS)),
         np.empty((0, c.BEZIER_COLUMNS)),
         np.empty((0, c.PAIR_COLUMNS)),
@@ -142,8 +140,7 @@ class Scene:
     hollows: Floats
     joints: Floats
     lines: Floats
-    circles: Floats
-    ellipses: Floats
+    arcs: Floats
     beziers: Floats
     pairs: Floats
     boxes: Floats
@@ -155,7 +152,7 @@ class Scene:
     def tables(self) -> Struct:
         """The tables with types equal for all walls, so that each function is compiled once."""
         return Struct(Tables(
-            self.hollows, self.joints, self.lines, self.circles, self.ellipses, self.beziers, self.pairs, self.boxes,
+            self.hollows, self.joints, self.lines, self.arcs, self.beziers, self.pairs, self.boxes,
             len(self.hollows), float(self.cell), bool(self.is_open),
         ))  # fmt: skip
 
@@ -167,8 +164,12 @@ class Scene:
     @property
     def primitives(self) -> tuple[str, ...]:
         """The names of the wall's primitives."""
-        curves = [name for name in ("circles", "ellipses", "beziers") if len(getattr(self, name))]
-        return ("lines", *curves) if self.joints[:, c.STARTS_LINE].any() else tuple(curves)
+        is_circular = self.arcs[:, c.STRETCH] == 1.0
+        present = {
+            "lines": self.joints[:, c.STARTS_LINE].any(), "circles": is_circular.any(),
+            "ellipses": not is_circular.all(), "beziers": len(self.beziers) > 0,
+        }  # fmt: skip
+        return tuple(name for name, is_present in present.items() if is_present)
 
 
 def scene_of(wall: Cell) -> Scene:
@@ -265,8 +266,7 @@ class _Tables:
         self.hollows: list[Floats] = []
         self.joints = _Blocks(c.JOINT_COLUMNS)
         self.lines = _Blocks(c.LINE_COLUMNS)
-        self.circles = _Blocks(c.ARC_COLUMNS)
-        self.ellipses = _Blocks(c.ARC_COLUMNS)
+        self.arcs = _Blocks(c.ARC_COLUMNS)
         self.beziers = _Blocks(c.BEZIER_COLUMNS)
         self.pairs = _Blocks(c.PAIR_COLUMNS)
         self.boxes = _Blocks(TREE_COLUMNS)
@@ -279,13 +279,11 @@ class _Tables:
         vertices = np.concatenate([chain.vertices for chain in chains])
         size = max(float(np.max(np.ptp(vertices, axis=0))), right - left)
         row = {c.LEFT: left, c.RIGHT: right, c.SIZE: size, c.LEFT_EDGE: edges[0], c.RIGHT_EDGE: edges[1]}
-        row |= dict(zip((c.FIRST_JOINT, c.FIRST_CIRCLE, c.FIRST_ELLIPSE, c.FIRST_BEZIER), self._sizes(), strict=True))
+        row |= dict(zip((c.FIRST_JOINT, c.FIRST_ARC, c.FIRST_BEZIER), self._sizes(), strict=True))
         joints = np.concatenate([_joint_rows(chain) for chain in chains])
         lines = np.concatenate([_line_rows(chain) for chain in chains])
-        circles = self._curves(chains)
+        self._add_curves(chains, size)
         self.hollows.append(row_of(c.HOLLOW_COLUMNS, row))
-        if len(circles):
-            _mark_runs(circles, chains, size)
         inside = bool(np.all((left <= vertices[:, 0]) & (vertices[:, 0] <= right)))
         if inside or edges != (c.NO_EDGE, c.NO_EDGE):
             self._mark_pairs(joints, lines, chains, size)
@@ -295,21 +293,18 @@ class _Tables:
                 lines[:-1, [c.ESCAPE_RIGHT, c.ESCAPE_LEFT]] = escape_sectors(chains[0].vertices, size)
         self.joints.append(joints)
         self.lines.append(lines)
-        self.circles.append(circles)
-        columns = [c.JOINTS_END, c.CIRCLES_END, c.ELLIPSES_END, c.BEZIERS_END]
-        self.hollows[-1][columns] = self._sizes()
+        self.hollows[-1][[c.JOINTS_END, c.ARCS_END, c.BEZIERS_END]] = self._sizes()
         form = None
         if is_closed and len(chains[0].pieces) <= MOST_PIECES:
             form = closed_form_of(chains[0].pieces, list(map(chains[0].joint, range(len(chains[0].vertices)))), size)
         self.closed.append(row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM}) if form is None else form)
 
-    def _sizes(self) -> tuple[int, int, int, int]:
-        return self.joints.count, self.circles.count, self.ellipses.count, self.beziers.count
+    def _sizes(self) -> tuple[int, int, int]:
+        return self.joints.count, self.arcs.count, self.beziers.count
 
-    def _curves(self, chains: list[_Chain]) -> Floats:
-        """Append ellipses and Bezier pieces; return the rows of circles, whose runs are not marked yet."""
-        circles: list[Floats] = []
-        ellipses: list[Floats] = []
+    def _add_curves(self, chains: list[_Chain], size: float) -> None:
+        """Append arcs and Bezier pieces."""
+        arcs: list[Floats] = []
         beziers: list[Floats] = []
         for chain in chains:
             for i in chain.curves():
@@ -319,12 +314,11 @@ class _Tables:
                     c.START_CORNER: chain.corners[i], c.END_CORNER: chain.corners[i + 1],
                 }  # fmt: skip
                 if isinstance(piece, Arc):
-                    (circles if piece.is_circular else ellipses).append(arc_row(piece, ends))
+                    arcs.append(arc_row(piece, ends))
                 elif isinstance(piece, Bezier):
                     beziers.append(bezier_row(piece, ends))
-        self.ellipses.append(table_of(ellipses, c.ARC_COLUMNS))
+        self.arcs.append(_with_runs(table_of(arcs, c.ARC_COLUMNS), chains, size))
         self.beziers.append(table_of(beziers, c.BEZIER_COLUMNS))
-        return table_of(circles, c.ARC_COLUMNS)
 
     def _add_tree(self, joints: Floats, size: float) -> None:
         """Add a tree over the lines of the last hollow."""
@@ -351,9 +345,8 @@ class _Tables:
 
     def scene(self, cell: float, is_open: bool) -> Scene:
         return Scene(
-            table_of(self.hollows, c.HOLLOW_COLUMNS), self.joints.whole(), self.lines.whole(), self.circles.whole(),
-            self.ellipses.whole(), self.beziers.whole(), self.pairs.whole(), self.boxes.whole(), cell, is_open,
-            closed_table(self.closed),
+            table_of(self.hollows, c.HOLLOW_COLUMNS), self.joints.whole(), self.lines.whole(), self.arcs.whole(),
+            self.beziers.whole(), self.pairs.whole(), self.boxes.whole(), cell, is_open, closed_table(self.closed),
         )  # fmt: skip
 
 
@@ -396,13 +389,16 @@ def _hulls(chain: _Chain) -> Floats:
     return hulls
 
 
-def _mark_runs(circles: Floats, chains: list[_Chain], size: float) -> None:
-    """Set RUN_SINE of the focusing circles whose circular segment contains no other piece of the hollow."""
+def _with_runs(arcs: Floats, chains: list[_Chain], size: float) -> Floats:
+    """Return arcs with RUN_SINE of the focusing circular ones whose segment contains no other piece of the hollow."""
+    if not len(arcs):
+        return arcs
     outlines = [chain.vertices for chain in chains]
     at = np.linspace(0.0, 1.0, OUTLINE_POINTS)
     outlines += [chain.pieces[k].point(at) for chain in chains for k in chain.curves()]
     points = np.concatenate(outlines)
-    for row in circles:
+    for k in np.flatnonzero((arcs[:, c.CURVATURE] > 0.0) & (arcs[:, c.STRETCH] == 1.0)):
+        row = arcs[k]
         half, radius = 0.5 * row[c.SPAN], 1.0 / abs(row[c.CURVATURE])
         x, y = points[:, 0] - row[c.START_X], points[:, 1] - row[c.START_Y]
         own = abs(
@@ -414,5 +410,6 @@ def _mark_runs(circles: Floats, chains: list[_Chain], size: float) -> None:
         height = y * row[c.CHORD_X] - x * row[c.CHORD_Y]
         slack = 1e-12 * size
         foreign = (height < -slack) & (np.abs(own - radius) > slack)
-        if row[c.CURVATURE] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
+        if half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
             row[c.RUN_SINE] = sin(half / RUN_CHORDS)
+    return arcs

@@ -11,7 +11,7 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..scene import columns as c
 from ..scene.tolerances import JOINT_ULPS
-from .double_double.records import Tables
+from .compiled.pieces.records import RefinedTables
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -49,7 +49,7 @@ class RefinedTrace(NamedTuple):
 
 def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 2**62) -> RefinedTrace:
     """Trace rays (two one-dimensional arrays) in double-double arithmetic from the start."""
-    from .double_double.rays import refined_rays
+    from .compiled.refined_tracing import refined_rays
 
     count = len(x)
     results = RefinedTrace(
@@ -61,15 +61,15 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     return results
 
 
-def tables_of(scene: Scene) -> Tables:
+def tables_of(scene: Scene) -> RefinedTables:
     """Return the tables of a wall for double-double arithmetic."""
-    from .double_double.arcs import refined_arcs
+    from .compiled.pieces.arcs import refined_arcs
 
-    arcs = refined_arcs(np.concatenate([scene.circles, scene.ellipses]))
+    arcs = refined_arcs(scene.arcs)
     # at least one row, as of arcs, because `face_of` passes a row also for a wall without Bezier pieces
     beziers = scene.beziers if len(scene.beziers) else np.zeros((1, c.BEZIER_COLUMNS))
-    return Tables(
-        scene.hollows, scene.joints, scene.lines, scene.pairs, arcs, len(scene.circles), beziers, _free_bands(scene),
+    return RefinedTables(
+        scene.hollows, scene.joints, scene.lines, scene.pairs, arcs, beziers, _free_bands(scene),
         scene.cell, scene.is_open,
     )  # fmt: skip
 
@@ -120,17 +120,10 @@ def _free_bands(scene: Scene) -> Floats:
         return np.empty((0, 2))
     lines = np.flatnonzero(scene.joints[:, c.STARTS_LINE] > 0.0)
     heights = [np.column_stack([scene.joints[lines, c.JOINT_Y], scene.joints[lines + 1, c.JOINT_Y]])]
-    for arcs in (scene.circles, scene.ellipses):
-        # every point of an arc is within half of the arc length of one of its ends
-        half = 0.5 * arcs[:, c.SPAN] / np.abs(arcs[:, c.CURVATURE]) / arcs[:, c.STRETCH]
-        heights.append(
-            np.column_stack(
-                [
-                    np.minimum(*arcs[:, (c.START_Y, c.END_Y)].T) - half,
-                    np.maximum(*arcs[:, (c.START_Y, c.END_Y)].T) + half,
-                ]
-            )
-        )
+    # every point of an arc is within half of the arc length of one of its ends
+    half = 0.5 * scene.arcs[:, c.SPAN] / np.abs(scene.arcs[:, c.CURVATURE]) / scene.arcs[:, c.STRETCH]
+    ends = scene.arcs[:, (c.START_Y, c.END_Y)]
+    heights.append(np.column_stack([ends.min(axis=1) - half, ends.max(axis=1) + half]))
     c0, c1, c2, c3 = scene.beziers[:, (c.START_Y, c.Y1, c.Y2, c.Y3)].T
     heights.append(np.column_stack([c0, c0 + c1 / 3, c0 + (2 * c1 + c2) / 3, c0 + c1 + c2 + c3]))
     slack = JOINT_ULPS * EPS * float(scene.hollows[0, c.SIZE])

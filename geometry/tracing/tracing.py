@@ -276,7 +276,7 @@ def _work(scene: Scene) -> int:
 
 def _goes_in_waves(scene: Scene, rays: int) -> bool:
     """Whether rays are traced in waves, which needs a function that takes a second to compile once on a machine."""
-    if rays < MANY_RAYS or scene.is_open or len(scene.ellipses) or len(scene.boxes):
+    if rays < MANY_RAYS or scene.is_open or np.any(scene.arcs[:, c.STRETCH] != 1.0) or len(scene.boxes):
         return False
     if np.all(scene.closed[:, c.FORM] != c.NO_FORM):
         return False
@@ -292,8 +292,8 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
     """
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
+        from .compiled.pieces.records import Rays
         from .compiled.rays import trace_into
-        from .compiled.records import Rays
 
         _check_rays(x, theta)
         trace_into(Rays._make((x, theta, *results, stop)), scene.tables, max_collisions)
@@ -302,7 +302,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
 
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         from .compiled.closed_forms import CROSSINGS, RAYS, UNDECIDED, room_for, trace_closed
-        from .compiled.pointers import checked
+        from .compiled.pieces.pointers import checked
 
         tables = scene.tables.address
         # of an earlier block, if another thread does not use it
@@ -369,8 +369,8 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     >>> geo.trajectory(geo.flat(), 0.5, pi / 2).tolist()
     [[0.5, 0.0], [0.5, 0.0], [0.5, 0.0]]
     """
+    from .compiled.pieces.records import Rays, details_for, results_for
     from .compiled.rays import trace_into
-    from .compiled.records import Rays, details_for, results_for
 
     _check_wall(wall)
     position = finite_number("x", x)

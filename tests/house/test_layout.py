@@ -21,7 +21,12 @@ FLOORS = [
     *("core", "verification"),
     *("geometry.curves", "geometry.disk", "geometry.tables", "geometry.cells", "geometry.scene"),
     *("geometry.scene.compiled", "geometry.walls"),
-    *("geometry.tracing.double_double", "geometry.tracing.compiled", "geometry.tracing"),
+    *(
+        "geometry.tracing.double_double",
+        "geometry.tracing.compiled.pieces",
+        "geometry.tracing.compiled",
+        "geometry.tracing",
+    ),
     *("geometry.polygons.compiled", "geometry.polygons", "geometry.itineraries.compiled", "geometry.itineraries"),
     *("geometry.plotting", "geometry.collisions.compiled", "geometry.collisions", "geometry"),
     *(

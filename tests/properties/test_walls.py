@@ -185,15 +185,15 @@ def test_the_tracer_agrees_with_a_plain_one(wall, request):
 def hit_by_hit(wall):
     """The same wall without its closed forms, and with the marks that allow runs taken off its tables."""
     plain = geo.Wall(wall.pieces, wall.period, wall.islands)
-    circles, lines, closed = (table.copy() for table in (plain.scene.circles, plain.scene.lines, plain.scene.closed))
-    circles[:, RUN_SINE], lines[:, [FIRST_PAIR, PAIRS_END]], closed[:, FORM] = 0.0, 0.0, NO_FORM
-    plain.__dict__["scene"] = replace(plain.scene, lines=lines, circles=circles, closed=closed)
+    arcs, lines, closed = (table.copy() for table in (plain.scene.arcs, plain.scene.lines, plain.scene.closed))
+    arcs[:, RUN_SINE], lines[:, [FIRST_PAIR, PAIRS_END]], closed[:, FORM] = 0.0, 0.0, NO_FORM
+    plain.__dict__["scene"] = replace(plain.scene, lines=lines, arcs=arcs, closed=closed)
     return plain
 
 
 def test_closed_forms_and_runs_of_hits_in_one_step_change_nothing_but_the_time(closed_wall):
     scene = closed_wall.scene
-    if not (np.any(scene.closed[:, FORM] != NO_FORM) or len(scene.pairs) or len(scene.circles)):
+    if not (np.any(scene.closed[:, FORM] != NO_FORM) or len(scene.pairs) or len(scene.arcs)):
         pytest.skip("it is traced hit by hit")
     rng = np.random.default_rng(3)
     count = FEW if len(closed_wall.pieces) < MANY_PIECES else 100

@@ -22,7 +22,7 @@ F(D) = f + g.D - curvature |D|^2/2     (y multiplied by the arc's stretch; curva
 
 where f and g are constants at the start of the motion. A graph eta = h(xi) over a chord is F = eta - h(xi); the
 acceleration of the satellite and the bounds on h'' bound its F'' below. The tables are those of the planar tracer, see
-`scene/scene`, with circles and ellipses in one table ``arcs``. Loads numba.
+`scene/scene`. Loads numba.
 """
 
 from __future__ import annotations
@@ -33,16 +33,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ...scene import columns as c
-from ...tracing.compiled.options import compiled, inlined, inner
-from ...tracing.compiled.pieces import arc_form, line_at, near_end, on_arc
+from ...tracing.compiled.pieces.arcs import arc_form, arc_normal, end_excess
+from ...tracing.compiled.pieces.formulas import near_end
+from ...tracing.compiled.pieces.kinds import Face
+from ...tracing.compiled.pieces.lines import line_at
+from ...tracing.compiled.pieces.options import compiled, inlined, inner
+from ...tracing.compiled.pieces.records import ARC, BEZIER, LINE, NO_PIECE, SIDE
+from ...tracing.compiled.pieces.sides import Arrival, in_front_at
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
-from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
-from ...tracing.double_double.formulas import arc_normal
 from ...tracing.double_double.numbers import extended
-from ...tracing.double_double.records import ARC as CURVED
-from ...tracing.double_double.records import BEZIER as SPLINE
-from ...tracing.double_double.records import LINE as STRAIGHT
-from ...tracing.double_double.sides import Arrival, Face, in_front_at
 from . import graph_table as g
 from .shapes import Start, height_above, in_frame, parameter_at
 
@@ -61,8 +60,6 @@ WIDEST_SLACK = 1e6
 # Limit on steps. Near a tangency a step at worst halves the distance, which takes about 100 steps from the wall's size
 # to its rounding. Disks that sink slowly and rotate fast need more: a step is a few sizes of the wall along the rim.
 ROOT_STEPS = 100_000
-# Kind of circles and ellipses together, a number that no kind of piece of the planar tracer has.
-ARC = 8
 
 
 class Motion(NamedTuple):
@@ -310,10 +307,10 @@ def face_at(kind, number, x, y, ground):
     arc = ground.exact_arcs[number if kind == ARC else 0]
     graph = ground.graphs[number if kind == BEZIER else 0]
     if kind != BEZIER:
-        return Face(CURVED if kind == ARC else STRAIGHT, number, arc, arc, extended(0.0))
+        return Face(kind, number, arc, arc, extended(0.0))
     along, _ = in_frame(graph, x - graph[c.START_X], y - graph[c.START_Y])
     curve = ground.beziers[int(graph[g.PIECE])]
-    return Face(SPLINE, number, arc, curve, extended(graph[g.FIRST_S] + parameter_at(graph, along)))
+    return Face(BEZIER, number, arc, curve, extended(graph[g.FIRST_S] + parameter_at(graph, along)))
 
 
 @inner
@@ -363,8 +360,8 @@ def where_on_piece(kind, number, path, state, inward, along, ground):
         graph = ground.graphs[number]
         return -wide <= along <= graph[g.WIDTH] + wide, near_end(graph, x, y, wide)
     arc, stretch = ground.arcs[number], ground.arcs[number, c.STRETCH]
-    inside = on_arc(arc, x - arc[c.START_X], stretch * (y - arc[c.START_Y]), wide * max(1.0, stretch))
-    return inside, near_end(arc, x, y, wide)
+    excess = end_excess(arc, x - arc[c.START_X], stretch * (y - arc[c.START_Y]))
+    return excess <= wide * max(1.0, stretch), near_end(arc, x, y, wide)
 
 
 @inlined
@@ -477,8 +474,7 @@ def first_in_hollow(h, own, came_from, path, span, ground):
     kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, c.SIZE]
     where = satellite_after(t, rotation, path.turn, motion)
     ranges = (
-        (LINE, c.FIRST_JOINT, c.JOINTS_END), (ARC, c.FIRST_CIRCLE, c.CIRCLES_END),
-        (ARC, c.FIRST_ELLIPSE, c.ELLIPSES_END), (BEZIER, c.FIRST_BEZIER, c.BEZIERS_END),
+        (LINE, c.FIRST_JOINT, c.JOINTS_END), (ARC, c.FIRST_ARC, c.ARCS_END), (BEZIER, c.FIRST_BEZIER, c.BEZIERS_END),
     )  # fmt: skip
     for tried, first, end_of_range in ranges:
         for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):

@@ -11,12 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...scene import columns as c
-from ...tracing.compiled.options import compiled, inlined, inner
-from ...tracing.compiled.pieces import arc_point, line_at
-from ...tracing.compiled.pointers import is_raised
+from ...tracing.compiled.pieces.arcs import arc_form, arc_point
+from ...tracing.compiled.pieces.formulas import opening_at
+from ...tracing.compiled.pieces.lines import line_at
+from ...tracing.compiled.pieces.options import compiled, inlined, inner
+from ...tracing.compiled.pieces.pointers import is_raised
+from ...tracing.compiled.pieces.records import BEZIER, LINE, NO_PIECE, SIDE
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
-from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
-from ...tracing.double_double.formulas import opening_at
 from . import contact
 from .contact import CLEAR, NO, NOTHING, WIDEST_SLACK, ZERO, Path, Span, Touch, Touching, turning
 from .shapes import graph_surface
@@ -149,7 +150,7 @@ def surface(kind, index, x, y, ground):
     if kind == LINE:
         return on_line(index, x, y, ground)
     arc = ground.arcs[index]
-    return arc_point(arc, 0.0, x, y, 0.0, 0.0, arc[c.STRETCH])
+    return arc_point(arc_form(arc), arc, arc[c.STRETCH], 0.0, x, y, 0.0, 0.0)
 
 
 @inlined

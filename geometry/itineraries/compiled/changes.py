@@ -21,10 +21,10 @@ from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
 from ...scene.compiled.tables import ROW, named, reader_of
 from ...scene.scene import Scene
 from ...scene.structs import Struct
-from ...tracing.compiled.options import compiled, inlined, linked
-from ...tracing.compiled.pointers import call_late
+from ...tracing.compiled.pieces.options import compiled, inlined, linked
+from ...tracing.compiled.pieces.pointers import call_late
+from ...tracing.compiled.pieces.records import Rays, details_for, results_for
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, TRACE, details_at, rays_at
-from ...tracing.compiled.records import Rays, details_for, results_for
 
 # Start integers as np.int64(0): a literal 0 has its own type in numba, and each function that receives it would be
 # compiled twice.

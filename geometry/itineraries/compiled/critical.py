@@ -6,7 +6,7 @@ import numpy as np
 
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from ...tracing.compiled.options import compiled, linked
+from ...tracing.compiled.pieces.options import compiled, linked
 from .changes import probe, set_angle, setting_at
 
 # Number of positions, at most the last width away from the expected middle, at which a piece is searched. Near a

@@ -19,7 +19,7 @@ from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT, SIZE
 from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.structs import Struct
-from ...tracing.compiled.options import compiled, linked
+from ...tracing.compiled.pieces.options import compiled, linked
 from ...tracing.compiled.rays import rays_at
 from . import changes
 from .changes import BLOCK, FIRST_LABEL, MOST_SAMPLES, Chain

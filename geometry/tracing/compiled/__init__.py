@@ -1,1 +1,1 @@
-"""The compiled functions of the tracer in double precision: the path of a ray and its hits on all kinds of pieces."""
+"""The compiled loops of the tracer: one ray in doubles and in double-doubles, many rays in waves and closed forms."""

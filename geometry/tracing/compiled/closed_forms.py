@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...scene import columns as c
-from ..double_double.formulas import TOP_CORNER, last_hollow, opening_at
-from .options import compiled, inlined, inner
-from .pointers import Late, call_late
+from .pieces.formulas import TOP_CORNER, last_hollow, opening_at
+from .pieces.options import compiled, inlined, inner
+from .pieces.pointers import Late, call_late
 from .rays import TABLES, tables_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 from .waves import cross_simple

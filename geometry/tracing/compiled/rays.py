@@ -16,18 +16,21 @@ import math
 import numpy as np
 from numba import types
 
-from ....core.rounding import EPS
 from ...scene import columns as c
 from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.scene import NO_TABLES
 from ...scene.structs import Struct
-from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
-from ..double_double.formulas import FLAT_TOP, TOP_CORNER, arc_normal, mirror, opening_at, opening_met, with_length_one
-from . import pieces, records
+from ...scene.tolerances import NEARBY_SLACKS
 from .nearby import UNCERTAIN, hit_nearby, line_starts_in_front, starts_in_front
-from .options import compiled, inlined, inner
-from .pointers import Late, call_late, checked, is_raised
-from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_DETAILS, NO_PIECE, NO_RAYS, OPENING, SIDE, Hit, Own, Rays
+from .pieces import records
+from .pieces.arcs import arc_form, arc_normal
+from .pieces.beziers import bend_number, nearest_bezier
+from .pieces.formulas import FLAT_TOP, TOP_CORNER, bounds_of, exit_time, opening_at, with_length_one
+from .pieces.kinds import incidence, nearest_curve, reflect
+from .pieces.lines import is_ahead, joint_side, line_at, line_hit
+from .pieces.options import compiled, inlined, inner
+from .pieces.pointers import Late, call_late, checked, is_raised
+from .pieces.records import ARC, BEZIER, LINE, NO_DETAILS, NO_PIECE, NO_RAYS, OPENING, SIDE, Hit, Own, Rays
 from .runs import skip_chords, skip_crossings
 from .tree import NO_LINE_HIT, nearest_line_in_boxes
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
@@ -47,57 +50,38 @@ BEND_SHIFT = 40
 def scope_of(tables, h, slots):
     """-> Scope: hollow number h."""
     hollow = tables.hollows[h]
-    joints = np.int64(hollow[c.FIRST_JOINT]), np.int64(hollow[c.JOINTS_END])
-    circles = np.int64(hollow[c.FIRST_CIRCLE]), np.int64(hollow[c.CIRCLES_END])
-    ellipses = np.int64(hollow[c.FIRST_ELLIPSE]), np.int64(hollow[c.ELLIPSES_END])
-    beziers = np.int64(hollow[c.FIRST_BEZIER]), np.int64(hollow[c.BEZIERS_END])
-    left, right, slack = hollow[c.LEFT], hollow[c.RIGHT], JOINT_ULPS * EPS * hollow[c.SIZE]
+    left, right, slack, joints, arcs, beziers = bounds_of(hollow)
     has_tree = hollow[c.TREE_LEVELS] > 0.0
-    return records.Scope(tables, hollow, left, right, slack, joints, circles, ellipses, beziers, has_tree, slots)
+    return records.Scope(tables, hollow, left, right, slack, joints, arcs, beziers, has_tree, slots)
 
 
 @inlined
-def arc_of(tables, kind, number):
-    """-> row: an arc, given by kind and row of its table."""
-    return tables.circles[number] if kind == CIRCLE else tables.ellipses[number]
+def nearest_line(scope, own, px, py, vx, vy, time):
+    """-> (t, line, fraction, corner, nearby): the first line before ``time``, and the time to the first corner; or inf.
 
-
-@inlined
-def nearest_curve(scope, own, px, py, vx, vy):
-    """-> (Hit, contact, nearby): the first hit on a curve that is not tangent, and the time to the first tangent one.
-
-    Both times are inf if there is none. For ``nearby`` see `nearest_line`.
+    ``nearby`` is true if a line is so close that rounding of the start may decide the hit; see `nearby`.
     """
     tables, slack = scope.tables, scope.slack
+    joints = tables.joints
     close = NEARBY_SLACKS * slack
-    time, kind, number, hit_s, contact, nearby = np.inf, NO_PIECE, -1, 0.0, np.inf, False
-    # one loop over the arcs of both kinds, because code for each would double the time of compilation
-    first_circle, circles_end = scope.circles
-    first_ellipse, ellipses_end = scope.ellipses
-    circles = circles_end - first_circle
-    for i in range(circles + ellipses_end - first_ellipse):
-        of_kind, k = (CIRCLE, first_circle + i) if i < circles else (ELLIPSE, first_ellipse + i - circles)
-        arc = arc_of(tables, of_kind, k)
-        stretch = arc[c.STRETCH]
-        is_own = own.kind == of_kind and own.number == k
-        t, tangent, _ = pieces.arc_time(arc, is_own, px, py, vx, vy, stretch)
-        if abs(t) <= close and not is_own:
-            nearby = True
-        elif tangent != 0:
-            if pieces.may_touch_arc(arc, t, px, py, vx, vy, stretch, slack):
-                contact = min(contact, t)
-        elif 0.0 <= t < time and pieces.on_arc_after(arc, t, px, py, vx, vy, stretch, slack):
-            time, kind, number = t, of_kind, k
-    first, end = scope.beziers
-    if first < end:
-        own_number = own.number if own.kind == BEZIER else -1
-        arguments = tables.beziers, first, end, own_number, own.s, px, py, vx, vy, slack, time
-        t, k, s, touch, near_s = call_late(scope.slots.bezier, pieces.NO_BEZIER_HIT, arguments)
-        contact = min(contact, touch)
-        if k >= 0:
-            time, kind, number, hit_s = t, BEZIER, k, s
-        nearby = nearby or near_s >= 0.0
-    return Hit(time, kind, number, hit_s, 0), contact, nearby
+    best, found, best_fraction, nearby = np.inf, -1, 0.0, False
+    at_entry, (first, end) = own.bounces == 0, scope.joints
+    c_before, corner_time = joint_side(joints, first, at_entry, px, py, vx, vy, slack)
+    for j in range(first, end - 1):
+        c_after, ahead = joint_side(joints, j + 1, at_entry, px, py, vx, vy, slack)
+        corner_time = min(corner_time, ahead)
+        if c_before >= 0.0 >= c_after and c_before > c_after and joints[j, c.STARTS_LINE] > 0.0:
+            is_own = own.kind == LINE and own.number == j
+            if not is_own:
+                line = line_at(tables, j)
+                t, fraction, _, _ = line_hit(line, c_before, c_after, px, py, vx, vy)
+                if is_ahead(t, c_before - c_after, line.length, close, slack):
+                    if t < min(best, time):
+                        best, found, best_fraction = t, j, fraction
+                elif t >= -close:
+                    nearby = True
+        c_before = c_after
+    return best, found, best_fraction, corner_time, nearby
 
 
 @inlined
@@ -108,7 +92,7 @@ def nearest_piece(scope, own, px, py, vx, vy):
         arguments = scope, own, px, py, vx, vy, hit.time
         t, line, fraction, corner, near = call_late(scope.slots.boxes, NO_LINE_HIT, arguments)
     else:
-        t, line, fraction, corner, near = pieces.nearest_line(scope, own, px, py, vx, vy, hit.time)
+        t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
     if t < hit.time:
         hit = Hit(t, LINE, line, fraction, 0)
     if contact < np.inf and is_beside(scope, hit, contact, px, py, vx, vy):
@@ -128,43 +112,8 @@ def is_beside(scope, hit, contact, px, py, vx, vy):
     At a smooth joint the ray may touch one piece and seem to hit the other before. At the hit, the point of contact is
     then in front of the tangent by rounding, and by far less than the bound here.
     """
-    sine = incidence(scope, hit, px, py, vx, vy)
+    sine = incidence(scope.tables, hit, px, py, vx, vy)
     return contact <= hit.time or (contact - hit.time) * sine <= NEARBY_SLACKS * scope.slack
-
-
-@inlined
-def incidence(scope, hit, px, py, vx, vy):
-    """-> float: sine of the angle between the velocity and the piece that is hit; of the opening and the sides |vy|."""
-    tables = scope.tables
-    if hit.kind == LINE:
-        lines = tables.lines
-        return abs(vx * lines[hit.number, c.LINE_NORMAL_X] + vy * lines[hit.number, c.LINE_NORMAL_Y])
-    if hit.kind == CIRCLE or hit.kind == ELLIPSE:
-        arc = arc_of(tables, hit.kind, hit.number)
-        return pieces.arc_incidence(arc, hit.time, px, py, vx, vy, arc[c.STRETCH])
-    if hit.kind == BEZIER:
-        tx, ty = pieces.bezier_tangent(tables.beziers[hit.number], hit.s)
-        return abs(tx * vy - ty * vx) / math.sqrt(tx * tx + ty * ty)
-    return abs(vy)
-
-
-@inlined
-def exit_time(scope, own, px, py, vx, vy, time):
-    """-> (t, kind): time to the opening (OPENING) or to a side of an open wall (SIDE) before ``time``, else NO_PIECE.
-
-    The opening is an edge from right to left. A piece within rounding of the opening or of a side is hit first.
-    """
-    left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
-    kind = NO_PIECE
-    if vy > 0.0:
-        t, is_met = opening_met(left, right, px, py, vx, vy)
-        if (is_met or is_open) and own.kind != OPENING and (time - t) * vy > slack:
-            time, kind = t, OPENING
-    if is_open and vx != 0.0:
-        t = ((right if vx > 0.0 else left) - px) / vx
-        if t < time and (kind == OPENING or (time - t) * abs(vx) > slack):
-            time, kind = max(t, 0.0), SIDE
-    return time, kind
 
 
 @inlined
@@ -178,55 +127,17 @@ def meets_corner(scope, hit, corner, px, py, vx, vy):
     # at grazing incidence a corner within the slack of the ray may lie far beyond the hit
     if hit.kind == BEZIER or hit.kind == SIDE:
         return False
-    return (corner - time) * incidence(scope, hit, px, py, vx, vy) <= 2.0 * slack
-
-
-@inlined
-def line_reflect(scope, hit, own, vx, vy):
-    """-> (px, py, vx, vy, at_corner): the ray after its reflection on a line, and whether it is at a corner."""
-    line = pieces.line_at(scope.tables, hit.number)
-    px, py = pieces.line_point(line, hit.s)
-    # a first hit near an end of the opening is as accurate as the ray, at any distance from that corner
-    at_opening = own.bounces == 0 and (line.y0 if hit.s >= 0.0 else line.y1) == 0.0
-    room = pieces.LEAST_FRACTION * line.length if at_opening else scope.slack
-    near = hit.number if hit.s >= 0.0 else hit.number + 1
-    at_corner = abs(hit.s) * line.length <= room and scope.tables.joints[near, c.IS_CORNER] > 0.0
-    vx, vy = mirror(vx, vy, line.normal_x, line.normal_y)
-    return px, py, vx, vy, at_corner
-
-
-@inlined
-def reflect(scope, hit, own, px, py, vx, vy):
-    """-> (px, py, vx, vy, at_corner): the ray after its reflection on a piece, and whether it is at a corner.
-
-    At a corner the velocity is not reflected.
-    """
-    tables = scope.tables
-    if hit.kind == LINE:
-        px, py, wx, wy, at_corner = line_reflect(scope, hit, own, vx, vy)
-    else:
-        if hit.kind == BEZIER:
-            curve = tables.beziers[hit.number]
-            px, py = pieces.bezier_point(curve, hit.s)
-            nx, ny = pieces.bezier_normal(curve, hit.s)
-        else:
-            curve = arc_of(tables, hit.kind, hit.number)
-            px, py, nx, ny = pieces.arc_point(curve, hit.time, px, py, vx, vy, curve[c.STRETCH])
-        wx, wy = mirror(vx, vy, nx, ny)
-        at_corner = pieces.near_end(curve, px, py, scope.slack)
-    if at_corner:
-        return px, py, vx, vy, True
-    return px, py, wx, wy, False
+    return (corner - time) * incidence(scope.tables, hit, px, py, vx, vy) <= 2.0 * slack
 
 
 @inlined
 def may_run(tables, hit, own, px, py, vx, vy):
     """-> bool: whether a run of hits may follow a hit, so that `skip_run` is worth a call."""
-    if hit.kind == CIRCLE:
-        arc = tables.circles[hit.number]
+    if hit.kind == ARC:
+        arc = tables.arcs[hit.number]
         qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
-        nx, ny = arc_normal(pieces.arc_form(arc), 1.0, qx, qy)
-        return vx * nx + vy * ny <= arc[c.RUN_SINE]
+        nx, ny = arc_normal(arc_form(arc), 1.0, qx, qy)
+        return (arc[c.RUN_SINE] > 0.0) & (vx * nx + vy * ny <= arc[c.RUN_SINE])
     # the ray came from this line, hit the other one, and came back
     came_back = hit.kind == LINE and own.kind == LINE and own.before == hit.number
     return came_back and tables.lines[hit.number, c.PAIRS_END] > 0.0
@@ -236,8 +147,8 @@ def may_run(tables, hit, own, px, py, vx, vy):
 def skip_run(scope, hit, own, px, py, vx, vy, most):
     """-> (px, py, vx, vy, hits): the ray after the run of hits that follows a hit; no hits if a run does not pay."""
     tables, number = scope.tables, hit.number
-    if hit.kind == CIRCLE and tables.circles[number, c.RUN_SINE] > 0.0:
-        return skip_chords(tables.circles[number], px, py, vx, vy, most)
+    if hit.kind == ARC and tables.arcs[number, c.RUN_SINE] > 0.0:
+        return skip_chords(tables.arcs[number], px, py, vx, vy, most)
     if hit.kind == LINE:
         lines, pairs = tables.lines, tables.pairs
         normal = lines[number, c.LINE_NORMAL_X], lines[number, c.LINE_NORMAL_Y]
@@ -253,7 +164,7 @@ def piece_label(tables, hit, vx):
     side = 1 if hit.kind == SIDE and vx > 0.0 else 0
     number = 8 * (hit.number + 1 + side) + hit.kind
     if hit.kind == BEZIER:
-        number += pieces.bend_number(tables.beziers[hit.number], hit.s) << BEND_SHIFT
+        number += bend_number(tables.beziers[hit.number], hit.s) << BEND_SHIFT
     return np.uint64(number)
 
 
@@ -363,7 +274,7 @@ def _late_functions() -> tuple[Late, ...]:
     number, integer, truth = types.float64, types.int64, types.boolean
     own = named(Own, integer, integer, number, number, integer, integer)
     hit = named(Hit, number, integer, integer, number, integer)
-    ranges = [types.UniTuple(integer, 2)] * 4
+    ranges = [types.UniTuple(integer, 2)] * 3
     scope = named(records.Scope, TABLES, ROW, *[number] * 3, *ranges, truth, kind_of(NO_SLOTS))
     ray = number, number, number, number
     return (
@@ -372,7 +283,7 @@ def _late_functions() -> tuple[Late, ...]:
         Late(line_starts_in_front, Table(c.JOINT_COLUMNS), integer, own, *ray, number),
         Late(nearest_line_in_boxes, scope, own, *ray, number),
         Late(skip_run, scope, hit, own, *ray, integer),
-        Late(pieces.nearest_bezier, Table(c.BEZIER_COLUMNS), integer, integer, integer, number, *ray, number, number),
+        Late(nearest_bezier, Table(c.BEZIER_COLUMNS), integer, integer, integer, number, *ray, number, number),
     )
 
 

@@ -1,7 +1,8 @@
 """Runs in closed form: consecutive hits of a ray on one circular arc or between two facing lines. Loads numba.
 
-Both functions return the state after the run and its number of hits, 0 if a run does not pay. A run omits the last
-hits, which are computed one by one.
+All functions return the state after the run and its number of hits, 0 if a run does not pay. A run omits the last
+hits, which are computed one by one. In double-doubles only long runs along an arc and between vertical sides are
+computed in one step.
 """
 
 from __future__ import annotations
@@ -11,35 +12,48 @@ import math
 import numpy as np
 
 from ...scene import columns as c
-from ..double_double.formulas import arc_normal
-from .options import linked
-from .pieces import arc_form
+from ..double_double.numbers import cross, direction_angle, dot, extended, rounded, scaled, sine_cosine, two_sum
+from .pieces.arcs import arc_form, arc_normal, refined_form
+from .pieces.options import inlined, linked
 
 # Least number of hits in a run, which costs about one arctangent and three sines; not tuned.
 SHORTEST_RUN = 4.0
 # The computed number of remaining hits has about eight relative rounding errors; a run omits the last two hits.
 COUNT_ROUNDING = 1.0 - 16.0 * 2.0**-52
 LAST_HITS = 2.0
+# Runs up to this number of hits are traced hit by hit in double-doubles, as a check of those in doubles; so are the
+# last hits of a run.
+LONGEST_FOLLOWED, LAST_REFINED_HITS = 4096.0, 4.0
 # Uncertainty of the ends of the facing parts and of the pieces beyond them, one slack (JOINT_ULPS) each.
 END_SLACKS = 2.0
+
+
+@inlined
+def state_on_arc(form, arc, px, py, vx, vy):
+    """-> ((sine, cosine), (nx, ny), phi, room): of a ray that leaves a circular arc.
+
+    The angle of the velocity with the arc, the unit normal n, the angle from the start of the arc about its centre, and
+    the angle that is left in the direction of travel; the last two are doubles.
+    """
+    n0x, n0y, _ = form
+    qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
+    nx, ny = arc_normal(form, 1.0, qx, qy)
+    # the free side, and so the normal, is on the left of the tangent in the direction of travel
+    sine, cosine = dot(vx, vy, nx, ny), cross(vx, vy, nx, ny)
+    # q = (sin(phi) t0 + (1 - cos(phi)) n0) / kappa with t0 = (n0y, -n0x)
+    phi = 2.0 * math.atan2(rounded(dot(qx, qy, n0x, n0y)), rounded(cross(qx, qy, n0x, n0y)))
+    if phi < 0.0:
+        phi += 2.0 * math.pi
+    return (sine, cosine), (nx, ny), phi, arc[c.SPAN] - phi if cosine > 0.0 else phi
 
 
 @linked
 def skip_chords(arc, px, py, vx, vy, most):
     """-> (px, py, vx, vy, chords): move a ray along a circular arc by all whole chords of its run, up to ``most``."""
-    qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
-    nx, ny = arc_normal(arc_form(arc), 1.0, qx, qy)
-    sine = vx * nx + vy * ny
-    # the free side, and so the normal n, is on the left of the tangent in the direction of travel
-    cosine = vx * ny - vy * nx
+    (sine, cosine), _, phi, room = state_on_arc(arc_form(arc), arc, px, py, vx, vy)
     if sine <= 0.0 or sine > arc[c.RUN_SINE]:
         return px, py, vx, vy, 0
     chord_angle = 2.0 * math.atan2(sine, abs(cosine))
-    # q = (sin(phi) t0 + (1 - cos(phi)) n0) / kappa with t0 = (n0y, -n0x)
-    phi = 2.0 * math.atan2(qx * arc[c.NORMAL_X] + qy * arc[c.NORMAL_Y], qx * arc[c.NORMAL_Y] - qy * arc[c.NORMAL_X])
-    if phi < 0.0:
-        phi += 2.0 * math.pi
-    room = arc[c.SPAN] - phi if cosine > 0.0 else phi
     count = room / chord_angle
     if count < 1.0 or most < 1:
         return px, py, vx, vy, 0
@@ -113,3 +127,63 @@ def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
     new_along, new_away = math.cos(last), math.sin(last)
     step = gap * (2.0 * math.sin(0.5 * turn) / sine) * math.cos(angle + 0.5 * turn) / new_away
     return px + step * ux, py + step * uy, new_along * ux + new_away * nx, new_along * uy + new_away * ny, hits
+
+
+@linked
+def refined_crossings(tables, index, other, py, vx, vy, most):
+    """-> (hits, travel, flight): an even number of hits between two facing vertical sides, travel along y, and time."""
+    joints, lines, pairs = tables.joints, tables.lines, tables.pairs
+    travel, flight = extended(0.0), 0.0
+    if (
+        joints[index, c.JOINT_X] != joints[index + 1, c.JOINT_X]
+        or joints[other, c.JOINT_X] != joints[other + 1, c.JOINT_X]
+    ):
+        return 0, travel, flight
+    for row in range(int(lines[index, c.FIRST_PAIR]), int(lines[index, c.PAIRS_END])):
+        if pairs[row, c.PARTNER] == other:
+            gap = two_sum(joints[other, c.JOINT_X], -joints[index, c.JOINT_X])
+            time = gap / vx
+            step = time * vy
+            low, high = min(pairs[row, c.NEAR_Y], pairs[row, c.FAR_Y]), max(pairs[row, c.NEAR_Y], pairs[row, c.FAR_Y])
+            room = high - py.high if step.high > 0.0 else py.high - low
+            count = room / abs(step.high) - LAST_REFINED_HITS if step.high != 0.0 else 0.0
+            if count > LONGEST_FOLLOWED and count < most and time > 0.0:
+                hits = 2 * np.int64(0.5 * count)
+                # beyond 2^53 hits is no double, and a double-double does not resolve the ray's position
+                return hits, float(hits) * step, float(hits) * time.high
+    return 0, travel, flight
+
+
+@linked
+def turned(x, y, sine, cosine):
+    """-> (x, y): a vector turned by an angle."""
+    return cosine * x - sine * y, sine * x + cosine * y
+
+
+@linked
+def skip_refined_chords(arc, px, py, vx, vy, most):
+    """-> (chords, px, py, vx, vy): move a ray along a circular arc by most chords of a long run.
+
+    With n the normal at the ray, t the tangent and tau the angle of all chords about the centre,
+    the ray moves by (2 sin(tau/2) / kappa) (cos(tau/2) t + sin(tau/2) n).
+    """
+    form = _, _, curvature = refined_form(arc)
+    (sine, cosine), (nx, ny), _, room = state_on_arc(form, arc, px, py, vx, vy)
+    if sine <= 0.0 or sine > arc[c.RUN_SINE]:
+        return 0, px, py, vx, vy
+    forward = cosine > 0.0
+    half_chord = direction_angle(cosine if forward else -cosine, sine)
+    count = 0.5 * room / half_chord.high - LAST_REFINED_HITS
+    if not LONGEST_FOLLOWED < count < most:
+        return 0, px, py, vx, vy
+    chords = np.int64(count)
+    half = float(chords) * half_chord
+    first, second = sine_cosine(half.high)
+    # the low part of the angle is below an ulp of it, and its square below all errors
+    sine, cosine = first + half.low * second, second - half.low * first
+    sine = sine if forward else -sine
+    dx, dy = turned(ny, -nx, sine, cosine)
+    shift = scaled(2.0, sine) / curvature
+    vx, vy = turned(vx, vy, sine, cosine)
+    vx, vy = turned(vx, vy, sine, cosine)
+    return chords, px + shift * dx, py + shift * dy, vx, vy

@@ -15,9 +15,10 @@ from ...scene import columns as c
 from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, COUNT, OTHER_X, OTHER_Y, PARENT
 from ...scene.escapes import ESCAPE_ROOM
 from ...scene.tolerances import NEARBY_SLACKS
-from .options import inlined, inner
-from .pieces import is_ahead, joint_side, line_at, line_hit, line_sides, side
-from .records import LINE
+from .pieces.formulas import side
+from .pieces.lines import is_ahead, joint_side, line_at, line_hit, line_sides
+from .pieces.options import inlined, inner
+from .pieces.records import LINE
 
 # No hit on a line, for `nearest_line`.
 NO_LINE_HIT = np.inf, -1, 0.0, np.inf, False

@@ -18,13 +18,12 @@ import numpy as np
 from ....core.rounding import EPS
 from ...scene import columns as c
 from ...scene.tolerances import NEARBY, NEARBY_SLACKS, TANGENT_ULPS
-from ..double_double import formulas
-from ..double_double.formulas import where
-from . import pieces
+from ..double_double.numbers import where
 from . import work as w
-from .options import inlined, inner, linked
+from .pieces import arcs, beziers, formulas, lines
+from .pieces.options import inlined, inner, linked
+from .pieces.records import ARC, LINE, Hit, Own
 from .rays import scope_of, skip_run
-from .records import CIRCLE, LINE, Hit, Own
 from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
 from .work import NATURAL, ray_at
 
@@ -95,8 +94,8 @@ def meet_corner(work, count, x, y, slack):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         at_entry = work[w.OWN + i] == w.OPENING
-        is_faced = pieces.is_faced(x - px, y - py, at_entry, vx, vy, slack)
-        is_met = (abs(pieces.side(x, y, px, py, vx, vy)) <= slack) & is_faced
+        is_faced = lines.is_faced(x - px, y - py, at_entry, vx, vy, slack)
+        is_met = (abs(formulas.side(x, y, px, py, vx, vy)) <= slack) & is_faced
         work[w.UNCERTAIN + i] += where(is_met, 1.0, 0.0)
 
 
@@ -109,10 +108,10 @@ def meet_line(work, count, line, number, corner_slack, close):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         own = work[w.OWN + i]
-        before, after = pieces.line_sides(line, px, py, vx, vy)
-        is_ahead = pieces.is_faced(line.x0 - px, line.y0 - py, own == w.OPENING, vx, vy, corner_slack)
+        before, after = lines.line_sides(line, px, py, vx, vy)
+        is_ahead = lines.is_faced(line.x0 - px, line.y0 - py, own == w.OPENING, vx, vy, corner_slack)
         is_met = (before >= 0.0) & (after <= 0.0) & (before > after) & (own != number)
-        t, _, _, _ = pieces.line_hit(line, before, after, px, py, vx, vy)
+        t, _, _, _ = lines.line_hit(line, before, after, px, py, vx, vy)
         is_uncertain = (is_ahead & (abs(before) <= corner_slack)) | (is_met & (abs(t) <= close))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
         keep(work, i, where(is_met & (t > close), t, np.inf), number)
@@ -121,16 +120,16 @@ def meet_line(work, count, line, number, corner_slack, close):
 @linked
 def meet_arc(work, count, arc, number, close):
     """Find the hits of rays on a circular arc that are nearer; a hit before the time ``close`` is uncertain."""
-    form = pieces.arc_form(arc)
+    form = arcs.arc_form(arc)
     # bounds of B of rays that meet the front, from elsewhere and from the arc itself
     most, least = where(arc[c.CURVATURE] > 0.0, np.inf, 0.0), where(arc[c.CURVATURE] > 0.0, 0.0, np.inf)
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         is_own, is_other = work[w.OWN + i] == number, work[w.OWN + i] != number
-        b, f, d, speed2 = formulas.arc_terms(form, px - arc[c.START_X], py - arc[c.START_Y], vx, vy)
+        b, f, d, speed2 = arcs.arc_terms(form, px - arc[c.START_X], py - arc[c.START_Y], vx, vy)
         from_afar = is_other & (d >= 0.0) & (b < most)
-        t = formulas.arc_root(form, is_own, b, f, math.sqrt(d), speed2)
-        is_uncertain = (is_other & pieces.is_nearly_tangent(arc, b, d, speed2)) | (from_afar & (abs(t) <= close))
+        t = arcs.arc_root(form, is_own, b, f, math.sqrt(d), speed2)
+        is_uncertain = (is_other & arcs.is_nearly_tangent(arc, b, d, speed2)) | (from_afar & (abs(t) <= close))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
         is_met = from_afar | (is_own & (b > least))
         work[w.ARC_TIME + i] = where(is_met & (t >= 0.0), t, np.inf)
@@ -138,7 +137,7 @@ def meet_arc(work, count, arc, number, close):
     for i in range(count):
         (px, py, vx, vy), t = ray_at(work, i), work[w.ARC_TIME + i]
         # at grazing incidence rounding moves the point along the arc by more than the slack
-        on_arc = pieces.beyond_end(arc, px + t * vx - arc[c.START_X], py + t * vy - arc[c.START_Y]) <= close
+        on_arc = arcs.end_excess(arc, px + t * vx - arc[c.START_X], py + t * vy - arc[c.START_Y]) <= close
         keep(work, i, where(on_arc, t, np.inf), number)
 
 
@@ -148,17 +147,17 @@ def meet_parabola(work, count, curve, number):
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
         is_own, is_other = work[w.OWN + i] == number, work[w.OWN + i] != number
-        a0, a1, a2, _ = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
-        spread, last = pieces.side_spread(curve, px, py, vx, vy), pieces.end_side(curve, px, py, vx, vy)
+        a0, a1, a2, _ = beziers.bezier_sides(beziers.bezier_coefficients(curve), px, py, vx, vy)
+        spread, last = beziers.side_spread(curve, px, py, vx, vy), beziers.end_side(curve, px, py, vx, vy)
         g, turn, own_s = (a0, a1, a2, 0.0), a1 / (-2.0 * a2), work[w.BEFORE + i]
-        value, room = formulas.cubic(g, turn), (TANGENT_ULPS * EPS) * spread
+        value, room = beziers.cubic(g, turn), (TANGENT_ULPS * EPS) * spread
         is_inside = (turn > 0.0) & (turn < 1.0)
         touches = (abs(a0) <= room) | (abs(last) <= room) | (is_inside & (abs(value) <= room))
-        falls = pieces.is_falling(a0, where(is_inside, value, last)) | (is_inside & pieces.is_falling(value, last))
-        own_root, is_front = pieces.own_point(g, own_s, formulas.cubic_slope(g, own_s) / -a2)
-        s = where(is_own, own_root, pieces.quadratic_root(a0, a1, a2))
-        t = formulas.bezier_time(pieces.bezier_coefficients(curve), s, px, py, vx, vy)
-        is_near = is_other & pieces.meets_circle(curve, px, py, vx, vy, work[w.TIME + i])
+        falls = beziers.is_falling(a0, where(is_inside, value, last)) | (is_inside & beziers.is_falling(value, last))
+        own_root, is_front = beziers.own_point(g, own_s, beziers.cubic_slope(g, own_s) / -a2, beziers.OWN_SLACK)
+        s = where(is_own, own_root, beziers.quadratic_root(a0, a1, a2))
+        t = beziers.bezier_time(beziers.bezier_coefficients(curve), s, px, py, vx, vy)
+        is_near = is_other & beziers.meets_circle(curve, px, py, vx, vy, work[w.TIME + i])
         is_uncertain = is_near & (touches | (falls & (abs(t) <= NEARBY * spread)))
         work[w.UNCERTAIN + i] += where(is_uncertain, 1.0, 0.0)
         t = where(((is_own & is_front) | (is_near & falls)) & (t > 0.0), t, np.inf)
@@ -170,7 +169,7 @@ def mark_near(work, count, curve, number):
     """Mark rays that meet the circle about a Bezier piece, on which they do not start."""
     for i in range(count):
         px, py, vx, vy = ray_at(work, i)
-        is_near = pieces.meets_circle(curve, px, py, vx, vy, work[w.TIME + i]) & (work[w.OWN + i] != number)
+        is_near = beziers.meets_circle(curve, px, py, vx, vy, work[w.TIME + i]) & (work[w.OWN + i] != number)
         work[w.NEAR + i] = where(is_near, 1.0, 0.0)
 
 
@@ -202,20 +201,20 @@ def find_fall(some, count, curve, turn):
     both = 0
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
+        g = beziers.bezier_sides(beziers.bezier_coefficients(curve), px, py, vx, vy)
         a0, _, _, _ = g
-        last = pieces.end_side(curve, px, py, vx, vy)
-        room = (TANGENT_ULPS * EPS) * pieces.side_spread(curve, px, py, vx, vy)
-        low, high = formulas.extrema(g)
-        value_low, value_high = formulas.cubic(g, low), formulas.cubic(g, high)
+        last = beziers.end_side(curve, px, py, vx, vy)
+        room = (TANGENT_ULPS * EPS) * beziers.side_spread(curve, px, py, vx, vy)
+        low, high = beziers.extrema(g)
+        value_low, value_high = beziers.cubic(g, low), beziers.cubic(g, high)
         has_low, has_high = (low > 0.0) & (low < 1.0), (high > 0.0) & (high < 1.0)
         touches = (abs(a0) <= room) | (abs(last) <= room)
         touches = touches | (has_low & (abs(value_low) <= room)) | (has_high & (abs(value_high) <= room))
         some[w.UNCERTAIN + j] += where(touches, 1.0, 0.0)
         low, value_low = where(has_low, low, 0.0), where(has_low, value_low, a0)
         high, value_high = where(has_high, high, 1.0), where(has_high, value_high, last)
-        first, third = pieces.is_falling(a0, value_low), pieces.is_falling(value_high, last)
-        middle = pieces.is_falling(value_low, value_high)
+        first, third = beziers.is_falling(a0, value_low), beziers.is_falling(value_high, last)
+        middle = beziers.is_falling(value_low, value_high)
         both += np.int64(first & third)
         first, middle = first & (turn == 0), middle & (turn == 0)
         falls = first | middle | third
@@ -232,9 +231,9 @@ def start_roots(some, count, curve):
     """Begin the search of the roots of g."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
+        g = beziers.bezier_sides(beziers.bezier_coefficients(curve), px, py, vx, vy)
         ends = some[w.LOW + j], some[w.HIGH + j], some[w.VALUE_LOW + j], some[w.VALUE_HIGH + j]
-        some[w.ROOT + j] = pieces.root_start(g, *ends)
+        some[w.ROOT + j] = beziers.root_start(g, *ends)
 
 
 @linked
@@ -243,9 +242,9 @@ def improve_roots(some, count, curve):
     more = 0
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy)
+        g = beziers.bezier_sides(beziers.bezier_coefficients(curve), px, py, vx, vy)
         old, low, high = kept(some, w.ROOT + j), kept(some, w.LOW + j), kept(some, w.HIGH + j)
-        s, low, high, is_last = pieces.root_step(g, old, low, high)
+        s, low, high, is_last = beziers.root_step(g, old, low, high)
         is_sought = some[w.SOUGHT + j] > 0.0
         some[w.ROOT + j] = where(is_sought, s, old)
         some[w.LOW + j], some[w.HIGH + j] = low, high
@@ -259,15 +258,13 @@ def find_own_root(some, count, curve):
     """Find the front hits of rays that start on a Bezier piece themselves."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        g, own_s = formulas.bezier_sides(pieces.bezier_coefficients(curve), px, py, vx, vy), some[w.BEFORE + j]
-        b0, b1, b2, disc, error = pieces.own_terms(curve, g, own_s)
-        one, other = formulas.quadratic_roots(b0, b1, b2, disc)
-        t, s = pieces.own_hit(curve, g, own_s, one, px, py, vx, vy)
-        other_t, other_s = pieces.own_hit(curve, g, own_s, other, px, py, vx, vy)
-        is_uncertain = (abs(disc) <= error) & (b2 != 0.0)
+        coefficients, own_s = beziers.bezier_coefficients(curve), some[w.BEFORE + j]
+        g = beziers.bezier_sides(coefficients, px, py, vx, vy)
+        b0, b1, b2, disc = beziers.own_terms(g, own_s)
+        t, some[w.ROOT + j] = beziers.nearest_own_hit(coefficients, g, own_s, px, py, vx, vy, beziers.OWN_SLACK)
+        is_uncertain = (abs(disc) <= beziers.own_error(curve, b0, b1, b2)) & (b2 != 0.0)
         some[w.UNCERTAIN + j] += where(is_uncertain, 1.0, 0.0)
-        some[w.ROOT + j], t = where(other_t < t, other_s, s), where(other_t < t, other_t, t)
-        some[w.FALLS + j] = where((disc >= 0.0) & (t < np.inf), 1.0, 0.0)
+        some[w.FALLS + j] = where(t < np.inf, 1.0, 0.0)
 
 
 @linked
@@ -275,9 +272,9 @@ def time_roots(some, count, curve, number):
     """Compute the times of the hits at the roots, inf for those that are none."""
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        t = formulas.bezier_time(pieces.bezier_coefficients(curve), some[w.ROOT + j], px, py, vx, vy)
+        t = beziers.bezier_time(beziers.bezier_coefficients(curve), some[w.ROOT + j], px, py, vx, vy)
         is_met = some[w.FALLS + j] > 0.0
-        is_close = (some[w.OWN + j] != number) & (abs(t) <= NEARBY * pieces.side_spread(curve, px, py, vx, vy))
+        is_close = (some[w.OWN + j] != number) & (abs(t) <= NEARBY * beziers.side_spread(curve, px, py, vx, vy))
         some[w.UNCERTAIN + j] += where(is_met & is_close, 1.0, 0.0)
         some[w.TIME + j] = where(is_met & (t > 0.0), t, np.inf)
 
@@ -297,7 +294,7 @@ def meet_cubic(work, places, count, curve, number, some):
         if find_fall(some, others, curve, turn) == 0 and turn > 0:
             break
         start_roots(some, others, curve)
-        steps = pieces.ROOT_STEPS
+        steps = beziers.ROOT_STEPS
         while steps > 0 and improve_roots(some, others, curve) > 0:
             steps -= 1
         time_roots(some, end, curve, number)
@@ -312,7 +309,7 @@ def meet_lines(scope, work, count):
     for j in range(scope.joints[0], scope.joints[1]):
         corner_slack = slack if joints[j, c.IS_CORNER] > 0.0 else -1.0
         if joints[j, c.STARTS_LINE] > 0.0:
-            meet_line(work, count, pieces.line_at(tables, j), w.LINES + j, corner_slack, NEARBY_SLACKS * slack)
+            meet_line(work, count, lines.line_at(tables, j), w.LINES + j, corner_slack, NEARBY_SLACKS * slack)
         elif corner_slack > 0.0:
             meet_corner(work, count, joints[j, c.JOINT_X], joints[j, c.JOINT_Y], slack)
 
@@ -321,8 +318,8 @@ def meet_lines(scope, work, count):
 def meet_pieces(scope, work, places, count):
     """Find the nearest hits of all rays on the pieces of a hollow."""
     tables, close = scope.tables, NEARBY_SLACKS * scope.slack
-    for k in range(scope.circles[0], scope.circles[1]):
-        meet_arc(work, count, numbers_of(tables.circles[k]), w.CIRCLES + k, close)
+    for k in range(scope.arcs[0], scope.arcs[1]):
+        meet_arc(work, count, numbers_of(tables.arcs[k]), w.ARCS + k, close)
     for k in range(scope.beziers[0], scope.beziers[1]):
         curve, number = numbers_of(tables.beziers[k]), w.BEZIERS + k
         if curve[c.X3] == 0.0 and curve[c.Y3] == 0.0:
@@ -345,7 +342,7 @@ def place_on_arc(some, count, arc, slack):
     room = 2.0 * NEARBY_SLACKS * slack
     for j in range(count):
         px, py, vx, vy = ray_at(some, j)
-        x, y, nx, ny = pieces.arc_point(arc, some[w.TIME + j], px, py, vx, vy, 1.0)
+        x, y, nx, ny = arcs.arc_point(arcs.arc_form(arc), arc, 1.0, some[w.TIME + j], px, py, vx, vy)
         dx, dy, ex, ey = x - arc[c.START_X], y - arc[c.START_Y], x - arc[c.END_X], y - arc[c.END_Y]
         at_end = (dx * dx + dy * dy <= room * room) | (ex * ex + ey * ey <= room * room)
         sine = RUN_MARGIN * arc[c.RUN_SINE]
@@ -356,10 +353,10 @@ def place_on_arc(some, count, arc, slack):
 def place_on_arcs(scope, work, places, count):
     """Compute the points at which rays meet arcs, for the rays of each arc in vectors."""
     some = work[w.WORK :]
-    for k in range(scope.circles[0], scope.circles[1]):
-        hits = list_rays(work, places, count, w.PIECE, w.CIRCLES + k, w.CIRCLES + k, 0)
+    for k in range(scope.arcs[0], scope.arcs[1]):
+        hits = list_rays(work, places, count, w.PIECE, w.ARCS + k, w.ARCS + k, 0)
         gather(work, places, hits, some, w.BEFORE_HIT)
-        place_on_arc(some, hits, numbers_of(scope.tables.circles[k]), scope.slack)
+        place_on_arc(some, hits, numbers_of(scope.tables.arcs[k]), scope.slack)
         for j in range(hits):
             i = places[j] & NATURAL
             for column in w.AT_HIT:
@@ -375,9 +372,9 @@ def place_hits(scope, work, places, count):
     for k in range(list_rays(work, places, count, w.PIECE, w.LINES, np.inf, 0)):
         i = places[k] & NATURAL
         j, (px, py, vx, vy) = int(work[w.PIECE + i] - w.LINES) & NATURAL, ray_at(work, i)
-        line = pieces.line_at(tables, j)
-        before, after = pieces.line_sides(line, px, py, vx, vy)
-        _, fraction, x, y = pieces.line_hit(line, before, after, px, py, vx, vy)
+        line = lines.line_at(tables, j)
+        before, after = lines.line_sides(line, px, py, vx, vy)
+        _, fraction, x, y = lines.line_hit(line, before, after, px, py, vx, vy)
         is_corner = where(fraction < 0.0, joints[j + 1, c.IS_CORNER], joints[j, c.IS_CORNER]) > 0.0
         may_run = (work[w.BEFORE + i] == w.LINES + j) & (tables.lines[j, c.PAIRS_END] > 0.0)
         at_corner = is_corner & (abs(fraction) * line.length <= slack)
@@ -386,8 +383,9 @@ def place_hits(scope, work, places, count):
         for k in range(list_rays(work, places, count, w.PIECE, w.BEZIERS, w.LINES - 1.0, 0)):
             i = places[k] & NATURAL
             curve, s = tables.beziers[int(work[w.PIECE + i] - w.BEZIERS) & NATURAL], work[w.HIT_S + i]
-            (x, y), (nx, ny) = pieces.bezier_point(curve, s), pieces.bezier_normal(curve, s)
-            keep_point(work, i, x, y, nx, ny, pieces.near_end(curve, x, y, slack), False)
+            coefficients = beziers.bezier_coefficients(curve)
+            (x, y), (nx, ny) = beziers.bezier_point(coefficients, s), beziers.bezier_normal(coefficients, s)
+            keep_point(work, i, x, y, nx, ny, formulas.near_end(curve, x, y, slack), False)
 
 
 @inlined
@@ -396,7 +394,7 @@ def begins_run(scope, work, i, limit):
     px, py, nx, ny = work[w.HIT_X + i], work[w.HIT_Y + i], work[w.HIT_NX + i], work[w.HIT_NY + i]
     vx, vy = formulas.mirror(work[w.VX + i], work[w.VY + i], nx, ny)
     piece, own = work[w.PIECE + i], work[w.OWN + i]
-    kind, first = (CIRCLE, w.CIRCLES) if piece < w.LINES else (LINE, w.LINES)
+    kind, first = (ARC, w.ARCS) if piece < w.LINES else (LINE, w.LINES)
     hit, start = Hit(0.0, kind, int(piece - first), 0.0, 0), Own(LINE, int(own - w.LINES), -1.0, 0.0, -1, 0)
     most = np.int64(limit - work[w.BOUNCES + i] - 1)
     _, _, _, _, hits = skip_run(scope, hit, start, px, py, vx, vy, most)

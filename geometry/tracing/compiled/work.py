@@ -5,7 +5,7 @@ The columns have constant distances, so the compiler knows that they do not over
 
 from __future__ import annotations
 
-from .options import inlined
+from .pieces.options import inlined
 
 # Rays of a wave, and the distance of columns: not close to each other modulo 4 kB, where the processor takes a number
 # that it reads for one that it has just written.
@@ -32,7 +32,7 @@ NEAR = ARC_TIME = END_VX
 BEFORE_RUN, AT_CORNER = 1.0, 2.0
 # Numbers of pieces in OWN, PIECE and BEFORE: of a row of a table that of its kind plus the row; of the opening; and
 # of no hit. After a hit on a curve, BEFORE is HIT_S.
-NO_HIT, OPENING, CIRCLES, BEZIERS, LINES = 0.0, 1.0, 2.0**20, 2.0**30, 2.0**40
+NO_HIT, OPENING, ARCS, BEZIERS, LINES = 0.0, 1.0, 2.0**20, 2.0**30, 2.0**40
 # Mask that tells the compiler that an index is not negative, so that it need not count from the end. A longer mask is
 # an instruction whose register of one byte makes a step of a ray wait for that of the ray before, in some compilations.
 NATURAL = (1 << 31) - 1

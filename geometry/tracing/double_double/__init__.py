@@ -1,1 +1,1 @@
-"""The compiled tracer in double-double arithmetic."""
+"""Numbers of two doubles in compiled code, and what is computed with them alone."""

@@ -1,10 +1,10 @@
 """Double-double numbers as a number type of compiled code: an unevaluated sum of two doubles, about 31 digits.
 
 Loads numba. The operators take double-doubles and doubles mixed. A formula that uses only operators, `root`, `scaled`,
-`cross` and `dot` serves both number types, see `formulas`. The error-free transforms are those of Dekker (1971) and
-Knuth. Sums and products follow Joldes, Muller & Popescu (2017), with relative errors of at most 3 u^2 for the sum,
-7 u^2 for the product and 15 u^2 for the quotient, u = 2^-53. No operation may be reassociated: never compile this
-module with ``fastmath``.
+`cross`, `dot`, `where`, `like` and `rounded` serves both number types. The error-free transforms are those of Dekker
+(1971) and Knuth. Sums and products follow Joldes, Muller & Popescu (2017), with relative errors of at most 3 u^2 for
+the sum, 7 u^2 for the product and 15 u^2 for the quotient, u = 2^-53. No operation may be reassociated: never compile
+this module with ``fastmath``.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import operator
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from numba import types
@@ -35,7 +36,7 @@ _FACTORIALS = [Fraction(1, math.factorial(n)) for n in range(_TERMS + 1)]
 _INVERSE_FACTORIALS = tuple((float(exact), float(exact - Fraction(float(exact)))) for exact in _FACTORIALS)
 
 # Without wrappers and counts of references, which no operator needs, numba compiles an operator in half the time.
-_OPTIONS: Any = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+OPTIONS: Any = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
 _compile = jit(linked=True, _nrt=False)
 
 
@@ -161,7 +162,7 @@ def are_mixed(a: Any, b: Any) -> bool:
 
 
 def _set_operator(symbol: Any, rule: Any) -> None:
-    @overload(symbol, jit_options=_OPTIONS)
+    @overload(symbol, jit_options=OPTIONS)
     def typed(a, b):
         return (lambda a, b: rule(extended(a), extended(b))) if are_mixed(a, b) else None
 
@@ -185,7 +186,7 @@ for _symbol in (operator.lt, operator.le, operator.gt, operator.ge, operator.eq)
     _set_comparison(_symbol)
 
 
-@overload(operator.neg, jit_options=_OPTIONS)
+@overload(operator.neg, jit_options=OPTIONS)
 def _negative(a):
     return (lambda a: double_double(-a.high, -a.low)) if a == DOUBLE_DOUBLE else None
 
@@ -194,7 +195,7 @@ def root(x):
     """Return the square root of a number of either type."""
 
 
-@overload(root, jit_options=_OPTIONS)
+@overload(root, jit_options=OPTIONS)
 def _root(x):
     return (lambda x: square_root(x)) if x == DOUBLE_DOUBLE else lambda x: math.sqrt(x)
 
@@ -203,11 +204,45 @@ def scaled(factor, x):
     """Return a number of either type times a power of 2, exactly."""
 
 
-@overload(scaled, jit_options=_OPTIONS)
+@overload(scaled, jit_options=OPTIONS)
 def _scaled(factor, x):
     if x == DOUBLE_DOUBLE:
         return lambda factor, x: double_double(factor * x.high, factor * x.low)
     return lambda factor, x: factor * x
+
+
+def like(x, value):
+    """Return a double as a number of the type of x."""
+
+
+@overload(like, jit_options=OPTIONS)
+def _like(x, value):
+    return (lambda x, value: extended(value)) if x == DOUBLE_DOUBLE else lambda x, value: value
+
+
+def rounded(x):
+    """Return a number of either type as a double."""
+
+
+@overload(rounded, jit_options=OPTIONS)
+def _rounded(x):
+    return (lambda x: x.high) if x == DOUBLE_DOUBLE else lambda x: x
+
+
+@intrinsic
+def where(typing, condition, yes, no):
+    """-> number: one of two numbers, a double-double if one of them is; both are computed, and there is no branch.
+
+    A conditional expression is a branch at first. The compiler would join those of one condition, and then write to the
+    columns of a wave with a mask, which is slow on many processors, or not vectorise at all.
+    """
+    if DOUBLE_DOUBLE not in (yes, no):
+        return types.float64(types.boolean, types.float64, types.float64), lambda *given: given[1].select(*given[3])
+
+    def select(context, builder, signature, values):
+        return builder.select(values[0], *map(partial(extend, context, builder), (yes, no), values[1:]))
+
+    return DOUBLE_DOUBLE(types.boolean, yes, no), select
 
 
 @_compile

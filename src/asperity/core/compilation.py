@@ -81,7 +81,7 @@ def digest() -> int:
     package = Path(__file__).parents[1]
     sources = [Path(__file__), package / "core" / "rounding.py"]
     for folder in ("compiled", "double_double", "scene"):
-        sources += sorted(package.glob(f"geometry/**/{folder}/*.py"))
+        sources += sorted(package.glob(f"geometry/**/{folder}/**/*.py"))
     return int.from_bytes(hashlib.sha256(b"".join(source.read_bytes() for source in sources)).digest()[:8], "big")
 
 

@@ -10,12 +10,12 @@ from numba import njit
 
 from asperity.core.rounding import EPS
 from asperity.geometry import Arc, Bezier
-from asperity.geometry.tracing.compiled import records as doubles
-from asperity.geometry.tracing.compiled.rays import SLOTS, nearest_piece, reflect, slots_at, tables_at
+from asperity.geometry.tracing.compiled import refined_tracing as twin
+from asperity.geometry.tracing.compiled.pieces import records
+from asperity.geometry.tracing.compiled.pieces.formulas import mirror, with_length_one
+from asperity.geometry.tracing.compiled.pieces.kinds import refined_surface, reflect
+from asperity.geometry.tracing.compiled.rays import SLOTS, nearest_piece, slots_at, tables_at
 from asperity.geometry.tracing.compiled.rays import scope_of as scope_in_doubles
-from asperity.geometry.tracing.double_double import rays as twin
-from asperity.geometry.tracing.double_double import records as pairs
-from asperity.geometry.tracing.double_double.formulas import mirror, with_length_one
 from asperity.geometry.tracing.double_double.numbers import extended
 from asperity.geometry.tracing.refinement import tables_of
 from wall_shapes import CLOSED
@@ -43,15 +43,15 @@ def trace_in_doubles(tables, slots, rays, found):
     """Two hits of each ray: the time, the number of the piece, the position s, the point and the new velocity."""
     scope = scope_in_doubles(tables_at(tables), 0, slots_at(slots))
     for i in range(rays.shape[0]):
-        (px, py, vx, vy), own = rays[i], doubles.Own(doubles.OPENING, -1, -1.0, 0.0, -1, 0)
+        (px, py, vx, vy), own = rays[i], records.Own(records.OPENING, -1, -1.0, 0.0, -1, 0)
         for k in range(2):
             hit, _ = nearest_piece(scope, own, px, py, vx, vy)
-            if hit.kind == doubles.NO_PIECE:
+            if hit.kind == records.NO_PIECE:
                 break
             px, py, vx, vy, _ = reflect(scope, hit, own, px, py, vx, vy)
             vx, vy = with_length_one(vx, vy)
             found[i, k] = hit.time, float(hit.number), hit.s, px, py, vx, vy
-            own = doubles.Own(hit.kind, hit.number, hit.s if hit.kind == doubles.BEZIER else -1.0, hit.time, -1, k + 1)
+            own = records.Own(hit.kind, hit.number, hit.s if hit.kind == records.BEZIER else -1.0, hit.time, -1, k + 1)
 
 
 @compiled
@@ -60,18 +60,19 @@ def trace_in_double_doubles(tables, rays, found):
     scope = twin.scope_of(tables, 0)
     for i in range(rays.shape[0]):
         px, py, vx, vy = extended(rays[i, 0]), extended(rays[i, 1]), extended(rays[i, 2]), extended(rays[i, 3])
-        own = pairs.Hit(extended(0.0), pairs.OPENING, -1, extended(-1.0))
-        sizes = pairs.Sizes(1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, EPS)
+        own = records.Hit(extended(0.0), records.OPENING, -1, extended(-1.0), 0)
+        sizes = records.Sizes(1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, EPS)
         for k in range(2):
             hit, _ = twin.nearest_line(scope, own, sizes, px, py, vx, vy)
             hit, _ = twin.nearest_curve(scope, own, hit, px, py, vx, vy, twin.error_of(scope, sizes))
-            if hit.kind == pairs.NO_PIECE:
+            if hit.kind == records.NO_PIECE:
                 break
-            px, py, nx, ny, _ = twin.point_of(tables, hit, px, py, vx, vy)
+            px, py, nx, ny, _ = refined_surface(tables, hit, px, py, vx, vy)
             vx, vy = mirror(vx, vy, nx, ny)
             vx, vy = with_length_one(vx, vy)
             found[i, k] = hit.time.high, float(hit.number), hit.s.high, px.high, py.high, vx.high, vy.high
-            own = pairs.Hit(hit.time, hit.kind, hit.number, hit.s if hit.kind == pairs.BEZIER else extended(-1.0))
+            s = hit.s if hit.kind == records.BEZIER else extended(-1.0)
+            own = records.Hit(hit.time, hit.kind, hit.number, s, 0)
 
 
 TYPES = ("doubles", "double-doubles")

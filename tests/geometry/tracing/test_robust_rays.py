@@ -9,8 +9,8 @@ import pytest
 from campaigns.rays.aimed_rays import WALLS, explained, follow_twin
 
 from asperity import geometry as geo
+from asperity.geometry.tracing.compiled.pieces.records import Rays, results_for
 from asperity.geometry.tracing.compiled.rays import trace_into
-from asperity.geometry.tracing.compiled.records import Rays, results_for
 from asperity.geometry.tracing.refinement import refined_trace
 from asperity.geometry.tracing.threads import new_flag
 

@@ -14,8 +14,7 @@ from numba import njit
 
 from asperity import geometry as geo
 from asperity.geometry.polygons.predicates import ExactPoints
-from asperity.geometry.tracing.compiled.pieces import Line, line_hit
-from asperity.geometry.tracing.double_double.sides import orientation
+from asperity.geometry.tracing.compiled.pieces.lines import Line, line_hit, orientation
 from asperity.geometry.tracing.refinement import refined_trace
 
 PRECISE_RAYS = 6

@@ -11,8 +11,9 @@ from numba import njit, types
 
 from asperity import geometry as geo
 from asperity.geometry.tracing import tracing
-from asperity.geometry.tracing.compiled import closed_forms, pieces, waves
-from asperity.geometry.tracing.compiled.pointers import Late
+from asperity.geometry.tracing.compiled import closed_forms, waves
+from asperity.geometry.tracing.compiled.pieces import lines
+from asperity.geometry.tracing.compiled.pieces.pointers import Late
 from asperity.geometry.tracing.compiled.trigonometry import mirrored
 from asperity.geometry.tracing.threads import new_flag
 
@@ -21,7 +22,7 @@ RAYS = 5_000
 
 NUMBER, COUNT = types.float64, types.int64
 WORK, LISTS = types.Array(NUMBER, 1, "C"), types.Array(COUNT, 1, "C")
-PAIR, CURVE, LINE = types.UniTuple(NUMBER, 2), types.UniTuple(NUMBER, 15), types.NamedUniTuple(NUMBER, 9, pieces.Line)
+PAIR, CURVE, LINE = types.UniTuple(NUMBER, 2), types.UniTuple(NUMBER, 15), types.NamedUniTuple(NUMBER, 9, lines.Line)
 LOOPS = {
     waves.meet_corner: (WORK, COUNT, NUMBER, NUMBER, NUMBER),
     waves.meet_line: (WORK, COUNT, LINE, NUMBER, NUMBER, NUMBER),

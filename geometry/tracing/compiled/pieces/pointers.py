@@ -17,7 +17,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from ....core.compilation import is_stored
+from .....core.compilation import is_stored
 
 Result = TypeVar("Result")
 

@@ -9,7 +9,7 @@ takes as long to compile as the function.
 
 from __future__ import annotations
 
-from ....core.compilation import jit
+from .....core.compilation import jit
 
 compiled = jit(_nrt=False)
 # For functions that only compiled functions call.

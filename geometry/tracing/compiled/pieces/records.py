@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ....core.checks import Floats
-from ...scene.structs import Struct
+from .....core.checks import Floats
+from ....scene.structs import Struct
 
 # Kinds of obstacles; OPENING is the opening of the hollow, SIDE a side of an open wall.
-NO_PIECE, OPENING, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
+NO_PIECE, OPENING, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 
 
 class Slots(NamedTuple):
@@ -43,11 +43,41 @@ class Scope(NamedTuple):
     right: float
     slack: float
     joints: tuple[int, int]
-    circles: tuple[int, int]
-    ellipses: tuple[int, int]
+    arcs: tuple[int, int]
     beziers: tuple[int, int]
     has_tree: bool
     slots: Any
+
+
+class RefinedTables(NamedTuple):
+    """The tables of a wall for double-double arithmetic.
+
+    ``arcs`` is the table of `refined_arcs`; ``bands`` are the bands of heights of an open
+    wall without pieces.
+    """
+
+    hollows: Floats
+    joints: Floats
+    lines: Floats
+    pairs: Floats
+    arcs: Floats
+    beziers: Floats
+    bands: Floats
+    cell: float
+    is_open: bool
+
+
+class RefinedScope(NamedTuple):
+    """The hollow that contains a ray in double-double arithmetic: as `Scope`, and the scale of lengths."""
+
+    tables: RefinedTables
+    scale: float
+    left: float
+    right: float
+    slack: float
+    joints: tuple[int, int]
+    arcs: tuple[int, int]
+    beziers: tuple[int, int]
 
 
 class Own(NamedTuple):
@@ -70,7 +100,7 @@ class Hit(NamedTuple):
     """The end of a ray segment: time (inf for no hit), kind and row of the piece, position s on it, and uncertainty.
 
     On a line, s is a fraction, negative if relative to the line's end; on a Bezier piece, s is the parameter. The
-    uncertainty is 0, 1 if hit and miss are not distinguished, or `UNCERTAIN`.
+    uncertainty is 0, 1 if hit and miss are not distinguished, or `UNCERTAIN`. In double-doubles, time and s are.
     """
 
     time: float
@@ -78,6 +108,24 @@ class Hit(NamedTuple):
     number: int
     s: float
     uncertainty: int
+
+
+class Sizes(NamedTuple):
+    """The quantities computed along a ray, see `refined_tracing`; displacements are in units of the scale.
+
+    The Jacobi fields of a displacement (j1, a1) and of a rotation (j2, a2); the sum C of M M^T, with entries for
+    displacement and rotation, and the number of local errors in C; half an ulp of the incoming angle.
+    """
+
+    j1: float
+    a1: float
+    j2: float
+    a2: float
+    c_jj: float
+    c_ja: float
+    c_aa: float
+    errors: float
+    half_ulp: float
 
 
 class Rays(NamedTuple):

@@ -1,9 +1,9 @@
 """The compiled tracer in double-double arithmetic, for the few rays that double precision does not resolve.
 
-Loads numba. The formulas are the same as in `compiled.rays`; those of curves are in `arcs` and `beziers`. The wall is
-exact: its joints are the doubles of the tables, and segments join them. A circular arc goes through both of its joints
-and subtends the double in its table (elliptic arcs in stretched coordinates). A Bezier piece has the coefficients of
-its table, except the highest, which is adjusted so that the piece ends at its joint. The ray starts from exact doubles.
+Loads numba. The formulas of the pieces are those of `rays`, see `pieces`. The wall is exact: its joints are the doubles
+of the tables, and segments join them. A circular arc goes through both of its joints and subtends the double in its
+table (elliptic arcs in stretched coordinates). A Bezier piece has the coefficients of its table, except the highest,
+which is adjusted so that the piece ends at its joint. The ray starts from exact doubles.
 
 Three quantities are computed along a ray.
 
@@ -26,17 +26,27 @@ import math
 
 import numpy as np
 
-from ....core.compilation import jit
-from ....core.rounding import EPS
 from ...scene import columns as c
-from ...scene.tolerances import JOINT_ULPS
-from .arcs import arc_hit, arc_point
-from .beziers import bezier_hit, bezier_point
-from .formulas import TOP_CORNER, mirror, opening_at, opening_met, with_length_one
-from .numbers import LOCAL_ERROR, cross, direction_angle, dot, extended, sine_cosine, two_product, two_sum
-from .records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit, Scope, Sizes
-from .runs import LAST_HITS, crossings, skip_chords
-from .sides import Arrival, Face, in_front_at, line_ends, line_frame, line_in_front_of_line, orientation
+from ..double_double.numbers import (
+    LOCAL_ERROR,
+    cross,
+    direction_angle,
+    dot,
+    extended,
+    sine_cosine,
+    two_product,
+    two_sum,
+    where,
+)
+from .pieces.arcs import refined_arc_hit
+from .pieces.beziers import refined_bezier_hit
+from .pieces.formulas import TOP_CORNER, bounds_of, exit_time, mirror, opening_at, with_length_one
+from .pieces.kinds import refined_face, refined_surface
+from .pieces.lines import line_ends, orientation
+from .pieces.options import compiled, linked
+from .pieces.records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit, RefinedScope, Sizes
+from .pieces.sides import Arrival, in_front_at, line_in_front_of_line
+from .runs import LAST_REFINED_HITS, refined_crossings, skip_refined_chords
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, UNRESOLVED, UNSETTLED = 0, 1, 2, 3, 4, 5
 # pi - math.pi
@@ -45,10 +55,9 @@ PI_REST = 1.2246467991473532e-16
 WIDTH_MARGIN = 1.0 + 2.0**-20
 # Accumulated rounding error, as a fraction of the scale, above which a ray remains unresolved.
 LARGEST_ERROR = 2.0**-50
-_compile = jit(linked=True, _nrt=False)
 
 
-@_compile
+@linked
 def free_cells(bands, py, vx, vy, cell, width, spread):
     """-> (cells, step): the number of cells that a ray passes without coming near a piece, and the step in y per cell.
 
@@ -64,22 +73,14 @@ def free_cells(bands, py, vx, vy, cell, width, spread):
             if vy.high < 0.0:
                 behind, room = high - py.high, py.high - low
             margin = width + spread * room / abs(vy.high)
-            cells = math.floor((room - margin) * abs(vx.high / vy.high) / cell - LAST_HITS)
+            cells = math.floor((room - margin) * abs(vx.high / vy.high) / cell - LAST_REFINED_HITS)
             # beyond 2^53 not all integers are doubles
             if behind > margin and 0.0 < cells < 2.0**53:
                 return cells, cell * (vy / (vx if vx > 0.0 else -vx))
     return 0.0, extended(0.0)
 
 
-@_compile
-def face_of(tables, hit):
-    """-> Face: the piece of a hit as an argument of `in_front_at`."""
-    _, kind, number, s = hit
-    arc, curve = tables.arcs[number if kind == ARC else 0], tables.beziers[number if kind == BEZIER else 0]
-    return Face(kind, number, arc, curve, s)
-
-
-@_compile
+@linked
 def meets(tables, hit, own, px, py, vx, vy, clearance):
     """-> bool: whether a computed hit counts, that is, whether the ray starts in front of the piece.
 
@@ -94,29 +95,29 @@ def meets(tables, hit, own, px, py, vx, vy, clearance):
     arrival = Arrival(own.time.high, slack, error)
     if hit.kind == LINE and own.kind == LINE:
         return line_in_front_of_line(tables.joints, hit.number, own.number, px, py, vx.high, vy.high, arrival)
-    piece, start = face_of(tables, hit), face_of(tables, own)
+    piece, start = refined_face(tables, hit), refined_face(tables, own)
     return in_front_at(tables.joints, piece, start, px, py, vx.high, vy.high, arrival)
 
 
-@_compile
+@linked
 def local_error(sizes):
     """-> float: bound on the rounding error of the ray, as a fraction of the scale."""
     return LOCAL_ERROR * math.sqrt(sizes.errors * (sizes.c_jj + sizes.c_aa))
 
 
-@_compile
+@linked
 def error_of(scope, sizes):
     """-> float: bound on the transversal error of the ray on its segment, at a distance of up to one scale."""
     return 2.0 * scope.scale * local_error(sizes)
 
 
-@_compile
+@linked
 def amplification_of(sizes):
     """-> float: norm of the derivative of the map."""
     return math.sqrt(sizes.j1 * sizes.j1 + sizes.a1 * sizes.a1 + sizes.j2 * sizes.j2 + sizes.a2 * sizes.a2)
 
 
-@_compile
+@linked
 def after_flight(sizes, flight):
     """-> Sizes: the sizes after a ray segment, whose length is in units of the scale."""
     j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
@@ -124,7 +125,7 @@ def after_flight(sizes, flight):
     return Sizes(j1 + flight * a1, a1, j2 + flight * a2, a2, c_jj, c_ja + flight * c_aa, c_aa, errors, half_ulp)
 
 
-@_compile
+@linked
 def after_reflection(sizes, power):
     """-> Sizes: the sizes after a reflection; the power of a straight piece is 0."""
     j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
@@ -132,14 +133,14 @@ def after_reflection(sizes, power):
     return Sizes(j1, a1 - power * j1, j2, a2 - power * j2, c_jj, c_ja - power * c_jj, c_aa, errors, half_ulp)
 
 
-@_compile
+@linked
 def with_new_error(sizes):
     """-> Sizes: the sizes with one more local error."""
     j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
     return Sizes(j1, a1, j2, a2, c_jj + 1.0, c_ja, c_aa + 1.0, errors + 1.0, half_ulp)
 
 
-@_compile
+@linked
 def after_chords(sizes, chords, length):
     """-> Sizes: the sizes after a run of equal chords on a circle, whose length is in units of the scale.
 
@@ -155,20 +156,20 @@ def after_chords(sizes, chords, length):
     return Sizes(j1, a1, j2, a2, after_jj, after_ja, after_aa, errors, half_ulp)
 
 
-@_compile
+@linked
 def width_at(scope, sizes, ahead, error):
     """-> float: width of the ray plus its error, at the distance ``ahead``."""
     tilt = sizes.half_ulp * abs(scope.scale * sizes.j2 + ahead * sizes.a2)
     return WIDTH_MARGIN * tilt + (1.0 + ahead / scope.scale) * error
 
 
-@_compile
+@linked
 def nearest_line(scope, own, sizes, px, py, vx, vy):
     """-> (Hit, corner): the first hit on a line, and the time to the first corner in the ray's width, or inf."""
     tables, error = scope.tables, error_of(scope, sizes)
     joints = tables.joints
-    first, end = int(scope.hollow[c.FIRST_JOINT]), int(scope.hollow[c.JOINTS_END])
-    nearest, corner = Hit(extended(np.inf), NO_PIECE, -1, extended(0.0)), np.inf
+    first, end = scope.joints
+    nearest, corner = Hit(extended(np.inf), NO_PIECE, -1, extended(0.0), 0), np.inf
     before = extended(0.0)
     for j in range(first, end):
         dx, dy = joints[j, c.JOINT_X] - px, joints[j, c.JOINT_Y] - py
@@ -186,87 +187,47 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
             dy = y0 + fraction * two_sum(y1, -y0) - py
             t = dot(dx, dy, vx, vy)
             height = t.high * (before.high - after.high) / tables.lines[j - 1, c.LENGTH]
-            hit = Hit(t, LINE, j - 1, fraction)
+            hit = Hit(t, LINE, j - 1, fraction, 0)
             if t < nearest.time and meets(tables, hit, own, px, py, vx, vy, (height, scope.slack, error)):
                 nearest = hit
         before = after
     return nearest, corner
 
 
-@_compile
+@linked
 def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
     """-> (Hit, graze): the first hit on a curve before ``nearest``, or ``nearest``; time of undecided contact."""
-    tables, slack, hollow = scope.tables, scope.slack, scope.hollow
+    tables, slack = scope.tables, scope.slack
     graze = np.inf
-    for before, first, end in (
-        (0, hollow[c.FIRST_CIRCLE], hollow[c.CIRCLES_END]),
-        (tables.first_ellipse, hollow[c.FIRST_ELLIPSE], hollow[c.ELLIPSES_END]),
-    ):
-        for k in range(before + int(first), before + int(end)):
-            widest = max(1.0, tables.arcs[k, c.STRETCH])
-            is_own = own.kind == ARC and own.number == k
-            t, undecided, height = arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
-            graze = min(graze, undecided)
-            hit, clearance = Hit(t, ARC, k, own.s), (height, slack * widest, error * widest)
-            if t < nearest.time and meets(tables, hit, own, px, py, vx, vy, clearance):
-                nearest = hit
-    for k in range(int(hollow[c.FIRST_BEZIER]), int(hollow[c.BEZIERS_END])):
+    for k in range(scope.arcs[0], scope.arcs[1]):
+        widest = max(1.0, tables.arcs[k, c.STRETCH])
+        is_own = own.kind == ARC and own.number == k
+        t, undecided, height = refined_arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
+        graze = min(graze, undecided)
+        hit, clearance = Hit(t, ARC, k, own.s, 0), (height, slack * widest, error * widest)
+        if t < nearest.time and meets(tables, hit, own, px, py, vx, vy, clearance):
+            nearest = hit
+    for k in range(scope.beziers[0], scope.beziers[1]):
         own_s = own.s if own.kind == BEZIER and own.number == k else extended(-1.0)
-        t, s, undecided, near_s = bezier_hit(tables.beziers[k], own_s, px, py, vx, vy, slack, error)
+        t, s, undecided, near_s = refined_bezier_hit(tables.beziers[k], own_s, px, py, vx, vy, slack, error)
         graze = min(graze, undecided)
         if t < nearest.time:
-            nearest = Hit(t, BEZIER, k, s)
+            nearest = Hit(t, BEZIER, k, s, 0)
         if near_s >= 0.0:
-            hit = Hit(extended(0.0), BEZIER, k, near_s)
+            hit = Hit(extended(0.0), BEZIER, k, near_s, 0)
             if meets(tables, hit, own, px, py, vx, vy, (0.0, slack, error)):
                 nearest = hit
     return nearest, graze
 
 
-@_compile
-def exit_time(scope, own, hit, px, py, vx, vy):
-    """-> Hit: the opening or a side of an open wall if it is met before the hit, else the hit.
-
-    A piece within rounding of the opening or of a side is hit first.
-    """
-    left, right, slack, is_open = scope.hollow[c.LEFT], scope.hollow[c.RIGHT], scope.slack, scope.tables.is_open
-    time, kind = hit.time, hit.kind
-    if vy > 0.0 and own.kind != OPENING and py.high + time.high * vy.high > slack:
-        t, is_met = opening_met(left, right, px, py, vx, vy)
-        if is_met or is_open:
-            time, kind = t, OPENING
-    if is_open and vx.high != 0.0:
-        t = ((right if vx > 0.0 else left) - px) / vx
-        beyond = abs(vx.high) * (time.high - t.high)
-        if beyond > slack or (kind == OPENING and t < time):
-            time, kind = t, SIDE
-    if time < 0.0:
-        time = extended(0.0)
-    return Hit(time, kind, hit.number, hit.s)
-
-
-@_compile
-def point_of(tables, hit, px, py, vx, vy):
-    """-> (qx, qy, nx, ny, bent): the end of a ray segment, the unit normal there, and the curvature (a double)."""
-    if hit.kind == LINE:
-        x0, y0, ex, ey, nx, ny = line_frame(tables.joints, hit.number)
-        return x0 + hit.s * ex, y0 + hit.s * ey, nx, ny, 0.0
-    if hit.kind == ARC:
-        return arc_point(tables.arcs[hit.number], hit.time, px, py, vx, vy)
-    if hit.kind == BEZIER:
-        return bezier_point(tables.beziers[hit.number], hit.s)
-    nx, ny = (0.0, 1.0) if hit.kind == OPENING else (1.0, 0.0)
-    return px + hit.time * vx, py + hit.time * vy, extended(nx), extended(ny), 0.0
-
-
-@_compile
+@linked
 def meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
     """-> bool: whether a corner in the ray's width is met before the hit or together with it.
 
     A corner at the end of the piece is further away than the hit by at most the width over the sine of incidence.
     """
     joints, error = scope.tables.joints, error_of(scope, sizes)
-    for j in range(int(scope.hollow[c.FIRST_JOINT]), int(scope.hollow[c.JOINTS_END])):
+    for j in range(scope.joints[0], scope.joints[1]):
         if joints[j, c.IS_CORNER] > 0.0:
             dx, dy = joints[j, c.JOINT_X] - px, joints[j, c.JOINT_Y] - py
             ahead = dot(dx, dy, vx, vy).high
@@ -282,7 +243,7 @@ def meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
     return False
 
 
-@_compile
+@linked
 def pass_cells(scope, sizes, py, vx, vy, error):
     """-> (py, cells, Sizes): the ray after it has passed a side and all cells in which it comes near no piece.
 
@@ -290,7 +251,7 @@ def pass_cells(scope, sizes, py, vx, vy, error):
     """
     cell, scale = scope.tables.cell, scope.scale
     # the two ends of the wall are the same point, and a ray passes a side above this point
-    end = scope.tables.joints[int(scope.hollow[c.FIRST_JOINT]), c.JOINT_Y]
+    end = scope.tables.joints[scope.joints[0], c.JOINT_Y]
     py = extended(end) if py < end else py
     spread = WIDTH_MARGIN * sizes.half_ulp * abs(sizes.a2) + error / scale
     width = WIDTH_MARGIN * sizes.half_ulp * scale * abs(sizes.j2) + error
@@ -298,14 +259,14 @@ def pass_cells(scope, sizes, py, vx, vy, error):
     return py + cells * step, cells, after_flight(sizes, cells * cell / abs(vx.high) / scale)
 
 
-@_compile
+@linked
 def refined_ray(scope, entry, theta, limit, most_segments):
     """-> (x, angle, bounces, status, amplification, rounding): trace one ray; x and angle are double-doubles.
 
     ``entry`` is a double-double in the hollow. The amplification is the norm of the map's derivative in the units
     (scale, radian).
     """
-    tables, scale, left, right = scope.tables, scope.scale, scope.hollow[c.LEFT], scope.hollow[c.RIGHT]
+    tables, scale, left, right = scope.tables, scope.scale, scope.left, scope.right
     px, py = entry, extended(0.0)
     sine, cosine = sine_cosine(theta)
     vx, vy = -cosine, -sine
@@ -313,7 +274,7 @@ def refined_ray(scope, entry, theta, limit, most_segments):
     sizes = Sizes(1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, math.ldexp(1.0, exponent - 54))
     norm, nowhere = 1.0, extended(0.0)
     wraps, bounces, steps = 0, 0, 0
-    own = Hit(extended(0.0), OPENING, -1, extended(-1.0))
+    own = Hit(extended(0.0), OPENING, -1, extended(-1.0), 0)
     while True:
         local = local_error(sizes)
         if not local <= LARGEST_ERROR:
@@ -321,13 +282,14 @@ def refined_ray(scope, entry, theta, limit, most_segments):
         error = error_of(scope, sizes)
         hit, corner = nearest_line(scope, own, sizes, px, py, vx, vy)
         hit, graze = nearest_curve(scope, own, hit, px, py, vx, vy, error)
-        hit = exit_time(scope, own, hit, px, py, vx, vy)
+        time, kind = exit_time(scope, own, px, py, vx, vy, hit.time)
+        hit = Hit(where(time > 0.0, time, 0.0), kind if kind != NO_PIECE else hit.kind, hit.number, hit.s, 0)
         steps += 1
         if graze < np.inf and graze <= hit.time.high + error:
             return px, nowhere, bounces, GRAZING, norm, local
         if hit.kind == NO_PIECE:
             return px, nowhere, bounces, CORNER if corner < np.inf else UNRESOLVED, norm, local
-        qx, qy, nx, ny, bent = point_of(tables, hit, px, py, vx, vy)
+        qx, qy, nx, ny, bent = refined_surface(tables, hit, px, py, vx, vy)
         incidence = abs(dot(vx, vy, nx, ny).high)
         if corner < np.inf and meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
             return px, nowhere, bounces, CORNER, norm, local
@@ -352,28 +314,29 @@ def refined_ray(scope, entry, theta, limit, most_segments):
             sizes = after_reflection(sizes, 2.0 * bent * scale / incidence)
             bounces += 1
             if hit.kind == LINE and own.kind == LINE:
-                hits, travel, flight = crossings(tables, hit.number, own.number, py, vx, vy, limit - bounces)
+                hits, travel, flight = refined_crossings(tables, hit.number, own.number, py, vx, vy, limit - bounces)
                 bounces += hits
                 py = py + travel
                 sizes = after_flight(sizes, flight / scale)
             if hit.kind == ARC:
-                hits, px, py, vx, vy = skip_chords(tables.arcs[hit.number], px, py, vx, vy, limit - bounces)
+                hits, px, py, vx, vy = skip_refined_chords(tables.arcs[hit.number], px, py, vx, vy, limit - bounces)
                 if hits > 0:
                     bounces += hits
                     sizes = after_chords(with_new_error(sizes), float(hits), 2.0 * incidence / (bent * scale))
         norm = amplification_of(sizes)
         sizes = with_new_error(sizes)
-        own = Hit(flown, hit.kind, hit.number, hit.s if hit.kind == BEZIER else extended(-1.0))
+        own = Hit(flown, hit.kind, hit.number, hit.s if hit.kind == BEZIER else extended(-1.0), 0)
 
 
-@_compile
+@linked
 def scope_of(tables, h):
-    """-> Scope: hollow number h."""
-    size = tables.hollows[h, c.SIZE]
-    return Scope(tables, tables.hollows[h], tables.cell + size, JOINT_ULPS * EPS * size)
+    """-> RefinedScope: hollow number h."""
+    hollow = tables.hollows[h]
+    left, right, slack, joints, arcs, beziers = bounds_of(hollow)
+    return RefinedScope(tables, tables.cell + hollow[c.SIZE], left, right, slack, joints, arcs, beziers)
 
 
-@jit(_nrt=False)
+@compiled
 def refined_rays(x, theta, tables, limit, most_segments, results):
     """Trace rays into ``results``, as double-doubles."""
     out_x, out_theta, bounces, status, amplification, rounding = results

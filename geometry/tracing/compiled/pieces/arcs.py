@@ -1,0 +1,293 @@
+"""Circular and elliptic arcs, in both number types: the hits of a ray, the point of the hit, distances. Loads numba.
+
+A circular arc is F(r) = n0.r - kappa |r|^2 / 2 = 0, with r relative to its first joint and n0 the unit normal there,
+towards the free side; kappa > 0 is focusing. With B the rate of F along a ray of velocity v and
+D = B^2 + 2 kappa |v|^2 F, the front root is (B + sqrt(D)) / (kappa |v|^2), and 2 B / (kappa |v|^2) if the ray starts on
+the arc. An elliptic arc is circular in coordinates with y multiplied by its stretch.
+
+In doubles an arc is a row of the table ``arcs`` or, for many rays, the tuple of the row's numbers; in double-doubles it
+is a row of `refined_arcs`. Its *form* is the tuple of the numbers n0 and kappa.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .....core.compilation import jit
+from .....core.rounding import EPS
+from ....scene import columns as c
+from ....scene.tolerances import NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
+from ...double_double.numbers import (
+    LOCAL_ERROR,
+    cross,
+    dot,
+    double_double,
+    extended,
+    like,
+    root,
+    scaled,
+    sine_cosine,
+    two_sum,
+    where,
+)
+from .options import inlined, linked
+
+# Bound, times B^2 + |v|^2, on the error of D that `tangent_error` gives for a ray near a tangency: there kappa |r| is
+# at most |B| and the chord over the radius.
+NEARLY_TANGENT = 4.0 * TANGENT_ULPS * EPS
+
+
+@inlined
+def arc_form(arc):
+    """-> (n0x, n0y, curvature): the form of an arc."""
+    return arc[c.NORMAL_X], arc[c.NORMAL_Y], arc[c.CURVATURE]
+
+
+@inlined
+def arc_chord(arc):
+    """-> (ex, ey, short): the unit vector along the chord, and its length, 0 for half angles beyond pi/4."""
+    return arc[c.CHORD_X], arc[c.CHORD_Y], arc[c.SHORT_CHORD]
+
+
+@jit()
+def refined_arcs(arcs):
+    """Return the table of arcs that go through both joints exactly and subtend their span exactly.
+
+    It has the columns of arcs, then the low parts of the numbers from NORMAL_X to SHORT_CHORD.
+    """
+    # at least one row, because `face_of` passes a row also for a wall without arcs
+    table = np.zeros((max(1, arcs.shape[0]), c.REFINED_ARC_COLUMNS))
+    for k in range(arcs.shape[0]):
+        arc, row = arcs[k], table[k]
+        for column in range(c.ARC_COLUMNS):
+            row[column] = arc[column]
+        cx, cy = two_sum(arc[c.END_X], -arc[c.START_X]), arc[c.STRETCH] * two_sum(arc[c.END_Y], -arc[c.START_Y])
+        length = root(dot(cx, cy, cx, cy))
+        ex, ey = cx / length, cy / length
+        sine, cosine = sine_cosine(0.5 * arc[c.SPAN])
+        if arc[c.CURVATURE] < 0.0:
+            sine = -sine
+        # n0 = (s ex - c ey, s ey + c ex), kappa = 2 s / length
+        nx, ny = sine * ex - cosine * ey, sine * ey + cosine * ex
+        curvature = scaled(2.0, sine) / length
+        numbers = nx, ny, curvature, ex, ey, length if arc[c.SHORT_CHORD] > 0.0 else extended(0.0)
+        for j in range(len(numbers)):
+            row[c.NORMAL_X + j], row[c.NORMAL_X + j + c.LOWS] = numbers[j].high, numbers[j].low
+    return table
+
+
+@linked
+def number_at(arc, column):
+    """-> number: the double-double in a column of a row of `refined_arcs`."""
+    return double_double(arc[column], arc[column + c.LOWS])
+
+
+@linked
+def refined_form(arc):
+    """-> (n0x, n0y, curvature): the form of an arc in double-doubles."""
+    return number_at(arc, c.NORMAL_X), number_at(arc, c.NORMAL_Y), number_at(arc, c.CURVATURE)
+
+
+@linked
+def refined_chord(arc):
+    """-> (ex, ey, short): `arc_chord` in double-doubles."""
+    return number_at(arc, c.CHORD_X), number_at(arc, c.CHORD_Y), number_at(arc, c.SHORT_CHORD)
+
+
+@inlined
+def form_value(form, x, y):
+    """-> number: F at a position relative to the first joint."""
+    nx, ny, curvature = form
+    return dot(nx, ny, x, y) - scaled(0.5, curvature * dot(x, y, x, y))
+
+
+@inlined
+def arc_normal(form, stretch, x, y):
+    """-> (nx, ny): the gradient of F with its y stretched: a normal of the arc, without stretch the unit normal."""
+    nx, ny, curvature = form
+    return nx - curvature * x, stretch * (ny - curvature * y)
+
+
+@inlined
+def arc_terms(form, x, y, vx, vy):
+    """-> (b, f, d, speed2): the numbers B, F, D and |v|^2 of a ray, in coordinates with a circular arc."""
+    nx, ny, curvature = form
+    b = dot(nx, ny, vx, vy) - curvature * dot(x, y, vx, vy)
+    f, speed2 = form_value(form, x, y), dot(vx, vy, vx, vy)
+    return b, f, b * b + scaled(2.0, curvature * speed2 * f), speed2
+
+
+@inlined
+def arc_root(form, is_own, b, f, root_of_d, speed2):
+    """-> number: time to the front of an arc, of a ray that meets it."""
+    _, _, curvature = form
+    # only of a focusing arc
+    far = b >= where(curvature > 0.0, 0.0, float("inf"))
+    top = where(is_own, scaled(2.0, b), where(far, b + root_of_d, scaled(2.0, f)))
+    return top / where(is_own | far, curvature * speed2, root_of_d - b)
+
+
+@inlined
+def front_hit(form, own, b, f, d, speed2):
+    """-> (t, height): time to the front of the full circle or ellipse, inf if there is no hit.
+
+    For a hit close by, ``height`` is about the distance of the start in front of the arc, in coordinates with a
+    circular arc; inf for a hit on the far side of a focusing arc.
+    """
+    _, _, curvature = form
+    far = own or b >= 0.0
+    if (far and curvature <= 0.0) or (own and b <= 0.0) or (not own and d < 0.0):
+        return like(b, np.inf), like(b, np.inf)
+    return arc_root(form, own, b, f, root(where(own, 0.0, d)), speed2), where(far, np.inf, f)
+
+
+@inlined
+def beyond_end(form, chord, x, y):
+    """-> number: how far a point of the full circle, relative to the first joint, is beyond an end of the arc.
+
+    The distance is along or across the chord, inf on the far side of the circle, and at most 0 on the arc.
+    """
+    (_, _, curvature), (ex, ey, short) = form, chord
+    # up to a half angle of pi/4: by the position along the chord, on the arc's side of the circle
+    along, (nx, ny) = dot(x, y, ex, ey), arc_normal(form, 1.0, x, y)
+    beyond = where(-along > along - short, -along, along - short)
+    # larger half angles: by the side of the chord; the arc curves away from its free side exactly if it is focusing
+    height = cross(ex, ey, x, y)
+    height = where(curvature > 0.0, height, -height)
+    return where(short > 0.0, where(cross(ex, ey, nx, ny) > 0.0, beyond, float("inf")), height)
+
+
+@inlined
+def arc_point(form, arc, stretch, t, px, py, vx, vy):
+    """-> (x, y, nx, ny): the position on an arc after the time t, by a Newton step on F, and the unit normal there."""
+    x, y = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
+    f, (nx, ny) = form_value(form, x, y), arc_normal(form, 1.0, x, y)
+    x, y = x - f * nx, y - f * ny
+    nx, ny = arc_normal(form, stretch, x, y)
+    scale = 1.0 / root(dot(nx, ny, nx, ny))
+    return arc[c.START_X] + x, arc[c.START_Y] + y / stretch, nx * scale, ny * scale
+
+
+@inlined
+def arc_time(arc, own, px, py, vx, vy):
+    """-> (t, tangent, height): `front_hit` of a ray in doubles; ``tangent`` is 1 if rounding may make it a miss."""
+    form, stretch = arc_form(arc), arc[c.STRETCH]
+    rx, ry = px - arc[c.START_X], stretch * (py - arc[c.START_Y])
+    b, f, d, speed2 = arc_terms(form, rx, ry, vx, stretch * vy)
+    tangent = 0
+    if not own and is_nearly_tangent(arc, b, d, speed2) and abs(d) <= tangent_error(arc, b, rx, ry, speed2):
+        tangent = 1
+        d = 0.0
+    t, height = front_hit(form, own, b, f, d, speed2)
+    return t, tangent, height
+
+
+@inlined
+def is_nearly_tangent(arc, b, d, speed2):
+    """-> bool: whether hit and miss of a ray that started elsewhere may not be distinguished; see `tangent_error`."""
+    dispersing = b < where(arc[c.CURVATURE] < 0.0, 0.0, -np.inf)
+    return dispersing & (abs(d) <= NEARLY_TANGENT * (b * b + speed2))
+
+
+@inlined
+def tangent_error(arc, b, rx, ry, speed2):
+    """-> float: the size of D up to which a tangent hit and a miss are not distinguished.
+
+    B has rounding errors of 3 + 4 kappa |r| eps, and F of (3 + 2 kappa |r|) |r| eps; kappa |r| is about |B|. At a
+    smooth joint of two arcs a ray between their tangents is tangent to neither, and D is at most the square of their
+    angle.
+    """
+    size = abs(arc[c.CURVATURE]) * (abs(rx) + abs(ry))
+    return TANGENT_ULPS * EPS * (b * b + (abs(b) + size) * math.sqrt(speed2)) + SMOOTH_JOINT * SMOOTH_JOINT * speed2
+
+
+@inlined
+def end_excess(arc, qx, qy):
+    """-> float: `beyond_end` in doubles."""
+    return beyond_end(arc_form(arc), arc_chord(arc), qx, qy)
+
+
+@inlined
+def on_arc_after(arc, t, px, py, vx, vy, slack):
+    """-> bool: whether the point of the full circle after the time t is on the arc.
+
+    At grazing incidence rounding moves the point along the arc by more than the slack; at a smooth joint of two arcs it
+    would be on neither.
+    """
+    stretch = arc[c.STRETCH]
+    qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
+    beyond, room = end_excess(arc, qx, qy), slack * max(1.0, stretch)
+    if room < beyond <= NEARBY_SLACKS * room:
+        ex, ey = arc[c.END_X] - arc[c.START_X], stretch * (arc[c.END_Y] - arc[c.START_Y])
+        is_late = 2.0 * (qx * ex + qy * ey) > ex * ex + ey * ey
+        is_corner = arc[c.END_CORNER if is_late else c.START_CORNER] > 0.0
+        return not is_corner and beyond * arc_incidence(arc, t, px, py, vx, vy) <= room
+    return beyond <= room
+
+
+@inlined
+def may_touch_arc(arc, t, px, py, vx, vy, slack):
+    """-> bool: whether a ray whose line touches the full circle after the time t may touch the arc.
+
+    The hits that rounding does not distinguish from a tangent one lie up to sqrt(D) / (kappa |v|) beside it.
+    """
+    stretch = arc[c.STRETCH]
+    rx, ry, wy = px - arc[c.START_X], stretch * (py - arc[c.START_Y]), stretch * vy
+    b, _, _, speed2 = arc_terms(arc_form(arc), rx, ry, vx, wy)
+    reach = math.sqrt(tangent_error(arc, b, rx, ry, speed2) / speed2) / abs(arc[c.CURVATURE])
+    return end_excess(arc, rx + t * vx, ry + t * wy) <= slack * max(1.0, stretch) + reach
+
+
+@inlined
+def arc_incidence(arc, t, px, py, vx, vy):
+    """-> float: sine of the angle between the velocity and the arc after the time t."""
+    stretch = arc[c.STRETCH]
+    qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
+    nx, ny = arc_normal(arc_form(arc), stretch, qx, qy)
+    return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)
+
+
+@linked
+def refined_arc_hit(arc, own, px, py, vx, vy, error):
+    """-> (t, undecided, height): `front_hit` on the arc in double-doubles; time of an undecided contact, or inf.
+
+    ``error`` bounds the transversal error of the ray at the arc.
+    """
+    form, chord, stretch, undecided = refined_form(arc), refined_chord(arc), arc[c.STRETCH], np.inf
+    widest = max(1.0, stretch)
+    rx, ry, wy = px - arc[c.START_X], stretch * (py - arc[c.START_Y]), stretch * vy
+    b, f, d, speed2 = arc_terms(form, rx, ry, vx, wy)
+    _, _, curvature = form
+    if not own and curvature < 0.0 and b < 0.0:
+        # d = w^2 - kappa^2 (distance of the line from the centre)^2 w^2; kappa times distance is about 1 at d = 0
+        noise = 8.0 * LOCAL_ERROR * (b.high * b.high + 2.0 * abs((curvature * speed2 * f).high))
+        if abs(d.high) <= noise + 4.0 * abs(curvature.high) * widest**4 * error:
+            t = arc_root(form, own, b, f, extended(0.0), speed2)
+            if t > 0.0 and beyond_end(form, chord, rx + t * vx, ry + t * wy) <= error:
+                undecided = t.high
+    t, height = front_hit(form, own, b, f, d, speed2)
+    if t < np.inf and beyond_end(form, chord, rx + t * vx, ry + t * wy) > error * widest:
+        t, height = extended(np.inf), extended(np.inf)
+    return t, undecided, height.high
+
+
+@linked
+def arc_height(arc, px, py):
+    """-> (height, nx, ny): distance of a position close to an arc, positive on the free side; unit normal.
+
+    Position and results are double-doubles.
+    """
+    form, stretch = refined_form(arc), arc[c.STRETCH]
+    qx, qy = px - arc[c.START_X], stretch * (py - arc[c.START_Y])
+    nx, ny = arc_normal(form, stretch, qx, qy)
+    size = root(dot(nx, ny, nx, ny))
+    return form_value(form, qx, qy) / size, nx / size, ny / size
+
+
+@inlined
+def arc_bend(arc, nx, ny):
+    """-> float: the curvature of an arc, positive if it is focusing, where (nx, ny) is the unit normal."""
+    stretch = arc[c.STRETCH]
+    return arc[c.CURVATURE] * (ny * ny + (stretch * nx) ** 2) * math.sqrt(nx * nx + (ny / stretch) ** 2)
