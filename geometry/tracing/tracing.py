@@ -214,8 +214,9 @@ def trace(
     unresolved = []
 
     def run(block: slice) -> None:
+        # block by block, because each thread checks its own
+        _check_rays(given[block], incoming[block])
         if starts is not given:
-            _check_rays(given[block], incoming[block])
             starts[block] = entries(wall, given[block], incoming[block])
         found = status[block]
         trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], found)
@@ -280,28 +281,24 @@ def _goes_in_waves(scene: Scene, rays: int) -> bool:
         return False
     if np.all(scene.closed[:, c.FORM] != c.NO_FORM):
         return False
-    from .compiled.closed_forms import SIMPLE
+    from .compiled.blocks import SIMPLE
 
     return SIMPLE.is_worth(rays, COMPILING_PAYS)
 
 
 def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in_waves: bool) -> Callable[..., None]:
-    """Return a function of x, theta and four arrays to fill, which traces by closed forms where possible.
-
-    It checks the rays, block by block because each thread checks its own, and raises `InvalidRays`.
-    """
+    """Return a function of x, theta and four arrays to fill, which traces by closed forms where possible."""
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         from .compiled.pieces.records import Rays
         from .compiled.rays import trace_into
 
-        _check_rays(x, theta)
         trace_into(Rays._make((x, theta, *results, stop)), scene.tables, max_collisions)
 
     rooms: list[Any] = []
 
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
-        from .compiled.closed_forms import CROSSINGS, RAYS, UNDECIDED, room_for, trace_closed
+        from .compiled.blocks import CROSSINGS, RAYS, UNDECIDED, room_for, trace_hollows
         from .compiled.pieces.pointers import checked
 
         tables = scene.tables.address
@@ -312,10 +309,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
         while first < len(x) and not stop[0]:
             part = slice(first, first + size)
             entry, angle, found = x[part], theta[part], tuple(result[part] for result in results)
-            if not checked(
-                partial(trace_closed, entry, angle, tables, scene.closed, max_collisions, found, room, crossings)
-            ):
-                raise InvalidRays
+            checked(partial(trace_hollows, entry, angle, tables, scene.closed, max_collisions, found, room, crossings))
             if in_waves and np.count_nonzero(found[-1] == UNDECIDED) > MOST_LEFT * len(entry):
                 crossings = (*CROSSINGS[:2], 0)
             first += size

@@ -11,7 +11,7 @@ from numba import njit, types
 
 from asperity import geometry as geo
 from asperity.geometry.tracing import tracing
-from asperity.geometry.tracing.compiled import closed_forms, waves
+from asperity.geometry.tracing.compiled import blocks, waves
 from asperity.geometry.tracing.compiled.pieces import lines
 from asperity.geometry.tracing.compiled.pieces.pointers import Late
 from asperity.geometry.tracing.compiled.trigonometry import mirrored
@@ -67,10 +67,10 @@ def rays(wall):
 def test_few_rays_are_left_to_the_loop(wall):
     x, theta = rays(wall)
     results = np.empty(RAYS), np.empty(RAYS), np.empty(RAYS, np.int64), np.empty(RAYS, np.uint8)
-    room = closed_forms.room_for(wall.scene.hollows, RAYS)
-    given = x, theta, wall.scene.tables.address, wall.scene.closed, 2**62, results, room, closed_forms.CROSSINGS
-    closed_forms.trace_closed(*given)
-    assert np.mean(results[-1] == closed_forms.UNDECIDED) < 0.01
+    room = blocks.room_for(wall.scene.hollows, RAYS)
+    given = x, theta, wall.scene.tables.address, wall.scene.closed, 2**62, results, room, blocks.CROSSINGS
+    blocks.trace_hollows(*given)
+    assert np.mean(results[-1] == blocks.UNDECIDED) < 0.01
 
 
 @pytest.mark.parametrize("wall", ["valley of arcs", "random teeth", "double-parabola"], indirect=True)
@@ -107,6 +107,6 @@ def test_a_function_is_worth_its_compilation_once_it_is_wanted_often_or_stored()
     assert not late.is_worth(4, 10)
     assert not late.is_worth(5, 10)
     assert late.is_worth(1, 10)
-    used = Late(closed_forms.cross_simple, *closed_forms.SIMPLE._kinds)
-    closed_forms.SIMPLE.load()
+    used = Late(blocks.cross_simple, *blocks.SIMPLE._kinds)
+    blocks.SIMPLE.load()
     assert used.is_worth(1, 10)
