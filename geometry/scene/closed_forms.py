@@ -1,6 +1,6 @@
-"""The table of hollows with a closed form of their reflection: two lines, or one circular arc.
+"""The closed forms of the reflection by hollows of two lines, or of one circular arc.
 
-`tracing/compiled/closed_forms` reads its rows; `columns` names its columns. A *wedge* is a hollow of two lines. Its
+`tracing/compiled/closed_forms` reads them; `columns` names their numbers. A *wedge* is a hollow of two lines. Its
 triangle is unfolded about the apex into copies, in which a ray is straight; the ray leaves through the first copy of
 the opening that it meets. A *circular hollow* is one circular arc of at most a half circle: all chords of a ray are
 equal.
@@ -34,42 +34,36 @@ FLATTEST_ARC = 0.05
 MOST_PIECES = 2
 # Angle, radians, up to which a wedge is traced hit by hit, with runs of hits computed in one step.
 NARROWEST_WEDGE = WIDEST_WEDGE
+# Of a hollow without a closed form.
+NONE = c.NO_FORM, np.empty(0)
 
 
-def closed_form_of(pieces: Sequence[Curve], points: Sequence[Point], size: float) -> Floats:
-    """Return the row of one hollow; ``points`` are its joints from left to right."""
+def closed_form_of(pieces: Sequence[Curve], points: Sequence[Point], size: float) -> tuple[float, Floats]:
+    """Return the kind and the numbers of the form of one hollow; ``points`` are its joints from left to right."""
     (left, top), (right, other) = points[0], points[-1]
     if top == other == 0.0 and left < right:
         if len(pieces) == 2 and all(isinstance(piece, Segment) for piece in pieces):
             return _wedge_form(left, right, points[1], size)
         if len(pieces) == 1 and isinstance(pieces[0], Arc) and pieces[0].is_circular:
             return _arc_form(left, right, pieces[0])
-    return row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM})
+    return NONE
 
 
-def closed_table(rows: Sequence[Floats]) -> Floats:
-    """Return all rows as one table."""
-    table = np.zeros((len(rows), max(map(len, rows), default=c.FORM_COLUMNS)))
-    for k, row in enumerate(rows):
-        table[k, : len(row)] = row
-    return table
-
-
-def _wedge_form(left: float, right: float, apex: Point, size: float) -> Floats:
+def _wedge_form(left: float, right: float, apex: Point, size: float) -> tuple[float, Floats]:
     x, y = apex
     # inclinations of the two lines, each measured from its own end of the opening
     west, east = atan2(-y, x - left), atan2(-y, right - x)
     angle = fsum([pi, -west, -east])
     # the chain of the unfolded ends of the opening is convex if the apex lies below the opening
     if not left <= x <= right or angle <= NARROWEST_WEDGE:
-        return row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM})
+        return NONE
     # a straight ray turns by less than pi about the apex
     copies = ceil(pi / angle)
     links = copies + 2
     row = row_of(
         c.CHAIN + 2 * links * c.LINK_COLUMNS,
         {
-            c.FORM: c.WEDGE, c.FORM_LEFT: left, c.FORM_RIGHT: right, c.UNCERTAINTY: UNCERTAIN_FRACTION * size,
+            c.FORM_LEFT: left, c.FORM_RIGHT: right, c.UNCERTAINTY: UNCERTAIN_FRACTION * size,
             c.WEDGE_X: x, c.WEDGE_Y: y, c.COPIES: copies,
         },
     )  # fmt: skip
@@ -80,7 +74,7 @@ def _wedge_form(left: float, right: float, apex: Point, size: float) -> Floats:
             link = c.CHAIN + (start + k) * c.LINK_COLUMNS
             row[link + c.LINK_X], row[link + c.LINK_Y] = x + side * length * cos(polar), y + length * sin(polar)
             row[link + c.LINK_CONSTANT] = _constant(k, side, first, angle)
-    return row
+    return c.WEDGE, row
 
 
 def _constant(hits: int, side: float, first: float, angle: float) -> float:
@@ -95,17 +89,15 @@ def _constant(hits: int, side: float, first: float, angle: float) -> float:
     return constant if side > 0.0 else 2.0 * pi - constant
 
 
-def _arc_form(left: float, right: float, arc: Arc) -> Floats:
+def _arc_form(left: float, right: float, arc: Arc) -> tuple[float, Floats]:
     half = 0.5 * (arc.end_angle - arc.start_angle)
     if not FLATTEST_ARC <= half <= 0.5 * pi:
-        return row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM})
+        return NONE
     radius = 0.5 * (right - left) / sin(half)
     # at pi/2 the centre lies on the opening
     height = radius * cos(half) if half < 0.5 * pi else 0.0
-    return row_of(
-        c.FORM_COLUMNS,
-        {
-            c.FORM: c.CIRCULAR, c.FORM_LEFT: left, c.FORM_RIGHT: right, c.UNCERTAINTY: UNCERTAIN_FRACTION,
-            c.CIRCLE_X: 0.5 * (left + right), c.CIRCLE_Y: height, c.RADIUS: radius, c.HALF_ANGLE: half,
-        },
-    )  # fmt: skip
+    numbers = {
+        c.FORM_LEFT: left, c.FORM_RIGHT: right, c.UNCERTAINTY: UNCERTAIN_FRACTION,
+        c.CIRCLE_X: 0.5 * (left + right), c.CIRCLE_Y: height, c.RADIUS: radius, c.HALF_ANGLE: half,
+    }  # fmt: skip
+    return c.CIRCULAR, row_of(c.CIRCULAR_COLUMNS, numbers)

@@ -36,9 +36,13 @@ LEFT_EDGE = 9  # the left end of the opening: NO_EDGE, SMOOTH_EDGE or CORNER_EDG
 RIGHT_EDGE = 10  # the right end
 TREE_ROOT = 11  # row of the root in `boxes`, of the tree over the lines of a hollow that has many
 TREE_LEVELS = 12  # number of levels of the tree, 0 without a tree
-HOLLOW_COLUMNS = 13
+FORM = 13  # kind of the closed form of the reflection
+FORM_START = 14  # place of its first number in `closed`
+HOLLOW_COLUMNS = 15
 # Kinds of ends of an opening; NO_EDGE for an open wall.
 NO_EDGE, SMOOTH_EDGE, CORNER_EDGE = 0.0, 1.0, 2.0
+# Kinds of closed forms.
+NO_FORM, WEDGE, CIRCULAR = 0.0, 1.0, 2.0
 
 # joints: the ends of pieces, chain by chain; row j + 1 is the other end of the piece that starts at row j.
 JOINT_X = 0
@@ -109,22 +113,19 @@ BEZIER_COLUMNS = 15
 LOWS = 9
 REFINED_ARC_COLUMNS = 21
 
-# closed: one row for each hollow, see `closed_forms`.
-FORM = 0  # NO_FORM, WEDGE or CIRCULAR
-FORM_LEFT = 1  # x of the ends of the opening
-FORM_RIGHT = 2
-UNCERTAINTY = 3  # a ray closer to a joint is traced hit by hit: a length in wedges, an angle in circular hollows
-CIRCLE_X = 4  # the centre
-CIRCLE_Y = 5
-RADIUS = 6
-HALF_ANGLE = 7  # of the arc
-WEDGE_X = 4  # the apex
-WEDGE_Y = 5
-COPIES = 6  # number K of copies of the triangle that a straight ray can meet
-CHAIN = 7  # K + 2 links for rays that meet the right line first, then K + 2 links for the other rays
-FORM_COLUMNS = 8  # of a circular hollow
-# Kinds of closed forms.
-NO_FORM, WEDGE, CIRCULAR = 0.0, 1.0, 2.0
+# closed: one after another the closed forms of the hollows that have one, see `closed_forms`; places in a form.
+FORM_LEFT = 0  # x of the ends of the opening
+FORM_RIGHT = 1
+UNCERTAINTY = 2  # a ray closer to a joint is traced hit by hit: a length in wedges, an angle in circular hollows
+CIRCLE_X = 3  # the centre
+CIRCLE_Y = 4
+RADIUS = 5
+HALF_ANGLE = 6  # of the arc
+CIRCULAR_COLUMNS = 7
+WEDGE_X = 3  # the apex
+WEDGE_Y = 4
+COPIES = 5  # number K of copies of the triangle that a straight ray can meet
+CHAIN = 6  # K + 2 links for rays that meet the right line first, then K + 2 links for the other rays
 # Columns of a link of a wedge's chain, relative to its first column: the unfolded end of the opening, and c in
 # theta' = +-theta + c after k hits for link k. Link 0 is the end of the opening on the other side.
 LINK_X = 0

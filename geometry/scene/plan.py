@@ -90,7 +90,7 @@ def plan_of(wall: Cell, scene: Scene, is_mirror_symmetric: bool) -> TracePlan:
         wraps=scene.is_open,
         channels=parallel,
         wedges=len(scene.pairs) // 2 - parallel,
-        closed_forms=int((scene.closed[:, c.FORM] != c.NO_FORM).sum()),
+        closed_forms=int((scene.hollows[:, c.FORM] != c.NO_FORM).sum()),
         hollows_with_grid=int((scene.hollows[:, c.TREE_LEVELS] > 0.0).sum()),
         distinct_hollows=len(distinct_hollows(wall)) if wall.closes else 1,
         mirror_symmetric=is_mirror_symmetric,

@@ -23,7 +23,7 @@ from ..curves.crossings import directions_of, straight_in
 from ..curves.curve import Curve, Point
 from . import columns as c
 from .boxes import TREE_COLUMNS, tree_of
-from .closed_forms import MOST_PIECES, closed_form_of, closed_table
+from .closed_forms import MOST_PIECES, closed_form_of
 from .columns import row_of, table_of
 from .escapes import escape_sectors
 from .facing import facing_pairs
@@ -43,6 +43,10 @@ TREE_LINES = 48
 GRID_DIGITS = 50
 # Nominal time of a segment in seconds, and how many times as long it takes on Bezier curves.
 SEGMENT_TIME, BEZIER_FACTOR = 2e-7, 4.0
+# Numbers of columns of the tables in `Tables` after the hollows.
+TABLE_COLUMNS = (
+    c.JOINT_COLUMNS, c.LINE_COLUMNS, c.ARC_COLUMNS, c.BEZIER_COLUMNS, c.PAIR_COLUMNS, TREE_COLUMNS, 1,
+)  # fmt: skip
 
 
 def hull_of(piece: Curve, start: Point, end: Point) -> list[Point]:
@@ -102,7 +106,10 @@ def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
 
 
 class Tables(NamedTuple):
-    """The tables of a scene as arguments of compiled functions; tables of absent primitives are empty."""
+    """The tables of a wall as arguments of compiled functions; tables of absent primitives are empty.
+
+    ``closed`` has one column.
+    """
 
     hollows: Floats
     joints: Floats
@@ -111,50 +118,19 @@ class Tables(NamedTuple):
     beziers: Floats
     pairs: Floats
     boxes: Floats
+    closed: Floats
     hollow_count: int
     cell: float
     is_open: bool
 
 
-# Empty tables, with the types of all tables.
-NO_TABLES = Struct(
-    Tables(
-        np.empty((0, c.HOLLOW_COLUMNS)),
-        np.empty((0, c.JOINT_COLUMNS)),
-        np.empty((0, c.LINE_COLUMNS)),
-        np.empty((0, c.ARC_COLUMNS)),
-        np.empty((0, c.BEZIER_COLUMNS)),
-        np.empty((0, c.PAIR_COLUMNS)),
-        np.empty((0, TREE_COLUMNS)),
-        0,
-        1.0,
-        False,
-    )
-)
-
-
-@dataclass(frozen=True)
-class Scene:
+class Scene(Tables):
     """The tables of one wall; see the docstring of this module."""
-
-    hollows: Floats
-    joints: Floats
-    lines: Floats
-    arcs: Floats
-    beziers: Floats
-    pairs: Floats
-    boxes: Floats
-    cell: float
-    is_open: bool
-    closed: Floats
 
     @cached_property
     def tables(self) -> Struct:
-        """The tables with types equal for all walls, so that each function is compiled once."""
-        return Struct(Tables(
-            self.hollows, self.joints, self.lines, self.arcs, self.beziers, self.pairs, self.boxes,
-            len(self.hollows), float(self.cell), bool(self.is_open),
-        ))  # fmt: skip
+        """The tables in memory, with types equal for all walls, so that each function is compiled once."""
+        return Struct(Tables(*self))
 
     @property
     def segment_time(self) -> float:
@@ -174,7 +150,7 @@ class Scene:
 
 def scene_of(wall: Cell) -> Scene:
     """Build the tables of a wall."""
-    tables = _Tables()
+    tables = _Tables(wall.period, not wall.closes)
     chain = _chain_of(wall.pieces, wall.vertices)
     if wall.closes:
         for hollow in wall.hollows:
@@ -184,7 +160,7 @@ def scene_of(wall: Cell) -> Scene:
     else:
         chains = [chain, *map(_chain_of, wall.islands, wall.island_vertices)]
         tables.add_hollow(0.0, wall.period, chains, edges=(c.NO_EDGE, c.NO_EDGE))
-    return tables.scene(wall.period, not wall.closes)
+    return tables.scene()
 
 
 def _edge(is_corner: bool) -> float:
@@ -262,15 +238,11 @@ def _with_exact_faces(chains: list[_Chain]) -> list[_Chain]:
 class _Tables:
     """The tables of a scene under construction; each hollow adds a block of rows to every one."""
 
-    def __init__(self) -> None:
+    def __init__(self, cell: float, is_open: bool) -> None:
+        self.cell, self.is_open = float(cell), bool(is_open)
         self.hollows: list[Floats] = []
-        self.joints = _Blocks(c.JOINT_COLUMNS)
-        self.lines = _Blocks(c.LINE_COLUMNS)
-        self.arcs = _Blocks(c.ARC_COLUMNS)
-        self.beziers = _Blocks(c.BEZIER_COLUMNS)
-        self.pairs = _Blocks(c.PAIR_COLUMNS)
-        self.boxes = _Blocks(TREE_COLUMNS)
-        self.closed: list[Floats] = []
+        self._blocks = tuple(map(_Blocks, TABLE_COLUMNS))
+        self.joints, self.lines, self.arcs, self.beziers, self.pairs, self.boxes, self.closed = self._blocks
 
     def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[float, float]) -> None:
         """Append one hollow, or the whole cell of an open wall."""
@@ -294,10 +266,11 @@ class _Tables:
         self.joints.append(joints)
         self.lines.append(lines)
         self.hollows[-1][[c.JOINTS_END, c.ARCS_END, c.BEZIERS_END]] = self._sizes()
-        form = None
         if is_closed and len(chains[0].pieces) <= MOST_PIECES:
-            form = closed_form_of(chains[0].pieces, list(map(chains[0].joint, range(len(chains[0].vertices)))), size)
-        self.closed.append(row_of(c.FORM_COLUMNS, {c.FORM: c.NO_FORM}) if form is None else form)
+            points = list(map(chains[0].joint, range(len(chains[0].vertices))))
+            kind, form = closed_form_of(chains[0].pieces, points, size)
+            self.hollows[-1][[c.FORM, c.FORM_START]] = kind, self.closed.count
+            self.closed.append(form[:, np.newaxis])
 
     def _sizes(self) -> tuple[int, int, int]:
         return self.joints.count, self.arcs.count, self.beziers.count
@@ -343,11 +316,9 @@ class _Tables:
             lines[line - first, c.PAIRS_END] += 1.0
         self.pairs.append(table_of(table, c.PAIR_COLUMNS))
 
-    def scene(self, cell: float, is_open: bool) -> Scene:
-        return Scene(
-            table_of(self.hollows, c.HOLLOW_COLUMNS), self.joints.whole(), self.lines.whole(), self.arcs.whole(),
-            self.beziers.whole(), self.pairs.whole(), self.boxes.whole(), cell, is_open, closed_table(self.closed),
-        )  # fmt: skip
+    def scene(self) -> Scene:
+        hollows, tables = table_of(self.hollows, c.HOLLOW_COLUMNS), (block.whole() for block in self._blocks)
+        return Scene._make((hollows, *tables, len(hollows), self.cell, self.is_open))
 
 
 class _Blocks:
@@ -413,3 +384,7 @@ def _with_runs(arcs: Floats, chains: list[_Chain], size: float) -> Floats:
         if half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
             row[c.RUN_SINE] = sin(half / RUN_CHORDS)
     return arcs
+
+
+# Empty tables, with the types of all tables.
+NO_TABLES = _Tables(1.0, True).scene().tables

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..scene import columns as c
+from ..scene.scene import Tables
 from ..scene.tolerances import JOINT_ULPS
-from .compiled.pieces.records import RefinedTables
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -57,21 +57,17 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
         np.empty(count), np.empty(count),
     )  # fmt: skip
     starts, angles = np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64)
-    refined_rays(starts, angles, tables_of(scene), max_collisions, REFINED_SEGMENTS, results)
+    refined_rays(starts, angles, tables_of(scene), _free_bands(scene), max_collisions, REFINED_SEGMENTS, results)
     return results
 
 
-def tables_of(scene: Scene) -> RefinedTables:
-    """Return the tables of a wall for double-double arithmetic."""
+def tables_of(scene: Scene) -> Tables:
+    """Return the tables of a wall for double-double arithmetic, with arcs as by `refined_arcs`."""
     from .compiled.pieces.arcs import refined_arcs
 
-    arcs = refined_arcs(scene.arcs)
-    # at least one row, as of arcs, because `face_of` passes a row also for a wall without Bezier pieces
+    # at least one row, as of arcs, because `refined_face` passes a row also for a wall without Bezier pieces
     beziers = scene.beziers if len(scene.beziers) else np.zeros((1, c.BEZIER_COLUMNS))
-    return RefinedTables(
-        scene.hollows, scene.joints, scene.lines, scene.pairs, arcs, beziers, _free_bands(scene),
-        scene.cell, scene.is_open,
-    )  # fmt: skip
+    return Tables(*scene._replace(arcs=refined_arcs(scene.arcs), beziers=beziers))
 
 
 def retrace(

@@ -279,7 +279,7 @@ def _goes_in_waves(scene: Scene, rays: int) -> bool:
     """Whether rays are traced in waves, which needs a function that takes a second to compile once on a machine."""
     if rays < MANY_RAYS or scene.is_open or np.any(scene.arcs[:, c.STRETCH] != 1.0) or len(scene.boxes):
         return False
-    if np.all(scene.closed[:, c.FORM] != c.NO_FORM):
+    if np.all(scene.hollows[:, c.FORM] != c.NO_FORM):
         return False
     from .compiled.blocks import SIMPLE
 
@@ -309,7 +309,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
         while first < len(x) and not stop[0]:
             part = slice(first, first + size)
             entry, angle, found = x[part], theta[part], tuple(result[part] for result in results)
-            checked(partial(trace_hollows, entry, angle, tables, scene.closed, max_collisions, found, room, crossings))
+            checked(partial(trace_hollows, entry, angle, tables, max_collisions, found, room, crossings))
             if in_waves and np.count_nonzero(found[-1] == UNDECIDED) > MOST_LEFT * len(entry):
                 crossings = (*CROSSINGS[:2], 0)
             first += size
@@ -322,7 +322,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
             for result, some in zip(results, followed, strict=True):
                 result[rest] = some
 
-    trace_block = close if in_waves or np.any(scene.closed[:, c.FORM] != c.NO_FORM) else follow
+    trace_block = close if in_waves or np.any(scene.hollows[:, c.FORM] != c.NO_FORM) else follow
 
     def in_order(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         order = np.argsort(x % scene.cell)

@@ -2,7 +2,6 @@
 
 import os
 import sqlite3
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -103,7 +102,7 @@ def test_a_tree_of_boxes_changes_no_bit(wall):
     plain = geo.Wall(wall.pieces, wall.period)
     hollows = plain.scene.hollows.copy()
     hollows[:, TREE_LEVELS] = 0.0
-    plain.__dict__["scene"] = replace(plain.scene, hollows=hollows, boxes=plain.scene.boxes[:0])
+    plain.__dict__["scene"] = plain.scene._replace(hollows=hollows, boxes=plain.scene.boxes[:0])
     assert bits(geo.trace(wall, x, theta, **limit)) == bits(geo.trace(plain, x, theta, **limit))
 
 

@@ -3,8 +3,6 @@
 Rays end where other tracers say: one in double-doubles, one in 50 digits, and a plain one with formulas of its own.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from campaigns.judges.plain_tracer import trace_plainly
@@ -185,15 +183,15 @@ def test_the_tracer_agrees_with_a_plain_one(wall, request):
 def hit_by_hit(wall):
     """The same wall without its closed forms, and with the marks that allow runs taken off its tables."""
     plain = geo.Wall(wall.pieces, wall.period, wall.islands)
-    arcs, lines, closed = (table.copy() for table in (plain.scene.arcs, plain.scene.lines, plain.scene.closed))
-    arcs[:, RUN_SINE], lines[:, [FIRST_PAIR, PAIRS_END]], closed[:, FORM] = 0.0, 0.0, NO_FORM
-    plain.__dict__["scene"] = replace(plain.scene, lines=lines, arcs=arcs, closed=closed)
+    hollows, lines, arcs = (getattr(plain.scene, name).copy() for name in ("hollows", "lines", "arcs"))
+    arcs[:, RUN_SINE], lines[:, [FIRST_PAIR, PAIRS_END]], hollows[:, FORM] = 0.0, 0.0, NO_FORM
+    plain.__dict__["scene"] = plain.scene._replace(hollows=hollows, lines=lines, arcs=arcs)
     return plain
 
 
 def test_closed_forms_and_runs_of_hits_in_one_step_change_nothing_but_the_time(closed_wall):
     scene = closed_wall.scene
-    if not (np.any(scene.closed[:, FORM] != NO_FORM) or len(scene.pairs) or len(scene.arcs)):
+    if not (np.any(scene.hollows[:, FORM] != NO_FORM) or len(scene.pairs) or len(scene.arcs)):
         pytest.skip("it is traced hit by hit")
     rng = np.random.default_rng(3)
     count = FEW if len(closed_wall.pieces) < MANY_PIECES else 100

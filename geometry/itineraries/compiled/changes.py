@@ -102,7 +102,7 @@ def setting_of(scene: Scene, hollow: int, limits: Limits, degree: int, edges: Fl
     rays = Struct(Rays(entries, angles, *results_for(BLOCK), np.zeros(1, np.int64)))
     tracer = TRACE.slot, rays, scene.tables, details_for(BLOCK), SLOTS, np.zeros(1, np.int64)
     edges, sizes = (np.require(values, np.float64, ["C", "A", "W"]) for values in (edges, sizes))
-    own = scene.tables.values.hollows[hollow], *limits, degree, len(edges), edges, sizes
+    own = scene.hollows[hollow], *limits, degree, len(edges), edges, sizes
     return Struct(Setting._make((*own, *tracer)))
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...scene import columns as c
+from ...scene.compiled.tables import ROW
 from .closed_forms import cross_arc, cross_wedge
 from .pieces.formulas import TOP_CORNER, last_hollow, opening_at
 from .pieces.options import compiled, inlined
@@ -67,22 +68,23 @@ def room_for(hollows: Floats, block: int) -> Room:
 
 
 NUMBERS, INTEGER = types.float64[::1], types.int64
-WEDGES, ARCS = Late(cross_wedge, *[NUMBERS] * 7), Late(cross_arc, *[NUMBERS] * 6)
+WEDGES, ARCS = Late(cross_wedge, ROW, *[NUMBERS] * 6), Late(cross_arc, ROW, *[NUMBERS] * 5)
 SIMPLE = Late(cross_simple, TABLES, INTEGER, INTEGER, *[NUMBERS] * 4, INTEGER[::1])
 # The slots of `cross_wedge`, `cross_arc` and `cross_simple`; 0 in place of the last one leaves its hollows undecided.
 CROSSINGS = WEDGES.slot, ARCS.slot, SIMPLE.slot
 
 
 @inlined
-def cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings):
+def cross_hollow(tables, h, limit, entry, angle, hits, room, crossings):
     """Reflect rays by hollow number h: by its closed form if it has one, else in waves if these are wanted."""
     count = entry.shape[0]
     first, second, third = room.numbers[0, :count], room.numbers[1, :count], room.numbers[2, :count]
     wedge, arc, simple = crossings
-    if closed[h, c.FORM] == c.WEDGE:
-        call_late(wedge, None, (closed[h], entry, angle, hits, first, second, third))
-    elif closed[h, c.FORM] == c.CIRCULAR:
-        call_late(arc, None, (closed[h], entry, angle, hits, first, second))
+    kind, form = tables.hollows[h, c.FORM], tables.closed[int(tables.hollows[h, c.FORM_START])]
+    if kind == c.WEDGE:
+        call_late(wedge, None, (form, entry, angle, hits, first, second, third))
+    elif kind == c.CIRCULAR:
+        call_late(arc, None, (form, entry, angle, hits, first, second))
     elif simple != 0:
         call_late(simple, None, (tables, h, limit, entry, angle, hits, room.waves, room.places))
     else:
@@ -135,11 +137,11 @@ def put_into_hollows(starts, theta, tables, results, room):
 
 
 @compiled
-def trace_hollows(x, theta, tables, closed, limit, results, room, crossings):
+def trace_hollows(x, theta, tables, limit, results, room, crossings):
     """Trace a block of rays by flat tops, closed forms and waves; all other rays get the status `UNDECIDED`.
 
-    ``closed`` are the closed forms; of the tables the address is given. ``results`` are four arrays to fill: x, theta,
-    collisions, status. ``room`` is `room_for`, ``crossings`` is `CROSSINGS`.
+    Of the tables the address is given. ``results`` are four arrays to fill: x, theta, collisions, status. ``room`` is
+    `room_for`, ``crossings`` is `CROSSINGS`.
     """
     tables = tables_at(tables)
     hollows, cell = tables.hollows, tables.cell
@@ -158,7 +160,7 @@ def trace_hollows(x, theta, tables, closed, limit, results, room, crossings):
                 ends[j] = starts[j] - cell_of(starts[j], cell)
             for j in range(count):
                 gone[j] = incoming[j]
-            cross_hollow(tables, closed, FIRST_HOLLOW, limit, ends, gone, hits, room, crossings)
+            cross_hollow(tables, FIRST_HOLLOW, limit, ends, gone, hits, room, crossings)
             for j in range(count):
                 ends[j] += cell_of(starts[j], cell)
             for j in range(count):
@@ -181,7 +183,7 @@ def trace_hollows(x, theta, tables, closed, limit, results, room, crossings):
             for j in range(count):
                 i = rays[j] & NATURAL
                 entry[j], angle[j] = starts[i] - bases[i], incoming[i]
-            cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings)
+            cross_hollow(tables, h, limit, entry, angle, hits, room, crossings)
             for j in range(count):
                 i = rays[j] & NATURAL
                 ends[i], gone[i], collisions[i] = entry[j] + bases[i], angle[j], int(hits[j])

@@ -1,6 +1,6 @@
 """The reflection of rays by hollows of two lines or of one circular arc, in closed form: compiled.
 
-A hollow is a row of the table of `scene/closed_forms`. The loops over rays have no branches and work in place, so the
+``form`` are the numbers of `scene/closed_forms`. The loops over rays have no branches and work in place, so the
 compiler vectorises them. They use sums, products, quotients, roots and selections only, so a ray's result does not
 depend on its block.
 """

@@ -255,7 +255,7 @@ def pass_cells(scope, sizes, py, vx, vy, error):
     py = extended(end) if py < end else py
     spread = WIDTH_MARGIN * sizes.half_ulp * abs(sizes.a2) + error / scale
     width = WIDTH_MARGIN * sizes.half_ulp * scale * abs(sizes.j2) + error
-    cells, step = free_cells(scope.tables.bands, py, vx, vy, cell, width, spread)
+    cells, step = free_cells(scope.bands, py, vx, vy, cell, width, spread)
     return py + cells * step, cells, after_flight(sizes, cells * cell / abs(vx.high) / scale)
 
 
@@ -329,15 +329,15 @@ def refined_ray(scope, entry, theta, limit, most_segments):
 
 
 @linked
-def scope_of(tables, h):
+def scope_of(tables, bands, h):
     """-> RefinedScope: hollow number h."""
     hollow = tables.hollows[h]
     left, right, slack, joints, arcs, beziers = bounds_of(hollow)
-    return RefinedScope(tables, tables.cell + hollow[c.SIZE], left, right, slack, joints, arcs, beziers)
+    return RefinedScope(tables, bands, tables.cell + hollow[c.SIZE], left, right, slack, joints, arcs, beziers)
 
 
 @compiled
-def refined_rays(x, theta, tables, limit, most_segments, results):
+def refined_rays(x, theta, tables, bands, limit, most_segments, results):
     """Trace rays into ``results``, as double-doubles."""
     out_x, out_theta, bounces, status, amplification, rounding = results
     cell = tables.cell
@@ -354,7 +354,7 @@ def refined_rays(x, theta, tables, limit, most_segments, results):
             out_x[i, c.HIGH], out_x[i, c.LOW] = x[i], 0.0
         else:
             end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
-                scope_of(tables, h), entry, theta[i], limit, most_segments
+                scope_of(tables, bands, h), entry, theta[i], limit, most_segments
             )
             end = base + end
             out_x[i, c.HIGH], out_x[i, c.LOW] = end.high, end.low

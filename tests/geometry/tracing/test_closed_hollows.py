@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import mpmath as mp
 import numpy as np
 import pytest
@@ -11,6 +9,7 @@ from campaigns.judges.precise_polynomials import POLYNOMIALS, coefficients
 from numba import njit
 
 from asperity import geometry as geo
+from asperity.geometry.scene.columns import FORM, NO_FORM
 from asperity.geometry.tracing.compiled import trigonometry as angle_engine
 
 EPS = 2.0**-52
@@ -22,7 +21,9 @@ def test_the_largest_number_of_collisions_ends_rays_alike(wall, limit):
     rng = np.random.default_rng(3)
     x, theta = rng.uniform(-2.0, 3.0, 20_000), np.arccos(1.0 - 2.0 * rng.random(20_000))
     plain = geo.Wall(wall.pieces, wall.period)
-    plain.__dict__["scene"] = replace(wall.scene, closed=np.zeros_like(wall.scene.closed))
+    hollows = wall.scene.hollows.copy()
+    hollows[:, FORM] = NO_FORM
+    plain.__dict__["scene"] = wall.scene._replace(hollows=hollows)
     closed, loop = (geo.trace(one, x, theta, max_collisions=limit) for one in (wall, plain))
     assert closed.counts() == loop.counts() and closed.counts()["bounce_limit"] > 200
     assert np.array_equal(closed.collisions, loop.collisions)

@@ -23,6 +23,8 @@ from wall_shapes import CLOSED
 # The tracer counts no references to arrays, nor may its callers.
 compiled = njit(error_model="numpy", _nrt=False)
 RAYS = 300
+# Of walls that close.
+NO_BANDS = np.empty((0, 2))
 # A wall of each kind of piece, without pieces of other kinds, and whether a ray can hit a piece twice in a row.
 KINDS = {
     "line": ("triangular-teeth", False),
@@ -55,9 +57,9 @@ def trace_in_doubles(tables, slots, rays, found):
 
 
 @compiled
-def trace_in_double_doubles(tables, rays, found):
+def trace_in_double_doubles(tables, bands, rays, found):
     """The same in double-double arithmetic."""
-    scope = twin.scope_of(tables, 0)
+    scope = twin.scope_of(tables, bands, 0)
     for i in range(rays.shape[0]):
         px, py, vx, vy = extended(rays[i, 0]), extended(rays[i, 1]), extended(rays[i, 2]), extended(rays[i, 3])
         own = records.Hit(extended(0.0), records.OPENING, -1, extended(-1.0), 0)
@@ -88,7 +90,7 @@ def hits(kind, number_type):
     if number_type == "doubles":
         trace_in_doubles(wall.scene.tables.address, SLOTS.address, rays, found)
     else:
-        trace_in_double_doubles(tables_of(wall.scene), rays, found)
+        trace_in_double_doubles(tables_of(wall.scene), NO_BANDS, rays, found)
     return wall, rays, found
 
 

@@ -68,7 +68,7 @@ def test_few_rays_are_left_to_the_loop(wall):
     x, theta = rays(wall)
     results = np.empty(RAYS), np.empty(RAYS), np.empty(RAYS, np.int64), np.empty(RAYS, np.uint8)
     room = blocks.room_for(wall.scene.hollows, RAYS)
-    given = x, theta, wall.scene.tables.address, wall.scene.closed, 2**62, results, room, blocks.CROSSINGS
+    given = x, theta, wall.scene.tables.address, 2**62, results, room, blocks.CROSSINGS
     blocks.trace_hollows(*given)
     assert np.mean(results[-1] == blocks.UNDECIDED) < 0.01
 

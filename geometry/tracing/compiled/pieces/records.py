@@ -49,28 +49,14 @@ class Scope(NamedTuple):
     slots: Any
 
 
-class RefinedTables(NamedTuple):
-    """The tables of a wall for double-double arithmetic.
+class RefinedScope(NamedTuple):
+    """The hollow that contains a ray in double-double arithmetic: as `Scope`.
 
-    ``arcs`` is the table of `refined_arcs`; ``bands`` are the bands of heights of an open
-    wall without pieces.
+    And the bands of heights of an open wall without pieces, and the scale of lengths.
     """
 
-    hollows: Floats
-    joints: Floats
-    lines: Floats
-    pairs: Floats
-    arcs: Floats
-    beziers: Floats
+    tables: Any
     bands: Floats
-    cell: float
-    is_open: bool
-
-
-class RefinedScope(NamedTuple):
-    """The hollow that contains a ray in double-double arithmetic: as `Scope`, and the scale of lengths."""
-
-    tables: RefinedTables
     scale: float
     left: float
     right: float
