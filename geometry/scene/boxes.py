@@ -1,8 +1,8 @@
-"""A tree of boxes about the straight pieces of a hollow: a ray is tested against up to eight boxes in one loop.
+"""A tree of boxes about the straight pieces of a hollow: a ray is tested against sixteen boxes at once.
 
-Pieces that follow each other along the wall are close to each other, so eight consecutive lines make a leaf, eight
-consecutive leaves a node, and so on up to the root. A row of the tree has up to eight lines with their ends, or
-boxes with their middles and half their widths and heights.
+Pieces that follow each other along the wall are close to each other, so sixteen consecutive lines make a leaf, sixteen
+consecutive leaves a node, and so on up to the root. A row of the tree has up to sixteen lines with their ends, or
+boxes with their middles and half their widths and heights; the rest of it is NaN.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 from ...core.checks import Floats
 from .tolerances import BOX_MARGIN
 
-# Most boxes, or lines, in a row.
-BOXES = 8
+# Most boxes, or lines, in a row; of four levels of nodes the masks are in one number, see `tracing/compiled/tree`.
+BOXES = 16
 # Columns of a row. Of a line the start and the end, of a box the middle and half of its width and height.
 ANCHOR_X = 0
 ANCHOR_Y = BOXES
@@ -21,8 +21,7 @@ OTHER_X = 2 * BOXES
 OTHER_Y = 3 * BOXES
 CONTENT = 4 * BOXES  # row of the first box's own row; of a leaf the joint at which the first line starts
 PARENT = 4 * BOXES + 1  # row of the node that contains this one
-COUNT = 4 * BOXES + 2  # number of boxes, or lines, in the row
-TREE_COLUMNS = 4 * BOXES + 3
+TREE_COLUMNS = 4 * BOXES + 2
 
 
 def tree_of(starts: Floats, ends: Floats, first: int, base: int, size: float) -> tuple[Floats, int]:
@@ -71,11 +70,10 @@ def tree_of(starts: Floats, ends: Floats, first: int, base: int, size: float) ->
 
 
 def _rows(entries: Floats) -> Floats:
-    """Return rows of eight entries of four numbers each, the last row of those that are left."""
+    """Return rows of sixteen entries of four numbers each, the last row of those that are left."""
     count = -(-len(entries) // BOXES)
-    padded = np.zeros((count * BOXES, 4))
+    padded = np.full((count * BOXES, 4), np.nan)
     padded[: len(entries)] = entries
     rows = np.zeros((count, TREE_COLUMNS))
     rows[:, : 4 * BOXES] = padded.reshape(count, BOXES, 4).transpose(0, 2, 1).reshape(count, 4 * BOXES)
-    rows[:, COUNT] = np.minimum(BOXES, len(entries) - BOXES * np.arange(count))
     return rows

@@ -16,7 +16,7 @@ from .pieces.options import allocating, inner, linked
 from .pieces.pointers import call_late
 from .pieces.records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit
 from .pieces.sides import Arrival, in_front_at, line_in_front_of_line
-from .tree import first_boxes, next_leaf
+from .tree import first_boxes, next_leaf, tree_of
 
 # A value of `Hit.uncertainty`: the side of the piece on which the ray starts is not resolved.
 UNCERTAIN = 2
@@ -74,9 +74,10 @@ def hit_nearby(scope, own, px, py, vx, vy):
     first, end = scope.joints
     if scope.has_tree:
         close = NEARBY_SLACKS * scope.slack
-        walk = first_boxes(scope, px, py, vx, vy, -close, close)
+        tree = tree_of(scope)
+        walk = first_boxes(tree, px, py, vx, vy, -close, close)
         while True:
-            leaf, walk = next_leaf(scope, walk, FORWARD, px, py, vx, vy, -close, close)
+            leaf, walk = next_leaf(tree, walk, FORWARD, px, py, vx, vy, -close, close)
             if leaf < 0:
                 break
             start = int(scope.tables.boxes[leaf, CONTENT])

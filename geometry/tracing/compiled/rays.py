@@ -17,6 +17,7 @@ import numpy as np
 from numba import types
 
 from ...scene import columns as c
+from ...scene.boxes import TREE_COLUMNS
 from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.scene import NO_TABLES
 from ...scene.structs import Struct
@@ -32,7 +33,7 @@ from .pieces.options import compiled, inlined, inner
 from .pieces.pointers import Late, call_late, checked, is_raised
 from .pieces.records import ARC, BEZIER, LINE, NO_DETAILS, NO_PIECE, NO_RAYS, OPENING, SIDE, Hit, Own, Rays
 from .runs import skip_chords, skip_crossings
-from .tree import NO_LINE_HIT, nearest_line_in_boxes
+from .tree import NO_LINE_HIT, nearest_line_in_boxes, tree_of
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
@@ -89,7 +90,8 @@ def nearest_piece(scope, own, px, py, vx, vy):
     """-> (Hit, corner): the first hit on a piece, and the time to the first corner within the slack of the ray."""
     hit, contact, nearby = nearest_curve(scope, own, px, py, vx, vy)
     if scope.has_tree:
-        arguments = scope, own, px, py, vx, vy, hit.time
+        own_line = own.number if own.kind == LINE else -1
+        arguments = tree_of(scope), own_line, own.bounces == 0, px, py, vx, vy, hit.time
         t, line, fraction, corner, near = call_late(scope.slots.boxes, NO_LINE_HIT, arguments)
     else:
         t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
@@ -276,12 +278,14 @@ def _late_functions() -> tuple[Late, ...]:
     hit = named(Hit, number, integer, integer, number, integer)
     ranges = [types.UniTuple(integer, 2)] * 3
     scope = named(records.Scope, TABLES, ROW, *[number] * 3, *ranges, truth, kind_of(NO_SLOTS))
+    table = Table(TREE_COLUMNS), Table(c.JOINT_COLUMNS), Table(c.LINE_COLUMNS)
+    tree = named(records.Tree, *table, integer, integer, number)
     ray = number, number, number, number
     return (
         Late(hit_nearby, scope, own, *ray),
         Late(starts_in_front, TABLES, hit, own, *ray, number),
         Late(line_starts_in_front, Table(c.JOINT_COLUMNS), integer, own, *ray, number),
-        Late(nearest_line_in_boxes, scope, own, *ray, number),
+        Late(nearest_line_in_boxes, tree, integer, truth, *ray, number),
         Late(skip_run, scope, hit, own, *ray, integer),
         Late(nearest_bezier, Table(c.BEZIER_COLUMNS), integer, integer, integer, number, *ray, number, number),
     )

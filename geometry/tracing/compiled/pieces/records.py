@@ -49,6 +49,17 @@ class Scope(NamedTuple):
     slots: Any
 
 
+class Tree(NamedTuple):
+    """The lines of a hollow that has a tree of boxes: the tables, row and level of the root, and the slack."""
+
+    boxes: Any
+    joints: Any
+    lines: Any
+    root: int
+    top: int
+    slack: float
+
+
 class RefinedScope(NamedTuple):
     """The hollow that contains a ray in double-double arithmetic: as `Scope`.
 
