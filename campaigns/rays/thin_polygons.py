@@ -191,7 +191,7 @@ def follow_plainly(wall: geo.Wall, x: Floats, theta: Floats, flagged: NDArray[np
 
         def pieces(angle: mp.mpf) -> object:
             ray = tracer.trace(x[k], angle, COLLISIONS)
-            return ray and [piece for _, piece in ray.path]
+            return ray and ray.path
 
         for k in range(n):
             ray = tracer.trace(x[k], theta[k], COLLISIONS)
