@@ -24,7 +24,7 @@ from ...scene.structs import Struct
 from ...scene.tolerances import NEARBY_SLACKS
 from .nearby import UNCERTAIN, hit_nearby, line_starts_in_front, starts_in_front
 from .pieces import records
-from .pieces.arcs import arc_form, arc_normal
+from .pieces.arcs import arc_form, arc_normal, on_smooth_end
 from .pieces.beziers import bend_number, nearest_bezier
 from .pieces.formulas import FLAT_TOP, TOP_CORNER, bounds_of, exit_time, opening_at, with_length_one
 from .pieces.kinds import incidence, nearest_curve, reflect
@@ -114,7 +114,7 @@ def is_beside(scope, hit, contact, px, py, vx, vy):
     At a smooth joint the ray may touch one piece and seem to hit the other before. At the hit, the point of contact is
     then in front of the tangent by rounding, and by far less than the bound here.
     """
-    sine = incidence(scope.tables, hit, px, py, vx, vy)
+    sine = call_late(scope.slots.incidence, 0.0, (scope.tables, hit, px, py, vx, vy))
     return contact <= hit.time or (contact - hit.time) * sine <= NEARBY_SLACKS * scope.slack
 
 
@@ -129,7 +129,8 @@ def meets_corner(scope, hit, corner, px, py, vx, vy):
     # at grazing incidence a corner within the slack of the ray may lie far beyond the hit
     if hit.kind == BEZIER or hit.kind == SIDE:
         return False
-    return (corner - time) * incidence(scope.tables, hit, px, py, vx, vy) <= 2.0 * slack
+    sine = call_late(scope.slots.incidence, 0.0, (scope.tables, hit, px, py, vx, vy))
+    return (corner - time) * sine <= 2.0 * slack
 
 
 @inlined
@@ -160,7 +161,7 @@ def skip_run(scope, hit, own, px, py, vx, vy, most):
     return px, py, vx, vy, np.int64(0)
 
 
-@inlined
+@inner
 def piece_label(tables, hit, vx):
     """-> int: a number for the piece or side that is hit; for a Bezier piece, of its part between inflections."""
     side = 1 if hit.kind == SIDE and vx > 0.0 else 0
@@ -203,7 +204,7 @@ def trace_ray(scope, entry, theta, limit, labelled, with_path, path):
         if (bounces >= limit and hit.kind != SIDE) or steps > MOST_STEPS:
             return shift + px, vx, vy, bounces, BOUNCE_LIMIT, label, steps
         if labelled:
-            label = HASH_FACTOR * label + piece_label(scope.tables, hit, vx)
+            label = HASH_FACTOR * label + call_late(scope.slots.label, label, (scope.tables, hit, vx))
         if hit.kind == SIDE:
             # the two ends of the wall are the same point, and a ray passes a side above this point
             py = max(py + hit.time * vy, scope.tables.joints[scope.joints[0], c.JOINT_Y])
@@ -288,10 +289,13 @@ def _late_functions() -> tuple[Late, ...]:
         Late(nearest_line_in_boxes, tree, integer, truth, *ray, number),
         Late(skip_run, scope, hit, own, *ray, integer),
         Late(nearest_bezier, Table(c.BEZIER_COLUMNS), integer, integer, integer, number, *ray, number, number),
+        Late(on_smooth_end, ROW, *[number] * 6),
+        Late(incidence, TABLES, hit, *ray),
+        Late(piece_label, TABLES, hit, number),
     )
 
 
-TABLES, NO_SLOTS = kind_of(NO_TABLES.values), records.Slots(0, 0, 0, 0, 0, 0)
+TABLES, NO_SLOTS = kind_of(NO_TABLES.values), records.Slots(*[0] * len(records.Slots._fields))
 LATE = _late_functions()
 # For functions that are compiled apart from `trace_rays`.
 TRACE = Late(trace_rays, *[types.int64] * 6)

@@ -200,33 +200,44 @@ def _root(x):
     return (lambda x: square_root(x)) if x == DOUBLE_DOUBLE else lambda x: math.sqrt(x)
 
 
-def scaled(factor, x):
-    """Return a number of either type times a power of 2, exactly."""
+def number_kind(x: Any) -> Any:
+    """Return the type of a number in compiled code: that of double-doubles, or of doubles."""
+    return x if x == DOUBLE_DOUBLE else types.float64
 
 
-@overload(scaled, jit_options=OPTIONS)
-def _scaled(factor, x):
-    if x == DOUBLE_DOUBLE:
-        return lambda factor, x: double_double(factor * x.high, factor * x.low)
-    return lambda factor, x: factor * x
+@intrinsic
+def scaled(typing, factor, x):
+    """-> number: a number of either type times a power of 2, exactly."""
+
+    def make(context, builder, signature, values):
+        power, number = values
+        if x != DOUBLE_DOUBLE:
+            return builder.fmul(power, number)
+        for k in range(2):
+            number = builder.insert_value(number, builder.fmul(power, builder.extract_value(number, k)), k)
+        return number
+
+    return number_kind(x)(types.float64, number_kind(x)), make
 
 
-def like(x, value):
-    """Return a double as a number of the type of x."""
+@intrinsic
+def like(typing, x, value):
+    """-> number: a double as a number of the type of x."""
+
+    def make(context, builder, signature, values):
+        return extend(context, builder, types.float64, values[1]) if x == DOUBLE_DOUBLE else values[1]
+
+    return number_kind(x)(number_kind(x), types.float64), make
 
 
-@overload(like, jit_options=OPTIONS)
-def _like(x, value):
-    return (lambda x, value: extended(value)) if x == DOUBLE_DOUBLE else lambda x, value: value
+@intrinsic
+def rounded(typing, x):
+    """-> float: a number of either type as a double."""
 
+    def make(context, builder, signature, values):
+        return builder.extract_value(values[0], 0) if x == DOUBLE_DOUBLE else values[0]
 
-def rounded(x):
-    """Return a number of either type as a double."""
-
-
-@overload(rounded, jit_options=OPTIONS)
-def _rounded(x):
-    return (lambda x: x.high) if x == DOUBLE_DOUBLE else lambda x: x
+    return types.float64(number_kind(x)), make
 
 
 @intrinsic

@@ -18,7 +18,7 @@ import numpy as np
 from .....core.compilation import jit
 from .....core.rounding import EPS
 from ....scene import columns as c
-from ....scene.tolerances import NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
+from ....scene.tolerances import SMOOTH_JOINT, TANGENT_ULPS
 from ...double_double.numbers import (
     LOCAL_ERROR,
     cross,
@@ -32,7 +32,7 @@ from ...double_double.numbers import (
     two_sum,
     where,
 )
-from .options import inlined, linked
+from .options import inlined, inner, linked
 
 # Bound, times B^2 + |v|^2, on the error of D that `tangent_error` gives for a ray near a tangency: there kappa |r| is
 # at most |B| and the chord over the radius.
@@ -210,21 +210,25 @@ def end_excess(arc, qx, qy):
 
 
 @inlined
-def on_arc_after(arc, t, px, py, vx, vy, slack):
-    """-> bool: whether the point of the full circle after the time t is on the arc.
+def excess_after(arc, t, px, py, vx, vy):
+    """-> float: how far the point of the full circle after the time t is beyond an end of the arc."""
+    return end_excess(arc, px + t * vx - arc[c.START_X], arc[c.STRETCH] * (py + t * vy - arc[c.START_Y]))
+
+
+@inner
+def on_smooth_end(arc, t, px, py, vx, vy, slack):
+    """-> bool: whether a point of the full circle close beyond an end of the arc, after the time t, counts as on it.
 
     At grazing incidence rounding moves the point along the arc by more than the slack; at a smooth joint of two arcs it
     would be on neither.
     """
     stretch = arc[c.STRETCH]
     qx, qy = px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])
-    beyond, room = end_excess(arc, qx, qy), slack * max(1.0, stretch)
-    if room < beyond <= NEARBY_SLACKS * room:
-        ex, ey = arc[c.END_X] - arc[c.START_X], stretch * (arc[c.END_Y] - arc[c.START_Y])
-        is_late = 2.0 * (qx * ex + qy * ey) > ex * ex + ey * ey
-        is_corner = arc[c.END_CORNER if is_late else c.START_CORNER] > 0.0
-        return not is_corner and beyond * arc_incidence(arc, t, px, py, vx, vy) <= room
-    return beyond <= room
+    ex, ey = arc[c.END_X] - arc[c.START_X], stretch * (arc[c.END_Y] - arc[c.START_Y])
+    is_late = 2.0 * (qx * ex + qy * ey) > ex * ex + ey * ey
+    is_corner = arc[c.END_CORNER if is_late else c.START_CORNER] > 0.0
+    across = end_excess(arc, qx, qy) * arc_incidence(arc, t, px, py, vx, vy)
+    return not is_corner and across <= slack * max(1.0, stretch)
 
 
 @inlined

@@ -18,7 +18,7 @@ from ....scene.tolerances import NEARBY_SLACKS
 from ...double_double.numbers import DoubleDouble, extended
 from . import arcs, beziers, lines
 from .formulas import mirror, near_end
-from .options import inlined, linked, linked_allocating
+from .options import inlined, inner, linked, linked_allocating
 from .pointers import call_late
 from .records import ARC, BEZIER, LINE, NO_PIECE, OPENING, Hit
 
@@ -44,8 +44,13 @@ def nearest_curve(scope, own, px, py, vx, vy):
         elif tangent != 0:
             if arcs.may_touch_arc(arc, t, px, py, vx, vy, slack):
                 contact = min(contact, t)
-        elif 0.0 <= t < time and arcs.on_arc_after(arc, t, px, py, vx, vy, slack):
-            time, kind, number = t, ARC, k
+        elif 0.0 <= t < time:
+            excess, room = arcs.excess_after(arc, t, px, py, vx, vy), slack * max(1.0, arc[c.STRETCH])
+            is_met = excess <= room
+            if room < excess <= NEARBY_SLACKS * room:
+                is_met = call_late(scope.slots.smooth_end, is_met, (arc, t, px, py, vx, vy, slack))
+            if is_met:
+                time, kind, number = t, ARC, k
     first, end = scope.beziers
     if first < end:
         own_number = own.number if own.kind == BEZIER else -1
@@ -108,7 +113,7 @@ def piece_nearby(scope, piece, own, px, py, vx, vy):
     return t, s, tangent, is_clear
 
 
-@inlined
+@inner
 def incidence(tables, hit, px, py, vx, vy):
     """-> float: sine of the angle between the velocity and the piece that is hit; of the opening and the sides |vy|."""
     if hit.kind == LINE:

@@ -17,8 +17,8 @@ NO_PIECE, OPENING, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 class Slots(NamedTuple):
     """The slots (`Late`) of functions that few rays or few walls need.
 
-    `hit_nearby`, `starts_in_front`, `line_starts_in_front`, `nearest_line_in_boxes`, `skip_run` and
-    `nearest_bezier`.
+    `hit_nearby`, `starts_in_front`, `line_starts_in_front`, `nearest_line_in_boxes`, `skip_run`, `nearest_bezier`,
+    `on_smooth_end`, `incidence` and `piece_label`.
     """
 
     nearby: int
@@ -27,6 +27,9 @@ class Slots(NamedTuple):
     boxes: int
     run: int
     bezier: int
+    smooth_end: int
+    incidence: int
+    label: int
 
 
 class Scope(NamedTuple):
