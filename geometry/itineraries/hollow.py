@@ -154,23 +154,21 @@ class HollowConditionals:
         """The pieces at an angle at which conditional distributions were computed."""
         return self._pieces[angle]
 
-    def miss(self, angle: float, x: float) -> None:
-        """Note an entry point in a piece that is missing at this angle."""
-        self._missed.setdefault(angle, []).append(x)
+    def trace(self, entries: Floats, angles: Floats, labels: NDArray[np.uint64]) -> tuple[Floats, set[float]]:
+        """The outgoing angles of rays, and the angles of those with other labels than these, which miss a piece there.
 
-    def trace(self, entries: Floats, angles: Floats) -> tuple[Floats, Floats, NDArray[np.uint64]]:
-        """The outgoing angles, exit points and labels of rays."""
+        The entry points of the latter are noted.
+        """
         from .compiled.changes import trace_points
 
-        outs, exits, labels = np.empty(len(entries)), np.empty(len(entries)), np.empty(len(entries), np.uint64)
+        outs, found = np.empty(len(entries)), np.empty(len(entries), np.uint64)
         setting = self._setting
-        compiled_result(lambda: trace_points(entries, angles, setting.address, outs, exits, labels))
-        self._count(len(entries), setting)
-        return outs, exits, labels
-
-    def _count(self, rays: int, setting: Struct) -> None:
-        """Add the rays and ray segments of a compiled call to those of the hollow."""
-        self.rays, self.segments = self.rays + rays, self.segments + int(setting.values.spent[0])
+        compiled_result(lambda: trace_points(entries, angles, setting.address, outs, found))
+        self.rays, self.segments = self.rays + len(entries), self.segments + int(setting.values.spent[0])
+        missed = found != labels
+        for angle, x in zip(angles[missed].tolist(), entries[missed].tolist(), strict=True):
+            self._missed.setdefault(angle, []).append(x)
+        return outs, set(angles[missed].tolist())
 
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
         from .compiled.march import marched_angles, nested_rules
@@ -234,11 +232,7 @@ class HollowConditionals:
         if not tried:
             return set()
         angles, entries, labels = (np.concatenate(column) for column in zip(*tried, strict=True))
-        _, _, found = self.trace(entries, angles)
-        missed = found != labels
-        for angle, x in zip(angles[missed].tolist(), entries[missed].tolist(), strict=True):
-            self.miss(angle, x)
-        return set(angles[missed].tolist())
+        return self.trace(entries, angles, labels)[1]
 
     def shared(self, theta: Floats) -> Floats:
         """The fraction of the opening whose itinerary also exists at the next of these known angles."""

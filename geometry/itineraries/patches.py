@@ -146,8 +146,6 @@ def _traced(hollow: HollowConditionals, strips: Strips, place: Floats) -> tuple[
     low, high = strips.ends[..., 1, None], strips.ends[..., 2, None]
     entries = low + (high - low) * (place * place * (3.0 - 2.0 * place))
     angles = np.broadcast_to(strips.angle[..., None], entries.shape)
-    outs, _, labels = hollow.trace(entries.ravel(), angles.ravel())
-    wrong = labels.reshape(entries.shape) != strips.label[:, None, None]
-    for angle, x in zip(angles[wrong].tolist(), entries[wrong].tolist(), strict=True):
-        hollow.miss(angle, x)
-    return outs.reshape(entries.shape), set(angles[wrong].tolist())
+    labels = np.broadcast_to(strips.label[:, None, None], entries.shape)
+    outs, missed = hollow.trace(entries.ravel(), angles.ravel(), labels.ravel())
+    return outs.reshape(entries.shape), missed

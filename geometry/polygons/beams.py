@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -162,31 +163,22 @@ def beams_of(
         exact = None
     entrances, images = (2, 1.0) if exact is None else (1, 2.0)
     triangulation = triangulated(hollow_vertices if exact is None else exact.vertices)
-    division = _divided(triangulation, tolerance, max_beams * entrances // 2, entrances, threads)
-    moved, offset_error = (0.0, 0.0) if exact is None else _changed(division.leaving, exact)
-    leaving, rest = (part if exact is None else _mirrored(part) for part in (division.leaving, division.rest))
-    flux, unresolved = (
-        images * float(_flux(part.low, part.high, part.sine, part.cosine).sum())
-        for part in (division.leaving, division.rest)
-    )
+    beams = _divided(triangulation, tolerance, max_beams * entrances // 2, entrances, threads)
+    parts = beams.leaving(), beams.rest()
+    moved, offset_error = (0.0, 0.0) if exact is None else _changed(parts[0], exact)
+    flux, unresolved = (images * float(_flux(part.low, part.high, part.sine, part.cosine).sum()) for part in parts)
+    leaving, rest = (_Pieces._make(map(_fixed, part if exact is None else _mirrored(part))) for part in parts)
     return Beams(
-        sign=_fixed(leaving.sign.astype(np.int8)),
-        offset=_fixed(leaving.offset),
-        low=_fixed(leaving.low),
-        high=_fixed(leaving.high),
-        sine=_fixed(leaving.sine),
-        cosine=_fixed(leaving.cosine),
-        leaf=_fixed(leaving.leaf),
-        bounces=_fixed(leaving.bounces),
+        **leaving._asdict(),
         unresolved=unresolved,
-        unresolved_low=_fixed(rest.low),
-        unresolved_high=_fixed(rest.high),
-        unresolved_sine=_fixed(rest.sine),
-        unresolved_cosine=_fixed(rest.cosine),
+        unresolved_low=rest.low,
+        unresolved_high=rest.high,
+        unresolved_sine=rest.sine,
+        unresolved_cosine=rest.cosine,
         defect=abs(flux + unresolved - 1.0),
-        rounding=0.5 * images * division.rounding / triangulation.width + moved,
+        rounding=0.5 * images * beams.rounding / triangulation.width + moved,
         offset_error=offset_error,
-        complete=division.complete,
+        complete=beams.left <= beams.wanted,
     )
 
 
@@ -198,18 +190,9 @@ class _Pieces(NamedTuple):
     sine: Floats
     cosine: Floats
     offset: Floats
-    leaf: NDArray[np.int64]
-    sign: NDArray[np.int64]
-    bounces: NDArray[np.int64]
-
-
-class _Division(NamedTuple):
-    """All rays as pieces; ``rounding`` in units of dp dtheta, others see `Beams`."""
-
-    leaving: _Pieces
-    rest: _Pieces
-    rounding: float
-    complete: bool
+    leaf: NDArray[Any]
+    sign: NDArray[Any]
+    bounces: NDArray[Any]
 
 
 class _Beams:
@@ -218,22 +201,30 @@ class _Beams:
     Attributes
     ----------
     waiting : Store
+    wanted : float
+        The flux of the beams that may be left, in units of dp dtheta.
     leaves, steps : int
         Number of beams that have left the hollow, and of triangles passed.
     rounding : float
-        See `_Division`.
+        See `Beams`, but in units of dp dtheta.
     """
 
-    def __init__(self, hollow: Hollow, entrance: Store) -> None:
+    def __init__(self, hollow: Hollow, entrance: Store, tolerance: float) -> None:
         self._hollow, self.waiting = hollow, entrance
         self._rows: list[Floats] = []
         self._tags: list[NDArray[np.int64]] = []
         self.leaves, self.steps, self.rounding = 0, 0, 0.0
+        self.wanted = tolerance * self.left
 
     @property
-    def flux(self) -> Floats:
+    def left(self) -> float:
         """The flux of all beams that wait."""
-        return self.waiting.real[:, c.FLUX]
+        return float(self.waiting.real[:, c.FLUX].sum())
+
+    @property
+    def priority(self) -> Floats:
+        """The priorities of all beams that wait."""
+        return np.asarray(self.waiting.real[:, c.FLUX] / self.waiting.real[:, c.DIVISOR])
 
     def divide(self, threshold: float, most_splits: int, most_steps: int, parts: int, threads: int | None) -> None:
         """Divide the beams above a threshold of priority, in parts.
@@ -242,23 +233,29 @@ class _Beams:
         """
         from .compiled.division import LEAVES, STEPS, divide
 
-        is_chosen = self.waiting.real[:, c.PRIORITY] > threshold
-        store, others = _selected(self.waiting, is_chosen), _selected(self.waiting, ~is_chosen)
+        is_chosen = self.priority > threshold
+        chosen = np.flatnonzero(is_chosen)
         rule = threshold, most_splits // parts, max(most_steps // parts, 1)
         found: list[Any] = [None] * parts
+        rounding = np.zeros((parts, 1))
 
         def run(part: slice) -> None:
             for k in range(part.start, part.stop):
-                found[k] = divide(self._hollow, store, k, parts, *rule)
+                # the last beam is divided first
+                own = _selected(self.waiting, chosen[k::parts][::-1])
+                found[k] = list(divide(self._hollow, own, *rule, rounding[k]))
 
         in_blocks(run, parts, threads, block=1)
-        for _, rows, tags, counts, rounding in found:
+        waiting = [_selected(self.waiting, np.flatnonzero(~is_chosen))]
+        for rest, rows, tags, counts in chain.from_iterable(found):
+            waiting.append(rest)
             tags[:, c.TAG_LEAF] += self.leaves
             self._rows.append(rows)
             self._tags.append(tags)
             self.leaves, self.steps = self.leaves + counts[LEAVES], self.steps + counts[STEPS]
-            self.rounding += rounding
-        self.waiting = _together([others, *(rest for rest, *_ in found)])
+        for part in rounding.ravel().tolist():
+            self.rounding += part
+        self.waiting = _together(waiting)
 
     def leaving(self) -> _Pieces:
         """Return the pieces of the beams that have left the hollow."""
@@ -274,34 +271,32 @@ class _Beams:
 
 def _divided(
     triangulation: Triangulation, tolerance: float, max_beams: int, entrances: int, threads: int | None
-) -> _Division:
+) -> _Beams:
     """Divide all beams above a threshold of priority, lower the threshold, and so on.
 
     Of a chain of few vertices some beams are divided in no order before, in one short call. The number of the parts
     into which a round is cut depends on the number of beams alone.
     """
     hollow = _hollow(triangulation)
-    beams = _Beams(hollow, _entrance(triangulation.entrance, hollow.width, entrances))
-    wanted = tolerance * float(beams.flux.sum())
+    beams = _Beams(hollow, _entrance(triangulation.entrance, hollow.width, entrances), tolerance)
     splits = min(FIRST_SPLITS, int(FIRST_FRACTION * max_beams))
     if splits and len(triangulation.vertices) <= FEW_VERTICES:
-        beams.divide(wanted / FIRST_SPLITS, splits, STEPS_A_BEAM * splits, 1, 1)
-    if float(beams.flux.sum()) > wanted:
-        interruptibly(lambda: _in_rounds(beams, wanted, max_beams, threads))
-    complete = float(beams.flux.sum()) <= wanted
-    return _Division(beams.leaving(), beams.rest(), beams.rounding, complete)
+        beams.divide(beams.wanted / FIRST_SPLITS, splits, STEPS_A_BEAM * splits, 1, 1)
+    if beams.left > beams.wanted:
+        interruptibly(lambda: _in_rounds(beams, max_beams, threads))
+    return beams
 
 
-def _in_rounds(beams: _Beams, wanted: float, max_beams: int, threads: int | None) -> None:
+def _in_rounds(beams: _Beams, max_beams: int, threads: int | None) -> None:
     """Divide beams in rounds until the flux that is left is as wanted, or a limit is reached."""
     while True:
-        flux, best = beams.flux, beams.waiting.real[:, c.PRIORITY].max(initial=0.0)
-        left, used = float(flux.sum()), beams.leaves + flux.size
+        left, priority = beams.left, beams.priority
+        best, used = priority.max(initial=0.0), beams.leaves + priority.size
         room, spare = max_beams - used, STEPS_A_BEAM * max_beams - beams.steps
-        if left <= wanted or room <= 0 or spare <= 0 or best <= 0.0:
+        if left <= beams.wanted or room <= 0 or spare <= 0 or best <= 0.0:
             return
-        parts = PARTS if min(flux.size, room) >= MANY else 1
-        threshold = best / _step(left / max(wanted, TINY), 1.0 + room / used)
+        parts = PARTS if min(priority.size, room) >= MANY else 1
+        threshold = best / _step(left / max(beams.wanted, TINY), 1.0 + room / used)
         beams.divide(threshold, room, spare, parts, threads)
 
 
@@ -332,7 +327,6 @@ def _hollow(triangulation: Triangulation) -> Hollow:
         apex_x=x[apex],
         apex_y=y[apex],
         exits=exits,
-        behind=beyond[exits],
         beyond=beyond.copy(),
         turn_high=triangulation.turn_high.copy(),
         turn_low=triangulation.turn_low.copy(),
@@ -347,26 +341,23 @@ def _entrance(edge: int, width: float, halves: int) -> Store:
     """Return the beams of rays with theta < pi/2, or, of two halves, of all rays."""
     from .compiled.division import Store
 
-    vertices, real, whole = (
-        np.zeros((6, c.VERTEX_COLUMNS)),
-        np.zeros((2, c.REAL_COLUMNS)),
-        np.zeros((2, c.WHOLE_COLUMNS), int),
-    )
+    vertices, real = np.zeros((6, c.VERTEX_COLUMNS)), np.zeros((2, c.REAL_COLUMNS))
+    whole = np.zeros((2, c.WHOLE_COLUMNS), int)
     # the lines along the opening and, vertical, through its left and its right end; then these and those along it again
     vertices[[0, 4], c.LINE_C], vertices[[1, 2, 3, 5], c.LINE_S] = (1.0, -1.0), 1.0
     vertices[[2, 5], c.LINE_P] = vertices[[2, 4], c.CUT_X] = width
-    real[:, c.FLUX] = real[:, c.PRIORITY] = width
+    real[:, c.FLUX], real[:, c.DIVISOR] = width, 1.0
     whole[:, c.FIRST], whole[:, c.COUNT], whole[:, c.EDGE], whole[:, c.SIGN] = (0, 3), 3, edge, 1
     return Store(vertices[: 3 * halves], real[:halves], whole[:halves])
 
 
-def _selected(store: Store, chosen: NDArray[np.bool_]) -> Store:
-    """Return the beams of a mask."""
-    whole = store.whole[chosen]
-    begin = np.cumsum(whole[:, c.COUNT]) - whole[:, c.COUNT]
-    vertices = store.vertices[np.repeat(chosen, store.whole[:, c.COUNT])]
-    whole[:, c.FIRST] = begin
-    return type(store)(vertices, store.real[chosen], whole)
+def _selected(store: Store, beams: NDArray[np.int64]) -> Store:
+    """Return the beams of these numbers."""
+    whole = store.whole.take(beams, axis=0)
+    count, given = whole[:, c.COUNT], whole[:, c.FIRST].copy()
+    whole[:, c.FIRST] = np.cumsum(count) - count
+    vertex = np.repeat(given - whole[:, c.FIRST], count) + np.arange(count.sum())
+    return type(store)(store.vertices.take(vertex, axis=0), store.real.take(beams, axis=0), whole)
 
 
 def _together(stores: list[Store]) -> Store:
@@ -380,7 +371,8 @@ def _columns(rows: list[Floats], tags: list[NDArray[np.int64]]) -> _Pieces:
     """Return the pieces of several tables, whose columns have the order of the fields."""
     real = np.concatenate([np.empty((0, c.PIECE_COLUMNS)), *rows])
     whole = np.concatenate([np.empty((0, c.TAG_COLUMNS), np.int64), *tags])
-    return _Pieces(*real.T, *whole.T)
+    leaf, sign, bounces = whole.T
+    return _Pieces._make((*real.T, leaf, sign.astype(np.int8), bounces))
 
 
 def _flux(low: Floats, high: Floats, sine: Floats, cosine: Floats) -> Floats:
@@ -405,16 +397,8 @@ def _changed(leaving: _Pieces, exact: Symmetrised) -> tuple[float, float]:
 def _mirrored(pieces: _Pieces) -> _Pieces:
     """Return the pieces and their mirror images, with theta and theta' replaced by pi - theta."""
     low, high, sine, cosine, offset, leaf, sign, bounces = pieces
-    images = _Pieces(
-        np.pi - high,
-        np.pi - low,
-        sine,
-        -cosine,
-        np.where(sign > 0, -offset, 2.0 * np.pi - offset),
-        leaf + leaf.max(initial=-1) + 1,
-        sign,
-        bounces,
-    )
+    turned = np.where(sign > 0, -offset, 2.0 * np.pi - offset)
+    images = _Pieces(np.pi - high, np.pi - low, sine, -cosine, turned, leaf + leaf.max(initial=-1) + 1, sign, bounces)
     return _Pieces(*(np.concatenate(pair) for pair in zip(pieces, images, strict=True)))
 
 

@@ -336,8 +336,8 @@ def add_change(x, first, setting, chain, count, goal):
 
 
 @compiled
-def trace_points(entries, angles, setting, outs, exits, labels):
-    """Trace rays with incoming angles of their own; set their outgoing angles, exit points and labels.
+def trace_points(entries, angles, setting, outs, labels):
+    """Trace rays with incoming angles of their own; set their outgoing angles and labels.
 
     Of the setting the address is given. The outgoing angle is 0 for rays that do not escape.
     """
@@ -350,4 +350,4 @@ def trace_points(entries, angles, setting, outs, exits, labels):
         trace_block(last - first, setting)
         for n in range(first, last):
             out, labels[n] = outcome(n - first, setting)
-            outs[n], exits[n] = 0.0 if labels[n] < FIRST_LABEL else out, rays.out_x[n - first]
+            outs[n] = 0.0 if labels[n] < FIRST_LABEL else out

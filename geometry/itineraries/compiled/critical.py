@@ -20,25 +20,18 @@ SAME_ANGLE = 1e-11
 
 
 @linked
-def label_at(x, setting):
-    """Return the label of one ray."""
-    _, label = probe(x, setting)
-    return label
-
-
-@linked
 def edge_from(x, step, label, setting):
     """Return the end of the piece around x in the direction of ``step``, to a small fraction of its distance."""
     left, right = setting.hollow[LEFT], setting.hollow[RIGHT]
     inside, outside = x, x + step
-    while left < outside < right and label_at(outside, setting) == label:
+    while left < outside < right and probe(outside, setting)[1] == label:
         inside = outside
         step *= 2.0
         outside = inside + step
     outside = min(max(outside, left), right)
     for _ in range(EDGE_STEPS):
         middle = 0.5 * (inside + outside)
-        if label_at(middle, setting) == label:
+        if probe(middle, setting)[1] == label:
             inside = middle
         else:
             outside = middle
@@ -65,7 +58,7 @@ def find_critical(label, present, absent, low, high, drift, setting):
         for n in range(POINTS_TRIED):
             # from the middle outwards, to either side in turn
             x = centre + width * (1.0 - 2.0 * (n % 2)) * ((n + 1) // 2) / (POINTS_TRIED // 2)
-            if left < x < right and label_at(x, setting) == label:
+            if left < x < right and probe(x, setting)[1] == label:
                 found = x
                 break
         if np.isnan(found):

@@ -59,7 +59,7 @@ class Cells(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Work space: crossings, their cells and slopes; cuts of a panel; values at positions, at nodes, and in cells.
+    """Work space: crossings, their cells and slopes; cuts; ends of a piece; values at positions, at nodes, in cells.
 
     ``marks``, of shape (2, positions + 4), are those of `set_marks`.
     """
@@ -69,6 +69,7 @@ class Room(NamedTuple):
     cells: NDArray[np.int64]
     slopes: Floats
     cuts: Floats
+    ends: Floats
     values: Floats
     edge_values: Floats
     samples: Floats
@@ -77,13 +78,11 @@ class Room(NamedTuple):
 
 def room_for(cells: int, nodes: int, positions: int) -> Room:
     """Return work space for patches in so many cells."""
-    most = MOST_CROSSINGS
-    marks = np.empty((2, max(nodes, positions) + 4))
-    return Room(
-        marks,
-        np.empty(most), np.empty(most + 1, np.int64), np.empty(most), np.empty(2 * most + 2), np.empty(positions),
-        np.empty(nodes), np.empty((max(NUMBERS), cells)), np.empty((MOST_DEPTH + 2, 3)),
-    )  # fmt: skip
+    most, marks = MOST_CROSSINGS, np.empty((2, max(nodes, positions) + 4))
+    found, crossed, slopes, cuts = np.empty(most), np.empty(most + 1, np.int64), np.empty(most), np.empty(2 * most + 2)
+    ends, values, edge_values = np.empty(STOP + 1), np.empty(positions), np.empty(nodes)
+    samples, stack = np.empty((max(NUMBERS), cells)), np.empty((MOST_DEPTH + 2, LEVEL + 1))
+    return Room(marks, found, crossed, slopes, cuts, ends, values, edge_values, samples, stack)
 
 
 @linked
@@ -215,12 +214,6 @@ def find_crossings(grid, values, edges, room):
 
 
 @linked
-def ends_at(ends, k):
-    """-> (start, low, high, stop): the ends of the piece at node k, see `row_masses`."""
-    return ends[k, START], ends[k, LOW], ends[k, HIGH], ends[k, STOP]
-
-
-@linked
 def sizes_at_ends(grid, values, cells):
     """-> (first, last): the norms of the functions in the cells of the outgoing angles at both ends."""
     edges, count = cells.edges, cells.edges.shape[0]
@@ -237,7 +230,7 @@ def row_masses(ends, grid, values, cells, masses, room):
     due to the gaps at the ends, both as norms of the functions' integrals.
     ``ends`` are the middle of the gap before the piece, its first and last sample, and the middle of the gap after it.
     """
-    start, low, high, end = ends
+    start, low, high, end = ends[START], ends[LOW], ends[HIGH], ends[STOP]
     edges, sizes = cells
     count = find_crossings(grid, values, edges, room)
     change, last = 0.0, start
@@ -257,31 +250,24 @@ def masses_of_rows(grid, ends, outs, owners, uncertainties, cells, masses, error
     """Add the masses of pieces, each at one angle, to those of the angles' numbers ``owners``, and their errors."""
     for i in range(owners.shape[0]):
         k = owners[i]
-        change, gaps = row_masses(ends_at(ends[i], ALONE), grid, outs[i, ALONE], cells, masses[k], room)
+        change, gaps = row_masses(ends[i, ALONE], grid, outs[i, ALONE], cells, masses[k], room)
         errors[k] += uncertainties[i] * change + gaps
 
 
 @linked
-def interpolate(s, nodes, weights, ends, outs, values):
-    """-> ends of the piece at position s of the panel; sets the outgoing angles there."""
+def interpolate(s, grid, rows, found):
+    """Set ``found`` to the row at position s of the panel, of which ``rows`` are those at the nodes."""
     total = 0.0
-    a, b, c, d = 0.0, 0.0, 0.0, 0.0
-    for j in range(values.shape[0]):
-        values[j] = 0.0
-    for k in range(nodes.shape[0]):
+    found[:] = 0.0
+    for k in range(grid.nodes.shape[0]):
         # cuts may be nodes
-        step = s - nodes[k]
-        ratio = weights[k] / (step if abs(step) > AT_NODE else AT_NODE)
+        step = s - grid.nodes[k]
+        ratio = grid.weights[k] / (step if abs(step) > AT_NODE else AT_NODE)
         total += ratio
-        a += ratio * ends[k, START]
-        b += ratio * ends[k, LOW]
-        c += ratio * ends[k, HIGH]
-        d += ratio * ends[k, STOP]
-        for j in range(values.shape[0]):
-            values[j] += ratio * outs[k, j]
-    for j in range(values.shape[0]):
-        values[j] /= total
-    return a / total, b / total, c / total, d / total
+        for j in range(found.shape[0]):
+            found[j] += ratio * rows[k, j]
+    for j in range(found.shape[0]):
+        found[j] /= total
 
 
 @linked
@@ -318,8 +304,9 @@ def gauss_masses(rule, begin, end, panel, row_grid, grid, ends, outs, cells, roo
     samples[:, :] = 0.0
     for k in range(NUMBERS[rule]):
         s = begin + (end - begin) * GAUSS_NODES[rule, k]
-        four = interpolate(s, row_grid.nodes, row_grid.weights, ends, outs, room.values)
-        change, _ = row_masses(four, grid, room.values, cells, samples[k], room)
+        interpolate(s, row_grid, ends, room.ends)
+        interpolate(s, row_grid, outs, room.values)
+        change, _ = row_masses(room.ends, grid, room.values, cells, samples[k], room)
         # the density of the measure is sin(theta) / 2
         theta = low + (high - low) * s * s * (3.0 - 2.0 * s)
         weight = 3.0 * (high - low) * s * (1.0 - s) * math.sin(theta) * (end - begin)
@@ -388,7 +375,7 @@ def masses_of_patches(panels, row_grid, grid, strips, uncertainties, limits, goa
     for i in range(owners.shape[0]):
         p = owners[i]
         ends, outs = all_ends[i], all_outs[i]
-        change, _ = row_masses(ends_at(ends, middle), grid, outs[middle], cells, room.samples[0], room)
+        change, _ = row_masses(ends[middle], grid, outs[middle], cells, room.samples[0], room)
         first, last = sizes_at_ends(grid, outs[middle], cells)
         at_ends = of_ends[i] * (first + last)
         if (at_nodes[i] + between[i]) * change + at_ends <= limits[p]:
@@ -401,6 +388,6 @@ def masses_of_patches(panels, row_grid, grid, strips, uncertainties, limits, goa
                 node_squares[p, k] += (at_nodes[i] * moved / measures[p]) ** 2
         else:
             for k in range(row_grid.nodes.shape[0]):
-                change, gaps = row_masses(ends_at(ends, k), grid, outs[k], cells, rest[p, k], room)
+                change, gaps = row_masses(ends[k], grid, outs[k], cells, rest[p, k], room)
                 errors[p, k] += gaps
                 node_squares[p, k] += (at_nodes[i] * change) ** 2

@@ -16,12 +16,12 @@ COUNT = 1  # number of vertices
 EDGE = 2  # the triangle's edge through which the beam enters
 SIGN = 3  # 1 or -1: orientation of the unfolding isometry
 BOUNCES = 4
-CUTS = 5  # splits in which the beam was the larger part, since it last was the smaller one
-WHOLE_COLUMNS = 6
+WHOLE_COLUMNS = 5
 
-# real[beam]: the flux, then the unfolding isometry V -> R V + T in two parts each, and the rounding errors of T.
+# real[beam]: the flux and its divisor, then the unfolding isometry V -> R V + T in two parts each, and the rounding
+# errors of T.
 FLUX = 0
-PRIORITY = 1  # flux expected to be cut off by the next split
+DIVISOR = 1  # flux / divisor is the priority, the flux expected to be cut off by the next split
 TURN = 2  # angle of R, radians
 TURN_LOW = 3
 T_X = 4

@@ -26,7 +26,7 @@ from .unfolding import FUNCTIONAL_ULPS
 
 
 @inlined
-def signs_of(polygon, count, apex, values):
+def signs_of(polygon, apex, values):
     """-> (positive, negative, rounding): set ``values`` to an apex's functional at the vertices, 0 within rounding.
 
     The first two tell whether each sign occurs. If the apex divides the beam only within rounding, ``rounding`` bounds
@@ -35,7 +35,7 @@ def signs_of(polygon, count, apex, values):
     uncertain, uncertainty = False, 0.0
     positive, negative = False, False
     low, high = 0, 0
-    for i in range(count):
+    for i in range(len(polygon)):
         p, s, c = polygon[i, LINE_P], polygon[i, LINE_S], polygon[i, LINE_C]
         value = apex.x * s - apex.y * c - p
         slack = apex.error_x * s + apex.error_y * abs(c) + FUNCTIONAL_ULPS * EPS * p
@@ -60,7 +60,7 @@ def signs_of(polygon, count, apex, values):
 
 
 @inlined
-def polygon_flux(polygon, count):
+def polygon_flux(polygon):
     """Return the integral of dp dtheta over a polygon of lines, positive if counterclockwise.
 
     The polygon is cut into triangles. The integral over a triangle is -det(a, b, c) sqrt(2 / product of 1 + cos over
@@ -68,7 +68,7 @@ def polygon_flux(polygon, count):
     """
     total = 0.0
     p, s, c = polygon[0, LINE_P], polygon[0, LINE_S], polygon[0, LINE_C]
-    for i in range(1, count - 1):
+    for i in range(1, len(polygon) - 1):
         here_s, here_c = polygon[i, LINE_S], polygon[i, LINE_C]
         next_s, next_c = polygon[i + 1, LINE_S], polygon[i + 1, LINE_C]
         bp, bs, bc = polygon[i, LINE_P] - p, here_s - s, here_c - c
@@ -80,11 +80,11 @@ def polygon_flux(polygon, count):
 
 
 @inlined
-def clip(polygon, count, values, wanted, apex, out):
+def clip(polygon, values, wanted, apex, out):
     """Write the part of a polygon with functional of the sign ``wanted`` to ``out``; return its number of vertices."""
     size = 0
-    for i in range(count):
-        j = i + 1 if i + 1 < count else 0
+    for i in range(len(polygon)):
+        j = i + 1 if i + 1 < len(polygon) else 0
         here, there = wanted * values[i], wanted * values[j]
         if here >= 0.0:
             for k in range(VERTEX_COLUMNS):
@@ -108,15 +108,15 @@ def clip(polygon, count, values, wanted, apex, out):
 
 
 @inlined
-def cut_rounding(polygon, count, apex):
+def cut_rounding(polygon, apex):
     """Return a bound on the flux on the wrong side of the line through an apex.
 
     The error of the line is at most ``uncertainty`` in p over the cut's range of angles.
     """
     rounding = 0.0
-    for i in range(count):
+    for i in range(len(polygon)):
         if polygon[i, CUT_X] == apex.x and polygon[i, CUT_Y] == apex.y:
-            j = i + 1 if i + 1 < count else 0
+            j = i + 1 if i + 1 < len(polygon) else 0
             here_s, here_c = polygon[i, LINE_S], polygon[i, LINE_C]
             there_s, there_c = polygon[j, LINE_S], polygon[j, LINE_C]
             p, s, c = max(polygon[i, LINE_P], polygon[j, LINE_P]), max(here_s, there_s), max(abs(here_c), abs(there_c))
@@ -139,13 +139,13 @@ class Frame(NamedTuple):
 
 
 @inlined
-def set_frame(frame, polygon, count, unfolding):
+def set_frame(frame, polygon, unfolding):
     """Compute the functionals of a beam's lines; return a bound on their error at any vertex.
 
     Coordinates of vertices, sines and cosines, and p are at most 1, so the terms besides T have a sum of at most 5.
     """
     sign, sine, cosine = unfolding.sign, unfolding.sine, unfolding.cosine
-    for i in range(count):
+    for i in range(len(polygon)):
         p, s, c = polygon[i, LINE_P], polygon[i, LINE_S], polygon[i, LINE_C]
         frame.along[i] = cosine * s - sine * c
         frame.up[i] = -sign * (sine * s + cosine * c)
@@ -186,17 +186,9 @@ def offset_of(sign, turn, middle):
 
 
 @inlined
-def leaving_offset(low, high, unfolding):
-    """-> (offset, upwards): of theta' for lines between two angles, and whether their middle leaves upwards."""
-    middle = 0.5 * (low + high)
-    offset = offset_of(unfolding.sign, unfolding.turn, middle)
-    return offset, 0.0 <= unfolding.sign * middle + offset <= PI
-
-
-@inlined
-def set_angles(polygon, count, angles, cuts):
+def set_angles(polygon, angles, cuts):
     """Compute the angles of the vertices of a polygon, also in ascending order, in ``cuts``."""
-    for i in range(count):
+    for i in range(len(polygon)):
         angle = math.atan2(polygon[i, c.LINE_S], polygon[i, c.LINE_C])
         angles[i] = angle
         k = i
@@ -207,18 +199,18 @@ def set_angles(polygon, count, angles, cuts):
 
 
 @inlined
-def put_pieces(pieces, used, polygon, count, angles, cuts, offset, tag, width):
+def put_pieces(pieces, used, polygon, angles, cuts, offset, tag, width):
     """Write the pieces of a beam between its ``cuts``; return the new number of pieces.
 
     ``tag`` is the number of the beam, its sign and its number of bounces.
     """
-    for k in range(count - 1):
+    for k in range(len(polygon) - 1):
         if cuts[k + 1] <= cuts[k]:
             continue
         middle = 0.5 * (cuts[k] + cuts[k + 1])
         lower, upper = -1, -1
-        for i in range(count):
-            j = i + 1 if i + 1 < count else 0
+        for i in range(len(polygon)):
+            j = i + 1 if i + 1 < len(polygon) else 0
             if angles[i] <= middle < angles[j]:
                 lower = i
             elif angles[j] <= middle < angles[i]:
@@ -241,9 +233,9 @@ def pieces_of(store, width):
     pieces, used = Pieces(np.empty((vertices, c.PIECE_COLUMNS)), np.empty((vertices, c.TAG_COLUMNS), np.int64)), 0
     angles, cuts = np.empty(vertices), np.empty(vertices)
     for beam in range(beams):
-        first, count = store.whole[beam, c.FIRST], store.whole[beam, c.COUNT]
-        polygon = store.vertices[first : first + count]
-        set_angles(polygon, count, angles, cuts)
+        first = store.whole[beam, c.FIRST]
+        polygon = store.vertices[first : first + store.whole[beam, c.COUNT]]
+        set_angles(polygon, angles, cuts)
         tag = beam, store.whole[beam, c.SIGN], store.whole[beam, c.BOUNCES]
-        used = put_pieces(pieces, used, polygon, count, angles, cuts, 0.0, tag, width)
+        used = put_pieces(pieces, used, polygon, angles, cuts, 0.0, tag, width)
     return pieces.rows[:used], pieces.tags[:used]

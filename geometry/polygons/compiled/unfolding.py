@@ -35,15 +35,13 @@ class Hollow(NamedTuple):
 
     ``apex_x``, ``apex_y`` are the third vertex of the triangle of each edge. A beam that enters through ``edge`` leaves
     the triangle through ``exits[2 edge]`` if the apex lies on its right, seen in the hollow, else through
-    ``exits[2 edge + 1]``; ``behind`` is what lies there, and ``beyond`` what lies behind each edge, see
-    `Triangulation`. The normal of each wall has twice the length of the distance of its line from the origin, with an
-    error of ``slack``.
+    ``exits[2 edge + 1]``; ``beyond`` is what lies behind each edge, see `Triangulation`. The normal of each wall has
+    twice the length of the distance of its line from the origin, with an error of ``slack``.
     """
 
     apex_x: Floats
     apex_y: Floats
     exits: NDArray[np.int64]
-    behind: NDArray[np.int64]
     beyond: NDArray[np.int64]
     turn_high: Floats
     turn_low: Floats
@@ -130,13 +128,13 @@ def reflected(unfolding, wall, hollow):
 
 @inlined
 def crossed(edge, course, hollow):
-    """-> (course, left): the course beyond an edge of the triangle, and whether the beam has left the hollow."""
+    """-> (course, code): the course beyond an edge of the triangle, and what lies there, as in `Hollow.beyond`."""
     code = hollow.beyond[edge]
     if code >= 0:
-        return Course(code, course.bounces, course.unfolding), False
+        return Course(code, course.bounces, course.unfolding), code
     if code == OPENING:
-        return Course(edge, course.bounces, course.unfolding), True
-    return Course(edge, course.bounces + 1, reflected(course.unfolding, FIRST_WALL - code, hollow)), False
+        return Course(edge, course.bounces, course.unfolding), code
+    return Course(edge, course.bounces + 1, reflected(course.unfolding, FIRST_WALL - code, hollow)), code
 
 
 @inlined
@@ -205,9 +203,9 @@ def lag_of(course, history, reflections):
 
 
 @inlined
-def set_drift(frame, polygon, count, period):
+def set_drift(frame, polygon, period):
     """Compute the change of each line's functional from one period to the next."""
-    for i in range(count):
+    for i in range(len(polygon)):
         frame.drift[i] = period.x * polygon[i, LINE_S] - period.y * polygon[i, LINE_C]
 
 
