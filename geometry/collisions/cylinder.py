@@ -15,7 +15,7 @@ from ..tracing.tracing import MAX_COLLISIONS
 from ..walls.wall import Wall
 from .amplification import DiskCounts
 from .configuration_space import ConfigurationSpace
-from .records import DiskResults, Rolling, ground_of, largest_bend, mass_fractions, position_rounding
+from .records import DiskResults, ground_of, largest_bend, mass_fractions, rolling_ring
 from .rigid import check_kinds, checked_states, collide, from_height_0, marked
 
 # Newton steps on a convex function: at worst a step halves the error, near the root it squares the error.
@@ -96,17 +96,17 @@ def collide_cylinder(
     >>> out.position.tolist(), out.velocity.tolist(), out.time.tolist()
     ([[0.25, 0.25]], [[0.0, 2.0, 0.0]], [0.5])
     """
-    from .compiled.rigid import roll_disks
+    from .compiled.rigid import collide_disks
 
     check_kinds(disk, wall)
     eps = positive_number("scale", scale)
     at, moving = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
     ground, masses = ground_of(wall.scene), mass_fractions(disk)
-    rolling = Rolling(eps, wall.cell.depth, position_rounding(wall.scene, 0.0))
+    ring = rolling_ring(eps, wall.cell.depth, wall.scene)
 
     def run(start: Floats, moving: Floats, results: DiskResults) -> None:
-        roll_disks(start, moving, masses, rolling, max_contacts, ground, results)
+        collide_disks(start, moving, masses, ring, max_contacts, ground, results)
 
     collided = from_height_0(run, wall, eps, ground, threads)
     bend = largest_bend(ground) * (wall.period + wall.depth)

@@ -52,7 +52,8 @@ class Ring(NamedTuple):
 
     At an angle of more than ``reach`` from the lowest point a satellite is above the wall; ``-floor`` is the least
     height of the disk; ``slack`` bounds the rounding error of a satellite's position. ``half_sine`` and ``half_cosine``
-    are the sine and cosine of half the spacing.
+    are the sine and cosine of half the spacing. ``is_rolling`` tells that the disk is on the cylinder, where one
+    satellite stays the lowest point: the contact moves with the velocity (v1 + omega, v2).
     """
 
     scale: float
@@ -62,14 +63,7 @@ class Ring(NamedTuple):
     slack: float
     half_sine: float
     half_cosine: float
-
-
-class Rolling(NamedTuple):
-    """A disk on the cylinder: scale of the wall, depth of the wall, bound on the rounding error of the contact."""
-
-    scale: float
-    deepest: float
-    slack: float
+    is_rolling: bool
 
 
 class DiskResults(NamedTuple):
@@ -125,7 +119,13 @@ def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:
         position_rounding(scene, math.sin(satellites.reach) / scale),
         math.sin(half),
         math.cos(half),
+        False,
     )
+
+
+def rolling_ring(scale: float, depth: float, scene: Scene) -> Ring:
+    """Return the one satellite of a disk on the cylinder over a wall of the given scale and depth."""
+    return Ring(scale, 1.0, 0.0, depth + scene.cell, position_rounding(scene, 0.0), 0.0, 1.0, True)
 
 
 def mass_fractions(disk: Disk) -> tuple[float, float]:

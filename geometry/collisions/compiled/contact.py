@@ -112,11 +112,11 @@ class Span(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """A contact: time (inf for none), kind and number of the piece, state of the satellite, and code."""
+    """A contact: time (inf for none), piece, left end of its cell, state of the satellite, and code."""
 
     time: float
-    kind: int
-    piece: int
+    on: Touching
+    base: float
     state: State
     code: int
 
@@ -463,13 +463,14 @@ def first_on_piece(kind, number, own, path, span, size, ground):
 
 
 @inlined
-def first_in_hollow(h, own, came_from, path, span, ground):
-    """-> Touch: the first contact of one satellite with the pieces of hollow h.
+def first_in_hollow(h, own, came_from, base, path, span, ground):
+    """-> Touch: the first contact of one satellite with the pieces of hollow h in the cell that begins at ``base``.
 
     The sides of the cell of an open wall count as pieces. ``came_from`` is -1 or 1 if the satellite has just entered
     through the left or the right side.
     """
     hollows, joints, motion = ground.hollows, ground.joints, path.motion
+    path = Path(path.x - base, path.y, path.turn, motion, path.slack)
     t, end, rotation = span
     kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, c.SIZE]
     where = satellite_after(t, rotation, path.turn, motion)
@@ -492,4 +493,4 @@ def first_in_hollow(h, own, came_from, path, span, ground):
             if hit < end:
                 end, kind, number, code = hit, SIDE, side, unclear
                 where = satellite_after(hit, then, path.turn, motion)
-    return Touch(end if kind != NO_PIECE else np.inf, kind, number, where, code)
+    return Touch(end if kind != NO_PIECE else np.inf, Touching(kind, number, h), base, where, code)
