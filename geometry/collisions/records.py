@@ -1,4 +1,4 @@
-"""The wall, the satellites and the masses as arguments of the compiled collision.
+"""The wall and the satellites as arguments of the compiled collision.
 
 Lengths are in units of the wall, so the disk's radius is 1/scale.
 """
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..disk.disk import Disk
 from ..disk.satellites import Satellites
 from ..scene import columns as c
 from ..tracing.threads import new_flag
@@ -126,12 +125,6 @@ def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:
 def rolling_ring(scale: float, depth: float, scene: Scene) -> Ring:
     """Return the one satellite of a disk on the cylinder over a wall of the given scale and depth."""
     return Ring(scale, 1.0, 0.0, depth + scene.cell, position_rounding(scene, 0.0), 0.0, 1.0, True)
-
-
-def mass_fractions(disk: Disk) -> tuple[float, float]:
-    """Return mass and inertia in the unit m + J; laws depend on their ratio only."""
-    total = disk.mass + disk.inertia
-    return disk.mass / total, disk.inertia / total
 
 
 def position_rounding(scene: Scene, farthest: float) -> float:
