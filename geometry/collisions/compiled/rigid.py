@@ -93,14 +93,13 @@ def first_contact(own, base, path, t, end, ground):
     turn, motion = path.turn, path.motion
     rotation = turning(motion.spin * t) if t > 0.0 else (0.0, 0.0)
     h, state = own.hollow, contact.satellite_after(t, rotation, turn, motion)
-    none = Touch(np.inf, Touching(NO_PIECE, -1, -1), base, state, CLEAR)
     if own.kind == TOP:
         # the satellite rises, and its path is convex
-        return none
+        return Touch(np.inf, Touching(NO_PIECE, -1, -1), base, state, CLEAR)
     if h < 0:
         t, rotation, h, base, code = descent(path, Span(t, end, rotation), ground)
         if t >= end:
-            return none
+            return Touch(np.inf, Touching(NO_PIECE, -1, -1), base, state, CLEAR)
         state = contact.satellite_after(t, rotation, turn, motion)
         if h < 0 or code != CLEAR:
             return Touch(t, Touching(TOP, -1, -1), base, state, code)
@@ -113,7 +112,7 @@ def first_contact(own, base, path, t, end, ground):
         if touch.on.kind != SIDE or touch.code == BOUNCE_LIMIT:
             return touch
         if path.y + state.dy > 0.0 and motion.v2 + motion.omega * state.sine > 0.0:
-            return none
+            return Touch(np.inf, Touching(NO_PIECE, -1, -1), base, state, CLEAR)
         rotation = turning(motion.spin * t)
         base += side * ground.cell
         came_from = -side
