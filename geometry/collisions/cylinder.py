@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, positive_number, whole_number
+from ...core.checks import Floats, positive_number
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk
@@ -15,8 +15,8 @@ from ..tracing.tracing import MAX_COLLISIONS
 from ..walls.wall import Wall
 from .amplification import DiskCounts
 from .configuration_space import ConfigurationSpace
-from .records import DiskResults, Rolling, ground_of, largest_bend, mass_fractions, position_rounding
-from .rigid import check_kinds, checked_states, collide, from_height_0, marked
+from .records import rolling_ring
+from .rigid import check_kinds, checked_states, collide, collide_ring
 
 # Newton steps on a convex function: at worst a step halves the error, near the root it squares the error.
 LANDING_STEPS = 80
@@ -96,21 +96,9 @@ def collide_cylinder(
     >>> out.position.tolist(), out.velocity.tolist(), out.time.tolist()
     ([[0.25, 0.25]], [[0.0, 2.0, 0.0]], [0.5])
     """
-    from .compiled.rigid import roll_disks
-
     check_kinds(disk, wall)
-    eps = positive_number("scale", scale)
-    at, moving = checked_states(position, velocity)
-    whole_number("max_contacts", max_contacts, 1)
-    ground, masses = ground_of(wall.scene), mass_fractions(disk)
-    rolling = Rolling(eps, wall.cell.depth, position_rounding(wall.scene, 0.0))
-
-    def run(start: Floats, moving: Floats, results: DiskResults) -> None:
-        roll_disks(start, moving, masses, rolling, max_contacts, ground, results)
-
-    collided = from_height_0(run, wall, eps, ground, threads)
-    bend = largest_bend(ground) * (wall.period + wall.depth)
-    results = marked(collided, (at, moving), disk, bend, (eps, eps))
+    ring = rolling_ring(positive_number("scale", scale), wall.cell.depth, wall.scene)
+    results = collide_ring(disk, wall, ring, position, velocity, max_contacts, threads)
     return CylinderCollision(results.position, results.velocity, results.time, results.contacts, results.status)
 
 

@@ -52,33 +52,27 @@ def collision_path(
             f"after {contacts}"
         )
     # a run limited to k contacts ends at contact k + 1; the heights follow from the times
-    states = [(start[0], moving[0], 0.0)]
     legs = [collide(disk, wall, scale, start, moving, spacing, max_contacts=k) for k in range(1, contacts)]
-    states += [(leg.position[0], leg.velocity[0], float(leg.time[0])) for leg in [*legs, whole]]
-    height, path = 0.0, [(*start[0], 0.0)]
-    if contacts:
-        first = _first_time(disk, wall, scale, start, moving, spacing, states[-1] if contacts == 1 else states[1])
-        path.append((*(start[0] + moving[0, [0, 2]] * first), moving[0, 1] * first))
-        height, before = moving[0, 1] * first, first
-        for configuration, w, at in states[1:]:
-            height += w[1] * (at - before)
-            before = at
-            path.append((*configuration, height))
-    else:
-        path.append((*whole.position[0], 0.0))
-    return np.array([(x1, x2, alpha) for x1, alpha, x2 in path])
+    states = [(leg.position[0], leg.velocity[0], float(leg.time[0])) for leg in [*legs, whole]]
+    before = _first_time(start[0], moving[0], *states[0])
+    height = moving[0, 1] * before
+    path = [(*start[0], 0.0), (*(start[0] + moving[0, [0, 2]] * before), height)]
+    for configuration, w, at in states:
+        height += w[1] * (at - before)
+        before = at
+        path.append((*configuration, height))
+    return np.array(path)[:, [0, 2, 1]]
 
 
-def _first_time(
-    disk: Disk, wall: Wall, scale: float, start: Floats, moving: Floats, spacing: float | None,
-    after: tuple[Floats, Floats, float],
-) -> float:  # fmt: skip
-    """Return the time of the first contact from the velocities before and after it and the state ``after``."""
-    configuration, w, end = after
-    change = w[[0, 2]] - moving[0, [0, 2]]
-    reached = configuration - start[0] - end * w[[0, 2]]
+def _first_time(start: Floats, moving: Floats, configuration: Floats, w: Floats, end: float) -> float:
+    """Return the time of the first contact of a disk that is at ``configuration`` at the time ``end``.
+
+    ``moving`` and ``w`` are its velocities before and after the contact.
+    """
+    change = w[[0, 2]] - moving[[0, 2]]
+    reached = configuration - start - end * w[[0, 2]]
     # start + v first + w (end - first) = position
     if not np.any(change):
         # only v2 changed: the time follows from the return to height 0
-        return float(end * w[1] / (w[1] - moving[0, 1]))
+        return float(end * w[1] / (w[1] - moving[1]))
     return float(-(change @ reached) / (change @ change))

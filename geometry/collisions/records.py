@@ -1,4 +1,4 @@
-"""The wall, the satellites and the masses as arguments of the compiled collision.
+"""The wall and the satellites as arguments of the compiled collision.
 
 Lengths are in units of the wall, so the disk's radius is 1/scale.
 """
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..disk.disk import Disk
 from ..disk.satellites import Satellites
 from ..scene import columns as c
 from ..tracing.threads import new_flag
@@ -52,7 +51,8 @@ class Ring(NamedTuple):
 
     At an angle of more than ``reach`` from the lowest point a satellite is above the wall; ``-floor`` is the least
     height of the disk; ``slack`` bounds the rounding error of a satellite's position. ``half_sine`` and ``half_cosine``
-    are the sine and cosine of half the spacing.
+    are the sine and cosine of half the spacing. ``is_rolling`` tells that the disk is on the cylinder, where one
+    satellite stays the lowest point: the contact moves with the velocity (v1 + omega, v2).
     """
 
     scale: float
@@ -62,14 +62,7 @@ class Ring(NamedTuple):
     slack: float
     half_sine: float
     half_cosine: float
-
-
-class Rolling(NamedTuple):
-    """A disk on the cylinder: scale of the wall, depth of the wall, bound on the rounding error of the contact."""
-
-    scale: float
-    deepest: float
-    slack: float
+    is_rolling: bool
 
 
 class DiskResults(NamedTuple):
@@ -125,13 +118,13 @@ def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:
         position_rounding(scene, math.sin(satellites.reach) / scale),
         math.sin(half),
         math.cos(half),
+        False,
     )
 
 
-def mass_fractions(disk: Disk) -> tuple[float, float]:
-    """Return mass and inertia in the unit m + J; laws depend on their ratio only."""
-    total = disk.mass + disk.inertia
-    return disk.mass / total, disk.inertia / total
+def rolling_ring(scale: float, depth: float, scene: Scene) -> Ring:
+    """Return the one satellite of a disk on the cylinder over a wall of the given scale and depth."""
+    return Ring(scale, 1.0, 0.0, depth + scene.cell, position_rounding(scene, 0.0), 0.0, 1.0, True)
 
 
 def position_rounding(scene: Scene, farthest: float) -> float:

@@ -16,10 +16,9 @@ from ..tracing.threads import in_blocks
 from ..tracing.tracing import MAX_COLLISIONS, Status
 from ..walls.wall import Wall
 from .amplification import DiskCounts, fewest_contacts, mark_amplified
-from .records import DiskResults, Ground, ground_of, largest_bend, mass_fractions, results_for, ring_of
+from .records import DiskResults, Ring, ground_of, largest_bend, results_for, ring_of
 
-# Functions of positions and velocities.
-Block = Callable[[Floats, Floats, DiskResults], None]
+# A function of positions and velocities.
 Collide = Callable[[Floats, Floats], DiskResults]
 
 
@@ -125,38 +124,37 @@ def collide(
     >>> hit.velocity.round(12).tolist(), hit.contacts.tolist(), hit.counts()["escaped"]
     ([[0.0, 1.0, 0.0]], [1], 1)
     """
-    from .compiled.rigid import collide_disks
-
     check_kinds(disk, wall)
     eps = positive_number("scale", scale)
     ring = ring_of(Satellites.around(eps, eps * wall.depth, spacing), eps, wall.scene)
-    at, moving = checked_states(position, velocity)
+    return RigidCollision(*collide_ring(disk, wall, ring, position, velocity, max_contacts, threads))
+
+
+def collide_ring(
+    disk: Disk, wall: Wall, ring: Ring, position: ArrayLike, velocity: ArrayLike, max_contacts: int, threads: int | None
+) -> DiskResults:
+    """Return the results of disks at x2 = 0 with the satellites of a ring, read-only, amplified ones marked."""
+    from .compiled.rigid import collide_disks
+
+    states = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
-    ground = ground_of(wall.scene)
-    masses = mass_fractions(disk)
-
-    def run(start: Floats, moving: Floats, results: DiskResults) -> None:
-        collide_disks(start, moving, masses, ring, max_contacts, ground, results)
-
-    collided = from_height_0(run, wall, eps, ground, threads)
-    bend = (largest_bend(ground) + eps) * (wall.period + wall.depth)
-    return RigidCollision(*marked(collided, (at, moving), disk, bend, (eps, ring.reach)))
-
-
-def from_height_0(run: Block, wall: Wall, scale: float, ground: Ground, threads: int | None) -> Collide:
-    """Return the function of disks at x2 = 0 from that of a block of disks at the level of the highest points."""
+    ground, total = ground_of(wall.scene), disk.mass + disk.inertia
+    masses = disk.mass / total, disk.inertia / total
 
     def collided(at: Floats, moving: Floats) -> DiskResults:
-        start, results = at_the_tops(wall, scale, at, moving), results_for(len(at))
+        start, results = at_the_tops(wall, ring.scale, at, moving), results_for(len(at))
 
         def run_part(part: slice) -> None:
-            run(start[part], moving[part], results.part(part))
+            collide_disks(start[part], moving[part], masses, ring, max_contacts, ground, results.part(part))
 
         in_blocks(run_part, len(at), threads, stop=ground.stop)
-        from_the_tops(wall, scale, at, start, moving, results)
+        from_the_tops(wall, ring.scale, at, start, moving, results)
         return results
 
-    return collided
+    # on the cylinder the paths are straight, and alpha is of the size of x1
+    curvature, angle = (0.0, ring.scale) if ring.is_rolling else (ring.scale, ring.reach)
+    bend = (largest_bend(ground) + curvature) * (wall.period + wall.depth)
+    return marked(collided, states, disk, bend, (ring.scale, angle))
 
 
 def marked(

@@ -112,11 +112,11 @@ class Span(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """A contact: time (inf for none), kind and number of the piece, state of the satellite, and code."""
+    """A contact: time (inf for none), piece, left end of its cell, state of the satellite, and code."""
 
     time: float
-    kind: int
-    piece: int
+    on: Touching
+    base: float
     state: State
     code: int
 
@@ -172,23 +172,16 @@ def line_after(line, t, rotation, motion):
 
 
 @inlined
-def conic_at(conic, t, rotation, turn, motion):
-    """Return F of a conic after the time t, F', F'', and the normal there, up to its length."""
+def conic_after(conic, t, rotation, turn, motion):
+    """Return F of a conic after the time t, F', F'', and b0 and b1: |F'''| is at most b0 + b1 s up to t + s."""
     level, g1, g2, curvature, stretch = conic
     dx, dy, sine, cosine = satellite_after(t, rotation, turn, motion)
     dy *= stretch
     n1, n2 = g1 - curvature * dx, g2 - curvature * dy
     u1, u2 = motion.v1 + motion.omega * cosine, stretch * (motion.v2 + motion.omega * sine)
-    f2 = motion.spin * motion.omega * (stretch * n2 * cosine - n1 * sine) - curvature * (u1 * u1 + u2 * u2)
-    return level + 0.5 * ((g1 + n1) * dx + (g2 + n2) * dy), n1 * u1 + n2 * u2, f2, n1, n2
-
-
-@inlined
-def conic_after(conic, t, rotation, turn, motion):
-    """Return F of a conic after the time t, F', F'', and b0 and b1: |F'''| is at most b0 + b1 s up to t + s."""
-    f, f1, f2, n1, n2 = conic_at(conic, t, rotation, turn, motion)
-    _, _, _, curvature, stretch = conic
     bend, widest = motion.spin * motion.omega, max(1.0, stretch)
+    f, f1 = level + 0.5 * ((g1 + n1) * dx + (g2 + n2) * dy), n1 * u1 + n2 * u2
+    f2 = bend * (stretch * n2 * cosine - n1 * sine) - curvature * (u1 * u1 + u2 * u2)
     swing, bent = widest * bend * abs(motion.spin), abs(curvature) * (widest * motion.fastest)
     third = swing * (abs(n1) + abs(n2)) + 3.0 * bent * widest * bend
     return f, f1, f2, third, swing * bent
@@ -205,7 +198,7 @@ def safe_step(f, f1, f2):
 
 @inlined
 def graph_after(form, t, rotation, path):
-    """-> (F, F', F'', xi, xi'): F of a graph on a path after the time t, and the abscissa with its speed."""
+    """-> (F, F', F'', xi'): F of a graph on a path after the time t, and the speed of the abscissa."""
     graph, begin = form
     motion = path.motion
     state = satellite_after(t, rotation, path.turn, motion)
@@ -214,7 +207,7 @@ def graph_after(form, t, rotation, path):
     xi1, eta1 = in_frame(graph, motion.v1 + motion.omega * state.cosine, motion.v2 + motion.omega * state.sine)
     turn = motion.spin * motion.omega
     xi2, eta2 = in_frame(graph, -turn * state.sine, turn * state.cosine)
-    return f, eta1 - slope * xi1, eta2 - slope * xi2 - bend * xi1 * xi1, begin.abscissa + d_xi, xi1
+    return f, eta1 - slope * xi1, eta2 - slope * xi2 - bend * xi1 * xi1, xi1
 
 
 @inlined
@@ -251,7 +244,7 @@ def next_root(sign, leaving, line, conic, graph, span, path, patience):
         if line is not None:
             f, f1, f2 = line_after(line, t, rotation, motion)
         if graph is not None:
-            f, f1, f2, _, xi1 = graph_after(graph, t, rotation, path)
+            f, f1, f2, xi1 = graph_after(graph, t, rotation, path)
         f, f1, f2 = sign * f, sign * f1, sign * f2
         if number == 0 and leaving:
             if f1 <= 0.0:
@@ -324,15 +317,12 @@ def is_in_front(kind, number, own, x, y, slack, ground):
 
 @inlined
 def piece_after(kind, line, conic, graph, t, rotation, path):
-    """-> (F, F', F'', abscissa): of a piece of any kind on a path after the time t; the abscissa is that of a graph."""
+    """-> (F, F', F''): of a piece of any kind on a path after the time t."""
     if kind == LINE:
-        f, f1, f2 = line_after(line, t, rotation, path.motion)
-        return f, f1, f2, 0.0
+        return line_after(line, t, rotation, path.motion)
     if kind == ARC:
-        f, f1, f2, _, _ = conic_at(conic, t, rotation, path.turn, path.motion)
-        return f, f1, f2, 0.0
-    f, f1, f2, along, _ = graph_after(graph, t, rotation, path)
-    return f, f1, f2, along
+        return conic_after(conic, t, rotation, path.turn, path.motion)[:3]
+    return graph_after(graph, t, rotation, path)[:3]
 
 
 @inlined
@@ -347,7 +337,7 @@ def stays_in_front(line, span, leaving, motion, slack):
 
 
 @inlined
-def where_on_piece(kind, number, path, state, inward, along, ground):
+def where_on_piece(kind, number, path, state, inward, ground):
     """-> (inside, corner): whether a point of the continuation of a piece is on it; see `where_on_line`.
 
     At shallow incidence a rounding error across the piece is a larger error along it.
@@ -358,6 +348,7 @@ def where_on_piece(kind, number, path, state, inward, along, ground):
         return where_on_line(ground.joints, ground.lines, number, x, y, wide)
     if kind == BEZIER:
         graph = ground.graphs[number]
+        along, _ = in_frame(graph, x - graph[c.START_X], y - graph[c.START_Y])
         return -wide <= along <= graph[g.WIDTH] + wide, near_end(graph, x, y, wide)
     arc, stretch = ground.arcs[number], ground.arcs[number, c.STRETCH]
     excess = end_excess(arc, x - arc[c.START_X], stretch * (y - arc[c.START_Y]))
@@ -416,7 +407,7 @@ def first_on_piece(kind, number, own, path, span, size, ground):
     t, end, rotation = span
     motion, slack = path.motion, path.slack
     is_own, line, conic, graph, patience, reach = piece_form(kind, number, own, path, size, ground)
-    here, rate, _, _ = piece_after(kind, line, conic, graph, t, rotation, path)
+    here, rate, _ = piece_after(kind, line, conic, graph, t, rotation, path)
     leaving = is_own and t == 0.0
     if t == 0.0 and own.kind != NO_PIECE and not is_own and abs(here) <= reach:
         leaving = not is_in_front(kind, number, own, path.x, path.y, reach, ground)
@@ -439,10 +430,10 @@ def first_on_piece(kind, number, own, path, span, size, ground):
             return np.inf, state, CLEAR
         if code == BOUNCE_LIMIT:
             return t, state, code
-        _, rate, bent, along = piece_after(kind, line, conic, graph, t, rotation, path)
+        _, rate, bent = piece_after(kind, line, conic, graph, t, rotation, path)
         if sign > 0.0:
             inward = rate
-            inside, corner = where_on_piece(kind, number, path, state, inward, along, ground)
+            inside, corner = where_on_piece(kind, number, path, state, inward, ground)
             if inside:
                 return t, state, CORNER if corner else code
         if code == GRAZING:
@@ -463,16 +454,17 @@ def first_on_piece(kind, number, own, path, span, size, ground):
 
 
 @inlined
-def first_in_hollow(h, own, came_from, path, span, ground):
-    """-> Touch: the first contact of one satellite with the pieces of hollow h.
+def first_in_hollow(h, own, came_from, base, path, span, ground):
+    """-> Touch: the first contact of one satellite with the pieces of hollow h in the cell that begins at ``base``.
 
     The sides of the cell of an open wall count as pieces. ``came_from`` is -1 or 1 if the satellite has just entered
     through the left or the right side.
     """
     hollows, joints, motion = ground.hollows, ground.joints, path.motion
+    path = Path(path.x - base, path.y, path.turn, motion, path.slack)
     t, end, rotation = span
-    kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, c.SIZE]
-    where = satellite_after(t, rotation, path.turn, motion)
+    none = satellite_after(t, rotation, path.turn, motion)
+    touch = Touch(np.inf, Touching(ZERO, NOTHING, h), base, none, CLEAR)
     ranges = (
         (LINE, c.FIRST_JOINT, c.JOINTS_END), (ARC, c.FIRST_ARC, c.ARCS_END), (BEZIER, c.FIRST_BEZIER, c.BEZIERS_END),
     )  # fmt: skip
@@ -480,16 +472,16 @@ def first_in_hollow(h, own, came_from, path, span, ground):
         for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
             if tried != LINE or joints[k, c.STARTS_LINE] > 0.0:
                 rest = Span(t, end, rotation)
-                hit, there, unclear = first_on_piece(tried, k, own, path, rest, size, ground)
+                hit, there, code = first_on_piece(tried, k, own, path, rest, hollows[h, c.SIZE], ground)
                 if hit < end:
-                    end, kind, number, code, where = hit, tried, k, unclear, there
+                    end, touch = hit, Touch(hit, Touching(tried, k, h), base, there, code)
     if ground.is_open:
         for side in (-1, 1):
             edge = hollows[h, c.LEFT] if side < 0 else hollows[h, c.RIGHT]
             line = towards_line(side * (edge - path.x), -float(side), 0.0, path.turn, motion)
             rest = Span(t, end, rotation)
-            hit, then, unclear = next_root(1.0, came_from == side, line, None, None, rest, path, np.inf)
+            hit, then, code = next_root(1.0, came_from == side, line, None, None, rest, path, np.inf)
             if hit < end:
-                end, kind, number, code = hit, SIDE, side, unclear
-                where = satellite_after(hit, then, path.turn, motion)
-    return Touch(end if kind != NO_PIECE else np.inf, kind, number, where, code)
+                there = satellite_after(hit, then, path.turn, motion)
+                end, touch = hit, Touch(hit, Touching(SIDE, side, h), base, there, code)
+    return touch

@@ -13,10 +13,10 @@ import numpy as np
 from ...scene import columns as c
 from ...tracing.compiled.pieces.arcs import arc_form, arc_point
 from ...tracing.compiled.pieces.formulas import opening_at
-from ...tracing.compiled.pieces.lines import line_at
+from ...tracing.compiled.pieces.lines import LEAST_FRACTION, line_at, line_point
 from ...tracing.compiled.pieces.options import compiled, inlined, inner
 from ...tracing.compiled.pieces.pointers import is_raised
-from ...tracing.compiled.pieces.records import BEZIER, LINE, NO_PIECE, SIDE
+from ...tracing.compiled.pieces.records import ARC, BEZIER, NO_PIECE, SIDE
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from . import contact
 from .contact import CLEAR, NO, NOTHING, WIDEST_SLACK, ZERO, Path, Span, Touch, Touching, turning
@@ -42,15 +42,6 @@ class Below(NamedTuple):
     number: int
     hollow: int
     base: float
-
-
-class Chosen(NamedTuple):
-    """A satellite that touches the wall: its number, its position, and the sine and cosine of its angle."""
-
-    number: int
-    x: float
-    y: float
-    turn: tuple[float, float]
 
 
 @inlined
@@ -95,67 +86,66 @@ def descent(path, span, ground):
 
 @inner
 def first_contact(own, base, path, t, end, ground):
-    """-> (Touch, h, base): the first contact in [t, end) of one satellite with the wall, its hollow and cell.
+    """-> Touch: the first contact in [t, end) of one satellite with the wall.
 
     The path starts on ``own``. Its hollow, -1 above the tops, is in the cell that begins at ``base``.
     """
-    x, y, turn, motion, slack = path
+    turn, motion = path.turn, path.motion
     rotation = turning(motion.spin * t) if t > 0.0 else (0.0, 0.0)
-    state = contact.satellite_after(t, rotation, turn, motion)
-    h = own.hollow
+    h, state = own.hollow, contact.satellite_after(t, rotation, turn, motion)
     if own.kind == TOP:
         # the satellite rises, and its path is convex
-        return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
+        return Touch(np.inf, Touching(NO_PIECE, -1, -1), base, state, CLEAR)
     if h < 0:
         t, rotation, h, base, code = descent(path, Span(t, end, rotation), ground)
-        state = contact.satellite_after(t, rotation, turn, motion)
         if t >= end:
-            return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
+            return Touch(np.inf, Touching(NO_PIECE, -1, -1), base, state, CLEAR)
+        state = contact.satellite_after(t, rotation, turn, motion)
         if h < 0 or code != CLEAR:
-            return Touch(t, TOP, -1, state, code), -1, base
+            return Touch(t, Touching(TOP, -1, -1), base, state, code)
     came_from = ZERO
     for cell in range(MOST_CELLS):
         if cell & (CELLS_A_CHECK - 1) == CELLS_A_CHECK - 1 and is_raised(ground.stop):
             break
-        shifted = Path(x - base, y, turn, motion, slack)
-        touch = contact.first_in_hollow(h, own, came_from, shifted, Span(t, end, rotation), ground)
-        t, state = touch.time, touch.state
-        if touch.kind != SIDE or touch.code == BOUNCE_LIMIT:
-            return touch, h, base
-        if y + state.dy > 0.0 and motion.v2 + motion.omega * state.sine > 0.0:
-            return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
+        touch = contact.first_in_hollow(h, own, came_from, base, path, Span(t, end, rotation), ground)
+        t, state, side = touch.time, touch.state, touch.on.piece
+        if touch.on.kind != SIDE or touch.code == BOUNCE_LIMIT:
+            return touch
+        if path.y + state.dy > 0.0 and motion.v2 + motion.omega * state.sine > 0.0:
+            return Touch(np.inf, Touching(NO_PIECE, -1, -1), base, state, CLEAR)
         rotation = turning(motion.spin * t)
-        base += touch.piece * ground.cell
-        came_from = -touch.piece
+        base += side * ground.cell
+        came_from = -side
         own = Touching(ZERO, NOTHING, h)
-    return Touch(t, NO_PIECE, -1, state, BOUNCE_LIMIT), h, base
-
-
-@inlined
-def on_line(k, x, y, ground):
-    """Return the point (x, y) projected onto a line, and the unit normal towards the free side."""
-    line = line_at(ground, k)
-    fraction = ((x - line.x0) * line.edge_x + (y - line.y0) * line.edge_y) / (line.length * line.length)
-    # from the nearer end
-    late = fraction > 0.5
-    x0, y0, fraction = (line.x1, line.y1, fraction - 1.0) if late else (line.x0, line.y0, fraction)
-    return x0 + fraction * line.edge_x, y0 + fraction * line.edge_y, line.normal_x, line.normal_y
+    return Touch(t, Touching(NO_PIECE, -1, h), base, state, BOUNCE_LIMIT)
 
 
 @inlined
 def surface(kind, index, x, y, ground):
     """Return the point (x, y) projected onto the piece that is hit, and the unit normal towards the free side."""
+    if kind == TOP:
+        return x, 0.0, 0.0, 1.0
     if kind == BEZIER:
         return graph_surface(ground.graphs[index], x, y)
-    if kind == LINE:
-        return on_line(index, x, y, ground)
-    arc = ground.arcs[index]
-    return arc_point(arc_form(arc), arc, arc[c.STRETCH], 0.0, x, y, 0.0, 0.0)
+    if kind == ARC:
+        arc = ground.arcs[index]
+        return arc_point(arc_form(arc), arc, arc[c.STRETCH], 0.0, x, y, 0.0, 0.0)
+    line = line_at(ground, index)
+    fraction = ((x - line.x0) * line.edge_x + (y - line.y0) * line.edge_y) / (line.length * line.length)
+    # from the nearer end
+    x, y = line_point(line, min(fraction - 1.0, -LEAST_FRACTION) if fraction > 0.5 else max(fraction, 0.0))
+    return x, y, line.normal_x, line.normal_y
 
 
 @inlined
-def satellite_at(x, y, turn, j, ring):
-    """Return the position and (sine, cosine) of the j-th satellite after the one at (x, y) and ``turn``.
+def moved(path, state):
+    """-> Path: the path of a satellite that goes on after a displacement."""
+    return Path(path.x + state.dx, path.y + state.dy, (state.sine, state.cosine), path.motion, path.slack)
+
+
+@inlined
+def neighbour(path, j, ring):
+    """-> Path: the path of the j-th satellite after the one on ``path``.
 
     The position is computed from a chord, without cancellation of numbers of the size of the disk. For neighbours, by
     far the most frequent case, no sine is computed.
@@ -164,10 +154,11 @@ def satellite_at(x, y, turn, j, ring):
     if abs(j) != 1:
         half = 0.5 * j * ring.spacing
         half_sine, half_cosine = math.sin(half), math.cos(half)
-    sine, cosine = turn
+    sine, cosine = path.turn
     across = 2.0 * half_sine * (cosine * half_cosine - sine * half_sine)
     upward = 2.0 * half_sine * (sine * half_cosine + cosine * half_sine)
-    return x + across / ring.scale, y + upward / ring.scale, (sine + across, cosine - upward)
+    turn = sine + across, cosine - upward
+    return Path(path.x + across / ring.scale, path.y + upward / ring.scale, turn, path.motion, path.slack)
 
 
 @inlined
@@ -192,86 +183,77 @@ def out_of_reach_after(angle, motion, ring):
 
 
 @inlined
+def within_reach_after(angle, motion, ring):
+    """Return when a satellite at ``angle`` comes within reach of the wall, 0 if it is; the angle must decrease."""
+    beyond = abs(angle) - ring.reach
+    return beyond / abs(motion.spin) if beyond > 0.0 else 0.0
+
+
+@inlined
 def first_of_all(own, below, path, height, angle, end, ring, ground):
-    """-> (t, Touching, base, Chosen, code): the first contact of any satellite before ``end``; t is ``end`` if none.
+    """-> (Touch, code, number, Path): the first contact of any satellite before ``end``, and the satellite's path.
 
     ``path`` is the path of satellite 0, which starts on ``own``; the disk is at ``height``.
     """
-    x, y, turn, motion, slack = path
-    reach, rate = ring.reach, abs(motion.spin)
-    passed = out_of_reach_after(angle, motion, ring)
-    touch, hollow, base = first_contact(own, 0.0, path, 0.0, min(end, passed), ground)
-    state, code = touch.state, touch.code
-    hit = Touching(touch.kind, touch.piece, hollow)
-    chosen = Chosen(0, x + state.dx, y + state.dy, (state.sine, state.cosine))
-    time = min(touch.time, end)
+    motion, slack = path.motion, path.slack
+    touch = first_contact(own, 0.0, path, 0.0, min(end, out_of_reach_after(angle, motion, ring)), ground)
+    time, code, number, chosen = min(touch.time, end), touch.code, 0, path
     # the others in the order in which they come within reach of the wall
     step = -1 if motion.spin > 0.0 else 1
     # numba's floor is a float
-    j = -step * int(math.floor((reach + step * angle) / ring.spacing))  # noqa: RUF046
+    j = -step * int(math.floor((ring.reach + step * angle) / ring.spacing))  # noqa: RUF046
     for count in range(MOST_CELLS):
         if count & (CELLS_A_CHECK - 1) == CELLS_A_CHECK - 1 and is_raised(ground.stop):
             break
         other = angle + j * ring.spacing
         away = other * motion.spin >= 0.0
-        beyond = abs(other) - reach
-        if beyond > 0.0 and (away or beyond >= rate * time):
+        if abs(other) > ring.reach and (away or abs(other) - ring.reach >= abs(motion.spin) * time):
             break
         if j != 0 and lowest_until(time, other, away, height, motion) <= 2.0 * slack:
             # two contacts are simultaneous if the disk falls less than the slack between them
-            tie = slack / max(abs(motion.v2), motion.fastest / WIDEST_SLACK) if hit.kind != NO_PIECE else 0.0
+            is_met = touch.on.kind != NO_PIECE
+            tie = slack / max(abs(motion.v2), motion.fastest / WIDEST_SLACK) if is_met else 0.0
             until = min(time + tie, out_of_reach_after(other, motion, ring))
-            start = beyond / rate if beyond > 0.0 else 0.0
-            x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
-            sine_other, _ = turn_other
+            start, there = within_reach_after(other, motion, ring), neighbour(path, j, ring)
+            sine, _ = there.turn
             # the path is convex, so it stays above its first tangent
-            if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * sine_other) * until < 0.0:
-                inside, left = (below.hollow, below.base) if j == below.number else (NOTHING, 0.0)
-                there = Path(x_other, y_other, turn_other, motion, slack)
-                touch, hollow, left = first_contact(Touching(ZERO, NOTHING, inside), left, there, start, until, ground)
-                tied = hit.kind != NO_PIECE and abs(touch.time - time) <= tie
-                if touch.time < time:
-                    time, hit, base, code = touch.time, Touching(touch.kind, touch.piece, hollow), left, touch.code
-                    state = touch.state
-                    chosen = Chosen(j, x_other + state.dx, y_other + state.dy, (state.sine, state.cosine))
+            if start > 0.0 or there.y <= 0.0 or there.y + (motion.v2 + motion.omega * sine) * until < 0.0:
+                inside, base = (below.hollow, below.base) if j == below.number else (NOTHING, 0.0)
+                hit = first_contact(Touching(ZERO, NOTHING, inside), base, there, start, until, ground)
+                tied = is_met and abs(hit.time - time) <= tie
+                if hit.time < time:
+                    touch, time, code, number, chosen = hit, hit.time, hit.code, j, there
                 if tied:
                     code = CORNER
         j += step
     else:
         code = BOUNCE_LIMIT
-    return time, hit, base, chosen, code
+    return touch, code, number, chosen
 
 
-@inner
-def left_below(own, below, path, angle, time, chosen, ring, ground):
-    """-> Below: the neighbour, if any, that is below the tops when the satellite ``chosen`` touches the wall.
+@inlined
+def left_below(own, below, path, angle, time, number, chosen, ring, ground):
+    """-> Below: the neighbour, if any, that is below the tops when the satellite ``number`` touches the wall.
 
-    Its hollow follows from the position where it came below the tops, not from its present position, which may be under
-    an overhang. At most one satellite besides ``chosen`` is below the tops.
+    ``chosen`` is the path of this satellite from the contact. The hollow of the neighbour follows from the position
+    where it came below the tops, not from its present position, which may be under an overhang. At most one satellite
+    besides ``number`` is below the tops.
     """
     if ground.is_open:
         return Below(ZERO, NOTHING, 0.0)
     motion = path.motion
-    later = angle + motion.spin * time + chosen.number * ring.spacing
-    for side in (-1, 1):
-        if abs(later + side * ring.spacing) <= ring.reach:
-            _, height, _ = satellite_at(chosen.x, chosen.y, chosen.turn, side, ring)
-            if height <= 0.0:
-                j = chosen.number + side
-                if j == 0 and own.hollow >= 0:
-                    return Below(j, own.hollow, 0.0)
-                if j == below.number and below.hollow >= 0:
-                    return below
-                other = angle + j * ring.spacing
-                x_other, y_other, turn_other = satellite_at(path.x, path.y, path.turn, j, ring)
-                start = 0.0
-                if abs(other) > ring.reach:
-                    # the satellite came within reach after the start
-                    start = (abs(other) - ring.reach) / abs(motion.spin)
-                there = Path(x_other, y_other, turn_other, motion, path.slack)
-                t, _, h, base, _ = descent(there, Span(start, time, turning(motion.spin * start)), ground)
-                if t < time:
-                    return Below(j, h, base)
+    for j in (number - 1, number + 1):
+        other = angle + j * ring.spacing
+        if abs(other + motion.spin * time) <= ring.reach and neighbour(chosen, j - number, ring).y <= 0.0:
+            if j == 0 and own.hollow >= 0:
+                return Below(j, own.hollow, 0.0)
+            if j == below.number and below.hollow >= 0:
+                return below
+            start = within_reach_after(other, motion, ring)
+            span = Span(start, time, turning(motion.spin * start))
+            t, _, h, base, _ = descent(neighbour(path, j, ring), span, ground)
+            if t < time:
+                return Below(j, h, base)
     return Below(ZERO, NOTHING, 0.0)
 
 
@@ -295,14 +277,11 @@ def reflect(v1, v2, omega, n1, n2, turn, disk):
 
 @inlined
 def longest_flight(height, motion, ring):
-    """-> float: a time by which the disk is back or lower than possible without contact; -inf if there is none."""
+    """-> float: a time by which the disk is back, lower than possible, or beyond `MOST_CELLS`, without contact."""
     if motion.v2 > 0.0:
         return max(-height / motion.v2, 0.0)
-    if motion.v2 < 0.0:
-        return -(height + ring.floor) / motion.v2
-    if motion.omega != 0.0:
-        return MOST_CELLS * ring.spacing / abs(motion.spin)
-    return -np.inf
+    time = -(height + ring.floor) / motion.v2 if motion.v2 < 0.0 else MOST_CELLS * ring.spacing / abs(motion.spin)
+    return min(time, FOREVER)
 
 
 @inlined
@@ -312,7 +291,7 @@ def collide_disk(entry, angle, velocity, disk, ring, limit, ground):
     The disk starts at height 0, its lowest satellite at ``angle`` from the lowest point. ``disk`` is (m, J) with
     m + J = 1. The velocities have kinetic norm 1. ``two`` tells whether more than one satellite touched the wall.
     """
-    scale, spacing = ring.scale, ring.spacing
+    scale = ring.scale
     v1, v2, omega = velocity
     travel, rotation, passed, contacts, two = 0.0, 0.0, 0.0, 0, False
     sine, versed = turning(angle)
@@ -320,127 +299,60 @@ def collide_disk(entry, angle, velocity, disk, ring, limit, ground):
     own, below = Touching(ZERO, NOTHING, NOTHING), Below(ZERO, NOTHING, 0.0)
     status = BOUNCE_LIMIT
     while not is_raised(ground.stop):
-        path = Path(x, y, (sine, 1.0 - versed), contact.flight(v1, v2, omega, scale), ring.slack)
+        plane, spin = (v1 + omega, 0.0) if ring.is_rolling else (v1, omega)
+        path = Path(x, y, (sine, 1.0 - versed), contact.flight(plane, v2, spin, scale), ring.slack)
         end = longest_flight(height, path.motion, ring)
-        if end == -np.inf:
-            break
-        time, hit, base, chosen, code = first_of_all(own, below, path, height, angle, end, ring, ground)
+        touch, code, number, chosen = first_of_all(own, below, path, height, angle, end, ring, ground)
+        time = min(touch.time, end)
         travel += v1 * time
-        rotation += path.motion.spin * time
+        rotation += scale * omega * time
         passed += time
         if code != CLEAR:
             status = code
             break
-        if hit.kind == NO_PIECE:
+        if touch.on.kind == NO_PIECE:
             status = ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
             break
         if contacts >= limit:
             break
-        left = left_below(own, below, path, angle, time, chosen, ring, ground)
-        below = Below(left.number - chosen.number, left.hollow, left.base - base)
-        two = two or (contacts > 0 and chosen.number != 0)
+        chosen = moved(chosen, touch.state)
+        left = left_below(own, below, path, angle, time, number, chosen, ring, ground)
+        below = Below(left.number - number, left.hollow, left.base - touch.base)
+        two = two or (contacts > 0 and number != 0)
         contacts += 1
-        angle += chosen.number * spacing + path.motion.spin * time
+        angle += number * ring.spacing + path.motion.spin * time
         sine, versed = turning(angle)
-        own, x, y, n1, n2 = hit, chosen.x - base, 0.0, 0.0, 1.0
-        if hit.kind != TOP:
-            x, y, n1, n2 = surface(hit.kind, hit.piece, x, chosen.y, ground)
+        own = touch.on
+        x, y, n1, n2 = surface(own.kind, own.piece, chosen.x - touch.base, chosen.y, ground)
         height = y - versed / scale
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (sine, 1.0 - versed), disk)
     return travel, rotation, passed, (v1, v2, omega), contacts, two, status
 
 
 @inlined
-def unit_velocity(velocity, i, disk):
-    """-> (norm, unit): the kinetic norm of a disk's velocity, and the velocity divided by its norm."""
-    mass, inertia = disk
-    norm = math.sqrt(mass * (velocity[i, V1] ** 2 + velocity[i, V2] ** 2) + inertia * velocity[i, OMEGA] ** 2)
-    return norm, (velocity[i, V1] / norm, velocity[i, V2] / norm, velocity[i, OMEGA] / norm)
-
-
-@inlined
-def start_of(position, i, width, ring):
-    """-> (entry, angle): where disk i meets the tops in its cell, and the angle of its lowest satellite."""
-    entry = (position[i, X1] - math.floor(position[i, X1] / width) * width) / ring.scale
-    return entry, position[i, ALPHA] - ring.spacing * round(position[i, ALPHA] / ring.spacing)
-
-
-@inlined
-def store(results, i, position, norm, path, velocity, contacts, two, status):
-    """Store the result of disk i; ``path`` is (displacement, rotation, time), the unit of velocities is ``norm``."""
-    travel, rotation, time = path
-    v1, v2, omega = velocity
-    results.position[i, X1], results.position[i, ALPHA] = position[i, X1] + travel, position[i, ALPHA] + rotation
-    results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = norm * v1, norm * v2, norm * omega
-    results.time[i], results.contacts[i] = time / norm, contacts
-    results.two_satellites[i], results.status[i] = two, status
+def start_of(x, alpha, width, ring):
+    """-> (entry, angle): where a disk meets the tops in its cell, and the angle of its lowest satellite."""
+    if ring.is_rolling:
+        x, alpha = x + alpha, 0.0
+    return (x - math.floor(x / width) * width) / ring.scale, alpha - ring.spacing * round(alpha / ring.spacing)
 
 
 @compiled
 def collide_disks(position, velocity, disk, ring, limit, ground, results):
     """Collide a block of disks into ``results``, see `DiskResults`."""
-    scale = ring.scale
+    (mass, inertia), scale = disk, ring.scale
     for i in range(position.shape[0]):
         if is_raised(ground.stop):
             break
-        norm, unit = unit_velocity(velocity, i, disk)
-        entry, angle = start_of(position, i, scale * ground.cell, ring)
+        x, alpha = position[i, X1], position[i, ALPHA]
+        v1, v2, omega = velocity[i, V1], velocity[i, V2], velocity[i, OMEGA]
+        norm = math.sqrt(mass * (v1**2 + v2**2) + inertia * omega**2)
+        entry, angle = start_of(x, alpha, scale * ground.cell, ring)
+        unit = v1 / norm, v2 / norm, omega / norm
         travel, rotation, time, end, contacts, two, status = collide_disk(entry, angle, unit, disk, ring, limit, ground)
-        path = scale * travel, rotation, scale * time
-        store(results, i, position, norm, path, end, contacts, two, status)
-
-
-@inlined
-def roll_disk(entry, velocity, disk, rolling, limit, ground):
-    """-> (displacement, rotation, time, velocity, contacts, status): one collision on the cylinder.
-
-    The contact moves on a straight line with the velocity (v1 + omega, v2) and starts at (position, 0).
-    """
-    v1, v2, omega = velocity
-    travel, rotation, passed, contacts = 0.0, 0.0, 0.0, 0
-    x, y = entry, 0.0
-    own, status = Touching(ZERO, NOTHING, NOTHING), BOUNCE_LIMIT
-    while not is_raised(ground.stop):
-        path = Path(x, y, (0.0, 1.0), contact.flight(v1 + omega, v2, 0.0, 1.0), rolling.slack)
-        end = FOREVER
-        if v2 > 0.0:
-            end = -y / v2
-        elif v2 < 0.0:
-            end = min(2.0 * (y + rolling.deepest + ground.cell) / -v2, FOREVER)
-        touch, hollow, base = first_contact(own, 0.0, path, 0.0, end, ground)
-        kind, state, code = touch.kind, touch.state, touch.code
-        time = min(touch.time, end)
-        travel += v1 * time
-        rotation += omega * time
-        passed += time
-        if code != CLEAR:
-            status = code
-            break
-        if kind == NO_PIECE:
-            status = ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
-            break
-        if contacts >= limit:
-            break
-        contacts += 1
-        own, x, y, n1, n2 = Touching(kind, touch.piece, hollow), x + state.dx - base, y + state.dy, 0.0, 1.0
-        if kind == TOP:
-            y = 0.0
-        else:
-            x, y, n1, n2 = surface(kind, touch.piece, x, y, ground)
-        v1, v2, omega = reflect(v1, v2, omega, n1, n2, (0.0, 1.0), disk)
-    return travel, rotation, passed, (v1, v2, omega), contacts, status
-
-
-@compiled
-def roll_disks(position, velocity, disk, rolling, limit, ground, results):
-    """Collide a block of disks on the cylinder into ``results``, see `DiskResults`."""
-    scale = rolling.scale
-    for i in range(position.shape[0]):
-        if is_raised(ground.stop):
-            break
-        norm, unit = unit_velocity(velocity, i, disk)
-        entry = (position[i, X1] + position[i, ALPHA]) / scale
-        entry -= math.floor(entry / ground.cell) * ground.cell
-        travel, rotation, time, end, contacts, status = roll_disk(entry, unit, disk, rolling, limit, ground)
-        path = scale * travel, scale * rotation, scale * time
-        store(results, i, position, norm, path, end, contacts, NO, status)
+        v1, v2, omega = end
+        results.position[i, X1], results.position[i, ALPHA] = x + scale * travel, alpha + rotation
+        results.velocity[i, V1], results.velocity[i, V2] = norm * v1, norm * v2
+        results.velocity[i, OMEGA] = norm * omega
+        results.time[i], results.contacts[i] = scale * time / norm, contacts
+        results.two_satellites[i], results.status[i] = two, status

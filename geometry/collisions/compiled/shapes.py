@@ -56,24 +56,16 @@ def parameter_at(graph, xi):
 
 
 @inlined
-def shape_at(graph, xi):
-    """-> (sigma, slope, bend): parameter, h' and h'' at an abscissa; h'' is 0 where the graph is continued."""
-    sigma = parameter_at(graph, xi)
+def height_above(graph, begin, d_xi, d_eta):
+    """-> (F, slope, bend): F, h' and h'' after a displacement from the start; h'' is 0 where the graph is continued."""
+    sigma, first = parameter_at(graph, begin.abscissa + d_xi), begin.sigma
     xi1 = graph[g.XI1] + sigma * (2.0 * graph[g.XI2] + 3.0 * sigma * graph[g.XI3])
     eta1 = graph[g.ETA1] + sigma * (2.0 * graph[g.ETA2] + 3.0 * sigma * graph[g.ETA3])
     xi2, eta2 = 2.0 * graph[g.XI2] + 6.0 * sigma * graph[g.XI3], 2.0 * graph[g.ETA2] + 6.0 * sigma * graph[g.ETA3]
     slope = eta1 / xi1
-    if sigma <= graph[g.LEAST_SIGMA] or sigma >= graph[g.MOST_SIGMA]:
-        return sigma, slope, 0.0
-    return sigma, slope, (eta2 - slope * xi2) / (xi1 * xi1)
-
-
-@inlined
-def height_above(graph, begin, d_xi, d_eta):
-    """-> (F, slope, bend): F, h' and h'' after a displacement from the start."""
-    sigma, slope, bend = shape_at(graph, begin.abscissa + d_xi)
+    inside = graph[g.LEAST_SIGMA] < sigma < graph[g.MOST_SIGMA]
+    bend = (eta2 - slope * xi2) / (xi1 * xi1) if inside else 0.0
     # h(xi) - h(xi0) by divided differences, which do not cancel
-    first = begin.sigma
     both, squares = sigma + first, sigma * (sigma + first) + first * first
     run = (sigma - first) * (graph[g.XI1] + graph[g.XI2] * both + graph[g.XI3] * squares)
     rise = (sigma - first) * (graph[g.ETA1] + graph[g.ETA2] * both + graph[g.ETA3] * squares)
