@@ -40,7 +40,6 @@ def _disks() -> None:
     disk = geo.Disk(1.0, 0.5)
     for wall in (geo.triangular_teeth(0.7), geo.rectangular_teeth(0.5)):
         geo.collide(disk, wall, 0.02, [[0.3, 0.1]], [[0.2, -1.0, 0.1]])
-    geo.collide_cylinder(disk, geo.triangular_teeth(0.7), 0.02, [[0.3, 0.1]], [[0.2, -1.0, 0.1]])
 
 
 TASKS: dict[str, Callable[[], None]] = {
