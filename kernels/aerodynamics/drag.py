@@ -16,6 +16,7 @@ from ...core.long_runs import TIME_LIMIT, reported
 from ...geometry.scene.scene import SEGMENT_TIME
 from ..bases.basis import Basis
 from ..bases.directions import Directions
+from ..bases.given import Vectorised
 from ..bases.measure import SINE, gauss_rule
 from ..bases.panels import Panels
 from ..discretisation.method import Budget
@@ -111,15 +112,12 @@ def resistance(
         raise InputError(f"law: expected one in the paper's convention, got {law!r}; call in_specular_frame() on it")
     wanted, seconds = positive_number("tolerance", tolerance), positive_number("time_limit", time_limit)
 
-    def checked(theta: Floats, outgoing: Floats) -> Floats:
-        return finite_array("cost", cost(theta, outgoing))
-
     if cost is air_resistance and not has_chain(law):
         # three functions suffice; a product of laws needs a basis that can be refined
         basis: Basis = Directions()
-        coefficients, missed = _projected(checked, basis)
+        coefficients, missed = _projected(cost, basis)
     else:
-        basis, coefficients, missed = _represented(checked, finite_array("breakpoints", breakpoints), 0.1 * wanted)
+        basis, coefficients, missed = _represented(cost, finite_array("breakpoints", breakpoints), 0.1 * wanted)
     size = float(np.linalg.norm(coefficients))
     budget = Budget(MATRIX_FRACTION * wanted / max(size, 1.0), segments=int(seconds / SEGMENT_TIME))
     matrix = matrix_by(law, "auto", basis, budget)
@@ -169,10 +167,4 @@ def _projected(function: CostFunction, basis: Basis) -> tuple[Floats, float]:
 
 
 def _table(function: CostFunction, angle: Floats) -> Floats:
-    table = function(angle[:, None], angle)
-    try:
-        return np.broadcast_to(table, (angle.size, angle.size))
-    except ValueError as reason:
-        raise InputError(
-            f"cost: expected a vectorised function, values of shape {(angle.size,) * 2}, got {np.shape(table)}"
-        ) from reason
+    return finite_array("cost", Vectorised(function, scalar=True)(angle[:, None], angle))

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
-from ...core.errors import InputError
+from ...core.errors import AsperityError, InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ..bases.basis import AngleFunction
+from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.law import Law
 from ..matrices.defects import SymmetryDefect, defect_of_pairs
@@ -93,7 +94,7 @@ class RoughBody(Summary):
         if isinstance(laws, Law) or not (callable(laws) or np.iterable(laws)):
             each = (laws,) * normals.size
         else:
-            each = tuple(map(laws, normals.tolist())) if callable(laws) else tuple(laws)
+            each = _laws_at(normals, laws) if callable(laws) else tuple(laws)
             object.__setattr__(self, "law", each)
             if len(each) != normals.size:
                 raise InputError(f"law: expected one or {normals.size}, one for every element, got {len(each)}")
@@ -180,13 +181,14 @@ class RoughBody(Summary):
         tangents, length = self.normals[here] - 0.5 * np.pi, float(self.lengths[here].sum())
         if cost is None and directions is None:
             return scaled(resistance(law, tolerance), SINE_MASS * length / 0.75)
-        chosen = _momentum if cost is None else cost
+        chosen = _momentum if cost is None else Vectorised(cost, scalar=True)
+        density = None if directions is None else Vectorised(directions, scalar=True)
 
         def averaged(theta: Floats, outgoing: Floats) -> Floats:
             total: Floats | float = 0.0
             for tangent, part in zip(tangents, self.lengths[here] / length, strict=True):
-                value = part * np.asarray(chosen(tangent + theta, tangent + outgoing), dtype=np.float64)
-                total = total + (value if directions is None else value * directions(tangent + theta))
+                value = part * chosen(tangent + theta, tangent + outgoing)
+                total = total + (value if density is None else value * density(tangent + theta))
             return np.asarray(total)
 
         return scaled(resistance(law, tolerance, cost=averaged), SINE_MASS * length)
@@ -229,6 +231,18 @@ class RoughBody(Summary):
         u, v, _ = self.sample(n, rng)
         scale = DIRECTION_BINS / (2.0 * np.pi)
         return defect_of_pairs(u * scale, v * scale, DIRECTION_BINS)
+
+
+def _laws_at(normals: Floats, laws: LawOfNormal) -> tuple[Law, ...]:
+    """The law of every element by a function from the direction of its normal."""
+    try:
+        return tuple(map(laws, normals.tolist()))
+    except AsperityError:
+        raise
+    except (TypeError, ValueError) as reason:
+        raise InputError(
+            f"law: expected a function from the direction of a normal to a law, it failed: {reason}"
+        ) from reason
 
 
 def _momentum(incoming: Floats, outgoing: Floats) -> Floats:

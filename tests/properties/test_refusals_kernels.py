@@ -328,6 +328,12 @@ REFUSED = {
         (lambda: BODY.force(0.0, 10), "rays"),
         (lambda: ker.RoughBody.polygon([MIRROR], [(0, 0), (1, 0), (0, 1)]), "one for every element"),
         (lambda: ker.RoughBody.polygon(MIRROR, [(0, 0), (1, 2), (1, 0)]), "against the clock"),
+        (lambda: ker.RoughBody.disk(lambda: MIRROR), "law: expected a function from the direction"),
+        (lambda: ker.RoughBody.disk(lambda normal: math.sqrt(-1.0 - normal)), "math domain error"),
+        (lambda: ker.RoughBody.disk(lambda normal: ker.maxwell(-1.0)), "diffuse_fraction"),
+        (lambda: ker.RoughBody.disk(MIRROR).resistance(cost=lambda u, v: np.exp(1j * u)), "expected numbers"),
+        (lambda: ker.RoughBody.disk(MIRROR).resistance(cost=lambda u, v: math.cos(u - v)), "vectorised"),
+        (lambda: ker.RoughBody.disk(MIRROR).resistance(directions=lambda u: np.ones(7)), "vectorised"),
         *((lambda law=law: ker.RoughBody.disk(law), "law: expected one in") for law in (None, 1.0, DISK, int)),
     ],
     "distances": [
