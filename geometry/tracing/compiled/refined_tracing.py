@@ -260,6 +260,19 @@ def pass_cells(scope, sizes, py, vx, vy, error):
 
 
 @linked
+def nearest_end(scope, own, sizes, px, py, vx, vy, error):
+    """-> (Hit, corner, graze): the end of a segment on a piece, at the opening or on a side.
+
+    For the times see `nearest_line` and `nearest_curve`.
+    """
+    hit, corner = nearest_line(scope, own, sizes, px, py, vx, vy)
+    hit, graze = nearest_curve(scope, own, hit, px, py, vx, vy, error)
+    time, kind = exit_time(scope, own, px, py, vx, vy, hit.time)
+    kind = kind if kind != NO_PIECE else hit.kind
+    return Hit(where(time > 0.0, time, 0.0), kind, hit.number, hit.s, 0), corner, graze
+
+
+@linked
 def refined_ray(scope, entry, theta, limit, most_segments):
     """-> (x, angle, bounces, status, amplification, rounding): trace one ray; x and angle are double-doubles.
 
@@ -280,10 +293,7 @@ def refined_ray(scope, entry, theta, limit, most_segments):
         if not local <= LARGEST_ERROR:
             return px, nowhere, bounces, UNSETTLED, norm, local
         error = error_of(scope, sizes)
-        hit, corner = nearest_line(scope, own, sizes, px, py, vx, vy)
-        hit, graze = nearest_curve(scope, own, hit, px, py, vx, vy, error)
-        time, kind = exit_time(scope, own, px, py, vx, vy, hit.time)
-        hit = Hit(where(time > 0.0, time, 0.0), kind if kind != NO_PIECE else hit.kind, hit.number, hit.s, 0)
+        hit, corner, graze = nearest_end(scope, own, sizes, px, py, vx, vy, error)
         steps += 1
         if graze < np.inf and graze <= hit.time.high + error:
             return px, nowhere, bounces, GRAZING, norm, local
