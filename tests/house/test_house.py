@@ -49,10 +49,10 @@ def test_a_plain_trace_loads_only_the_compiler_and_the_checker_of_crossings():
 
 
 def test_a_trace_compiles_no_function_that_few_walls_need():
-    code = "from asperity.geometry.tracing.compiled.rays import LATE\nprint([bool(late._words[0]) for late in LATE])"
+    code = "from asperity.geometry.tracing.compiled.rays import LATE\nprint(*(bool(late._words[0]) for late in LATE))"
     trace = "from asperity import geometry as g; g.trace(g.{}, [0.3, 0.4], [1.0, 2.0])\n"
-    assert run_python(trace.format("mushrooms(0.3)") + code).split() == ["[False,", *4 * ["False,"], "False]"]
-    assert run_python(trace.format("koch(4)") + code).split()[3] == "True,"
+    assert set(run_python(trace.format("mushrooms(0.3)") + code).split()) == {"False"}
+    assert run_python(trace.format("koch(4)") + code).split()[3] == "True"
 
 
 def test_a_command_ends_without_a_search_for_garbage():
