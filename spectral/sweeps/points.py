@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ...core.checkpoints import content
+from ...core.contents import content
 from ...core.checks import finite_number, positive_number, whole_number
 from ...core.errors import InputError
 

@@ -12,7 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from ...core.checkpoints import Checkpoint, content, told
+from ...core.checkpoints import Checkpoint
+from ...core.contents import content, told
 from ...core.checks import finite_number, positive_number
 from ...core.errors import AsperityError, InputError
 from ...core.long_runs import Engine, progress_bar

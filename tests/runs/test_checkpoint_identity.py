@@ -17,7 +17,8 @@ from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.core.checkpoints import Checkpoint, Stored, content, packed_arrays, unpacked_arrays
+from asperity.core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
+from asperity.core.contents import content
 from asperity.core.estimates import Estimate
 from asperity.core.long_runs import all_parts
 from asperity.spectral.sweeps import running

@@ -5,13 +5,19 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import lru_cache
+from importlib.machinery import ExtensionFileLoader
 from itertools import islice
 from multiprocessing.connection import Connection, wait
+from pickle import PicklingError
+from types import ModuleType
 from typing import Any, TypeVar
 
-from .checks import whole_number
+from .checks import shortened, whole_number
+from .contents import content, is_installed
 from .errors import AsperityError, InputError
 
 # Tasks that the scheduler knows at a time: two for each of a thousand workers.
@@ -24,9 +30,11 @@ MOST_ENDED = 3
 # Exit code of a process that reads a script which starts processes again.
 STARTED_AGAIN = 79
 SCHEDULER_GONE = "the scheduler is gone, and with it the tasks that it had; start one, and this again"
-COULD_NOT_RUN = (
-    "the workers could not run a task; they need the same environment as this process, and the modules of your own "
-    "functions ({})"
+COULD_NOT_RUN = "the workers could not run a task; they need the same environment as this process ({})"
+ARRIVED_CHANGED = (
+    "client: a worker would compute something else than this process, because {} arrives there with another content: a "
+    "class pickles only a part of its objects, a compiled function reads its module anew, or the versions of Python or "
+    "of packages differ; compute without client"
 )
 STARTED_FROM_A_SCRIPT = (
     "client: each worker reads the script that starts it, and so would start workers again; put what is computed below "
@@ -120,17 +128,17 @@ class Workers:
 
     def results(self, function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[tuple[Task, Result]]:
         """Every task with its result; the tasks of a process that is lost are computed again by another."""
-        from cloudpickle import dumps, loads
+        from cloudpickle import loads
 
         self._workers = self._workers or [_Worker(own) for own in self._processors]
-        packed, rest = dumps(function), iter(tasks)
+        packed, rest = packed_function(function), iter(tasks)
         running: dict[_Worker, tuple[Task, int]] = {}
 
         def give(worker: _Worker, task: Task, tries: int) -> None:
             running[worker] = task, tries
             # one that is gone is noticed below
             with suppress(OSError):
-                worker.channel.send_bytes(dumps((packed, task)))
+                worker.channel.send_bytes(by_value((packed, task)))
 
         try:
             # one task first: it compiles the loops, which the other workers then find on the disk
@@ -145,8 +153,8 @@ class Workers:
                     except (EOFError, OSError):
                         give(self._replacement(worker, tries), task, tries + 1)
                         continue
-                    if error:
-                        raise AsperityError(COULD_NOT_RUN.format(error))
+                    if error is not None:
+                        raise error
                     yield task, result
                     idle = [one for one in self._workers if one not in running]
                     for one, task in zip(idle, islice(rest, len(idle)), strict=False):
@@ -176,17 +184,72 @@ def _work(channel: Connection, processors: list[int]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if processors:
         os.sched_setaffinity(0, processors)
-    known, function = b"", abs
     # the other end is closed when the process there ends
     with suppress(EOFError, OSError):
         while True:
             packed, task = loads(channel.recv_bytes())
             try:
-                known, function = packed, function if packed == known else loads(packed)
-                answer = dumps((None, function(task)))
+                answer = dumps((None, run_packed(packed, task)))
+            except InputError as reason:
+                answer = dumps((reason, None))
             except Exception as reason:
-                answer = dumps((repr(reason), None))
+                answer = dumps((AsperityError(COULD_NOT_RUN.format(repr(reason))), None))
             channel.send_bytes(answer)
+
+
+def by_value(value: Any) -> bytes:
+    """A value for workers, with the functions, classes and modules of the user's as they are in this process.
+
+    Other packers send the names of functions, whose modules a worker would read from the disk anew.
+    """
+    import cloudpickle
+
+    own = [module for name, module in list(sys.modules.items()) if _travels_by_value(name, module)]
+    added = [module for module in own if module.__name__ not in cloudpickle.list_registry_pickle_by_value()]
+    for module in added:
+        cloudpickle.register_pickle_by_value(module)
+    try:
+        packed: bytes = cloudpickle.dumps(value)
+    except (TypeError, ValueError, RecursionError, PicklingError) as reason:
+        raise InputError(
+            f"client: {shortened(value)} cannot be sent to workers ({reason}); keep open files, locks and the like out "
+            "of what your functions use, or compute without client"
+        ) from reason
+    finally:
+        for module in added:
+            cloudpickle.unregister_pickle_by_value(module)
+    return packed
+
+
+def _travels_by_value(name: str, module: Any) -> bool:
+    loader = getattr(getattr(module, "__spec__", None), "loader", None)
+    own = isinstance(module, ModuleType) and module.__name__ == name and not is_installed(name)
+    return own and not name.startswith("__") and not isinstance(loader, ExtensionFileLoader)
+
+
+def packed_function(function: Callable[[Any], Any]) -> bytes:
+    """A function for `run_packed`, with its content if it has one."""
+    try:
+        told = content(function)
+    except (TypeError, RecursionError):
+        told = None
+    return by_value((by_value(function), told, shortened(function)))
+
+
+@lru_cache(maxsize=1)
+def _unpacked(packed: bytes) -> Callable[[Any], Any]:
+    from cloudpickle import loads
+
+    inner, told, words = loads(packed)
+    function: Callable[[Any], Any] = loads(inner)
+    if told is not None and content(function) != told:
+        raise InputError(ARRIVED_CHANGED.format(words))
+    return function
+
+
+def run_packed(packed: bytes, task: Any) -> Any:
+    """The result of a task, in a worker."""
+    return _unpacked(packed)(task)
 
 
 def results(
@@ -223,12 +286,12 @@ def results(
         return
     from dask import config
 
-    rest = iter(tasks)
+    packed, rest = packed_function(function), iter(tasks)
 
     def submit(task: Task, **where: Any) -> Any:
         # a block of pairs is longer than what dask warns of
         with config.set({"distributed.admin.large-graph-warning-threshold": LARGEST_TASK}):
-            return client.submit(function, task, pure=False, **where)
+            return client.submit(run_packed, packed, task, pure=False, **where)
 
     # one task on each machine first: it compiles the loops, which the other workers then find on the disk
     workers = _one_worker_a_machine(client)
@@ -285,6 +348,8 @@ def _failure(reason: BaseException) -> AsperityError:
     """The error to raise for a task that failed on the workers."""
     from distributed import KilledWorker
 
+    if isinstance(reason, InputError):
+        return reason
     if isinstance(reason, KilledWorker):
         return AsperityError(f"a task ended every worker that tried it; perhaps it needs more memory ({reason})")
     return AsperityError(COULD_NOT_RUN.format(repr(reason)))
