@@ -107,7 +107,7 @@ WRITTEN = {"__init__", "__repr__", "__eq__", "__hash__", "__setattr__", "__delat
 IMPLICIT = {"__module__", "__qualname__", "__doc__", "__dict__", "__weakref__", "__annotations__", "__annotate__",
             "__annotations_cache__", "__annotate_func__", "__conditional_annotations__", "__firstlineno__",
             "__static_attributes__", "__dataclass_fields__", "__dataclass_params__", "__match_args__",
-            "__abstractmethods__", "_abc_impl", "__name__", "__package__", "__loader__", "__spec__", "__path__",
+            "__abstractmethods__", "__slotnames__", "_abc_impl", "__name__", "__package__", "__loader__", "__spec__", "__path__",
             "__file__", "__cached__", "__builtins__", "__warningregistry__"}  # fmt: skip
 # Of a field of a dataclass what its class writes methods from.
 FIELD = ("name", "default", "default_factory", "init", "compare", "hash", "kw_only")
@@ -265,7 +265,8 @@ class _Contents:
         function, arguments, state, entries, items, setter = (*made, None, None, None, None)[:6]
         kept = _attributes(value)
         if type(state) is dict:
-            state = _without_cached(value, state)
+            # with nothing but cached properties it is as without any
+            state = _without_cached(value, state) or None
         listed = [None if one is None else list(one) for one in (entries, items)]
         return ["object", *map(self.of, (function, arguments, state, listed, setter, None if kept == state else kept))]
 
@@ -277,7 +278,7 @@ def _attributes(value: Any) -> list[tuple[str, Any]] | None:
         return None
     slots = {name for base in kind.__mro__ for name, one in vars(base).items() if isinstance(one, HIDDEN[0])}
     own = {name: getattr(value, name) for name in slots if hasattr(value, name)}
-    return _without_cached(value, {**own, **getattr(value, "__dict__", {})})
+    return _without_cached(value, {**own, **getattr(value, "__dict__", {})}) or None
 
 
 def _without_cached(value: Any, attributes: Mapping[str, Any]) -> list[tuple[str, Any]]:

@@ -32,9 +32,9 @@ STARTED_AGAIN = 79
 SCHEDULER_GONE = "the scheduler is gone, and with it the tasks that it had; start one, and this again"
 COULD_NOT_RUN = "the workers could not run a task; they need the same environment as this process ({})"
 ARRIVED_CHANGED = (
-    "client: a worker would compute something else than this process, because {} arrives there with another content: a "
-    "class pickles only a part of its objects, a compiled function reads its module anew, or the versions of Python or "
-    "of packages differ; compute without client"
+    "client: a worker would compute something else than this process, because {} arrives there with another content. A "
+    "class pickles only a part of its objects, a function imports its module inside of itself or is compiled by numba, "
+    "or the versions of Python or of packages differ; import at the top of the module, or compute without client"
 )
 STARTED_FROM_A_SCRIPT = (
     "client: each worker reads the script that starts it, and so would start workers again; put what is computed below "
@@ -154,7 +154,8 @@ class Workers:
                         give(self._replacement(worker, tries), task, tries + 1)
                         continue
                     if error is not None:
-                        raise error
+                        refused, words = error
+                        raise InputError(words) if refused else AsperityError(words)
                     yield task, result
                     idle = [one for one in self._workers if one not in running]
                     for one, task in zip(idle, islice(rest, len(idle)), strict=False):
@@ -191,9 +192,9 @@ def _work(channel: Connection, processors: list[int]) -> None:
             try:
                 answer = dumps((None, run_packed(packed, task)))
             except InputError as reason:
-                answer = dumps((reason, None))
+                answer = dumps(((True, str(reason)), None))
             except Exception as reason:
-                answer = dumps((AsperityError(COULD_NOT_RUN.format(repr(reason))), None))
+                answer = dumps(((False, COULD_NOT_RUN.format(repr(reason))), None))
             channel.send_bytes(answer)
 
 
