@@ -150,7 +150,7 @@ REACHES = {
     "inner class": ("import {m}", "class I:\n        x = {m}.read()", "I.x"),
     "local import in an inner function": ("", "import {m}\n    def inner():\n        return {m}.read()", "inner()"),
     "decorator": (
-        "import {m}\ndef with_it(f):\n    return lambda: f({m})\n@with_it\ndef f(module): return module.read()", "", "f()"),
+        "import {m}\ndef given(f):\n    return lambda: f({m})\n@given\ndef f(module): return module.read()", "", "f()"),
     "method": ("import {m}\nclass C:\n    def x(self): return {m}.read()", "", "C().x()"),
     "two modules": ("import {m}", "one, other = {m}, {m}", "other.read()"),
 }  # fmt: skip

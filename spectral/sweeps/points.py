@@ -11,8 +11,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ...core.contents import content
 from ...core.checks import finite_number, positive_number, whole_number
+from ...core.contents import content
 from ...core.errors import InputError
 
 Value: TypeAlias = float | int | str

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from ...core.checkpoints import Checkpoint
-from ...core.contents import content, told
 from ...core.checks import finite_number, positive_number
+from ...core.contents import content, told
 from ...core.errors import AsperityError, InputError
 from ...core.long_runs import Engine, progress_bar
 from ...core.version import __version__

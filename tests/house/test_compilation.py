@@ -16,7 +16,7 @@ from numba.core import config
 
 import asperity
 from asperity.core import compilation
-from commands import ended
+from commands import ended, environment
 
 TWICE = "from asperity.core.compilation import jit\n@jit()\ndef twice(x):\n    return 2.0 * x\n"
 SOURCE = Path(asperity.__file__).parent
@@ -44,6 +44,22 @@ def hits_after_a_call(path):
 
 def test_a_compiled_function_is_loaded_from_disk(module):
     assert [hits_after_a_call(module) for _ in range(2)] == [0, 1]
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize("content", [b"", b"damaged", None])
+def test_a_function_whose_stored_files_are_damaged_is_compiled_again(module, kind, content, caplog):
+    assert hits_after_a_call(module) == 0
+    (path,) = module.parent.glob(f"**/*.{kind}")
+    path.write_bytes(path.read_bytes()[:100] if content is None else content)
+    with caplog.at_level(logging.WARNING, logger="asperity"):
+        assert [hits_after_a_call(module) for _ in range(2)] == [0, 1]
+    assert str(path.parent) in caplog.text and "damaged" in caplog.text
+
+
+def test_numbas_switch_that_turns_compilation_off_is_refused():
+    done = ended("-c", TWICE, env=environment(NUMBA_DISABLE_JIT="1"))
+    assert "AsperityError: NUMBA_DISABLE_JIT is set, but rays are traced by compiled functions; unset it" in done.stderr
 
 
 def test_code_from_other_sources_is_not_run(module, monkeypatch):

@@ -95,7 +95,7 @@ def test_what_arrives_with_another_content_is_refused_and_the_advice_works(worke
 
 def test_a_module_that_a_worker_would_read_from_the_disk_is_refused_and_the_advice_works(own, worker_processes):
     _, nested = own
-    with pytest.raises(InputError, match="imports its module inside of itself .*; import at the top of the module"):
+    with pytest.raises(InputError, match=r"imports its module inside of itself .*; import at the top of the module"):
         spec.sweep(ker.maxwell, GRID, nested.late, client=worker_processes)
     assert spec.sweep(ker.maxwell, GRID, nested.quantity, client=worker_processes).rows[0].value == 0.75
 

@@ -20,6 +20,7 @@ from weakref import WeakSet
 from numba import njit
 from numba.core import event
 
+from .errors import AsperityError
 from .long_runs import is_heard
 
 logger = logging.getLogger("asperity")
@@ -49,11 +50,10 @@ def jit(*, linked: bool = False, **options: Any) -> Callable[[Any], Any]:
         except RuntimeError:
             _warn_of_no_folder()
             dispatcher = njit(**own)(function)
+        if isinstance(dispatcher, FunctionType):
+            raise AsperityError("NUMBA_DISABLE_JIT is set, but rays are traced by compiled functions; unset it")
         COMPILED.add(dispatcher)
-        # not with numba's switch that turns compilation off
-        if own.get("no_cpython_wrapper") and not isinstance(dispatcher, FunctionType):
-            kind: Any = type(dispatcher)
-            dispatcher.__class__ = _inner_kind(kind)
+        dispatcher.__class__ = _kind(type(dispatcher), bool(own.get("no_cpython_wrapper")))
         return dispatcher
 
     return compiled
@@ -67,13 +67,29 @@ def has_option(name: str) -> bool:
 
 
 @cache
-def _inner_kind(kind: Any) -> Any:
-    """Return the kind of functions without a wrapper for Python, whose call from there would end the process."""
+def _kind(kind: Any, inner: bool) -> Any:
+    """Return the kind of functions that are compiled again where what is stored of them is damaged.
+
+    An inner one has no wrapper for Python, and a call from there would end the process.
+    """
+
+    def compiled(self: Any, signature: Any) -> Any:
+        try:
+            return kind.compile(self, signature)
+        # a damaged pickle fails in any way; numba's own errors are of the function
+        except Exception as reason:
+            damaged = [] if type(reason).__module__.startswith("numba.") else stored_files(self)
+            if not damaged:
+                raise
+            for path in damaged:
+                path.unlink(missing_ok=True)
+            logger.warning("%s: damaged (%r), compiled again", damaged[0], reason)
+            return kind.compile(self, signature)
 
     def refuse(self: Any, *arguments: Any, **named: Any) -> Any:
         raise TypeError(f"{self.py_func.__name__}: only compiled functions call it; from Python call its py_func")
 
-    return type("Inner", (kind,), {"__call__": refuse})
+    return type("Kind", (kind,), {"compile": compiled, **({"__call__": refuse} if inner else {})})
 
 
 @cache
@@ -130,6 +146,11 @@ def announce() -> None:
 
 def is_stored(function: Any) -> bool:
     """Return whether a compiled function has been stored on disk."""
+    return any(path.suffix == ".nbi" for path in stored_files(function))
+
+
+def stored_files(function: Any) -> list[Path]:
+    """Return the files in which a compiled function is stored."""
     folder, python = function.stats.cache_path, function.py_func
     name = f"{Path(python.__code__.co_filename).stem}.{python.__qualname__}-"
-    return folder is not None and any(path.name.startswith(name) for path in Path(folder).glob("*.nbi"))
+    return [] if folder is None else [path for path in Path(folder).glob("*.nb?") if path.name.startswith(name)]

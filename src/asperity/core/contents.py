@@ -107,8 +107,8 @@ WRITTEN = {"__init__", "__repr__", "__eq__", "__hash__", "__setattr__", "__delat
 IMPLICIT = {"__module__", "__qualname__", "__doc__", "__dict__", "__weakref__", "__annotations__", "__annotate__",
             "__annotations_cache__", "__annotate_func__", "__conditional_annotations__", "__firstlineno__",
             "__static_attributes__", "__dataclass_fields__", "__dataclass_params__", "__match_args__",
-            "__abstractmethods__", "__slotnames__", "_abc_impl", "__name__", "__package__", "__loader__", "__spec__", "__path__",
-            "__file__", "__cached__", "__builtins__", "__warningregistry__"}  # fmt: skip
+            "__abstractmethods__", "__slotnames__", "_abc_impl", "__name__", "__package__", "__loader__", "__spec__",
+            "__path__", "__file__", "__cached__", "__builtins__", "__warningregistry__"}  # fmt: skip
 # Of a field of a dataclass what its class writes methods from.
 FIELD = ("name", "default", "default_factory", "init", "compare", "hash", "kw_only")
 # Functions and tables of Python through which a function reads what its code does not name.
