@@ -5,11 +5,14 @@ docstrings name are proved in docs/theory/proved-gaps.md.
 """
 
 import json
+import re
 import sys
 from itertools import pairwise
 
 from flint import acb, acb_poly, arb, arb_poly, ctx
 
+DECIMAL = re.compile(r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]{1,4})?", re.ASCII)
+WORDS = "family", "frame", "format", "written by"
 UNIT, ZERO, ONE = acb(0, 1), arb(0), arb(1)
 with ctx.workprec(512):
     PI = arb.pi()
@@ -56,13 +59,20 @@ def increasing(numbers):
     return all(x < y for x, y in pairwise(numbers))
 
 
+def plain(given):
+    """Whether all texts but words are finite decimals: python-flint reads fractions, balls and infinities too."""
+    if isinstance(given, dict):
+        return all(key in WORDS or plain(value) for key, value in given.items())
+    if isinstance(given, list):
+        return all(map(plain, given))
+    return not isinstance(given, str) or DECIMAL.fullmatch(given) is not None
+
+
 def exact(number):
     """The ball of a text, or of a middle and a radius."""
     texts = [number] if isinstance(number, str) else number
-    plain = (
-        isinstance(texts, list) and len(texts) in (1, 2) and all(isinstance(x, str) and x.isprintable() for x in texts)
-    )
-    demand(plain, "numbers as texts, or as lists of middle and radius")
+    listed = isinstance(texts, list) and len(texts) in (1, 2) and all(isinstance(x, str) for x in texts)
+    demand(listed and plain(texts), "numbers as decimal texts, or as lists of middle and radius")
     return arb(*texts)
 
 
@@ -452,6 +462,7 @@ def temple(law, v, sign, guess, bins, above):
 
 def enclose(certificate):
     """The interval of the gap that the certificate proves."""
+    demand(plain(certificate), "finite decimals")
     ctx.prec, frame, law = certificate["precision"], certificate["frame"], certificate["law"]
     demand(ctx.prec >= 53 and frame in ("specular", "paper"), "53 bits or more, and a known convention")
     weights = {name: exact(number) for name, number in certificate["weights"].items()}

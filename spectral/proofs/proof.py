@@ -11,7 +11,7 @@ from typing import Any
 from ...core.checks import number_between
 from ...core.errors import InputError, ProofError
 from ...core.estimates import Summary
-from ...core.files import write_whole
+from ...core.files import text_of, write_whole
 from ...core.long_runs import reported
 from ...core.version import __version__
 from ...kernels import Law
@@ -143,14 +143,14 @@ def check_proof(path: str | Path) -> Proof:
         If an inequality does not hold.
     """
     try:
-        certificate = json.loads(Path(path).read_text(encoding="utf-8"))
+        certificate = json.loads(text_of(Path(path)))
         with ctx.workprec(BITS):
             check(certificate)
     except Refused as refusal:
         raise ProofError(f"{path}: the certificate is refused, expected {refusal}") from refusal
-    except OSError as reason:
-        raise InputError(f"path: cannot read a certificate from {path}: {reason}") from reason
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, ZeroDivisionError) as reason:
+    except InputError:
+        raise
+    except (RecursionError, ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, ZeroDivisionError) as reason:
         raise InputError(f"path: expected a certificate that Proof.save wrote, got {path} ({reason!r})") from reason
     return _proof(certificate)
 

@@ -53,7 +53,8 @@ def jit(*, linked: bool = False, **options: Any) -> Callable[[Any], Any]:
         if isinstance(dispatcher, FunctionType):
             raise AsperityError("NUMBA_DISABLE_JIT is set, but rays are traced by compiled functions; unset it")
         COMPILED.add(dispatcher)
-        dispatcher.__class__ = _kind(type(dispatcher), bool(own.get("no_cpython_wrapper")))
+        kind: Any = type(dispatcher)
+        dispatcher.__class__ = _kind(kind, bool(own.get("no_cpython_wrapper")))
         return dispatcher
 
     return compiled
