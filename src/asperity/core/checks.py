@@ -45,6 +45,8 @@ MAKES = {
 }  # fmt: skip
 # Seeds are below this number, the size of numpy's own.
 SEEDS = 2**128
+# Nested lists are arrays of at most so many axes, as numpy has it.
+MOST_AXES = 64
 
 
 def numbers(name: str, value: ArrayLike) -> Floats:
@@ -72,10 +74,12 @@ def numbers(name: str, value: ArrayLike) -> Floats:
         raise InputError(f"{name}: expected {what}, got {shortened(value)}") from reason
 
 
-def _is_masked(value: object) -> bool:
+def _is_masked(value: object, depth: int = MOST_AXES) -> bool:
     """Whether an array, or one in a list, has masked entries."""
     if isinstance(value, (list, tuple)):
-        return not set(map(type, value)) <= {float, int} and any(map(_is_masked, value))
+        # a list may contain itself
+        plain = not depth or set(map(type, value)) <= {float, int}
+        return not plain and any(_is_masked(one, depth - 1) for one in value)
     return bool(np.ma.is_masked(value))
 
 
