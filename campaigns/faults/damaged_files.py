@@ -295,6 +295,10 @@ def judge(case: tuple[Kind, bytes, str]) -> Iterator[Judged]:
             outcome = "refused"
             if damage == "none" or len(str(reason)) >= 1000:
                 fault = f"{reason}"
+        except UserWarning as reason:
+            outcome = "read, and told how"
+            if "readable in one way alone" not in str(reason):
+                fault = f"{reason}"
         except Exception as reason:
             fault = f"{type(reason).__name__}: {reason}"
         finally:

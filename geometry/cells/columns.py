@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -13,7 +14,7 @@ import numpy as np
 from ...core.checks import Floats, choice, whole_number
 from ...core.errors import InputError
 from ...core.long_runs import counted
-from .measured import METRES, is_slope
+from .measured import is_slope, metres
 
 BRACKETED = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
 # A sign # of a comment, but not that of an undefined number as in 1.#QNAN and #N/A.
@@ -23,6 +24,12 @@ UNDEFINED = re.compile(
     r"[+-]?(nan|inf|infinity|n/?a|bad|null|none|void|invalid|missing|undef(ined)?|masked|[*?.-]+|\d\.#\w+|#\S*|)",
     re.IGNORECASE,
 )
+# Thousands set off by a sign, in texts with a decimal point and with a decimal comma, and by a blank or an apostrophe.
+GROUPED = {
+    ".": re.compile(r"[+−-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?"),
+    ",": re.compile(r"[+−-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?"),
+}
+GROUPED_BY_BLANK = re.compile(r"(?<=\d)['’\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 # Lines that name the unit of one column each.
 UNIT_OF_ONE = re.compile(r"^\W*[xyz]\w*[ _]units?\s*[:=]\s*(\S+)", re.IGNORECASE)
 # Characters between the names of columns, from the surest to the least sure.
@@ -89,7 +96,8 @@ class Columns:
             try:
                 rows.append(self._pair(words))
             except ValueError:
-                if names_allowed and not any(_is_number(word) for word in words):
+                names = not any(_is_number(word) for word in words)
+                if names and (names_allowed or (not rows and all(_is_unit(word.strip("[]()")) for word in words))):
                     names_allowed = False
                     head.append(line)
                     continue
@@ -102,12 +110,20 @@ class Columns:
         return table[:, 0], table[:, 1], self._header(head, count)
 
     def _words(self, line: str) -> list[str]:
-        data = COMMENT.sub("", line) if "#" in line else line
-        if self.delimiter is not None and self.delimiter != " ":
+        data = GROUPED_BY_BLANK.sub("", COMMENT.sub("", line) if "#" in line else line)
+        if '"' in data:
+            bare = re.sub(r'"[^"]*"', "", data)
+            between = self.delimiter or next((sign for sign in ";\t," if sign in bare), " ")
+            words = [word.strip() for word in next(csv.reader([data.strip()], delimiter=between))]
+        elif self.delimiter is not None and self.delimiter != " ":
             words = [word.strip() for word in data.split(self.delimiter)] if data.strip() else []
+        elif self.decimal == "." and (parts := _surely_grouped(data)):
+            words = parts
         else:
             separators = ";" if self.decimal == "," else ",;"
             words = data.translate(dict.fromkeys(map(ord, separators), " ")).split()
+        other = "," if self.decimal == "." else "."
+        words = [word.replace(other, "") if GROUPED[self.decimal].fullmatch(word) else word for word in words]
         return [word.replace(",", ".") for word in words] if self.decimal == "," else words
 
     def _pair(self, words: list[str]) -> tuple[float, float]:
@@ -174,7 +190,7 @@ class Columns:
             for fields in _fields(line, count):
                 names = [fields[column] for column in chosen]
                 units = [_unit(name) for name in names]
-                if any(unit in METRES or is_slope(unit) for unit in units):
+                if any(map(_is_unit, units)) or (units[0] != units[1] and all(map(_like_a_unit, units))):
                     return Header(line.strip(), (units[0], units[1]), "slope" in names[1].lower())
         alone = [line for line in head if UNIT_OF_ONE.match(line)]
         slopes = [line for line in head if "slope" in line.lower()]
@@ -182,6 +198,14 @@ class Columns:
             first, second = (UNIT_OF_ONE.sub(r"\1", line).strip() for line in alone)
             return Header(f"{alone[0]}; {alone[1]}", (first, second), bool(slopes))
         return Header(slopes[-1].strip(), ("", ""), True) if slopes else None
+
+
+def _surely_grouped(line: str) -> list[str]:
+    """The words between semicolons or tabs, if all their commas surely set off thousands, as beside a point."""
+    words = [word.strip() for word in re.split(r"[;\t]", line)]
+    grouped = [word for word in words if "," in word]
+    sure = len(words) > 1 and any("." in word for word in grouped)
+    return words if sure and all(map(GROUPED["."].fullmatch, grouped)) else []
 
 
 def remedy(options: dict[str, Any]) -> str:
@@ -203,7 +227,8 @@ def _fields(line: str, count: int) -> Iterator[list[str]]:
     for between in BETWEEN:
         fields = [field.strip() for field in re.split(between, bare) if field.strip()]
         if len(fields) == count and not any(
-            field[0].isdigit() or len(BRACKETED.findall(field)) > 1 for field in fields
+            (field[0].isdigit() and not _is_unit(field)) or sum(map(_is_unit, BRACKETED.findall(field))) > 1
+            for field in fields
         ):
             yield fields
     words = bare.split()
@@ -212,13 +237,25 @@ def _fields(line: str, count: int) -> Iterator[list[str]]:
         yield pairs
 
 
+def _is_unit(text: str) -> bool:
+    return metres(text) is not None or is_slope(text)
+
+
+def _like_a_unit(text: str) -> bool:
+    """Whether a text is no unit that is known, but no word for something else either."""
+    return bool(re.fullmatch(r"\S{1,5}|.*(meter|metre|inch|zoll|mikr|nano|10|\d[eE]).*", text, re.IGNORECASE))
+
+
 def _unit(name: str) -> str:
-    """The unit in a name of a column: in brackets, or its last word if that is a unit."""
+    """The unit in a name of a column: in brackets, the last of them that is one, or its last word if that is one."""
+    if _is_unit(name):
+        # a line of units below the names
+        return name
     found = BRACKETED.findall(name)
     if found:
-        return str(found[-1])
+        return str(next((text for text in reversed(found) if _is_unit(text)), found[-1]))
     last = re.split(r"[\s_/:]+", name)[-1]
-    return last if last != name and (last in METRES or is_slope(last)) else ""
+    return last if _is_unit(last) else ""
 
 
 def _two_columns(table: Floats) -> tuple[int, int]:
@@ -232,6 +269,8 @@ def _two_columns(table: Floats) -> tuple[int, int]:
 
 def _number(word: str) -> float:
     """A finite number, or NaN for a word that stands for none."""
+    # the minus of typesetting, and the exponent of Fortran
+    word = re.sub(r"(?<=[\d.])[dD](?=[+-]?\d+$)", "e", word.replace("−", "-"))
     try:
         value = float(word)
     except ValueError:

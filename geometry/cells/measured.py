@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -15,12 +17,17 @@ from ...core.errors import InputError
 from ...core.estimates import Summary
 from ..curves.curve import LARGEST_COORDINATE
 
-# Metres of the units that headers of profiles have; micro is written in three ways.
+# Metres of units of length: signs, which are told from each other by capitals, and words in small letters.
 METRES = {
-    "pm": 1e-12, "Å": 1e-10, "A": 1e-10, "angstrom": 1e-10, "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6,
-    "micron": 1e-6, "microns": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "km": 1e3, "in": 0.0254,
-    "mil": 2.54e-5, "ft": 0.3048,
+    "pm": 1e-12, "Å": 1e-10, "A": 1e-10, "nm": 1e-9, "um": 1e-6, "μm": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1,
+    "m": 1.0, "km": 1e3, "in": 0.0254, "mil": 2.54e-5, "thou": 2.54e-5, "uin": 2.54e-8, "μin": 2.54e-8,
+    "ft": 0.3048, "angstrom": 1e-10, "ångström": 1e-10, "micron": 1e-6, "inch": 0.0254, "inches": 0.0254,
+    "microinch": 2.54e-8, "microinches": 2.54e-8, "foot": 0.3048, "feet": 0.3048,
 }  # fmt: skip
+PREFIXES = {"": 1.0, "pico": 1e-12, "nano": 1e-9, "micro": 1e-6, "milli": 1e-3, "centi": 1e-2, "deci": 0.1, "kilo": 1e3}
+METRES |= {f"{prefix}{metre}": size for prefix, size in PREFIXES.items() for metre in ("meter", "metre")}
+# A unit may have a power of ten before it.
+SCALED = re.compile(r"(?:1(?:\.0*)?\s*[x*·]?\s*)?(?:e|10\s*(?:\^|\*\*)\s*|E)([+-]?\d{1,2})\s*[x*·]?\s*(\S+)")
 # Radians of the units of angles that slopes have.
 RADIANS = {
     "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6, "μrad": 1e-6, "microrad": 1e-6, "nrad": 1e-9,
@@ -135,6 +142,27 @@ def heights_of(name: str, value: ArrayLike) -> Floats:
     return np.where(np.isfinite(array), array, np.nan)
 
 
+def metres(unit: str) -> float | None:
+    """How many metres a unit of length is, written as a sign or a word, also after a power of ten; None if none.
+
+    Examples
+    --------
+    >>> metres("µm"), metres("Microns"), metres("1e-6 m"), metres("MM"), metres("px")
+    (1e-06, 1e-06, 1e-06, 0.001, None)
+    """
+    # the sign of Angstrom is a letter with a ring, and the one of micro a Greek letter
+    plain = unicodedata.normalize("NFKC", unit).strip().replace("−", "-")
+    scaled = SCALED.fullmatch(plain)
+    if scaled is not None:
+        size = metres(scaled[2])
+        return None if size is None else float(f"{size * 10.0 ** int(scaled[1]):.12g}")
+    # capitals tell milli from mega; words, and signs all in capitals, have no other meaning
+    small = plain.lower() if plain.isupper() or len(plain) > 3 else plain
+    single = small.removesuffix("s") if len(plain) > 3 else small
+    found = (METRES.get(name) for name in (plain, small, single))
+    return next((size for size in found if size is not None), None)
+
+
 def unit_ratio(given: str, wanted: str) -> float:
     """How many of the wanted unit one of the given is.
 
@@ -145,10 +173,13 @@ def unit_ratio(given: str, wanted: str) -> float:
     """
     if given == wanted:
         return 1.0
+    sizes = []
     for unit in (given, wanted):
-        if unit not in METRES:
-            raise InputError(f"units: expected units of length such as {', '.join(list(METRES)[:8])}, got {unit!r}")
-    return finite_number("units", float(f"{METRES[given] / METRES[wanted]:.12g}"))
+        size = metres(unit)
+        if size is None:
+            raise InputError(f"units: expected units of length such as nm, um, mm, m, in, mil, got {unit!r}")
+        sizes.append(size)
+    return finite_number("units", float(f"{sizes[0] / sizes[1]:.12g}"))
 
 
 def is_slope(unit: str) -> bool:
@@ -160,7 +191,7 @@ def is_slope(unit: str) -> bool:
     (True, True, False)
     """
     above, per, below = unit.partition("/")
-    return unit in RADIANS or bool(per and above in METRES and below in METRES)
+    return unit in RADIANS or bool(per and metres(above) and metres(below))
 
 
 def integrated(x: Floats, slopes: Floats, unit: str) -> tuple[Floats, Floats]:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 
-from ...core.checks import Floats, choice, whole_number
+from ...core.checks import Floats, choice, finite_number, whole_number
 from ...core.errors import InputError
 from ...core.files import text_of
-from .columns import Columns, Header, NotPairs, remedy
-from .measured import METRES, Profile, heights_of, integrated, is_slope, unit_ratio
+from .columns import GROUPED, Columns, Header, NotPairs, remedy
+from .measured import Profile, heights_of, integrated, is_slope, metres, unit_ratio
 
 Seam = Literal["mirror", "step", "wrap"]
 Quantity = Literal["height", "slope"]
@@ -27,8 +28,16 @@ STEEPEST = 100.0
 WIDEST, FLATTEST_WIDE, FLATTEST = 10.0, 1e-6, 1e-9
 # Steps of a profile that wraps round differ by at most this fraction of them: positions are printed with few digits.
 EVEN = 1e-3
+# A trace in order of its positions is the same one if it is at most this much longer.
+LONGER = 1.1
+# Heights that instruments write for none; at most this fraction of heights, farther from the median than FAR times the
+# span of 96 % of them, with sides steeper than STEEPER times all other slopes, are taken for such.
+CODES = (-9999.0, -99999.0, -999.0, 9999.0, 99999.0, 999.0, -32768.0, 32767.0, 65535.0, 1e10, -1e10, 1e30, -1e30)
+FEW, FAR, STEEPER = 0.01, 10.0, 3.0
 # What headers of maps say.
 MAP = re.compile(r"^\W*(width|channel)\s*:", re.IGNORECASE | re.MULTILINE)
+# Of texts, in the order in which they are tried.
+ENCODINGS = "utf-8-sig", "utf-16", "latin-1"
 # Words for separators in texts that describe a wall, where the characters have another meaning.
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 
@@ -44,11 +53,20 @@ def vertices_of_profile(profile: Profile, seam: Seam = "mirror") -> Floats:
         )
     worst = int(np.argmin(np.diff(x)))
     if not x[worst + 1] > x[worst]:
+        ordered = profile.sorted()
+        lengths = [float(np.hypot(np.diff(one.x), np.diff(one.height)).sum()) for one in (profile, ordered)]
+        remedy = "use Profile.sorted() (sort=yes), which also averages heights at one position"
+        if lengths[1] > LONGER * lengths[0]:
+            remedy = (
+                f"the trace turns back, and in order its length would be {lengths[1]:.3g}, not {lengths[0]:.3g}; "
+                "Wall.from_vertices takes vertices that overhang"
+            )
         raise InputError(
             f"x: expected strictly increasing positions, got {x[worst]:.10g} at row {worst} and {x[worst + 1]:.10g} "
-            f"at row {worst + 1}; use Profile.sorted() (sort=yes), which also averages heights at one position"
+            f"at row {worst + 1}; {remedy}"
         )
     _warn_of_units(profile)
+    _warn_of_dropouts(profile)
     choice("seam", seam, get_args(Seam))
     if seam == "mirror":
         x = np.concatenate([x, 2.0 * x[-1] - x[-2::-1]])
@@ -71,7 +89,7 @@ def _warn_of_units(profile: Profile) -> None:
     x, height = profile
     width, change = float(x[-1] - x[0]), float(np.ptp(height))
     slope = float(np.abs(np.diff(height)).sum()) / width
-    wide = width * METRES.get(profile.unit, 0.0) > WIDEST
+    wide = width * (metres(profile.unit) or 0.0) > WIDEST
     if slope > STEEPEST:
         oddity = f"mean slope is {slope:.3g}: are the heights in a smaller unit than the positions"
     elif 0.0 < change < (FLATTEST_WIDE if wide else FLATTEST) * width:
@@ -79,6 +97,29 @@ def _warn_of_units(profile: Profile) -> None:
     else:
         return
     warnings.warn(f"the profile's {oddity}? Give units, for example units=('mm', 'nm')", stacklevel=4)
+
+
+def _warn_of_dropouts(profile: Profile) -> None:
+    """Warn of few heights far from all others, between which and the others the profile is steeper than elsewhere."""
+    x, height = profile
+    low, middle, high = np.quantile(height, [2.0 * FEW, 0.5, 1.0 - 2.0 * FEW])
+    away = np.abs(height - middle) > np.where(np.isin(height, CODES), 1.0, FAR) * (high - low)
+    if not 0.0 < away.mean() <= FEW or low == high:
+        return
+    slopes = np.abs(np.diff(height) / np.diff(x))
+    edges, rest = away[1:] != away[:-1], ~(away[1:] | away[:-1])
+    if slopes[edges].min() <= STEEPER * slopes[rest].max(initial=0.0):
+        return
+    first, values = int(np.argmax(away)), np.unique(height[away])
+    remedy = f"read the file with undefined={values[0]:g} (undefined={values[0]:g})"
+    if len(values) > 1:
+        remedy = "make them nan before Profile(x, height)"
+    warnings.warn(
+        f"{int(away.sum())} of {len(x)} heights, the first {height[first]:g} at index ({first},), are far from all "
+        f"others and beyond any of their slopes. If they are dropouts, {remedy} and use Profile.interpolated() "
+        "(interpolate=yes)",
+        stacklevel=4,
+    )
 
 
 def rolled(x: Floats, height: Floats) -> Floats:
@@ -101,11 +142,12 @@ def read_profile(
     units: str | Sequence[str] | None = None,
     *,
     delimiter: str | None = None,
-    decimal: str = ".",
+    decimal: str | None = None,
     usecols: Sequence[int] | None = None,
     skiprows: int = 0,
-    encoding: str = "utf-8-sig",
+    encoding: str | None = None,
     quantity: Quantity | None = None,
+    undefined: float | None = None,
 ) -> Profile:
     """Read a profile from a two-column text file or, with the extra ``profiles``, from an instrument's file.
 
@@ -125,17 +167,20 @@ def read_profile(
         ``"urad"`` or ``"nm/mm"``.
     delimiter : str, optional
         The one separator of columns; two in a row have an undefined height between them.
-    decimal : str
-        The decimal sign, ``"."`` or ``","``.
+    decimal : {".", ","}, optional
+        The decimal sign; by default a point, or a comma where the text is readable with it alone.
     usecols : (int, int), optional
         The columns of x and height, counted from 0.
     skiprows : int
         So many lines are left out at the beginning.
-    encoding : str
-        Of the text.
+    encoding : str, optional
+        Of the text; by default UTF-8, or UTF-16 or Latin-1 where the file is readable in it alone. A warning says what
+        was taken in place of the point and UTF-8.
     quantity : {"height", "slope"}, optional
         Of the second column, where units do not tell. Slopes are integrated by the trapezoidal rule, from height 0 at
         the first position.
+    undefined : float, optional
+        The number that the file has for an undefined height.
 
     Returns
     -------
@@ -159,38 +204,70 @@ def read_profile(
     ([0.0, 1.0, 3.0], [2.0, 5.0, 4.0], 'um')
     """
     file = Path(path)
-    columns = Columns(delimiter, decimal, usecols, skiprows)
-    given = _pair_of_units(units)
+    columns = Columns(delimiter, "." if decimal is None else decimal, usecols, skiprows)
+    given, undefined = _pair_of_units(units), None if undefined is None else finite_number("undefined", undefined)
     if quantity is not None:
         choice("quantity", quantity, get_args(Quantity))
+    taken: dict[str, str] = {}
     try:
-        text = text_of(file, encoding)
+        text = text_of(file, ENCODINGS[0] if encoding is None else encoding)
     except InputError as reason:
         if not isinstance(reason.__cause__, UnicodeDecodeError):
             raise
-        _refuse_other_encoding(file, columns)
-        return _read_instrument(file, row, given, quantity, "it is not text")
+        other = _other_encoding(file, columns)
+        if other is None:
+            return _read_instrument(file, row, given, quantity, "it is not text")
+        if encoding is not None:
+            raise InputError(f"{file}: not in the encoding given; {remedy({'encoding': other})}") from None
+        taken["encoding"], text = other, text_of(file, other)
+    is_map = row is not None or MAP.search(text) is not None
     try:
-        x, values, header = columns.parsed(text, is_map=row is not None or MAP.search(text) is not None)
-        return _profile(x, values, *_meaning(header, given, quantity))
+        try:
+            found = columns.parsed(text, is_map=is_map)
+        except InputError:
+            comma = _with_a_comma(text, columns) if decimal is None else None
+            if comma is None:
+                raise
+            taken["decimal"], found = ",", comma
+        values = found[1] if undefined is None else np.where(found[1] == undefined, np.nan, found[1])
+        profile = _profile(found[0], values, *_meaning(found[2], given, quantity))
     except NotPairs as reason:
         try:
             return _read_instrument(file, row, given, quantity, str(reason))
-        except InputError as other:
-            raise InputError(f"{file}, {reason}; {str(other).removeprefix(f'{file}: ')}") from other
+        except InputError as other_reason:
+            words = str(other_reason).removeprefix(f"{file}: ")
+            raise InputError(f"{file}, {reason}; {words}") from other_reason
     except InputError as reason:
         raise InputError(f"{file}, {reason}") from None
+    if taken:
+        warnings.warn(f"{file}: readable in one way alone; to be silent, {remedy(taken)}", stacklevel=2)
+    return profile
 
 
-def _refuse_other_encoding(file: Path, columns: Columns) -> None:
-    """Refuse a text of pairs in another encoding than the one given, with its name."""
-    for encoding in ("utf-16", "latin-1"):
-        try:
-            columns.parsed(text_of(file, encoding))
-        except InputError as reason:
-            if isinstance(reason, NotPairs) or not str(reason).startswith("line"):
-                continue
-        raise InputError(f"{file}: not in the encoding given; {remedy({'encoding': encoding})}")
+def _other_encoding(file: Path, columns: Columns) -> str | None:
+    """The other encoding in which a file is a text of pairs, or of something that options would make pairs."""
+    for encoding in ENCODINGS[1:]:
+        for decimal in (columns.decimal, ","):
+            try:
+                replace(columns, decimal=decimal).parsed(text_of(file, encoding))
+            except InputError as reason:
+                if isinstance(reason, NotPairs) or not str(reason).startswith("line"):
+                    continue
+            return encoding
+    return None
+
+
+def _with_a_comma(text: str, columns: Columns) -> tuple[Floats, Floats, Header | None] | None:
+    """The columns of a text with decimal commas; None if it is none, or if the commas may set off thousands."""
+    words = re.findall(r"\d[\d.,]*", text)
+    commas, points = ([word for word in words if sign in word] for sign in ",.")
+    mixed = any(not GROUPED[","].fullmatch(word) for word in points)
+    if columns.delimiter == "," or mixed or all(map(GROUPED["."].fullmatch, commas)):
+        return None
+    try:
+        return replace(columns, decimal=",").parsed(text)
+    except InputError:
+        return None
 
 
 def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
@@ -214,7 +291,7 @@ def _meaning(
     wanted = {None: slopes or is_slope(second), "slope": True, "height": False}[quantity]
     if not (first or second) and (quantity is not None or not slopes):
         return None, wanted
-    known = first in METRES and (second in METRES or is_slope(second))
+    known = metres(first) and (metres(second) or is_slope(second))
     if is_slope(second) == wanted and (known or given is not None):
         return (first, second), wanted
     what = (
@@ -222,10 +299,10 @@ def _meaning(
         if known or not wanted
         else "units as in 'x [mm], slope [urad]'"
     )
-    likely = ("mm", "urad") if wanted else ("um", second if second in METRES else "nm")
-    call = remedy({"units": (first if first in METRES else likely[0], likely[1])})
+    likely = ("mm", "urad") if wanted else ("um", second if metres(second) else "nm")
+    call = remedy({"units": (first if metres(first) else likely[0], likely[1])})
     alternative = f"; of heights {remedy({'quantity': 'height'})}" if slopes and quantity is None else ""
-    raise InputError(f"header: expected {what}, got {line!r}; {call}{alternative}")
+    raise InputError(f"header: expected {what}, got {line!r}; if these are the units, {call}{alternative}")
 
 
 def _profile(x: Floats, values: Floats, units: tuple[str, str] | None, slopes: bool) -> Profile:
@@ -263,5 +340,5 @@ def _read_instrument(
         count = heights.shape[1]
         chosen = count // 2 if row is None else whole_number("row", row, 0, most=count - 1)
         heights, positions = heights[:, chosen], positions[0][:, chosen]
-    header = Header("", (unit, unit), False) if unit in METRES else None
+    header = Header("", (unit, unit), False) if metres(unit) else None
     return _profile(np.asarray(positions, dtype=np.float64), heights, *_meaning(header, given, quantity))

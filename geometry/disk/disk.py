@@ -108,8 +108,8 @@ class Disk:
         if positive_number("radius", radius) != 1.0:
             raise InputError(
                 f"radius: expected 1, the unit of lengths, got {radius!r}; a disk of radius R moves as "
-                f"Disk(mass={self.mass!r}, inertia={self.inertia / float(radius) / float(radius)!r}), whose inertia is J / R**2, "
-                "with R * omega in place of omega"
+                f"Disk(mass={self.mass!r}, inertia={self.inertia / float(radius) / float(radius)!r}), whose inertia is "
+                "J / R**2, with R * omega in place of omega"
             )
 
     @property

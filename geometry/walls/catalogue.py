@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from os.path import isfile
@@ -84,7 +85,7 @@ def wall_from_text(text: str) -> Wall:
         be followed by parameters: ``seam=step`` (see ``Wall.from_profile``), those of ``read_profile``
         (``units=um/nm``, ``delimiter=semicolon``, ``decimal=comma``, ``usecols=0/2``, ``skiprows=3``,
         ``encoding=latin-1``, ``row=5``,
-        ``quantity=slope``), and ``sort=yes``, ``interpolate=yes``, ``detrend=1`` (see `Profile`).
+        ``quantity=slope``, ``undefined=-9999``), and ``sort=yes``, ``interpolate=yes``, ``detrend=1`` (see `Profile`).
 
     Raises
     ------
@@ -102,11 +103,12 @@ def wall_from_text(text: str) -> Wall:
         return _wall_from_file(Path(text), {})
     name, _, tail = text.partition(":")
     entry = WALLS.get(name.strip().lower().replace("_", "-"))
-    parameters = _parameters(text, tail)
     if entry is not None:
-        return entry.build(**{key: _value(entry, key, value) for key, value in parameters.items()})
-    if isfile(name):
-        return _wall_from_file(Path(name), parameters)
+        return entry.build(**{key: _value(entry, key, value) for key, value in _parameters(text, tail).items()})
+    for split in (found.start() for found in re.finditer(":", text)):
+        # the name of a file may have colons too
+        if isfile(text[:split]):
+            return _wall_from_file(Path(text[:split]), _parameters(text, text[split + 1 :]))
     near = difflib.get_close_matches(name, WALLS, n=3)
     guess = f" Did you mean {' or '.join(near)}?" if near else ""
     raise InputError(f"{name!r} is neither a named wall nor a file.{guess} Named walls: {', '.join(WALLS)}")
@@ -174,7 +176,7 @@ def _flag(text: str) -> bool:
 PREPARATIONS = ("seam", "sort", "interpolate", "detrend")
 PROFILE_PARAMETERS: Mapping[str, Callable[[str], Any]] = MappingProxyType({
     "seam": str, "sort": _flag, "interpolate": _flag, "detrend": int, "row": int, "skiprows": int, "encoding": str,
-    "quantity": str,
+    "quantity": str, "undefined": float,
     "units": lambda text: tuple(text.split("/")) if "/" in text else text,
     "usecols": lambda text: tuple(int(part) for part in text.split("/")),
     "delimiter": lambda text: SEPARATORS.get(text, text),

@@ -150,7 +150,16 @@ def check_proof(path: str | Path) -> Proof:
         raise ProofError(f"{path}: the certificate is refused, expected {refusal}") from refusal
     except InputError:
         raise
-    except (RecursionError, ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, ZeroDivisionError) as reason:
+    except (
+        RecursionError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        IndexError,
+        OverflowError,
+        ZeroDivisionError,
+    ) as reason:
         raise InputError(f"path: expected a certificate that Proof.save wrote, got {path} ({reason!r})") from reason
     return _proof(certificate)
 

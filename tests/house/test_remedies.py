@@ -120,6 +120,7 @@ EXPLAINED = {
     "pass invariant=False": "test_pairs.py runs it",
     "write rng={} for a seed": "test_argument_doors.py runs it",
     'pass key="..."': "test_checkpoint_identity.py runs it",
+    "or compute without client": "test_workers.py runs it",
     "chmod go-w": "a command of the shell; test_compilation.py makes such folders",
     "which traces with periodic wrap": "as for curves",
     "its symmetric half where it was sampled": "a formula",

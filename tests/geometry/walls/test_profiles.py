@@ -236,12 +236,132 @@ def test_columns_are_read_as_the_options_say(text, options, tmp_path):
     assert x.tolist() == [0, 1] and height.tolist() == [1.5, 2.5]
 
 
-def test_a_text_in_another_encoding_is_refused_with_its_name(tmp_path):
-    for encoding in ("latin-1", "utf-16"):
-        (tmp_path / "scan.txt").write_bytes("x [µm]; z [nm]\n0 1000\n1 2000\n".encode(encoding))
-        with pytest.raises(InputError, match=f"pass encoding='{encoding}'"):
-            geo.read_profile(tmp_path / "scan.txt")
-        assert geo.read_profile(tmp_path / "scan.txt", encoding=encoding).height.tolist() == [1.0, 2.0]
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16"])
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_encoding_and_decimal_sign_are_found_and_told_where_one_reading_is_possible(tmp_path, encoding, decimal):
+    file = tmp_path / "profil.txt"
+    file.write_bytes("Länge [µm];Höhe [nm]\n0.0;1500.5\n1.0;2000.5\n".replace(".", decimal).encode(encoding))
+    expected = {"encoding": encoding} if encoding != "utf-8" else {}
+    expected |= {"decimal": ","} if decimal == "," else {}
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        found = geo.read_profile(file)
+    assert found.x.tolist() == [0.0, 1.0] and found.height == pytest.approx([1.5005, 2.0005]) and found.unit == "µm"
+    assert len(heard) == bool(expected)
+    for one in heard:
+        call, words = re.search(r"pass (.*?) \(on the command line (.*?)\)", str(one.message)).groups()
+        assert eval(f"dict({call})") == expected
+        assert geo.read_profile(file, **expected).height.tolist() == found.height.tolist()
+        assert geo.wall_from_text(f"{file}:{words}") == geo.Wall.from_profile(found)
+
+
+def test_commas_that_may_set_off_thousands_are_not_taken_for_decimal_signs(tmp_path):
+    text = "1,500;1,250\n2,000;2,250\n"
+    with pytest.raises(InputError, match="expected two numbers") as refused:
+        profile_of(tmp_path, text)
+    options, _ = advised(refused)
+    assert options == {"decimal": ","} and profile_of(tmp_path, text, decimal=",").x.tolist() == [1.5, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ('"x [um]","z [nm]"\n"0","1,000.5"\n"1","2,000"\n', {}),
+        ('"x [um]";"z [nm]"\n"0,0";"1.000,5"\n"1,0";"2.000"\n', {"decimal": ","}),
+        ("x [um];z [nm]\n0;1,000.5\n1;2,000.0\n", {}),
+        ("x [um] z [nm]\n0 1'000.5\n1 2'000\n", {}),
+        ("x [um]\tz [nm]\n0\t1\u202f000.5\n1\t2\u00a0000\n", {}),
+        ("x [um];z [nm]\n0;1.0005D3\n1;2D+03\n", {}),
+        ("x [um];z [nm]\n0;+1000.5\n1;2000\n", {}),
+    ],
+)
+def test_numbers_are_read_as_programs_write_them(tmp_path, text, options):
+    found = profile_of(tmp_path, text, **options)
+    assert found.x.tolist() == [0.0, 1.0] and found.height == pytest.approx([1.0005, 2.0], rel=1e-12)
+
+
+def test_the_minus_of_typesetting_is_a_minus(tmp_path):
+    assert profile_of(tmp_path, "0;0\n1;\u22121000\n").height.tolist() == [0.0, -1000.0]
+
+
+# Headers of a column of positions and one of heights, with metres for each.
+HEADERS = {
+    "x (position) [um];z (height) [nm]": (1e-6, 1e-9), "x [um];z(1) [nm]": (1e-6, 1e-9),
+    "x [um];z [nm] (1)": (1e-6, 1e-9), "Position (mm), Height (raw) (um)": (1e-3, 1e-6),
+    "x [micrometer];z [nanometer]": (1e-6, 1e-9), "x [Microns];z [Nanometers]": (1e-6, 1e-9),
+    "x [1e-6 m];z [1e-9 m]": (1e-6, 1e-9), "X [10^-6 m];Z [10^-9 m]": (1e-6, 1e-9), "X;Z\num;nm": (1e-6, 1e-9),
+    "X\tZ\n[um]\t[nm]": (1e-6, 1e-9), "X,Z\n(mm),(um)": (1e-3, 1e-6), "x [mil];z [uin]": (2.54e-5, 2.54e-8),
+    "x [Angstrom];z [nm]": (1e-10, 1e-9), "x [\u212b];z [nm]": (1e-10, 1e-9), "x [inch];z [thou]": (0.0254, 2.54e-5),
+    "x [MM];z [UM]": (1e-3, 1e-6), "x_um,z_nm": (1e-6, 1e-9), "Lateral um   Height nm": (1e-6, 1e-9),
+    "pos mm\theight µm": (1e-3, 1e-6), "x [metres];z [millimetre]": (1.0, 1e-3), "x (ft) z (inches)": (0.3048, 0.0254),
+    "# x [um] z [nm]": (1e-6, 1e-9), "x [μm]; z [µm]": (1e-6, 1e-6), "x /um;z /nm": (1e-6, 1e-9),
+    "x in um;z in nm": (1e-6, 1e-9), "Distance: um;Height: nm": (1e-6, 1e-9), "% x[mm] z[um]": (1e-3, 1e-6),
+    "x [Micrometers];z [micro-inch]": None, "x [foo];z [bar]": None,
+    "x [um];z [counts]": None, "x [Mm];z [nm]": None, "Weg (mikrometer);Hoehe (nanometer)": None,
+    "x [um];z [V]": None, "x [ms];z [nm]": None,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("head", HEADERS)
+def test_each_header_is_read_right_or_refused_with_advice_that_reads_it(tmp_path, head):
+    text = head + "\n0 0\n1 -1000\n2 1000\n".replace(" ", ";" if ";" in head else " ")
+    sizes = HEADERS[head]
+    if sizes is None:
+        with pytest.raises(InputError, match="header: expected two units of length") as refused:
+            profile_of(tmp_path, text)
+        options, _ = advised(refused)
+        assert profile_of(tmp_path, text, **options).unit == options["units"][0]
+        return
+    found = profile_of(tmp_path, text)
+    assert found.in_unit("m").x == pytest.approx(sizes[0] * np.arange(3.0), rel=1e-9)
+    assert found.in_unit("m").height == pytest.approx(sizes[1] * np.array([0.0, -1000.0, 1000.0]), rel=1e-9)
+
+
+@pytest.mark.parametrize(("codes", "count"), [((-9999.0,), 2), ((32767.0,), 1), ((-400.0, -500.0), 2), ((), 0)])
+def test_dropouts_are_told_with_what_to_do(tmp_path, codes, count):
+    x, rng = np.arange(2000.0), np.random.default_rng(5)
+    height = np.cumsum(rng.normal(size=2000)) / 10.0
+    for index, code in zip((500, 501), codes * 2 if len(codes) == 1 else codes, strict=False):
+        height[index if count == 2 else 500] = code
+    file = tmp_path / "scan.txt"
+    np.savetxt(file, np.column_stack([x, height]))
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        geo.Wall.from_profile(geo.read_profile(file))
+    assert len(heard) == bool(count)
+    if not count:
+        return
+    assert f"{count} of 2000 heights, the first {codes[0]:g} at index (500,)" in str(heard[0].message)
+    if len(codes) == 1:
+        assert f"read the file with undefined={codes[0]:g} (undefined={codes[0]:g})" in str(heard[0].message)
+        mended = geo.wall_from_text(f"{file}:undefined={codes[0]:g},interpolate=yes")
+    else:
+        height[500:502] = np.nan
+        mended = geo.Wall.from_profile(geo.Profile(x, height).interpolated())
+    assert mended.depth < 20.0
+
+
+def test_real_grooves_are_no_dropouts():
+    x = np.arange(1000.0)
+    for height in (np.where(x % 100 == 50, -10.0, 0.0), np.where(x > 500, 0.0, -30.0), np.sin(x / 50) - (x == 7)):
+        geo.Wall.from_profile(x, height)
+
+
+def test_a_trace_that_turns_back_is_not_to_be_sorted():
+    angle = np.linspace(0.0, 2.0 * np.pi, 200)
+    x, height = angle + 1.2 * np.sin(2.0 * angle), np.cos(angle) - 1.0
+    with pytest.raises(InputError, match=r"the trace turns back, .*; Wall\.from_vertices takes vertices that overhang"):
+        geo.Wall.from_profile(x, height)
+    wall = geo.Wall.from_vertices(np.column_stack([x, height]))
+    assert wall.arc_length == pytest.approx(np.hypot(np.diff(x), np.diff(height)).sum(), rel=1e-9)
+    with pytest.raises(InputError, match="sort=yes"):
+        geo.Wall.from_profile([0.0, 1.0, 1.0, 2.0], [0.0, -0.5, -0.5, 0.0])
+
+
+def test_a_name_with_a_colon_takes_parameters(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "C:prof.txt").write_text("0 0\n1 -1\n2 -1\n")
+    assert geo.wall_from_text("C:prof.txt:seam=step") == geo.Wall.from_profile([0, 1, 2], [0, -1, -1], seam="step")
 
 
 def test_an_empty_field_is_an_undefined_height(tmp_path):
@@ -357,7 +477,6 @@ def test_contradictions_of_quantity_and_unit_are_refused_with_the_call_that_deci
         ("{x} {y} {h}", "", {"usecols": (0, 2)}), ("{k} {x} {h}", "", {"usecols": (1, 2)}),
         ("{x};{h}", "1 of 2\nmade by hand\n", {"skiprows": 2}),
         ("{k};{x};{h};9", "a 1\n", {"usecols": (1, 2), "skiprows": 1}),
-        ("{cx};{ch}", "", {"decimal": ","}),
         ("{cx} {ch} {ch}", "scan 1\n", {"decimal": ",", "skiprows": 1, "usecols": (0, 2)}),
     ],
 )  # fmt: skip
