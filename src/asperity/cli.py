@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import atexit
+import errno
 import gc
 import os
 import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
@@ -23,8 +24,8 @@ from .core.errors import INTERRUPTED, AccuracyError, AsperityError, FileExistsRe
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile. This is mirrored to make it periodic, or repeated with
 profile.txt:seam=step or, if it is periodic, seam=wrap; more of its parameters, joined by commas: units=um/nm,
-delimiter=semicolon, decimal=comma, usecols=0/2, skiprows=3, encoding=latin-1, row=5, quantity=slope, sort=yes,
-interpolate=yes, detrend=1."""
+delimiter=semicolon, decimal=comma, usecols=0/2, skiprows=3, encoding=latin-1, row=5, quantity=slope,
+undefined=-9999, sort=yes, interpolate=yes, detrend=1."""
 
 
 class OneLineErrors(click.Group):
@@ -40,6 +41,15 @@ class OneLineErrors(click.Group):
             sys.exit(INTERRUPTED)
         except AsperityError as reason:
             click.echo(f"asperity: {' '.join(str(reason).split())}", err=True)
+            sys.exit(1)
+        except OSError as reason:
+            # click ends quietly where nobody reads a pipe any more
+            if reason.errno == errno.EPIPE:
+                raise
+            click.echo(f"asperity: cannot print the answer ({reason.strerror}); write it somewhere else", err=True)
+            # else it would be written once more at the end
+            with suppress(OSError):
+                sys.stdout.close()
             sys.exit(1)
 
 

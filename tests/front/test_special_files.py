@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,7 +14,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import FileExistsRefusal, InputError
 from asperity.kernels.inverse.named_laws import law_from_text
-from commands import run
+from commands import environment, run
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
 # Seconds in which any of these must answer.
@@ -110,6 +112,18 @@ def test_where_nothing_can_be_written_every_writer_says_so_before_its_work(name,
         pytest.skip("not on this system")
     with at_once(), pytest.raises((InputError, FileExistsRefusal)):
         WRITERS[name](path)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="not on this system")
+@pytest.mark.parametrize("words", [["walls"], ["gap", "flat"], ["walls", "--help"]])
+def test_an_answer_that_cannot_be_printed_is_told_in_one_line(words):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "asperity", *words], stdout=full, stderr=subprocess.PIPE, text=True, timeout=300,
+            env=environment(),
+        )  # fmt: skip
+    assert done.returncode == 1 and done.stderr.startswith("asperity: cannot print the answer (No space left")
+    assert len(done.stderr.splitlines()) == 1
 
 
 @pytest.mark.skipif(not Path("/proc/kcore").exists(), reason="not on this system")

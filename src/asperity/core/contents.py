@@ -263,12 +263,11 @@ class _Contents:
         if not isinstance(made, tuple):
             raise _NoContent(shortened(value))
         function, arguments, state, entries, items, setter = (*made, None, None, None, None)[:6]
-        kept = _attributes(value)
         if type(state) is dict:
             # with nothing but cached properties it is as without any
             state = _without_cached(value, state) or None
         listed = [None if one is None else list(one) for one in (entries, items)]
-        return ["object", *map(self.of, (function, arguments, state, listed, setter, None if kept == state else kept))]
+        return ["object", *map(self.of, (function, arguments, state, listed, setter, _attributes(value)))]
 
 
 def _attributes(value: Any) -> list[tuple[str, Any]] | None:
