@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats
-from ...geometry.disk.disk import branch_block
-
-if TYPE_CHECKING:
-    from ...geometry import Disk
+from ...core.checks import Floats, instance
+from ...geometry.disk.disk import Disk, branch_block
 
 
 def smooth_matrix(disk: Disk) -> Floats:
@@ -55,6 +50,7 @@ def isometry_matrix(disk: Disk, sign: ArrayLike, offset: ArrayLike, flip: bool =
         for column, entry in enumerate(entries):
             inner[..., row, column] = entry
     inner[..., 2, 2] *= 1.0 if flip else -1.0
+    instance("disk", disk, Disk, "geo.Disk()")
     frame = np.asarray(disk.frame)
     metric = np.array([disk.mass, disk.mass, disk.inertia])
     return np.asarray(frame.T @ inner @ (frame * metric))

@@ -420,6 +420,7 @@ class KernelMatrix:
 
     def tensor(self, other: KernelMatrix) -> KernelMatrix:
         """The kernel that applies this one to the first angle and the other to the second, independently."""
+        instance("other", other, KernelMatrix, "ker.discretise(ker.lambertian(), ker.Bins(4))")
         # A x B - A* x B* = E_A x B + A* x E_B, in the Frobenius norm
         check_same_frame(self, other)
         mine, yours = float(self.error), float(other.error)

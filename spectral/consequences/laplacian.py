@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...core.checks import Floats, frozen, instance, whole_number
 from ...core.estimates import Summary
+from ...geometry import Wall
 from ...kernels import Law, Legendre, discretise
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 # Chords of a wall's pieces and twice as many, whose difference tells the error of the mean squared slope.
 CHORDS = 4096
@@ -91,6 +88,7 @@ def mean_squared_slope(wall: Wall) -> float:
     >>> round(mean_squared_slope(geo.triangular_teeth(np.pi / 2)), 12)
     1.0
     """
+    instance("wall", wall, Wall, "geo.koch(2)")
     coarse, fine = (_slope_sum(wall, chords) for chords in (CHORDS, 2 * CHORDS))
     if not np.isfinite(fine[0]) or fine[1] > STEEPENING * coarse[1]:
         # a vertical tangent, where the integral diverges
