@@ -321,7 +321,11 @@ def _irreducible(e: Any) -> Iterable[tuple[Any, Any]]:
     found: dict[Any, Any] = defaultdict(lambda: sp.Integer(0))
     for factor in sp.Mul.make_args(sp.together(e)):
         base, times = factor.as_base_exp()
-        polynomial = sp.Poly(base) if base.is_Add and times.is_Integer else None
+        try:
+            polynomial = sp.Poly(base) if base.is_Add and times.is_Integer else None
+        except sp.GeneratorsNeeded:
+            # a sum that is a number
+            base, polynomial = sp.expand(base), None
         if polynomial is None or not (polynomial.domain.is_ZZ or polynomial.domain.is_QQ):
             found[base] += times
             continue
