@@ -500,16 +500,17 @@ class Writer(Maker):
     def asked(self, left: Any, right: Any, relation: str, domain: list[Any]) -> tuple[Any, ...]:
         assumed = self.pick([domain, tuple(domain), iter(domain), sp.And(*domain) if domain else ()])
         if relation == "<=":
-            return self.pick([
+            return *self.pick([
                 (sp.Le(left, right, evaluate=False),), (sp.Ge(right, left, evaluate=False),),
                 ([sp.Le(left, right, evaluate=False), sp.Lt(left, right + 1, evaluate=False)],),
                 (sp.And(sp.Le(left, right, evaluate=False), sp.Le(left, right + 1, evaluate=False), evaluate=False),),
-            ]) + (assumed,)  # fmt: skip
-        return self.pick([
+            ]), assumed  # fmt: skip
+        return *self.pick([
             (left, right), (left, right), ([left, 1], [right, 1.0]), (sp.Matrix([[left, 0]]), sp.Matrix([[right, 0]])),
-            (sp.ImmutableMatrix([left]), [[right]]), (sp.Array([left, 2]), (right, 2)), (sp.Tuple(left), sp.Tuple(right)),
+            (sp.ImmutableMatrix([left]), [[right]]), (sp.Array([left, 2]), (right, 2)),
+            (sp.Tuple(left), sp.Tuple(right)),
             (np.array([left], dtype=object), [right]), (sp.Eq(left, right, evaluate=False),),
-        ]) + (assumed,)  # fmt: skip
+        ]), assumed  # fmt: skip
 
     def broken(self) -> Claim:
         """A claim that is none: every part of `verify` should say so."""
@@ -517,11 +518,14 @@ class Writer(Maker):
         asked = self.pick([
             (u, sp.Poly(X**2 + 1, X)), ({u}, {u}), ({"a": u}, {"a": u}), ("x", u), (u, None), (None, u), (u, b"1"),
             (u, sp.Interval(0, 1)), (sp.FiniteSet(u), sp.FiniteSet(u)), (u, u, [True]), (u, u, [u == 3]), (u, u, None),
-            (u, u, sp.Eq(X, 1)), (u, u, [X > 1, X < 1]), (u, u, "x > 0"), (u, u, 7), (u, u, {X: 1}), (u, u, {"x": (0, 1)}),
+            (u, u, sp.Eq(X, 1)), (u, u, [X > 1, X < 1]), (u, u, "x > 0"), (u, u, 7), (u, u, {X: 1}),
+            (u, u, {"x": (0, 1)}),
             (u, u, {X: (1, 0)}), (u, u, X), (u, u, sp.Contains(X, sp.Interval(0, 1))), (u, sp.I * u), (u, sp.nan),
-            (u, sp.oo), (u, float("nan")), (u, 1j), (sp.Symbol("z", imaginary=True), 1), (x, sp.Symbol("x", positive=True)),
+            (u, sp.oo), (u, float("nan")), (u, 1j), (sp.Symbol("z", imaginary=True), 1),
+            (x, sp.Symbol("x", positive=True)),
             ([], []), ([u], []), ([u, u], [u]), (sp.eye(2), sp.eye(3)), (sp.MatrixSymbol("A", 2, 2), sp.eye(2)),
-            (sp.IndexedBase("A")[0], 1), (u,), (X > 0, 1, 2), (sp.Ne(X, 0),), (sp.Or(X > 0, Y > 0),), (u == u,), (sp.sin, u),
+            (sp.IndexedBase("A")[0], 1), (u,), (X > 0, 1, 2), (sp.Ne(X, 0),), (sp.Or(X > 0, Y > 0),), (u == u,),
+            (sp.sin, u),
             (u, lambda t: t), (u, object()), (u, u, [sp.Gt(X, sp.nan, evaluate=False)]),
             (np.array([[1.0, 2.0]]), [1.0]), (sp.Symbol("a", commutative=False), 1), (u, u, [X**2 < -1]), (u, range),
         ])  # fmt: skip

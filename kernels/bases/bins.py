@@ -58,7 +58,7 @@ class Bins(Basis):
         equal = not np.iterable(divisions)
         if equal:
             check_memory("bins", "the edges", whole_number("bins", divisions, 1))
-        edges = _equal_edges(whole_number("bins", divisions, 1), measure) if equal else _checked_edges(divisions)
+        edges = _equal_edges(whole_number("bins", divisions, 1), measure) if equal else checked_edges(divisions)
         object.__setattr__(self, "_edges", frozen(edges))
         object.__setattr__(self, "_weights", frozen(measure.mass(edges[:-1], edges[1:])))
         object.__setattr__(self, "_measure", measure)
@@ -142,7 +142,7 @@ def _equal_edges(n: int, measure: AngularMeasure) -> Floats:
     return np.concatenate((lower, np.pi - lower[: (n + 1) // 2][::-1]))
 
 
-def _checked_edges(values: ArrayLike) -> Floats:
+def checked_edges(values: ArrayLike) -> Floats:
     edges = finite_array("edges", values)
     if edges.ndim != 1 or edges.size < 2:
         raise InputError(f"edges: expected at least two angles in a row, got an array of shape {edges.shape}")

@@ -13,6 +13,7 @@ from ...core.checks import DOUBLE, Rng, check_memory, choice, finite_number, gen
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.long_runs import Engine, reported
+from ..bases.assembly import checked_basis
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
@@ -171,7 +172,7 @@ def discretise(
         )
     source = generator(rng, SEED_WITHOUT_RNG)
     instance("law", law, Law, "ker.WallLaw(wall)")
-    instance("basis", basis, Basis, "ker.Bins(64)")
+    checked_basis(basis)
     if isinstance(basis, TensorBasis):
         raise InputError(f"basis: expected a basis of one angle for {law!r}, got {basis!r}; use P.tensor(Q)")
     if basis.measure != SINE:

@@ -32,7 +32,7 @@ def test_the_check_accepts_the_right_formula_and_refutes_the_wrong_one(entry):
 def test_a_user_can_negate_a_formula_and_the_check_refutes_it_or_says_why_not(entry):
     if entry.id in ("S1.01", "S2.28"):
         # an angle below 0, and a wall
-        with pytest.raises(InputError, match="expected angles|write the wrong code"):
+        with pytest.raises(InputError, match=r"expected angles|write the wrong code"):
             entry.check(entry.negated)
         return
     expected = "agrees" if (entry.id, "result negated") in EQUIVALENT else "refuted"

@@ -451,7 +451,10 @@ def test_what_sympy_cannot_do_is_undecided_and_the_evidence_says_so(monkeypatch)
         raise NotImplementedError("a relation of this kind")
 
     monkeypatch.setattr(derivation, "_method", fails)
-    assert "(NotImplementedError: a relation of this kind)" in verify(sp.gamma(m + 1), m * sp.gamma(m), time_limit=None).evidence
+    assert (
+        "(NotImplementedError: a relation of this kind)"
+        in verify(sp.gamma(m + 1), m * sp.gamma(m), time_limit=None).evidence
+    )
 
 
 def test_an_expression_that_is_too_deep_to_be_sent_is_refused():
@@ -479,7 +482,8 @@ REFUSED = [
     ((sp.I * x, x), "imaginary unit"), ((sp.Symbol("z", imaginary=True), 0), "real symbol"),
     ((sp.Symbol("z", zero=True) * x, 1), "substitute 0"),
     (([1, 2], [1, 2, 3]), "one shape"), ((sp.ones(2, 3), sp.ones(3, 2)), "one shape"),
-    (([], []), "not empty"), ((x, sp.Poly(x**2, x)), "numbers and expressions"), (({x}, {x}), "numbers and expressions"),
+    (([], []), "not empty"), ((x, sp.Poly(x**2, x)), "numbers and expressions"),
+    (({x}, {x}), "numbers and expressions"),
     ((sp.MatrixSymbol("A", 2, 2), sp.eye(2)), "numbers and expressions"), ((sp.IndexedBase("A")[0], 1), "real symbol"),
     ((x + sp.Symbol("x", positive=True), 2 * x), "different names"), ((x, 1, [x != 1]), "write sympy.Ne"),
     ((np.array([x <= 1, y <= 1]),), "two sides"),
