@@ -1,7 +1,7 @@
 """Functions of users in sweeps, ensembles, mean laws and work diagrams, which fail or give no number at some points.
 
-Right are a reason in the place of each such value, and all other values as if no point were odd. Every third case has no
-odd point.
+Right are a reason in the place of each such value, and all other values as if no point were odd. Every third case has
+no odd point.
 """
 
 from __future__ import annotations
@@ -141,4 +141,4 @@ def judge(case: Case) -> Iterator[Judged]:
 
 
 QUESTION = "Does a function of a user's that fails at a point cost any other point its value?"
-CAMPAIGNS = (Campaign("odd-functions", QUESTION, draw, judge, 2000, range(60)),)
+CAMPAIGNS = (Campaign("odd-functions", QUESTION, draw, judge, 2000, range(30)),)

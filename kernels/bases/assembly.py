@@ -1,8 +1,8 @@
-"""Galerkin matrices: sums of weighted products e_i(theta) e_j(theta') over many pairs of angles, for checked bases."""
+"""Galerkin matrices: sums of weighted products e_i(theta) e_j(theta') over many pairs of angles, for every basis."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from typing import Any
@@ -10,18 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, frozen, instance, shaped, whole_number
-from ...core.errors import AsperityError, InputError
+from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE
-from .basis import DENSER, Basis, BasisOfPoints
-from .bins import checked_edges
-from .measure import AngularMeasure
+from .basis import Basis
 from .panels import Panels
 
 # OpenBLAS uses one thread for products of at most this many multiplications, and to limit it takes 30 us.
 SMALL_PRODUCT = 2**18
-# Rounding of <e_i, e_j> for each function, and the attribute of a basis that was found to be orthonormal.
-ORTHONORMAL, CHECKED = 1e-12, "_is_checked"
 # Matrices with more entries are copied as seldom as possible.
 LARGE = 2**22
 
@@ -36,53 +31,6 @@ def _blas() -> Any:
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
-
-
-def checked_basis(basis: Any) -> None:
-    """Refuse what is no basis, and a basis of a user's own class that breaks a promise of `Basis`.
-
-    An object is examined once, at its own nodes and at more. The tests examine the classes of this package.
-    """
-    instance("basis", basis, Basis, "ker.Bins(64)")
-    if type(basis).__module__.startswith(__package__) or isinstance(basis, BasisOfPoints) or CHECKED in vars(basis):
-        return
-    try:
-        for what, found, expected in _promises(basis):
-            defect = np.abs(found - shaped("basis", expected, *found.shape))
-            # rounding of functions on narrow cells is larger
-            if not defect.max() <= ORTHONORMAL * basis.size * max(1.0, np.abs(found).max()):
-                raise InputError(f"basis: expected {what}, got a difference of {defect.max():.2g}")
-    except AsperityError:
-        raise
-    except Exception as reason:  # of the user's methods
-        raise InputError(f"basis: {basis!r} failed ({type(reason).__name__}: {reason}); see ker.Basis") from reason
-    vars(basis)[CHECKED] = True
-
-
-def _promises(basis: Basis) -> Iterator[tuple[str, Floats, Any]]:
-    """What a basis promises, what is found, and what is expected."""
-    hash(basis)
-    instance("basis.measure", basis.measure, AngularMeasure, "ker.SINE")
-    instance("basis.edges", basis.edges, np.ndarray, "np.array([0.0, np.pi])")
-    instance("basis.constant", basis.constant, np.ndarray, "np.array([1.0, 0.0])")
-    size, nodes = whole_number("basis.size", basis.size, 1), basis.nodes_per_interval
-    for number in (nodes, DENSER * whole_number("basis.nodes_per_interval", nodes, 1)):
-        angle, weight = basis.measure.quadrature(checked_edges(basis.edges), number)
-        values = shaped("basis.evaluate(angles)", basis.evaluate(frozen(angle)), angle.size, size)
-        gram = values.T @ (weight[:, None] * values)
-        remedy = "raise nodes_per_interval, or add edges where functions have kinks"
-        yield f"orthonormal functions at {number} nodes an interval ({remedy})", gram, np.eye(size)
-    yield "evaluate(angle) @ constant = 1", values @ shaped("basis.constant", basis.constant, size), np.ones(angle.size)
-    if basis.is_partition:
-        cells = basis.index(angle)[:, None] == np.arange(size)
-        yield "is_partition of indicators only", values, cells * basis.normalisation
-    if basis.is_polynomial:
-        powers = np.polynomial.legendre.legvander(np.cos(angle), size - 1)
-        triangle = np.triu(np.linalg.lstsq(powers, values)[0])
-        yield "is_polynomial of degrees 0, 1, ... in cos(theta) only", values, powers @ triangle
-    coarser = basis.coarsened()
-    if coarser is not None:
-        yield "coarsened() of a subspace", values @ np.transpose(coarser[1]), coarser[0].evaluate(angle)
 
 
 def overlaps(basis: Basis, functions: Callable[[Floats], Floats], edges: Floats) -> Floats:
@@ -132,8 +80,5 @@ def add_blocks(
 
 
 def largest_square_sum(basis: Basis) -> float:
-    """sup over theta of the sum of e_i(theta)^2; all our bases attain it at an edge, from one side."""
-    if basis.is_partition:
-        return float(np.max(basis.normalisation**2))
-    ends = np.concatenate((basis.edges, np.nextafter(basis.edges, 0.0)))
-    return float(np.max(np.sum(basis.evaluate(ends) ** 2, axis=1)))
+    """sup over theta of the sum of e_i(theta)^2."""
+    return float(np.max(basis.magnitudes()[0])) ** 2

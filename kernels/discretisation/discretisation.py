@@ -13,8 +13,7 @@ from ...core.checks import DOUBLE, Rng, check_memory, choice, finite_number, gen
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.long_runs import Engine, reported
-from ..bases.assembly import checked_basis
-from ..bases.basis import Basis
+from ..bases.basis import Basis, checked_basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..bases.mirror import reflection_matrix

@@ -33,8 +33,7 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, html_table
 from ...core.frames import data_array, data_frame
 from ...core.rounding import EPS
-from ..bases.assembly import checked_basis
-from ..bases.basis import AngleFunction, Basis, BasisOfPoints, Frame
+from ..bases.basis import AngleFunction, Basis, BasisOfPoints, Frame, checked_basis
 from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..bases.tensor import TensorBasis

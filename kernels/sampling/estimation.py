@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles, check_memory
 from ...core.errors import InputError
-from ..bases.assembly import checked_basis
-from ..bases.basis import Basis
+from ..bases.basis import Basis, checked_basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score

@@ -16,8 +16,7 @@ from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arra
 from ...core.checks import Floats, angles, check_memory, shortened
 from ...core.errors import InputError
 from ...core.version import __version__
-from ..bases.assembly import checked_basis
-from ..bases.basis import Basis
+from ..bases.basis import Basis, checked_basis
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score
 from ..matrices.matrix import KernelMatrix

@@ -19,7 +19,7 @@ from ...core.estimates import Estimate, Summary
 from ...core.frames import data_frame
 from ...core.long_runs import Engine, all_parts, identity_of
 from ...kernels import Basis, KernelMatrix, discretise
-from ...kernels.bases.assembly import checked_basis
+from ...kernels.bases.basis import checked_basis
 from ...kernels.sampling.counts import half_width
 from .quantities import UserQuantity, name_of
 from .running import Family, in_words, law_of, sweep

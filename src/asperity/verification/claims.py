@@ -47,7 +47,7 @@ def _related(given: Any) -> list[Claim]:
         raise InputError(f"lhs: expected two sides, or a relation such as a <= b, got {given!r} alone")
     if isinstance(given, sp.Eq):
         return _equations(*given.args)
-    left, right = (_side(side) for side in given.args)
+    left, right = (_exact("lhs", side) for side in given.args)
     sides = (right, left) if isinstance(given, sp.Ge | sp.Gt) else (left, right)
     return [(*sides, _RELATIONS[type(given)])]
 
@@ -66,25 +66,21 @@ def _entries(side: Any) -> list[Any]:
     side = side.tolist() if hasattr(side, "tolist") else side
     if isinstance(side, sp.Tuple | list | tuple):
         return [entry for part in side for entry in _entries(part)]
-    return [_side(side)]
+    return [_exact("lhs, rhs", side)]
 
 
-def _side(given: Any) -> Any:
-    found = _exact("lhs, rhs", given)
-    if not isinstance(found, sp.Expr) or found.is_Matrix:
-        raise InputError(f"lhs, rhs: expected numbers and expressions, got {reprlib.repr(given)}")
-    return found
-
-
-def _exact(name: str, given: Any) -> Any:
+def _exact(name: str, given: Any, kind: type = sp.Expr) -> Any:
     """The sympy object; text is refused, because sympy would execute it."""
     try:
-        return sp.sympify(given, strict=True)
-    except sp.SympifyError as reason:
-        raise InputError(
-            f"{name}: expected expressions, equations or inequalities of sympy, or numbers, got "
-            f"{reprlib.repr(given)}; build expressions from sympy.Symbol"
-        ) from reason
+        found = sp.sympify(given, strict=True)
+    except sp.SympifyError:
+        found = None
+    if isinstance(found, kind) and not getattr(found, "is_Matrix", False):
+        return found
+    raise InputError(
+        f"{name}: expected expressions, equations or inequalities of sympy, or numbers, got {reprlib.repr(given)}; "
+        "build expressions from sympy.Symbol"
+    )
 
 
 def _assumed(assumptions: Any) -> list[Any]:
@@ -99,7 +95,7 @@ def _assumed(assumptions: Any) -> list[Any]:
         return [sp.Lt(*side, evaluate=False) for symbol, low, high in exact for side in ((low, symbol), (symbol, high))]
     given = [assumptions] if isinstance(assumptions, sp.Basic | bool | str) else assumptions
     try:
-        found = [_exact("assumptions", one) for one in given]
+        found = [_exact("assumptions", one, sp.Basic) for one in given]
     except TypeError as reason:
         raise InputError(f"assumptions: expected relations, got {reprlib.repr(assumptions)}") from reason
     if any(isinstance(one, bool) for one in given):

@@ -74,18 +74,14 @@ class Part:
 
     def is_within_a_turn(self, e: Any) -> bool:
         """Whether an expression with arctangents or arccosines is surely between -2 pi and 2 pi."""
-        ranges: dict[Any, Any] = {}
-        for f in e.atoms(sp.atan, sp.acos):
-            ends = (0 if self.signs(f.args[0]) <= allowed else 1 for allowed in (NOT_NEGATIVE, NOT_POSITIVE))
-            low, high = (sign * end * sp.pi / 2 for sign, end in zip((-1, 1), ends, strict=True))
-            low, high = (low, high) if f.func is sp.atan else (sp.pi / 2 - high, sp.pi / 2 - low)
-            ranges[f] = sp.Dummy("a"), interval(low, high, FEW_BITS)
-        free = e.xreplace({f: symbol for f, (symbol, _) in ranges.items()})
+        box, names = dict(self._box), {f: sp.Dummy("a") for f in e.atoms(sp.atan, sp.acos)}
+        for f, name in names.items():
+            low, high = (sign * sp.pi / 2 * int(sign in self.signs(f.args[0])) for sign in (-1, 1))
+            box[name] = interval(low, high) if f.func is sp.atan else interval(sp.pi / 2 - high, sp.pi / 2 - low)
         try:
-            ball = evaluate(free, self._box | dict(ranges.values()), FEW_BITS).ball
+            return bool(names) and bool(abs(evaluate(e.xreplace(names), box, FEW_BITS).ball) < 6)
         except (Undefined, Unclear):
             return False
-        return bool(ranges) and bool(abs(ball) < 6)
 
     # ---- rules
 

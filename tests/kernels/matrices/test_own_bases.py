@@ -10,7 +10,7 @@ from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.kernels.bases import assembly
+from asperity.kernels.bases import basis as promises
 from asperity.kernels.bases.directions import Directions
 
 OURS = [
@@ -28,9 +28,9 @@ def good():
 
 @pytest.mark.parametrize("basis", OURS, ids=repr)
 def test_our_bases_keep_the_promises_that_are_asked_of_a_users(basis):
-    for what, found, expected in assembly._promises(basis):
+    for what, found, expected in promises._promises(basis):
         scale = basis.size * max(1.0, np.abs(found).max())
-        assert np.abs(found - expected).max() <= assembly.ORTHONORMAL * scale, what
+        assert np.abs(found - expected).max() <= promises.ORTHONORMAL * scale, what
 
 
 @pytest.mark.parametrize(
@@ -80,9 +80,9 @@ def test_a_basis_is_examined_once(good):
         return good.functions(u)
 
     basis = replace(good, functions=counted)
-    assembly.checked_basis(basis)
+    promises.checked_basis(basis)
     assert len(calls) == 2
-    assembly.checked_basis(basis)
+    promises.checked_basis(basis)
     assert len(calls) == 2
 
 
