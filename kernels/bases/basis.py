@@ -31,6 +31,9 @@ class Basis(ABC):
 
     In every basis the matrix S with entries <e_i, P e_j> represents a kernel P. Two bases are equal if they are of the
     same class with the same parameters.
+
+    An object of a user's own class is examined once, where it is first used: <e_i, e_j> at its own nodes and at more,
+    the constant, cells, polynomials and the coarser basis. An InputError says which promise it breaks.
     """
 
     # numpy would take a basis for an entry of an array

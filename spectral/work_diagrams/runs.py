@@ -98,7 +98,8 @@ def work_precision(
     budgets : sequence of numbers, or mapping from a method's name to one
         Budgets of every method, measured in increasing order.
     repeats : int
-        Timed runs per method and budget.
+        Timed runs per method and budget. A run that fails, or whose value is not of finite numbers, makes a row with
+        the reason; the other rows keep their values.
     seconds : float
         Time limit of a row in seconds: no further repeat begins after it. If every run of a row exceeds it, larger
         budgets of the method are left out. A running computation is ended only by a ``runner`` with a hard limit.

@@ -27,13 +27,14 @@ def verify(
 
     Parameters
     ----------
-    lhs, rhs : sympy expressions, numbers, matrices or nested sequences of them
+    lhs, rhs : sympy expressions, numbers, matrices, arrays or nested sequences of them
             Both have the same shape and are compared entry by entry. Decimal numbers are read as their exact binary
             fractions. Text is refused, because sympy would execute it. ``lhs`` may be a relation such as ``a <= b`` or
             a sequence of relations. Then there is no ``rhs``, and the assumptions may be the second argument.
         assumptions : sympy relation, iterable of them, or mapping from symbols to open intervals
-            Inequalities such as ``0 < theta`` or ``x <= y``, or ``{theta: (0, sympy.pi)}``, in addition to the
-            properties of the symbols (``positive=True``, ``integer=True``). Symbols stand for real numbers.
+            Inequalities such as ``0 < theta`` or ``x <= y``, also with ``|`` and ``~``, or ``{theta: (0, sympy.pi)}``,
+            in addition to the properties of the symbols (``positive=True``, ``integer=True``). Symbols stand for real
+            numbers.
         time_limit : float or None
             Seconds after which the answer is ``"undecided"``. The work runs in a separate process, which is killed at
             the limit. The process starts with the first call, which takes about a second, and serves later calls. None:
@@ -51,8 +52,8 @@ def verify(
     ------
     InputError
             If a side or an assumption is text or another object than these, the shapes differ, an assumption is not an
-            inequality, a side has the imaginary unit, no point meets the assumptions, or at each examined point of the
-            domain one side is undefined or not real.
+            inequality, two symbols have one name, a side has the imaginary unit, no point meets the assumptions, or at
+            each examined point of the domain one side is undefined or not real.
 
     Notes
     -----
