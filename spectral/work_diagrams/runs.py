@@ -172,7 +172,7 @@ def _met_the_limit(row: WorkRow, seconds: float) -> bool:
 
 
 def _ladders(methods: Sequence[WorkMethod], budgets: Budgets) -> dict[str, list[float]]:
-    names = [method.name for method in sequence("methods", methods, WorkMethod, "spec.WorkMethod('name', solve)")]
+    names = [method.name for method in sequence("methods", methods, WorkMethod, "spec.WorkMethod('by hand', float)")]
     if not names or len(set(names)) < len(names):
         raise InputError(f"methods: expected at least one, with different names, got {names}")
     if not isinstance(budgets, (Mapping, Sequence, np.ndarray)):
