@@ -16,6 +16,7 @@ from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.files import regular_file, text_of, write_whole
 from ...kernels import KernelMatrix
+from ..sweeps.running import in_words
 from .machine import Machine, on_one_core
 from .problem import WorkMethod, WorkProblem
 from .report import WorkReport, WorkRow
@@ -46,8 +47,8 @@ def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: in
             errors.append(problem.error(value, method.name))
             reports.append(reported)
     except Exception as reason:  # of the method, which must not cost the other rows
-        words = " ".join(f"{type(reason).__name__}: {reason}".split())
-        return WorkRow(method.name, budget, "failed", seconds=tuple(times), note=words)
+        note = " ".join(in_words(reason).split())
+        return WorkRow(method.name, budget, "failed", seconds=tuple(times), note=note)
     known = [one for one in reports if one is not None]
     together = _root_mean_square(known) if len(known) == len(reports) else None
     return WorkRow(method.name, budget, "done", _root_mean_square(errors), tuple(times), together, note)
