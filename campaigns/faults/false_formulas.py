@@ -4,7 +4,9 @@ In each claim the second expression is the first one rewritten by a rule that ho
 perturbation, down to 1e-25 or at one point only. The domain is drawn independently of the rule. The judge evaluates
 both sides in 50 digits by mpmath, with its own evaluator. Its points are random points, ends and special points of the
 domain, and neighbours of these. A proof is false if the values differ at a point. A refutation is false if its
-counterexample is not in the domain, or if there the values agree or one is not real.
+counterexample is not in the domain, or if there the values agree or one is not real. Later numbers draw claims in the
+forms in which users write them (cases with Boolean conditions, relations, matrices, symbols of any kind), a third of
+them no claims at all, which must be refused by InputErrors.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import numpy as np
 import sympy as sp
 
 from asperity import InputError, verify
+from asperity.verification.derivation import FAILED
 from campaigns.engine import Campaign, Judged
 
 DIGITS = 50
@@ -26,6 +29,8 @@ SAME = 0.75
 # An argument that differs from a jump only in the last fifth of the digits counts as on the jump.
 ON_A_JUMP = 0.8
 POINTS = 80
+# From this number on claims are written as users write them.
+FIRST_WRITTEN = 5000
 SECONDS = 10.0
 
 X, Y = sp.symbols("x y", real=True)
@@ -93,6 +98,10 @@ def truth(condition: Any, point: dict[Any, Any]) -> bool:
         return all(truth(part, point) for part in condition.args)
     if isinstance(condition, sp.Or):
         return any(truth(part, point) for part in condition.args)
+    if isinstance(condition, sp.Not):
+        return not truth(condition.args[0], point)
+    if condition in (sp.true, sp.false):
+        return bool(condition)
     sign = sign_of(value(condition.lhs, point) - value(condition.rhs, point))
     return {sp.Gt: sign > 0, sp.Ge: sign >= 0, sp.Lt: sign < 0, sp.Le: sign <= 0, sp.Eq: sign == 0, sp.Ne: sign != 0}[
         condition.func
@@ -222,6 +231,8 @@ class Claim:
     right: Any
     relation: str
     domain: tuple[Any, ...]
+    # the arguments of `verify`, if they are not the two sides, or their relation, and the domain
+    asked: tuple[Any, ...] = ()
 
     @property
     def symbols(self) -> list[Any]:
@@ -414,6 +425,116 @@ class Maker:
         return Claim(kind, sp.sympify(left, strict=True), sp.sympify(right, strict=True), relation, domain)
 
 
+# Symbols as users make them, with what the judge has to know of them.
+SYMBOLS = [
+    (sp.Symbol("x"), ()), (sp.Symbol("x", positive=True), (sp.Gt, 0)), (sp.Symbol("x", negative=True), (sp.Lt, 0)),
+    (sp.Symbol("x", nonnegative=True), (sp.Ge, 0)), (sp.Symbol("x", nonzero=True), (sp.Ne, 0)),
+    (sp.Symbol("x", finite=True), ()), (sp.Symbol("x", extended_real=True), ()), (sp.Symbol("x", integer=True), ()),
+]  # fmt: skip
+
+
+class Writer(Maker):
+    """Draws claims in the forms in which users write them, a third of them broken on purpose."""
+
+    def relation(self) -> Any:
+        return self.pick([sp.Gt, sp.Ge, sp.Lt, sp.Le])(self.pick([X, X, Y, X - Y, X**2]), self.pick([*NICE, Y, sp.oo]))
+
+    def condition(self) -> Any:
+        one, other, third = self.relation(), self.relation(), self.relation()
+        return self.pick([
+            lambda: one, lambda: one & other, lambda: one | other, lambda: ~one, lambda: ~(one & other),
+            lambda: ~(one | other), lambda: (one & other) | third, lambda: (one | other) & third,
+            lambda: sp.And(one, other, evaluate=False), lambda: sp.Not(one, evaluate=False),
+        ])()  # fmt: skip
+
+    def cases(self) -> tuple[Any, Any]:
+        u, v, w, where, there = self.inner(), self.inner(), self.linear(), self.condition(), self.condition()
+        return self.pick([
+            lambda: (sp.Piecewise((u, where), (v, True)), sp.Piecewise((v, ~where), (u, True))),
+            lambda: (sp.Piecewise((u, where), (v, True)), self.pick([u, v])),
+            lambda: (sp.Piecewise((1, where), (7, True)), self.pick([1, 7])),
+            lambda: (sp.Piecewise((u, where), (v, there), (w, True)), self.pick([u, v, w])),
+            lambda: (sp.Piecewise((u, where & there), (v, True)),
+                     sp.Piecewise((sp.Piecewise((u, there), (v, True)), where), (v, True))),
+            lambda: (sp.Piecewise((u, where)) + w, u + w),
+            lambda: (sp.sin(sp.Piecewise((X, X > Y), (Y, True))), sp.sin(sp.Max(X, Y))),
+        ])()  # fmt: skip
+
+    def inverse(self) -> tuple[Any, Any]:
+        u, w = self.inner(), self.pick([X, X, Y, 2 * X, X - Y])
+        sine = w / sp.sqrt(1 + w**2)
+        return self.pick([
+            lambda: (sp.atan(u) + sp.atan(1 / u), self.pick([PI / 2, -PI / 2, sp.sign(u) * PI / 2])),
+            lambda: (sp.atan(w), self.pick([sp.asin(sine), sp.acos(1 / sp.sqrt(1 + w**2)), PI / 2 - sp.atan(1 / w)])),
+            lambda: (2 * sp.atan(w), self.pick([sp.atan(2 * w / (1 - w**2)), sp.asin(2 * w / (1 + w**2)),
+                                                sp.acos((1 - w**2) / (1 + w**2))])),
+            lambda: (sp.acos(w), self.pick([sp.atan(sp.sqrt(1 - w**2) / w), 2 * sp.atan(sp.sqrt((1 - w) / (1 + w))),
+                                            sp.asin(sp.sqrt(1 - w**2)), PI / 2 - sp.asin(w)])),
+            lambda: (2 * sp.acos(w), self.pick([sp.acos(2 * w**2 - 1), 2 * PI - sp.acos(2 * w**2 - 1)])),
+            lambda: (2 * sp.asin(w), self.pick([sp.asin(2 * w * sp.sqrt(1 - w**2)), sp.acos(1 - 2 * w**2)])),
+            lambda: (3 * sp.atan(w), sp.atan((3 * w - w**3) / (1 - 3 * w**2)) + self.pick([0, PI, -PI])),
+            lambda: (sp.atan(X) + sp.atan(Y), sp.atan((X + Y) / (1 - X * Y)) + self.pick([0, PI, -PI])),
+            lambda: (sp.atan2(X, Y), self.pick([sp.atan(X / Y), PI / 2 - sp.atan(Y / X),
+                                                2 * sp.atan(X / (sp.sqrt(X**2 + Y**2) + Y))])),
+        ])()  # fmt: skip
+
+    def limits(self) -> list[Any]:
+        """Assumptions on x and y, among them infinite bounds and Boolean combinations."""
+        plain = list(self.domain())
+        more = [sp.Lt(X, sp.oo), sp.Gt(Y, -sp.oo), self.condition(), self.condition()]
+        return [r for r in (*plain, self.pick(more)) if r not in (sp.true, sp.false)] if self.pick([0, 1]) else plain
+
+    def written(self) -> Claim:
+        kind = self.pick(["cases", "inverse", "rule", "inequality"])
+        _, left, right = (kind, *getattr(self, kind)())[-3:]
+        relation = "<=" if kind == "inequality" else "=="
+        symbol, sign = self.pick(SYMBOLS)
+        domain = [] if self.pick([0, 0, 1]) else self.limits()
+        left, right, *domain = (sp.sympify(one).xreplace({X: symbol}) for one in (left, right, *domain))
+        symbols = left.free_symbols | right.free_symbols
+        domain = [r for r in domain if r.free_symbols and r.free_symbols <= symbols and r.func is not sp.Eq]
+        known = [sign[0](symbol, sign[1], evaluate=False)] if sign and symbol in symbols else []
+        return Claim(f"written, {kind}", left, right, relation, (*domain, *known),
+                     self.asked(left, right, relation, domain))  # fmt: skip
+
+    def asked(self, left: Any, right: Any, relation: str, domain: list[Any]) -> tuple[Any, ...]:
+        assumed = self.pick([domain, tuple(domain), iter(domain), sp.And(*domain) if domain else ()])
+        if relation == "<=":
+            return *self.pick([
+                (sp.Le(left, right, evaluate=False),), (sp.Ge(right, left, evaluate=False),),
+                ([sp.Le(left, right, evaluate=False), sp.Lt(left, right + 1, evaluate=False)],),
+                (sp.And(sp.Le(left, right, evaluate=False), sp.Le(left, right + 1, evaluate=False), evaluate=False),),
+            ]), assumed  # fmt: skip
+        return *self.pick([
+            (left, right), (left, right), ([left, 1], [right, 1.0]), (sp.Matrix([[left, 0]]), sp.Matrix([[right, 0]])),
+            (sp.ImmutableMatrix([left]), [[right]]), (sp.Array([left, 2]), (right, 2)),
+            (sp.Tuple(left), sp.Tuple(right)),
+            (np.array([left], dtype=object), [right]), (sp.Eq(left, right, evaluate=False),),
+        ]), assumed  # fmt: skip
+
+    def broken(self) -> Claim:
+        """A claim that is none: every part of `verify` should say so."""
+        u, x = self.inner(), sp.Symbol("x")
+        asked = self.pick([
+            (u, sp.Poly(X**2 + 1, X)), ({u}, {u}), ({"a": u}, {"a": u}), ("x", u), (u, None), (None, u), (u, b"1"),
+            (u, sp.Interval(0, 1)), (sp.FiniteSet(u), sp.FiniteSet(u)), (u, u, [True]), (u, u, [u == 3]), (u, u, None),
+            (u, u, sp.Eq(X, 1)), (u, u, [X > 1, X < 1]), (u, u, "x > 0"), (u, u, 7), (u, u, {X: 1}),
+            (u, u, {"x": (0, 1)}),
+            (u, u, {X: (1, 0)}), (u, u, X), (u, u, sp.Contains(X, sp.Interval(0, 1))), (u, sp.I * u), (u, sp.nan),
+            (u, sp.oo), (u, float("nan")), (u, 1j), (sp.Symbol("z", imaginary=True), 1),
+            (x, sp.Symbol("x", positive=True)),
+            ([], []), ([u], []), ([u, u], [u]), (sp.eye(2), sp.eye(3)), (sp.MatrixSymbol("A", 2, 2), sp.eye(2)),
+            (sp.IndexedBase("A")[0], 1), (u,), (X > 0, 1, 2), (sp.Ne(X, 0),), (sp.Or(X > 0, Y > 0),), (u == u,),
+            (sp.sin, u),
+            (u, lambda t: t), (u, object()), (u, u, [sp.Gt(X, sp.nan, evaluate=False)]),
+            (np.array([[1.0, 2.0]]), [1.0]), (sp.Symbol("a", commutative=False), 1), (u, u, [X**2 < -1]), (u, range),
+        ])  # fmt: skip
+        return Claim("broken", sp.Integer(0), sp.Integer(0), "==", (), asked)
+
+    def claim(self) -> Claim:
+        return self.broken() if self.rng.random() < 1 / 3 else self.written()
+
+
 def places(claim: Claim, rng: np.random.Generator) -> Iterator[dict[Any, Any]]:
     """Random and simple points and neighbours of simple points, inside and outside the domain."""
     named = {atom for part in (claim.left, claim.right, *claim.domain) for atom in part.atoms(sp.Rational)}
@@ -445,36 +566,43 @@ def _bounds(claim: Claim, symbol: Any, *kinds: Any) -> list[float]:
 
 def draw(number: int) -> tuple[int, Claim]:
     """The seed of the points, and a claim."""
-    return number, Maker(number).claim()
+    return number, (Maker if number < FIRST_WRITTEN else Writer)(number).claim()
 
 
 def judge(case: tuple[int, Claim]) -> Iterator[Judged]:
     """The answer of `verify` beside the verdict from values."""
     number, claim = case
-    outcomes = [compared(claim, point) for point in places(claim, np.random.default_rng(number))]
+    is_broken = claim.kind == "broken"
+    outcomes = [] if is_broken else [compared(claim, at) for at in places(claim, np.random.default_rng(number))]
     broken, seen = outcomes.count(False), outcomes.count(True)
     sides = (claim.left, claim.right) if claim.relation == "==" else (sp.Le(claim.left, claim.right),)
     fault = ""
     try:
-        verdict = verify(*sides, claim.domain, time_limit=SECONDS)
+        verdict = verify(*(claim.asked or (*sides, claim.domain)), time_limit=SECONDS)
     except InputError:
         answer, fault = "error", "FALSE error" if broken + seen > 0 else ""
+    except Exception as reason:  # what users must never see
+        answer, fault = "raw", f"RAW {type(reason).__name__}"
     else:
         answer = "out of time" if "time limit" in verdict.evidence else verdict.answer
+        # sympy rewrites some cases for ever
+        if is_broken or (FAILED in verdict.evidence and "RecursionError" not in verdict.evidence):
+            fault = "TAKEN" if is_broken else "FAILED"
         if answer == "proved" and broken:
             fault = "FALSE proof"
         if answer == "refuted" and verdict.counterexample:
             point = {s: sp.sympify(verdict.counterexample.get(str(s), 0)) for s in claim.symbols}
             is_allowed = all(has_its_properties(s, v) for s, v in point.items())
-            fault = "" if is_allowed and compared_in_more_digits(claim, point) is False else "FALSE refutation"
+            fault = fault if is_allowed and compared_in_more_digits(claim, point) is False else "FALSE refutation"
     label = "false" if broken else "true" if seen else "nowhere"
-    yield Judged(claim.kind, fault=f"{fault}: {claim}" if fault else "", outcome=f"{answer}, {label} by values")
+    label = "broken" if is_broken else f"{label} by values"
+    yield Judged(claim.kind, fault=f"{fault}: {claim}" if fault else "", outcome=f"{answer}, {label}")
 
 
 def has_its_properties(symbol: Any, number: Any) -> bool:
     return (not symbol.is_integer or number.is_integer is True) and (not symbol.is_even or number.is_even is True)
 
 
-# The last five are about constants.
-SMALL = (*range(16, 28), 43, 56, 67, 72, 79)
-CAMPAIGNS = (Campaign("false-formulas", "Is any verdict of verify false?", draw, judge, 5000, SMALL),)
+# Those before FIRST_WRITTEN without the first twelve are about constants.
+SMALL = (*range(16, 28), 43, 56, 67, 72, 79, *range(FIRST_WRITTEN, FIRST_WRITTEN + 30))
+CAMPAIGNS = (Campaign("false-formulas", "Is any verdict of verify false?", draw, judge, 8000, SMALL),)

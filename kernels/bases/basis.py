@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Literal, NoReturn
+from collections.abc import Callable, Iterator
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array
+from ...core.checks import Floats, finite_array, frozen, instance, shaped, whole_number
+from ...core.errors import AsperityError, InputError
 from .given import Vectorised
 from .intervals import cell_among
 from .measure import AngularMeasure, gauss_rule
@@ -21,6 +22,8 @@ AngleFunction = Callable[[Floats], Floats]
 DIFFERENCE = 1e-6
 # Maxima are taken over this many times the nodes of a Gauss rule, with a margin for those between nodes.
 DENSER, BETWEEN = 3, 1.02
+# Rounding of <e_i, e_j> for each function, and the attribute of a basis that was found to be orthonormal.
+ORTHONORMAL, CHECKED = 1e-12, "_is_checked"
 
 
 class Basis(ABC):
@@ -28,6 +31,9 @@ class Basis(ABC):
 
     In every basis the matrix S with entries <e_i, P e_j> represents a kernel P. Two bases are equal if they are of the
     same class with the same parameters.
+
+    An object of a user's own class is examined once, where it is first used: <e_i, e_j> at its own nodes and at more,
+    the constant, cells, polynomials and the coarser basis. An InputError says which promise it breaks.
     """
 
     # numpy would take a basis for an entry of an array
@@ -156,3 +162,66 @@ class BasisOfPoints(Basis):
     @abstractmethod
     def _refuse(self, what: str) -> NoReturn:
         """Raise an InputError that says what to use in place of a property."""
+
+
+def checked_basis(basis: Any) -> None:
+    """Refuse what is no basis, and a basis of a user's own class that breaks a promise of `Basis`.
+
+    An object is examined once, at its own nodes and at more. The tests examine the classes of this package.
+    """
+    instance("basis", basis, Basis, "ker.Bins(64)")
+    if type(basis).__module__.startswith(__package__) or isinstance(basis, BasisOfPoints) or CHECKED in vars(basis):
+        return
+    try:
+        for what, found, expected in _promises(basis):
+            defect = np.abs(found - shaped("basis", expected, *found.shape)).max()
+            # rounding of functions on narrow cells is larger
+            if not defect <= ORTHONORMAL * basis.size * max(1.0, np.abs(found).max()):
+                raise InputError(f"basis: expected {what}, got a difference of {defect:.2g}")
+    except AsperityError:
+        raise
+    except Exception as reason:  # of the user's methods
+        raise InputError(f"basis: {basis!r} failed ({type(reason).__name__}: {reason}); see ker.Basis") from reason
+    vars(basis)[CHECKED] = True
+
+
+def _promises(basis: Basis) -> Iterator[tuple[str, Floats, Any]]:
+    """What a basis promises, what is found, and what is expected."""
+    hash(basis)
+    size, nodes = whole_number("basis.size", basis.size, 1), whole_number("basis.nodes", basis.nodes_per_interval, 1)
+    # lists have no such index
+    edges, constant = checked_edges(basis.edges[...]), shaped("basis.constant", basis.constant[...], size)
+    for number in (nodes, DENSER * nodes):
+        angle, weight = basis.measure.quadrature(edges, number)
+        values = shaped("basis.evaluate(angles)", basis.evaluate(frozen(angle)), angle.size, size)
+        remedy = "raise nodes_per_interval, or add edges where functions have kinks"
+        gram = values.T @ (weight[:, None] * values)
+        yield f"orthonormal functions at {number} nodes an interval ({remedy})", gram, np.eye(size)
+    yield "evaluate(angle) @ constant = 1", values @ constant, np.ones(angle.size)
+    if basis.is_partition:
+        cells = basis.index(angle)[:, None] == np.arange(size)
+        yield "is_partition of indicators only", values, cells * basis.normalisation
+    if basis.is_polynomial:
+        powers = np.polynomial.legendre.legvander(np.cos(angle), size - 1)
+        triangle = np.triu(np.linalg.lstsq(powers, values)[0])
+        yield "is_polynomial of degrees 0, 1, ... in cos(theta) only", values, powers @ triangle
+    if (coarser := basis.coarsened()) is not None:
+        yield "coarsened() of a subspace", values @ np.transpose(coarser[1]), coarser[0].evaluate(angle)
+
+
+def checked_edges(values: ArrayLike) -> Floats:
+    """Increasing angles from 0 to pi; an InputError for others."""
+    edges = finite_array("edges", values)
+    if edges.ndim != 1 or edges.size < 2:
+        raise InputError(f"edges: expected at least two angles in a row, got an array of shape {edges.shape}")
+    step = np.diff(edges)
+    if not np.all(step > 0.0):
+        worst = int(np.argmin(step))
+        raise InputError(
+            f"edges: expected increasing angles, got {edges[worst]!r} then {edges[worst + 1]!r} at index {worst}"
+        )
+    if edges[0] != 0.0 or abs(edges[-1] - np.pi) > 4.0 * np.spacing(np.pi):
+        raise InputError(
+            f"edges: expected angles from 0 to pi in radians, got {edges[0]!r} to {edges[-1]!r}; add the missing ends"
+        )
+    return np.concatenate((edges[:-1], [np.pi]))

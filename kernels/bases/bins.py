@@ -8,9 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, check_memory, finite_array, frozen, whole_number
-from ...core.errors import InputError
-from .basis import Basis
+from ...core.checks import Floats, check_memory, frozen, whole_number
+from .basis import Basis, checked_edges
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
 # Numbers of Gauss nodes that integrate a smooth function times the weight to rounding on cells of width up to NARROW
@@ -58,7 +57,7 @@ class Bins(Basis):
         equal = not np.iterable(divisions)
         if equal:
             check_memory("bins", "the edges", whole_number("bins", divisions, 1))
-        edges = _equal_edges(whole_number("bins", divisions, 1), measure) if equal else _checked_edges(divisions)
+        edges = _equal_edges(whole_number("bins", divisions, 1), measure) if equal else checked_edges(divisions)
         object.__setattr__(self, "_edges", frozen(edges))
         object.__setattr__(self, "_weights", frozen(measure.mass(edges[:-1], edges[1:])))
         object.__setattr__(self, "_measure", measure)
@@ -140,20 +139,3 @@ def _equal_edges(n: int, measure: AngularMeasure) -> Floats:
     if n % 2 == 0:
         lower[-1] = 0.5 * np.pi
     return np.concatenate((lower, np.pi - lower[: (n + 1) // 2][::-1]))
-
-
-def _checked_edges(values: ArrayLike) -> Floats:
-    edges = finite_array("edges", values)
-    if edges.ndim != 1 or edges.size < 2:
-        raise InputError(f"edges: expected at least two angles in a row, got an array of shape {edges.shape}")
-    step = np.diff(edges)
-    if not np.all(step > 0.0):
-        worst = int(np.argmin(step))
-        raise InputError(
-            f"edges: expected increasing angles, got {edges[worst]!r} then {edges[worst + 1]!r} at index {worst}"
-        )
-    if edges[0] != 0.0 or abs(edges[-1] - np.pi) > 4.0 * np.spacing(np.pi):
-        raise InputError(
-            f"edges: expected angles from 0 to pi in radians, got {edges[0]!r} to {edges[-1]!r}; add the missing ends"
-        )
-    return np.concatenate((edges[:-1], [np.pi]))

@@ -13,7 +13,7 @@ from ...core.checks import DOUBLE, Rng, check_memory, choice, finite_number, gen
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.long_runs import Engine, reported
-from ..bases.basis import Basis
+from ..bases.basis import Basis, checked_basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..bases.mirror import reflection_matrix
@@ -171,7 +171,7 @@ def discretise(
         )
     source = generator(rng, SEED_WITHOUT_RNG)
     instance("law", law, Law, "ker.WallLaw(wall)")
-    instance("basis", basis, Basis, "ker.Bins(64)")
+    checked_basis(basis)
     if isinstance(basis, TensorBasis):
         raise InputError(f"basis: expected a basis of one angle for {law!r}, got {basis!r}; use P.tensor(Q)")
     if basis.measure != SINE:

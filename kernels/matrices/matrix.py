@@ -33,7 +33,7 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, html_table
 from ...core.frames import data_array, data_frame
 from ...core.rounding import EPS
-from ..bases.basis import AngleFunction, Basis, BasisOfPoints, Frame
+from ..bases.basis import AngleFunction, Basis, BasisOfPoints, Frame, checked_basis
 from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, mirror_image
 from ..bases.tensor import TensorBasis
@@ -206,7 +206,7 @@ class KernelMatrix:
     __array_ufunc__ = None
 
     def __post_init__(self) -> None:
-        instance("basis", self.basis, Basis, "ker.Bins(64)")
+        checked_basis(self.basis)
         symmetric = finite_array("symmetric", self.symmetric)
         n = self.basis.size
         if symmetric.shape != (n, n):

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, check_memory, instance
+from ...core.checks import Floats, angles, check_memory
 from ...core.errors import InputError
-from ..bases.basis import Basis
+from ..bases.basis import Basis, checked_basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score
@@ -84,7 +84,7 @@ def estimate(
         raise InputError(
             f"theta_out: expected the shape of theta_in, {incoming.shape}, got {outgoing.shape}; pass pairs"
         )
-    instance("basis", basis, Basis, "ker.Bins(64)")
+    checked_basis(basis)
     check_memory("basis", f"the matrix in {basis!r}", basis.size**2)
     if basis.measure != SINE:
         raise InputError(f"basis: expected one for sin(theta), got {basis!r}")

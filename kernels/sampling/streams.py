@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
-from ...core.checks import Floats, angles, check_memory, instance, shortened
+from ...core.checks import Floats, angles, check_memory, shortened
 from ...core.errors import InputError
 from ...core.version import __version__
-from ..bases.basis import Basis
+from ..bases.basis import Basis, checked_basis
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score
 from ..matrices.matrix import KernelMatrix
@@ -79,7 +79,7 @@ def estimate_stream(
     >>> estimate_stream(chunks, Bins(2)).counts.tolist()
     [[1, 1], [1, 1]]
     """
-    instance("basis", basis, Basis, "ker.Bins(64)")
+    checked_basis(basis)
     if basis.measure != SINE:
         raise InputError(f"basis: expected one for sin(theta), got {basis!r}")
     chunks_after, size = _source(pairs)

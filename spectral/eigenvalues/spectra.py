@@ -28,6 +28,7 @@ EARLIER_FRACTION = 0.25
 # 97 % of 156 gaps of walls and scatterings in Legendre polynomials and bins; at most the change itself for 81 %.
 ONE_MATRIX = 3.0
 UNREFINED = "one matrix: its basis was not refined, and the error estimates the distance from the law's eigenvalue"
+ALONE = "one matrix: no coarser basis (`Basis.coarsened`) has such an eigenvalue, so the error is not known"
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 # A sampled matrix is rejected as irreversible if its antisymmetric part has a z-score above this. Under reversibility
 # the score is standard normal and exceeds 5 once in 3.5 million matrices.
@@ -240,7 +241,8 @@ class Spectrum(Summary):
         names = [f"{k} {parity}" if parity != "none" else str(k) for k, parity in enumerate(self.parity)]
         names = names or [str(k) for k in range(len(self.values))]
         numbers = dict(zip(names, self.estimates(), strict=True))
-        return {"convention": self.convention, "basis": self.basis, **numbers}
+        unknown = None if np.isfinite([self.gap_error, *self.errors.total()]).all() else "; ".join(self.evidence)
+        return {"convention": self.convention, "basis": self.basis, "inf": unknown, **numbers}
 
 
 def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) -> Spectrum:
@@ -266,6 +268,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
     residuals, algebraic = np.append(defect, rest.residuals), np.append(defect, rest.errors)
     # a matrix of a law that is known beyond the basis has the law's eigenvalues
     exact = matrix.beyond is not None
+    reason = "the matrix of a law in bins beyond which the law is known" if exact else UNREFINED
     changes = np.zeros(len(values)) if exact else margin * np.append(0.0, two_grid_changes(matrix, rest))
 
     algebraic = algebraic + matrix.basis.size * EPS
@@ -297,7 +300,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
         matrix_error=0.0 if matrix.samples else float(matrix.error),
         parity=("none" if "none" in names or not names else "even", *(names[i] for i in chosen)),
         completeness=rest.method,
-        evidence=("the matrix of a law in bins beyond which the law is known",) if exact else (UNREFINED,),
+        evidence=(reason if exact or (len(rest.values) and np.isfinite(changes).all()) else ALONE,),
     )
 
 

@@ -22,7 +22,7 @@ from ..bounds.images import is_costly, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import adapted_trial_space
-from ..eigenvalues.spectra import ONE_MATRIX, UNREFINED, Spectrum, matrix_spectrum
+from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, matrix_spectrum
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .grooves import gap_of_grooves
@@ -171,8 +171,9 @@ def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
     found = matrix_spectrum(matrix, EIGENVALUES)
     method = made_from(found, f"algebraic + {ONE_MATRIX:.0f} x two-grid + 1.96 x sampling error")
     evidence = (
-        f"{UNREFINED}; the gap of the matrix itself is {with_error(found.gap, found.gap_errors.algebraic[0])}, an "
-        "upper bound of the law's but for noise and the errors of entries",
+        f"{found.evidence[0]}; the gap of the matrix itself is "
+        f"{with_error(found.gap, found.gap_errors.algebraic[0])}, an upper bound "
+        "of the law's but for noise and the errors of entries",
     )
     gap = SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
     return split_gap(matrix, gap) or (gap.cut_at_zero() if matrix.norm_bound == 1.0 else gap)

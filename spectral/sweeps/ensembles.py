@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checkpoints import Stored
-from ...core.checks import Rng, check_memory, generator, instance, positive_number, whole_number
+from ...core.checks import Rng, check_memory, generator, positive_number, whole_number
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate, Summary
 from ...core.frames import data_frame
 from ...core.long_runs import Engine, all_parts, identity_of
 from ...kernels import Basis, KernelMatrix, discretise
+from ...kernels.bases.basis import checked_basis
 from ...kernels.sampling.counts import half_width
 from .quantities import UserQuantity, name_of
 from .running import Family, in_words, law_of, sweep
@@ -298,7 +299,7 @@ def mean_law(
     True
     """
     number = whole_number("realisations", realisations, FEWEST)
-    instance("basis", basis, Basis, "ker.Bins(64)")
+    checked_basis(basis)
     check_memory("realisations", f"{number} matrices in {basis!r}", 2 * number * basis.size**2)
     seeds = _seeds(rng, number)
     job = _Matrices(family, basis, positive_number("tolerance", tolerance), np.array(seeds))

@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from traceback import format_exception_only
 from typing import Any, TypeAlias
 
 from ...core.checkpoints import Checkpoint
@@ -222,7 +223,9 @@ def law_of(made: object) -> Law:
 
 def in_words(reason: Exception) -> str:
     """Why a computation failed: our own messages say what to do, others need the name of their class."""
-    return str(reason) if isinstance(reason, AsperityError) else f"{type(reason).__name__}: {reason}"
+    words = str(reason) if isinstance(reason, AsperityError) else format_exception_only(reason)[-1].strip()
+    # halves of characters, as in names of files, cannot be written
+    return words.encode(errors="backslashreplace").decode()
 
 
 def _refused(point: Point, quantity: str, reason: Exception, seconds: float) -> SweepRow:
@@ -248,5 +251,5 @@ def _made(family: Family, point: Point, by_name: bool) -> str:
     try:
         law = law_of(family(**point))
     except Exception as reason:  # a refused wall is a row of the table
-        return f"refused: {reason}"
+        return f"refused: {in_words(reason)}"
     return str(told("family", law, by_name=by_name))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, sequence
+from ...core.checks import Floats, finite_array, finite_number, frozen, number_between, sequence
 from ...core.errors import InputError
 from ...core.estimates import Summary
 from ...core.rounding import EPS
@@ -114,12 +114,12 @@ class WorkProblem(Summary):
         raise InputError(f"{self.name}: method {method!r} made every reference; add one that is independent of it")
 
     def error(self, value: Any, method: str) -> float:
-        """The norm of ``value`` minus the reference for ``method``."""
+        """The norm of ``value`` minus the reference for ``method``; an InputError if a number is not finite."""
         reference = self.reference_for(method).value
-        found = np.asarray(value, dtype=np.float64)
+        found = finite_array(method, value)
         if found.shape != reference.shape:
             raise InputError(f"{method}: expected a value of shape {reference.shape}, got {found.shape}")
-        return float(self.norm(found - reference))
+        return number_between("norm", self.norm(found - reference), 0.0, np.inf, closed="low")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
@@ -10,19 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from ...core.checks import Floats, positive_number, shortened, whole_number
-from ...core.errors import AsperityError, InputError
+from ...core.checks import positive_number, sequence, shortened, whole_number
+from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.files import regular_file, text_of, write_whole
 from ...kernels import KernelMatrix
+from ..sweeps.running import in_words
 from .machine import Machine, on_one_core
 from .problem import WorkMethod, WorkProblem
 from .report import WorkReport, WorkRow
 
 # Seed of the generators of the repeats, together with the number of the repeat.
 SEED = 20220
-# Errors of a method that make a row, not an end.
-FAILURES = (AsperityError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 Budgets = Sequence[float] | Mapping[str, Sequence[float]]
 # A function that measures one row from problem, method, budget, repeats and seconds, in this or another process.
 Runner = Callable[[WorkProblem, WorkMethod, float, int, float], WorkRow]
@@ -31,7 +31,7 @@ Runner = Callable[[WorkProblem, WorkMethod, float, int, float], WorkRow]
 def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
     """Measure one row; no further repeat begins after a total of ``seconds``.
 
-    An AsperityError, ArithmeticError, LinAlgError or MemoryError becomes a row with its message.
+    An error of the method, or a value that is not of finite numbers, becomes a row with its message.
     """
     times: list[float] = []
     errors: list[float] = []
@@ -46,16 +46,17 @@ def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: in
             value, reported, note = parts_of(result)
             errors.append(problem.error(value, method.name))
             reports.append(reported)
-    except FAILURES as reason:
-        words = " ".join(f"{type(reason).__name__}: {reason}".split())
-        return WorkRow(method.name, budget, "failed", seconds=tuple(times), note=words)
+    except Exception as reason:  # of the method, which must not cost the other rows
+        note = " ".join(in_words(reason).split())
+        return WorkRow(method.name, budget, "failed", seconds=tuple(times), note=note)
     known = [one for one in reports if one is not None]
     together = _root_mean_square(known) if len(known) == len(reports) else None
     return WorkRow(method.name, budget, "done", _root_mean_square(errors), tuple(times), together, note)
 
 
 def _root_mean_square(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
+    # without overflow
+    return math.hypot(*values) / math.sqrt(len(values))
 
 
 def solve_once(method: WorkMethod, budget: float, repeat: int) -> Any:
@@ -64,13 +65,13 @@ def solve_once(method: WorkMethod, budget: float, repeat: int) -> Any:
     return method.solve(size, np.random.default_rng([SEED, repeat])) if method.is_random else method.solve(size)
 
 
-def parts_of(result: Any) -> tuple[Floats, float | None, str]:
+def parts_of(result: Any) -> tuple[Any, float | None, str]:
     """Value, reported error and description from the result of a method."""
     if isinstance(result, KernelMatrix):
         return result.symmetric, _number(result.error.value), result.method
     if isinstance(result, Estimate):
-        return np.asarray(result.value), _number(result.error), result.method
-    return np.asarray(result, dtype=np.float64), None, ""
+        return result.value, _number(result.error), result.method
+    return result, None, ""
 
 
 def _number(error: float) -> float | None:
@@ -98,7 +99,8 @@ def work_precision(
     budgets : sequence of numbers, or mapping from a method's name to one
         Budgets of every method, measured in increasing order.
     repeats : int
-        Timed runs per method and budget.
+        Timed runs per method and budget. A run that fails, or whose value is not of finite numbers, makes a row with
+        the reason; the other rows keep their values.
     seconds : float
         Time limit of a row in seconds: no further repeat begins after it. If every run of a row exceeds it, larger
         budgets of the method are left out. A running computation is ended only by a ``runner`` with a hard limit.
@@ -171,7 +173,7 @@ def _met_the_limit(row: WorkRow, seconds: float) -> bool:
 
 
 def _ladders(methods: Sequence[WorkMethod], budgets: Budgets) -> dict[str, list[float]]:
-    names = [method.name for method in methods]
+    names = [method.name for method in sequence("methods", methods, WorkMethod, "spec.WorkMethod('by hand', float)")]
     if not names or len(set(names)) < len(names):
         raise InputError(f"methods: expected at least one, with different names, got {names}")
     if not isinstance(budgets, (Mapping, Sequence, np.ndarray)):

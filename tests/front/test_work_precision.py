@@ -1,6 +1,7 @@
 """Error against run time, on synthetic problems whose orders are known."""
 
 import json
+import math
 import time
 
 import numpy as np
@@ -160,6 +161,39 @@ def test_failures_and_time_outs_are_rows():
     assert "fails" not in [row.method for row in report.front()]
 
 
+ODD = {
+    "complex": EXACT + 1e-3j, "nan": math.nan, "inf": math.inf, "none": None, "text": "0.3", "an object": object(),
+    "two numbers": [EXACT, EXACT],
+}  # fmt: skip
+
+
+def test_a_value_that_is_no_number_is_a_row_with_the_reason_and_costs_no_other():
+    def raises(n):
+        raise KeyError(n)
+
+    methods = [spec.WorkMethod(name, lambda n, value=value: value) for name, value in ODD.items()]
+    methods = [*methods, spec.WorkMethod("raises", raises), spec.WorkMethod("no function", 3), DECLARED["trapezoid"]]
+    report = spec.work_precision(problem(), methods, [1, 2], repeats=2)
+    *odd, first, last = report.rows
+    assert {row.status for row in odd} == {"failed"} and first.is_done and last.is_done
+    assert all("expected " in row.note for row in odd[: 2 * len(ODD)])
+    assert [row.note for row in odd[2 * len(ODD) :]][::2] == ["KeyError: 1", "TypeError: 'int' object is not callable"]
+    assert spec.WorkReport.of_json(report.to_json()).rows == report.rows and "expected numbers" in report.table()
+
+
+@pytest.mark.parametrize("norm", [lambda d: 1j, lambda d: math.nan, lambda d: -1.0, lambda d: "far", 5])
+def test_a_norm_that_is_no_number_is_a_row_with_the_reason(norm):
+    one = spec.WorkProblem("one third", spec.ReferenceValue(EXACT, 0.0, "by hand"), norm=norm)
+    (row,) = spec.work_precision(one, [DECLARED["trapezoid"]], [2], repeats=1).rows
+    assert row.status == "failed" and row.note
+
+
+def test_the_root_mean_square_of_large_errors_does_not_overflow():
+    one = spec.WorkProblem("one third", spec.ReferenceValue(EXACT, 0.0, "by hand"), norm=abs)
+    (row,) = spec.work_precision(one, [spec.WorkMethod("far", lambda n: 1e200)], [2], repeats=2).rows
+    assert row.error == pytest.approx(1e200)
+
+
 def test_repeats_end_with_the_time():
     slow = spec.WorkMethod("slow", lambda n: time.sleep(0.05) or EXACT)
     row = measure(problem(), slow, 1, 1000, 0.2)
@@ -173,7 +207,7 @@ def test_the_norm_of_a_matrix_is_frobenius_or_the_one_of_the_problem():
     largest = spec.WorkProblem("matrix", reference, norm=lambda difference: np.abs(difference).max())
     assert measure(largest, method, 1, 1, 10.0).error == 4.0
     shape = spec.WorkMethod("shape", lambda n: np.zeros(3))
-    assert measure(problem(), shape, 1, 1, 1.0).note == "InputError: shape: expected a value of shape (), got (3,)"
+    assert measure(problem(), shape, 1, 1, 1.0).note == "shape: expected a value of shape (), got (3,)"
 
 
 def test_a_run_goes_on_where_its_file_ends(tmp_path):

@@ -27,6 +27,10 @@ SPECULAR, Z = LAW.in_specular_frame(), sp.Symbol("z")
 
 # A part of the message, the call that it refuses, and the one that it advises.
 REMEDIES = {
+    "write sympy.Ne(x, 1)": (
+        lambda: asperity.verify(Z, Z, [Z != 1]),
+        lambda: asperity.verify(Z, Z, [sp.Ne(Z, 1)]),
+    ),
     "pass both sides, or sympy.Eq": (
         lambda: asperity.verify((Z + 1) ** 2 == Z**2 + 2 * Z + 1),
         lambda: (asperity.verify(Z * Z, Z**2), asperity.verify(sp.Eq((Z + 1) ** 2, Z**2 + 2 * Z + 1))),

@@ -104,6 +104,22 @@ def test_refusals_are_rows_and_stop_no_other_point():
     assert found[0.5, "eta"].value == pytest.approx(3.0) and found[0.5, "eta"].message == ""
 
 
+def test_an_error_that_cannot_be_printed_or_written_is_a_row_too(tmp_path):
+    class Silent(Exception):
+        def __str__(self):
+            raise ValueError("no words")
+
+    def family(k):
+        if k < 2:
+            raise Silent if k else OSError(2, "no file", "\udcff")
+        return ker.maxwell(0.5)
+
+    table = spec.sweep(family, {"k": [0, 1, 2]}, checkpoint=tmp_path / "points.h5")
+    assert [row.value for row in table.rows] == [None, None, 0.5]
+    assert "no file" in table.rows[0].message and "Silent" in table.rows[1].message
+    assert table.to_csv().encode() and spec.SweepTable.of_json(table.to_json()).rows == table.rows
+
+
 # ---- the forms of a table ---------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def table():

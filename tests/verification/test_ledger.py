@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import replace
 
 import pytest
+from campaigns.cases.equivalent_mutants import EQUIVALENT
 
 from asperity import InputError
 from asperity.ledger import by_reading, row
@@ -25,6 +26,17 @@ ABBREVIATIONS = re.compile(r"\b(?:eqs?|Eqs?|Prop|resp)\.")
 def test_the_check_accepts_the_right_formula_and_refutes_the_wrong_one(entry):
     found = entry.run()
     assert found.as_stated, f"right: {found.right}\nwrong: {found.wrong}"
+
+
+@pytest.mark.parametrize("entry", MACHINE, ids=lambda entry: entry.id)
+def test_a_user_can_negate_a_formula_and_the_check_refutes_it_or_says_why_not(entry):
+    if entry.id in ("S1.01", "S2.28"):
+        # an angle below 0, and a wall
+        with pytest.raises(InputError, match=r"expected angles|write the wrong code"):
+            entry.check(entry.negated)
+        return
+    expected = "agrees" if (entry.id, "result negated") in EQUIVALENT else "refuted"
+    assert entry.check(entry.negated).answer == expected
 
 
 def test_every_row_of_the_audit_is_there():

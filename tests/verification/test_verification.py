@@ -2,6 +2,7 @@
 
 import math
 import os
+import sys
 import time
 
 import mpmath
@@ -17,7 +18,7 @@ from asperity import InputError, Verdict, verify
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.disk import symbolic as sym
-from asperity.verification import agreement, every, holds, no_excess
+from asperity.verification import agreement, derivation, every, holds, identity, no_excess
 from asperity.verification.balls import Unclear, evaluate
 from asperity.verification.domain import Domain, Interval
 from asperity.verification.normal_form import product
@@ -177,6 +178,19 @@ PROVED = {
         sp.sqrt(1 - sp.cos(theta) ** 2), sp.sin(theta), sp.And(theta > 0, theta < sp.pi),
     ),
     "one assumption": (sp.sqrt(x**2), x, x > 0),
+    "cases by two conditions": (sp.Piecewise((1, (x > 0) & (x < 2)), (7, True)), 1, [x > 0.5, x < 1]),
+    "cases by one of two conditions": (sp.Piecewise((1, (x > 0) | (x < -2)), (7, True)), 7, [x > -1, x < 0]),
+    "cases by no condition of two": (
+        sp.Piecewise((1, sp.Not((x > 0) & (y > 0), evaluate=False)), (7, True)), 7, [x > 0, y > 0],
+    ),
+    "complementary arctangents": (sp.atan(x) + sp.atan(1 / x), sp.pi / 2, [x > 0]),
+    "complementary arctangents by a sign": (sp.atan(x) + sp.atan(1 / x), sp.sign(x) * sp.pi / 2, sp.Ne(x, 0)),
+    "twice acos, where both are defined": (2 * sp.acos(x), sp.acos(2 * x**2 - 1), [x >= 0]),
+    "an arccosine by an arctangent": (sp.acos(x), 2 * sp.atan(sp.sqrt((1 - x) / (1 + x))), [x > -1]),
+    "an interval without an end": (sp.sqrt(x**2), x, {x: (0, sp.oo)}),
+    "one of two assumptions": (sp.sqrt(x**2), x, [x > 0, sp.Or(x > 1, x < -1)]),
+    "arrays of sympy": (sp.Array([x, y]), sp.Tuple(x, y)),
+    "arrays of numpy": (np.array([[x, 2.0]]), [[x, 2]]),
 }  # fmt: skip
 # Undecided, though true: by a derivative, cuts at zeros of sines, parity, integrals, which are refuted only.
 UNDECIDED = {
@@ -185,9 +199,7 @@ UNDECIDED = {
         sp.log(sp.expand((1 - x**2) * (x**2 - y**2))), sp.log(1 - x**2) + sp.log(x**2 - y**2), [x < pi],
     ),
     "the functional equation of the gamma function": (sp.gamma(m + 1), m * sp.gamma(m), []),
-    "complementary arctangents": (sp.atan(x) + sp.atan(1 / x), sp.pi / 2, [x > 0]),
     "atan2": (sp.atan2(p * sp.sin(x), p * sp.cos(x)), x, [x > -pi, x <= pi]),
-    "twice acos, where both are defined": (2 * sp.acos(x), sp.acos(2 * x**2 - 1), [x >= 0]),
     "a sum of arctangents under a condition": (
         sp.atan(x) + sp.atan(y), sp.atan((x + y) / (1 - x * y)), [x > 0, y > 0, x * y < 1],
     ),
@@ -215,6 +227,9 @@ REFUTED = {
     "cases at the end": (sp.Piecewise((1, x < 0), (2, x < 1), (3, True)), 2, [x >= 0, x <= 1]),
     "twice acos, on the other side": (2 * sp.acos(x), sp.acos(2 * x**2 - 1), [x >= -1, x <= 1]),
     "complementary arctangents, but for 0": (sp.atan(x) + sp.atan(1 / x), pi / 2, [sp.Ne(x, 0)]),
+    "one of two assumptions": (sp.sqrt(x**2), x, sp.Or(x > 1, x < -1)),
+    "an equation of matrices": (sp.Eq(sp.Matrix([x, 1]), sp.Matrix([y, 1])), None, ()),
+    "three times an arctangent": (3 * sp.atan(x), sp.atan((3 * x - x**3) / (1 - 3 * x**2)), [x > 0]),
     "one integer of four": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 0, n <= 3]),
     "the sine below its argument, everywhere": (sp.sin(x) <= x, None, ()),
     "a shifted square above a small number": (sp.Rational(1, 10**25) <= (3 * x + 1) ** 2, [x > -3, x <= 0], ()),
@@ -431,6 +446,32 @@ def test_a_function_known_here_alone_needs_this_process():
     assert verify(Own(x), Own(x + 1), time_limit=None).answer == "undecided"
 
 
+def test_what_sympy_cannot_do_is_undecided_and_the_evidence_says_so(monkeypatch):
+    def fails(*_):
+        raise NotImplementedError("a relation of this kind")
+
+    monkeypatch.setattr(derivation, "_method", fails)
+    assert (
+        "(NotImplementedError: a relation of this kind)"
+        in verify(sp.gamma(m + 1), m * sp.gamma(m), time_limit=None).evidence
+    )
+
+
+def test_an_expression_that_is_too_deep_to_be_sent_is_refused():
+    nested = x
+    for _ in range(sys.getrecursionlimit()):
+        nested = sp.sin(nested, evaluate=False)
+    with pytest.raises(InputError, match="time_limit=None"):
+        verify(nested, x)
+
+
+def test_a_process_that_ends_is_an_undecided_claim_and_not_an_error(monkeypatch):
+    monkeypatch.setattr(identity, "_answer", sys.exit)
+    assert "ended with code" in verify(x, x).evidence
+    monkeypatch.undo()
+    assert verify(x, x).answer == "proved"
+
+
 # It holds everywhere or nowhere, and no ball tells which: so no point is certainly in the domain.
 UNCLEAR = sp.Gt(
     x**2 + sp.sqrt(2, evaluate=False) ** 2 - 2 - sp.exp(-sp.exp(20)), x**2, evaluate=False
@@ -441,6 +482,11 @@ REFUSED = [
     ((sp.I * x, x), "imaginary unit"), ((sp.Symbol("z", imaginary=True), 0), "real symbol"),
     ((sp.Symbol("z", zero=True) * x, 1), "substitute 0"),
     (([1, 2], [1, 2, 3]), "one shape"), ((sp.ones(2, 3), sp.ones(3, 2)), "one shape"),
+    (([], []), "not empty"), ((x, sp.Poly(x**2, x)), "or numbers, got"),
+    (({x}, {x}), "or numbers, got"),
+    ((sp.MatrixSymbol("A", 2, 2), sp.eye(2)), "or numbers, got"), ((sp.IndexedBase("A")[0], 1), "real symbol"),
+    ((x + sp.Symbol("x", positive=True), 2 * x), "different names"), ((x, 1, [x != 1]), "write sympy.Ne"),
+    ((np.array([x <= 1, y <= 1]),), "two sides"),
     ((x, y, [sp.Eq(x, y)]), "inequalities"), ((x, y, ["x"]), "ineq"),
     *(((n * even * x, 0, nowhere), "no point") for nowhere in (
         [n > 0, n < 1], [2 * n > 1, n < 1], [even > 0, even < 2], [n > x, x > n], [x > 1, x < 0], [x > y, y > x + 1],

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fnmatch import fnmatch
 from functools import cache
+from typing import Any
 
 import numpy as np
 
-from ..core.checks import Floats
 from ..core.errors import InputError
 from ..spectral import ReferenceValue, WorkMethod, WorkProblem
 from ..spectral.work_diagrams.machine import on_one_core
@@ -103,6 +103,6 @@ def measured(
         return measure(WorkProblem(name, references), _method(name, method), budget, repeats, seconds)
 
 
-def value_of(name: str, method: str, budget: float) -> tuple[Floats, float | None, str]:
+def value_of(name: str, method: str, budget: float) -> tuple[Any, float | None, str]:
     """Value, reported error and description of a problem by a method, with rays that no row has."""
     return parts_of(solve_once(_method(name, method), budget, REFERENCE_REPEAT))

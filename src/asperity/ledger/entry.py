@@ -9,6 +9,8 @@ from inspect import cleandoc
 from time import perf_counter
 from typing import Any, Literal
 
+import numpy as np
+
 from ..core.errors import InputError
 from ..verification import Verdict
 
@@ -93,6 +95,16 @@ class Entry:
         if self.kind != "by reading" and None in (self.check, self.right, self.wrong):
             raise InputError(f"{self.id}: expected a check, a formula that it accepts and one that it refutes, as code")
 
+    def negated(self, *arguments: Any) -> Any:
+        """The right formula with the opposite sign and the opposite conditions, code to try ``check`` on.
+
+        Raises
+        ------
+        InputError
+            If the value is neither numbers nor conditions, such as a wall.
+        """
+        return _opposite(self.right and self.right(*arguments))
+
     def run(self) -> Finding:
         """Run the check on the right and on the wrong formula."""
         if self.check is None or self.right is None or self.wrong is None:
@@ -100,6 +112,17 @@ class Entry:
         start = perf_counter()
         right, wrong = self.check(self.right), self.check(self.wrong)
         return Finding(self, right, wrong, perf_counter() - start)
+
+
+def _opposite(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return type(value)(map(_opposite, value))
+    if np.asarray(value).dtype == bool:
+        return np.logical_not(value)
+    try:
+        return -value
+    except TypeError as reason:
+        raise InputError(f"negated: expected numbers or conditions, got {value!r}; write the wrong code") from reason
 
 
 @dataclass(frozen=True)

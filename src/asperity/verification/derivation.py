@@ -37,6 +37,8 @@ NORMAL_FORM = "polynomial normal form"
 SQUARES = "neither side is negative, and the polynomial normal forms of the squares agree"
 SIGN = "the sign of the difference"
 NOWHERE = "defined nowhere on the domain"
+ANGLES = "the cosine of the difference is 1, and it is less than a turn"
+FAILED = "sympy does not serve"
 
 
 def decide(claims: list[Claim], relations: list[Any]) -> Verdict:
@@ -47,6 +49,10 @@ def decide(claims: list[Claim], relations: list[Any]) -> Verdict:
             verdicts.append(_decided(*claim, relations))
         except Unclear:
             verdicts.append(Verdict("undecided", "two numbers could not be told apart"))
+        except InputError:
+            raise
+        except Exception as error:  # of sympy's algorithms, which know many more kinds of objects
+            verdicts.append(Verdict("undecided", f"{FAILED} ({type(error).__name__}: {error})"))
         if verdicts[-1].answer == "refuted":
             break
     return every(*verdicts)
@@ -55,6 +61,8 @@ def decide(claims: list[Claim], relations: list[Any]) -> Verdict:
 def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Verdict:
     symbols = set().union(*(part.free_symbols for part in (left, right, *assumptions)))
     real = {symbol: _as_real(symbol) for symbol in symbols}
+    if len({symbol.name for symbol in symbols}) < len(symbols):
+        raise InputError(f"{', '.join(sorted(map(str, symbols)))}: expected different names of different symbols")
     domain = Domain.of(real.values(), [written(given, real) for given in assumptions])
     claim = written(left, real), written(right, real), relation
     for side in claim[:2]:
@@ -75,7 +83,7 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
 
 
 def _as_real(symbol: Any) -> Any:
-    if symbol.is_real is False:
+    if symbol.is_real is False or not symbol.is_Symbol:
         raise InputError(f"{symbol}: expected a real symbol, because identities are verified over the real numbers")
     return symbol if symbol.is_real else sp.Dummy(symbol.name, **{**symbol._assumptions_orig, "real": True})
 
@@ -93,7 +101,7 @@ def _found(search: Search, domain: Domain) -> Verdict:
         return found
     if expands and search.defined:
         return Verdict("proved", EXPANSION)
-    reason = f"no counterexample among {search.tried} points, and "
+    reason = f"no counterexample among {search.defined} points where both are defined, and "
     if unfinished:
         return Verdict("undecided", reason + "no integral, derivative, sum or limit is evaluated; try .doit() first")
     waiting = domain.faces()
@@ -106,10 +114,7 @@ def _found(search: Search, domain: Domain) -> Verdict:
         found = search.refutation(part, FEW_POINTS) if tried > 1 or waiting else None
         if found is not None:
             return found
-        try:
-            method = _method(*sides, search.relation, part)
-        except sp.polys.polyerrors.BasePolynomialError as error:
-            return Verdict("undecided", f"{reason}sympy's polynomials do not serve: {error}")
+        method = _method(*sides, search.relation, part)
         if method is not None:
             methods[method] = None
             continue
@@ -135,6 +140,8 @@ def _method(left: Any, right: Any, relation: str, domain: Domain) -> str | None:
     if relation == "<":
         return None
     method = _equal(left, right, part)
+    if method is None and part.is_within_a_turn(left - right) and vanishes(1 - sp.cos(left - right), part.parameters):
+        return ANGLES
     if method is None and all(part.signs(side) <= NOT_NEGATIVE for side in (left, right)):
         return SQUARES if vanishes(left**2 - right**2, part.parameters) else None
     return method

@@ -405,6 +405,9 @@ def _logarithmic(rng: np.random.Generator, top: float) -> float:
     return float(np.exp(rng.uniform(np.log(CLOSEST), np.log(top))))
 
 
+_ORDER = (sp.Lt, sp.Le, sp.Gt, sp.Ge)
+
+
 def _parts(given: Any) -> list[Any]:
     if given is sp.true:
         return []
@@ -412,7 +415,10 @@ def _parts(given: Any) -> list[Any]:
         raise InputError("assumptions: no point meets them, because one is false")
     if isinstance(given, sp.And):
         return [part for argument in given.args for part in _parts(argument)]
-    if isinstance(given, sp.Ne | sp.Lt | sp.Le | sp.Gt | sp.Ge):
+    if isinstance(given, _ORDER) and (given.gts is sp.oo or given.lts is -sp.oo):
+        # of all real numbers
+        return []
+    if isinstance(given, (*_ORDER, sp.Ne, sp.Or, sp.Not)):
         return [given]
     raise InputError(
         f"assumptions: expected inequalities such as 0 < theta, got {given!r}; substitute equations in both sides first"
@@ -432,7 +438,7 @@ def _own_interval(symbol: Any) -> Interval:
 
 def _form(relation: Any) -> tuple[dict[Any, Any], Any] | None:
     """The linear form that a relation makes positive, or not negative; None if there is none."""
-    return None if isinstance(relation, sp.Ne) else linear(relation.gts - relation.lts)
+    return linear(relation.gts - relation.lts) if isinstance(relation, _ORDER) else None
 
 
 def _positive(relation: Any) -> Interval:

@@ -321,6 +321,8 @@ def _irreducible(e: Any) -> Iterable[tuple[Any, Any]]:
     found: dict[Any, Any] = defaultdict(lambda: sp.Integer(0))
     for factor in sp.Mul.make_args(sp.together(e)):
         base, times = factor.as_base_exp()
+        # a sum may be a number
+        base = sp.expand(base) if base.is_Add and sp.expand(base).is_Rational else base
         polynomial = sp.Poly(base) if base.is_Add and times.is_Integer else None
         if polynomial is None or not (polynomial.domain.is_ZZ or polynomial.domain.is_QQ):
             found[base] += times

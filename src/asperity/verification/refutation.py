@@ -44,8 +44,9 @@ def _deciding(e: Any) -> Iterator[Any]:
             yield from (part.args[0].args[0] - k * sp.pi / 2 for k in _OUTWARD)
         elif part.is_Pow:
             yield from () if part.exp.is_Integer and part.exp > 0 else part.args
-        elif part.is_Function and part.func is not sp.Piecewise:
-            yield from part.args
+        elif part.is_Function:
+            # not of And, Or and cases, whose relations come by themselves
+            yield from (one for one in part.args if isinstance(one, sp.Expr))
 
 
 def _zeros(g: Any) -> list[tuple[Any, Any]]:

@@ -72,6 +72,17 @@ class Part:
         excluded = {1: ball <= 0, 0: ball > 0 or ball < 0, -1: ball >= 0}
         return frozenset(sign for sign in ANY if not excluded[sign])
 
+    def is_within_a_turn(self, e: Any) -> bool:
+        """Whether an expression with arctangents or arccosines is surely between -2 pi and 2 pi."""
+        box, names = dict(self._box), {f: sp.Dummy("a") for f in e.atoms(sp.atan, sp.acos)}
+        for f, name in names.items():
+            low, high = (sign * sp.pi / 2 * int(sign in self.signs(f.args[0])) for sign in (-1, 1))
+            box[name] = interval(low, high) if f.func is sp.atan else interval(sp.pi / 2 - high, sp.pi / 2 - low)
+        try:
+            return bool(names) and bool(abs(evaluate(e.xreplace(names), box, FEW_BITS).ball) < 6)
+        except (Undefined, Unclear):
+            return False
+
     # ---- rules
 
     def resolved(self, e: Any) -> Any:
