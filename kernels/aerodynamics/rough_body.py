@@ -10,9 +10,19 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    finite_array,
+    finite_number,
+    frozen,
+    generator,
+    positive_number,
+    sequence,
+    whole_number,
+)
 from ...core.errors import AsperityError, InputError
-from ...core.estimates import Estimate, Summary
+from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
 from ..bases.basis import AngleFunction
 from ..bases.given import Vectorised
@@ -22,7 +32,7 @@ from ..laws.density import split_panels
 from ..laws.law import Law
 from ..matrices.defects import SymmetryDefect, defect_of_pairs
 from .drag import StreamForce, resistance, scaled
-from .spinning_disk import NODES, PANELS, SAFETY, WEIGHTS, integral, normals_at_breakpoints, pushes
+from .spinning_disk import PANELS, integral, normals_at_breakpoints, pushes
 
 TURN = 2.0 * math.pi
 # Equal steps of the direction between which a change of the law is sought, and changes of a law that does not vary
@@ -32,10 +42,11 @@ STEPS, MOST_CHANGES = 4096, 256
 GRADING = 0.25
 # Rounding of integrals along the boundary, and how far it may miss itself, relative to the perimeter.
 ROUNDING, CLOSED = 4e-15, 1e-9
-# Halvings of all panels for a cost of one's own.
-MOST_LEVELS = 5
-# Margin for the largest radius of curvature between the nodes of a panel.
-MARGIN = 1.25
+# The rule for a cost of one's own on each panel, and halvings of all panels.
+(GAUSS_NODES, GAUSS_WEIGHTS), MOST_LEVELS = np.polynomial.legendre.leggauss(6), 5
+# Cells of a panel in which normals are drawn uniformly; the error of their distribution function is below 1e-6.
+CELLS = 256
+QUADRATURE = "sums over sides, polynomials on panels of curves"
 # Bins of directions in the test of symmetry.
 DIRECTION_BINS = 24
 # The measure sin(theta) d theta has the mass 2.
@@ -43,7 +54,7 @@ SINE_MASS = 2.0
 
 DirectionCost = Callable[[Floats, Floats], Floats]
 LawOfNormal = Callable[[float], Law]
-Rows = Callable[[Floats], Floats]
+RowsOf = Callable[[Law, Floats], Floats]
 Laws: TypeAlias = "Law | Sequence[Law] | LawOfNormal"
 Indices: TypeAlias = NDArray[np.intp]
 
@@ -119,33 +130,34 @@ class RoughBody(Summary):
     _show = "law perimeter"
 
     def __post_init__(self) -> None:
-        normals = np.atleast_1d(finite_array("normals", self.normals))
-        lengths = np.atleast_1d(finite_array("lengths", self.lengths))
+        normals, lengths, cuts = (
+            np.atleast_1d(finite_array(name, getattr(self, name))) for name in ("normals", "lengths", "breakpoints")
+        )
         if normals.shape != lengths.shape or normals.ndim != 1:
             raise InputError(f"lengths: expected one for each of {normals.size} normals, got shape {lengths.shape}")
-        if lengths.size and lengths.min() <= 0.0:
+        if lengths.min(initial=1.0) <= 0.0:
             raise InputError(f"lengths: expected numbers greater than 0, got {lengths.min():g}")
-        if self.radius is None and not normals.size:
-            raise InputError("normals: expected at least one, or a radius of curvature")
-        if not (isinstance(self.law, Law) or callable(self.law)) and np.iterable(self.law):
-            object.__setattr__(self, "law", tuple(self.law))
-            if self.radius is not None or len(self.law) != normals.size:
-                fit = f"{normals.size}, one for every side" if self.radius is None else "a function of the normal"
-                raise InputError(f"law: expected one or {fit}, got {len(self.law)}")
-        object.__setattr__(self, "normals", frozen(normals))
-        object.__setattr__(self, "lengths", frozen(lengths))
-        cuts = np.unique(np.mod(np.atleast_1d(finite_array("breakpoints", self.breakpoints)), TURN))
-        object.__setattr__(self, "breakpoints", frozen(cuts))
-        laws, changes = self._changes()
-        object.__setattr__(self, "_laws", laws)
-        cuts = np.unique(np.concatenate((np.linspace(0.0, TURN, PANELS + 1), cuts, changes)))
-        object.__setattr__(self, "_edges", frozen(cuts))
-        (size, *gap), errors, _ = self._integral(_components, 0.0, cuts)
-        if np.hypot(*gap) > CLOSED * size + errors.max():
-            miss = np.hypot(*gap)
-            raise InputError(f"normals: expected the boundary of a body, got one that misses itself by {miss:.3g}")
-        how = "sum of the sides" if self.radius is None else "Gauss rules on panels and their halves"
-        object.__setattr__(self, "perimeter", Estimate(size, errors[0], "estimate", how))
+        laws = self.law
+        if not (isinstance(laws, Law) or callable(laws)):
+            laws = sequence("law", laws, Law, "ker.lambertian()")
+            if self.radius is not None or len(laws) != normals.size:
+                raise InputError(
+                    f"law: expected one, a function or {normals.size}, one for every side, got {len(laws)}"
+                )
+        for name, value in (("normals", normals), ("lengths", lengths), ("breakpoints", cuts)):
+            object.__setattr__(self, name, frozen(value))
+        object.__setattr__(self, "law", laws)
+        found, changes = self._changes()
+        edges = np.concatenate((np.linspace(0.0, TURN, PANELS + 1), np.mod(cuts, TURN), changes))
+        object.__setattr__(self, "_laws", found)
+        object.__setattr__(self, "_edges", frozen(np.unique(edges)))
+        (size, *miss), errors, _ = self._integral(_components, 4, 0.0, self._edges)
+        if not np.hypot(*miss) <= CLOSED * size + errors[0] or size == 0.0:
+            raise InputError(
+                f"normals: expected the boundary of a body, got one of length {size:.3g} that misses itself by "
+                f"{np.hypot(*miss):.3g}"
+            )
+        object.__setattr__(self, "perimeter", Estimate(size, errors[0], "estimate", QUADRATURE))
 
     @classmethod
     def disk(cls, law: Laws, radius: float = 1.0, breakpoints: ArrayLike = ()) -> RoughBody:
@@ -210,52 +222,48 @@ class RoughBody(Summary):
         >>> round(3 * float(body.resistance(directions=lambda u: 0 * u + 0.5 / np.pi)), 9)
         8.0
         """
-        found: dict[Hashable, Estimate] = {}
+        known: dict[Hashable, Estimate] = {}
 
         def mean(law: Law, normals: Floats) -> Floats:
-            key = _key(law)
-            if key not in found:
-                found[key] = resistance(law, tolerance)
-            one = found[key]
-            return np.broadcast_to(np.array([[one.value], [one.error]]), (2, normals.size))
+            if (key := _key(law)) not in known:
+                known[key] = resistance(law, tolerance)
+            return np.tile([[known[key].value], [known[key].error]], normals.size)
 
         size = float(self.perimeter)
-        (value,), (error,), panels = self._integral(self._by_law(mean), tolerance * size, self._edges)
+        (value,), (error,), panels = self._integral(mean, 2, tolerance * size, self._edges)
+        parts: Sequence[Estimate] = list(known.values())
         if cost is not None or directions is not None:
-            return self._with_cost(_momentum if cost is None else cost, directions, tolerance, panels)
-        bound = self.radius is None and all(one.kind == "bound" for one in found.values())
-        how = f"{next(iter(found.values())).method}; {len(found)} laws; {self.perimeter.method}"
-        return scaled(Estimate(value, error, "bound" if bound else "estimate", how), SINE_MASS / 0.75)
+            chosen = Vectorised(cost or _momentum, scalar=True)
+            density = Vectorised(directions or (lambda direction: 1.0), scalar=True)
+            value, error, parts = self._mean_cost(
+                lambda u, v: chosen(u, v) * density(u), 0.75 * tolerance * size, panels
+            )
+        kind: ErrorKind = "bound" if self.radius is None and all(one.kind == "bound" for one in parts) else "estimate"
+        return scaled(Estimate(value, error, kind, f"{parts[0].method}; {QUADRATURE}"), SINE_MASS / 0.75)
 
-    def _with_cost(
-        self, cost: DirectionCost, directions: AngleFunction | None, tolerance: float, panels: Floats
-    ) -> Estimate:
-        """The integral of a cost, by Gauss rules on panels that are halved until two of them agree."""
-        chosen = Vectorised(cost, scalar=True)
-        density = Vectorised(directions or (lambda direction: 1.0), scalar=True)
+    def _mean_cost(
+        self, cost: DirectionCost, tolerance: float, panels: Floats
+    ) -> tuple[float, float, Sequence[Estimate]]:
+        """The integral of 3/4 of the mean cost, its error and its parts, by rules on panels until two of them agree."""
 
         def part(law: Law, normals: Floats, lengths: Floats) -> Estimate:
             def averaged(theta: Floats, outgoing: Floats) -> Floats:
                 total: Floats | float = 0.0
-                for tangent, length in zip(normals - 0.5 * np.pi, lengths / size, strict=True):
-                    total = total + length * chosen(tangent + theta, tangent + outgoing) * density(tangent + theta)
+                for tangent, length in zip(normals - 0.5 * np.pi, lengths, strict=True):
+                    total = total + 0.75 * length * cost(tangent + theta, tangent + outgoing)
                 return np.asarray(total)
 
             return resistance(law, tolerance, cost=averaged)
 
-        size, last = float(self.perimeter), math.nan
-        for level in range(1 if self.radius is None else MOST_LEVELS):
-            edges = split_panels(panels, 2**level)
-            normals, lengths = self._rule(edges)
-            parts = [part(law, normals[here], lengths[here]) for law, here in self._groups(normals)]
+        last = math.inf
+        for level in range(MOST_LEVELS):
+            normals, lengths = self._rule(split_panels(panels, 2**level))
+            parts = [part(law, normals[here], lengths[here]) for law, here in self._groups(normals, lengths)]
             value, error = math.fsum(one.value for one in parts), math.fsum(one.error for one in parts)
-            missed = 0.0 if self.radius is None else SAFETY * abs(value - last)
-            last = value
+            missed, last = 2.0 * abs(value - last), value
             if missed <= max(tolerance, error):
                 break
-        bound = self.radius is None and all(one.kind == "bound" for one in parts)
-        how = f"{len(parts)} laws, {normals.size} normals: {parts[0].method}"
-        return scaled(Estimate(value, error + missed, "bound" if bound else "estimate", how), SINE_MASS * size)
+        return value, error + missed, parts
 
     def force(self, direction: float, tolerance: float = 1e-8) -> StreamForce:
         """The force on the body of a stream of particles with velocity -u, as components along and across -u.
@@ -267,33 +275,26 @@ class RoughBody(Summary):
         wanted = positive_number("tolerance", tolerance) * size
         cuts = np.concatenate([[-0.5 * np.pi, 0.5 * np.pi], *(normals_at_breakpoints(law, 0.0) for law in self._laws)])
         edges = np.unique(np.concatenate((self._edges, np.mod(source + cuts, TURN))))
-        rows = self._by_law(lambda law, normal: pushes(law, normal - source, 0.0))
-        values, errors, panels = self._integral(rows, wanted, edges)
-        how = "sum of the sides" if self.radius is None else f"Gauss rules on {panels.size - 1} panels and their halves"
-        along, across, _ = (Estimate(*one, "estimate", how) for one in zip(values, errors, strict=True))
+        values, errors, _ = self._integral(lambda law, normal: pushes(law, normal - source, 0.0), 4, wanted, edges)
+        along, across, _ = (Estimate(*one, "estimate", QUADRATURE) for one in zip(values, errors, strict=True))
         return StreamForce(along, across)
 
     def sample(self, n: int, rng: Rng = None) -> tuple[Floats, Floats, Floats]:
-        """Directions u, u' and n of ``n`` independent triples drawn from nu, divided by its mass, in [0, 2 pi)."""
+        """Directions u, u' and n of ``n`` independent triples drawn from nu, divided by its mass, in [0, 2 pi).
+
+        On curves the distribution function of the normal has an error below 1e-6.
+        """
         whole_number("n", n, 1)
         source = generator(rng)
-        _, _, panels = self._integral(_components, 0.0, self._edges)
-        normals, lengths = self._rule(panels)
-        # elements are the sides, then the panels
-        sides, rule = self.normals.size, (panels.size - 1, NODES.size)
-        weights = np.append(self.lengths, lengths[sides:].reshape(rule).sum(axis=1))
+        edges, sides = split_panels(self._edges, CELLS), self.normals.size
+        lengths = self._rule(edges)[1]
+        # the elements are the sides, then cells on curves
+        weights = np.append(self.lengths, lengths[sides:].reshape(-1, GAUSS_NODES.size).sum(axis=1))
         element = source.choice(weights.size, size=n, p=weights / weights.sum())
-        normal = normals[np.minimum(element, sides)]
-        pending = np.flatnonzero(element >= sides)
-        if pending.size:
-            nodes, ends = self._radius(normals[sides:]).reshape(rule), self._radius(panels)
-            largest = MARGIN * np.max([nodes.max(axis=1), ends[:-1], ends[1:]], axis=0)
-        while pending.size:
-            panel = element[pending] - sides
-            normal[pending] = panels[panel] + np.diff(panels)[panel] * source.random(pending.size)
-            pending = pending[source.random(pending.size) * largest[panel] > self._radius(normal[pending])]
+        normal = np.append(self.normals, edges[:-1])[element]
+        normal += np.append(np.zeros(sides), np.diff(edges))[element] * source.random(n)
         incoming, outgoing = SINE.sample(n, source), np.empty(n)
-        for law, here in self._groups(normal, element):
+        for law, here in self._groups(normal, weights[element], element):
             outgoing[here] = law.sample(incoming[here], source)
         tangent = normal - 0.5 * np.pi
         u, v = (np.mod(tangent + angle, TURN) for angle in (incoming, outgoing))
@@ -305,91 +306,76 @@ class RoughBody(Summary):
         scale = DIRECTION_BINS / TURN
         return defect_of_pairs(u * scale, v * scale, DIRECTION_BINS)
 
-    def _integral(self, rows: Rows, tolerance: float, edges: Floats) -> tuple[Floats, Floats, Floats]:
-        """The `integral` along the boundary of functions of the normal."""
-        values, errors, panels = 0.0, 0.0, edges
-        if self.radius is not None:
-            values, errors, panels = integral(lambda normal: rows(normal) * self._radius(normal), edges, tolerance)
-        if self.normals.size:
-            *sides, error = rows(self.normals) @ self.lengths
-            values, errors = values + np.array(sides), errors + np.full(len(sides), error)
-        return values, errors, panels
+    def _integral(self, function: RowsOf, count: int, tolerance: float, edges: Floats) -> tuple[Floats, Floats, Floats]:
+        """The `integral` along the boundary of a function of the law and normals, shape (count, normals)."""
 
-    def _by_law(self, function: Callable[[Law, Floats], Floats]) -> Rows:
-        """The function of normals, shape (rows, normals), from one of the law and normals that have it."""
-
-        def rows(normals: Floats) -> Floats:
-            parts = [(here, function(law, normals[here])) for law, here in self._groups(normals)]
-            found = np.empty((len(parts[0][1]), normals.size))
-            for here, part in parts:
-                found[:, here] = part
+        def rows(normals: Floats, lengths: Floats) -> Floats:
+            found = np.zeros((count, normals.size))
+            for law, here in self._groups(normals, lengths):
+                found[:, here] = lengths[here] * function(law, normals[here])
             return found
 
-        return rows
+        values, errors, panels = integral(lambda normals: rows(normals, self._radii(normals)), edges, tolerance)
+        *sides, error = rows(self.normals, self.lengths).sum(axis=1)
+        return values + np.array(sides), errors + error, panels
 
-    def _groups(self, normals: Floats, sides: Indices | None = None) -> list[tuple[Law, Indices]]:
-        """The laws at these normals, by default those of the sides, with the indices of the normals that have them."""
-        laws = self.law
-        if isinstance(laws, Law):
-            each: Sequence[Law] = (laws,)
-        elif callable(laws):
-            each = _laws_at(np.mod(normals, TURN), laws)
+    def _groups(self, normals: Floats, lengths: Floats, element: Indices | None = None) -> list[tuple[Law, Indices]]:
+        """The laws, and where they are among normals of positive lengths, which are those of sides or have an element."""
+        used = np.flatnonzero(lengths > 0.0)
+        if isinstance(self.law, tuple):
+            laws = [self.law[k] for k in (used if element is None else element)]
         else:
-            each = [laws[k] for k in (range(len(laws)) if sides is None else sides)]
-        groups: dict[Hashable, tuple[Law, list[int]]] = {}
-        for k, law in enumerate(each):
+            laws = [self.law] * min(used.size, 1) if isinstance(self.law, Law) else self._laws_at(normals[used])
+        groups: dict[int, tuple[Law, list[int]]] = {}
+        for k, law in enumerate(laws):
             if not isinstance(law, Law) or law.frame != "paper":
                 raise InputError(f"law: expected one in the paper's convention, got {law!r}")
-            groups.setdefault(_key(law), (law, []))[1].append(k)
-        if isinstance(laws, Law):
-            return [(laws, np.arange(normals.size))]
-        return [(law, np.array(here)) for law, here in groups.values()]
+            groups.setdefault(id(law), (law, []))[1].append(k)
+        return [(law, used if len(laws) < used.size else used[here]) for law, here in groups.values()]
+
+    def _laws_at(self, normals: Floats) -> list[Law]:
+        """The laws by the given function of the direction of the normal."""
+        try:
+            return list(map(self.law, np.mod(normals, TURN).tolist()))  # type: ignore[arg-type]
+        except AsperityError:
+            raise
+        except (TypeError, ValueError) as reason:
+            raise InputError(
+                f"law: expected a function from the direction of a normal to a law, it failed: {reason}"
+            ) from reason
 
     def _changes(self) -> tuple[tuple[Law, ...], Floats]:
         """The laws along curves, and the normals between them; none if there are many, as of a continuous change."""
-        at = np.minimum(np.arange(STEPS + 1) * (TURN / STEPS), np.nextafter(TURN, 0.0))
-        if self.radius is None or isinstance(self.law, Law):
-            return tuple(law for law, _ in self._groups(self.normals)), np.empty(0)
-        groups, which = self._groups(at), np.empty(at.size, dtype=np.intp)
-        for k, (_, here) in enumerate(groups):
-            which[here] = k
-        changed = np.flatnonzero(np.diff(which))
-        if changed.size > MOST_CHANGES:
+        if isinstance(self.law, Law) or self.radius is None:
+            return (self.law,) if isinstance(self.law, Law) else (), np.empty(0)
+        at = TURN / STEPS * np.arange(STEPS)
+        laws = self._laws_at(at)
+        keys = [_key(law) for law in laws]
+        changed = [k for k in range(STEPS - 1) if keys[k] != keys[k + 1]]
+        if len(changed) > MOST_CHANGES:
             return (), np.empty(0)
-        before = [_key(groups[k][0]) for k in which[changed]]
 
         def unchanged(normals: Floats) -> NDArray[np.bool_]:
-            laws = _laws_at(normals, self.law)
-            return np.array([_key(law) == key for law, key in zip(laws, before, strict=True)])
+            return np.array([_key(law) == keys[k] for law, k in zip(self._laws_at(normals), changed, strict=True)])
 
-        return tuple(law for law, _ in groups), bisected(at[changed], at[changed + 1], unchanged)
+        return tuple({**dict(zip(keys, laws, strict=True))}.values()), bisected(
+            at[changed], at[changed] + at[1], unchanged
+        )
 
     def _rule(self, edges: Floats) -> tuple[Floats, Floats]:
         """The sides, then Gauss nodes between the edges: normals and lengths."""
-        if self.radius is None:
-            return self.normals, self.lengths
-        half = 0.5 * np.diff(edges)[:, None]
-        normals = (edges[:-1, None] + half * (1.0 + NODES)).ravel()
-        lengths = (half * WEIGHTS).ravel() * self._radius(normals)
+        width = np.diff(edges)[:, None]
+        normals = (edges[:-1, None] + 0.5 * width * (1.0 + GAUSS_NODES)).ravel()
+        lengths = (0.5 * width * GAUSS_WEIGHTS).ravel() * self._radii(normals)
         return np.append(self.normals, normals), np.append(self.lengths, lengths)
 
-    def _radius(self, normals: Floats) -> Floats:
+    def _radii(self, normals: Floats) -> Floats:
+        if self.radius is None:
+            return np.zeros(normals.size)
         found = finite_array("radius", Vectorised(self.radius, scalar=True)(normals))
         if found.min() < 0.0:
             raise InputError(f"radius: expected radii of curvature of at least 0, got {found.min():g}")
         return found
-
-
-def _laws_at(normals: Floats, laws: LawOfNormal) -> tuple[Law, ...]:
-    """The law of every element by a function from the direction of its normal."""
-    try:
-        return tuple(map(laws, normals.tolist()))
-    except AsperityError:
-        raise
-    except (TypeError, ValueError) as reason:
-        raise InputError(
-            f"law: expected a function from the direction of a normal to a law, it failed: {reason}"
-        ) from reason
 
 
 def _key(law: Law) -> Hashable:
@@ -401,7 +387,7 @@ def _key(law: Law) -> Hashable:
     return law
 
 
-def _components(normals: Floats) -> Floats:
+def _components(law: Law, normals: Floats) -> Floats:
     """1 and the unit vector, with their rounding."""
     one = np.ones(normals.size)
     return np.stack([one, np.cos(normals), np.sin(normals), ROUNDING * one])

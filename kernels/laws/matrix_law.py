@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import lru_cache, reduce
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,8 +31,8 @@ ROW_SUM_TOLERANCE = 1e-9
 SAME_EDGE = 32.0 * EPS
 # Relative rounding of an entry of a matrix on finer bins: three masses, each of a few roundings.
 ENTRY_ROUNDING = 16.0 * EPS
-# Position of the node that stands for a whole interval: no angle of a grid, at which it would pass for an atom.
-INSIDE = 0.5 * (5.0**0.5 - 1.0)
+# Position of the node that stands for a whole interval: no angle of a grid, at which it would pass for an atom. Matrices of masses in memory.
+INSIDE, MATRICES = 0.5 * (5.0**0.5 - 1.0), 4
 
 
 class MatrixLaw(DensityLaw):
@@ -131,12 +131,13 @@ class MatrixLaw(DensityLaw):
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """The nodes of all bins; for functions that are constant between edges one node between each two of them."""
-        within, whole = uniform_on_bins(self.edges, degree, edges), np.concatenate(([0.0], edges, [np.pi]))
-        rows = self.array[cell_among(self.edges, theta)]
+        cell = cell_among(self.edges, theta)
         if degree:
-            weights, nodes = rows[:, within.owner] * within.weights, within.nodes
+            within = uniform_on_bins(self.edges, degree, edges)
+            weights, nodes = self.array[cell][:, within.owner] * within.weights, within.nodes
         else:
-            weights, nodes = rows @ within.masses(whole), whole[:-1] + INSIDE * np.diff(whole)
+            whole = np.concatenate(([0.0], edges, [np.pi]))
+            weights, nodes = _masses_between(self, whole.tobytes())[cell], whole[:-1] + INSIDE * np.diff(whole)
         return Conditionals.of_atoms(np.broadcast_to(nodes, weights.shape), weights, ENTRY_ROUNDING)
 
     def adjoint(self) -> MatrixLaw:
@@ -175,6 +176,13 @@ def uniform_on_bins(bins: Floats, degree: int, edges: Floats) -> Conditionals:
     owner, nodes, weights = gauss_nodes(cell_among(bins, 0.5 * (low + high)), low, high, stiffness)
     error = np.full(bins.size - 1, ENTRY_ROUNDING)
     return Conditionals.of_lists(owner, nodes, weights * SINE.density(nodes), error)
+
+
+@lru_cache(maxsize=MATRICES)
+def _masses_between(law: MatrixLaw, edges: bytes) -> Floats:
+    """Masses between edges from 0 to pi after each bin."""
+    whole = np.frombuffer(edges)
+    return np.asarray(law.array @ uniform_on_bins(law.edges, 0, whole[1:-1]).masses(whole))
 
 
 def finite_matrix(law: Law, functions: int = 0, edges: Floats | None = None) -> KernelMatrix | None:
