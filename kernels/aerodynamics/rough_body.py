@@ -144,6 +144,8 @@ class RoughBody(Summary):
                 raise InputError(
                     f"law: expected one, a function or {normals.size}, one for every side, got {len(laws)}"
                 )
+        if isinstance(laws, Law) and laws.frame != "paper":
+            raise InputError(f"law: expected one in the paper's convention, got {laws!r}")
         for name, value in (("normals", normals), ("lengths", lengths), ("breakpoints", cuts)):
             object.__setattr__(self, name, frozen(value))
         object.__setattr__(self, "law", laws)
@@ -192,8 +194,8 @@ class RoughBody(Summary):
         if turn.min() < -CLOSED or turn.max() > math.pi - CLOSED or turn.sum() > 1.5 * TURN:
             raise InputError(
                 "vertices: expected a convex polygon, its vertices once round against the clock, got turns from "
-                f"{turn.min():.3g} to {turn.max():.3g} radians, in sum {turn.sum() / TURN:.3g} times 2 pi; for the hull "
-                "of any points pass points[scipy.spatial.ConvexHull(points).vertices]"
+                f"{turn.min():.3g} to {turn.max():.3g} radians, in sum {turn.sum() / TURN:.3g} times 2 pi; for the "
+                "hull of any points pass points[scipy.spatial.ConvexHull(points).vertices]"
             )
         return cls(np.arctan2(-side[:, 0], side[:, 1]), np.hypot(side[:, 0], side[:, 1]), law)
 
@@ -258,7 +260,7 @@ class RoughBody(Summary):
         last = math.inf
         for level in range(MOST_LEVELS):
             normals, lengths = self._rule(split_panels(panels, 2**level))
-            parts = [part(law, normals[here], lengths[here]) for law, here in self._groups(normals, lengths)]
+            parts = [part(law, normals[here], weights) for law, here, weights in self._parts(normals, lengths)]
             value, error = math.fsum(one.value for one in parts), math.fsum(one.error for one in parts)
             missed, last = 2.0 * abs(value - last), value
             if missed <= max(tolerance, error):
@@ -294,8 +296,11 @@ class RoughBody(Summary):
         normal = np.append(self.normals, edges[:-1])[element]
         normal += np.append(np.zeros(sides), np.diff(edges))[element] * source.random(n)
         incoming, outgoing = SINE.sample(n, source), np.empty(n)
-        for law, here in self._groups(normal, weights[element], element):
-            outgoing[here] = law.sample(incoming[here], source)
+        laws = self._laws_at(normal, element)
+        numbers = np.array([id(law) for law in laws])
+        for number in np.unique(numbers):
+            here = np.flatnonzero(numbers == number)
+            outgoing[here] = laws[here[0]].sample(incoming[here], source)
         tangent = normal - 0.5 * np.pi
         u, v = (np.mod(tangent + angle, TURN) for angle in (incoming, outgoing))
         return u, v, np.mod(normal, TURN)
@@ -310,57 +315,64 @@ class RoughBody(Summary):
         """The `integral` along the boundary of a function of the law and normals, shape (count, normals)."""
 
         def rows(normals: Floats, lengths: Floats) -> Floats:
-            found = np.zeros((count, normals.size))
-            for law, here in self._groups(normals, lengths):
-                found[:, here] = lengths[here] * function(law, normals[here])
-            return found
+            found = np.zeros((normals.size, count))
+            for law, here, weights in self._parts(normals, lengths):
+                np.add.at(found, here, (weights * function(law, normals[here])).T)
+            return found.T
 
         values, errors, panels = integral(lambda normals: rows(normals, self._radii(normals)), edges, tolerance)
         *sides, error = rows(self.normals, self.lengths).sum(axis=1)
         return values + np.array(sides), errors + error, panels
 
-    def _groups(self, normals: Floats, lengths: Floats, element: Indices | None = None) -> list[tuple[Law, Indices]]:
-        """The laws, and where they are among normals of positive lengths, which are those of sides or have an element."""
+    def _parts(self, normals: Floats, lengths: Floats) -> list[tuple[Law, Indices, Floats]]:
+        """The `parts` of the laws, where they are among sides or normals on curves, and lengths times weights there."""
         used = np.flatnonzero(lengths > 0.0)
-        if isinstance(self.law, tuple):
-            laws = [self.law[k] for k in (used if element is None else element)]
-        else:
-            laws = [self.law] * min(used.size, 1) if isinstance(self.law, Law) else self._laws_at(normals[used])
-        groups: dict[int, tuple[Law, list[int]]] = {}
-        for k, law in enumerate(laws):
-            if not isinstance(law, Law) or law.frame != "paper":
-                raise InputError(f"law: expected one in the paper's convention, got {law!r}")
-            groups.setdefault(id(law), (law, []))[1].append(k)
-        return [(law, used if len(laws) < used.size else used[here]) for law, here in groups.values()]
+        expanded: dict[int, list[tuple[float, Law, Hashable]]] = {}
+        found: dict[Hashable, tuple[Law, list[int], list[float]]] = {}
+        # the laws are kept, so that no other object has their number
+        laws = self._laws_at(normals[used], used)
+        for k, law in zip(used.tolist(), laws, strict=True):
+            if id(law) not in expanded:
+                expanded[id(law)] = [(weight, part, _key(part)) for weight, part in law.parts]
+            for weight, part, key in expanded[id(law)]:
+                _, here, weights = found.setdefault(key, (part, [], []))
+                here.append(k)
+                weights.append(weight)
+        return [(law, np.array(here), weights * lengths[here]) for law, here, weights in found.values()]
 
-    def _laws_at(self, normals: Floats) -> list[Law]:
-        """The laws by the given function of the direction of the normal."""
+    def _laws_at(self, normals: Floats, sides: Indices) -> list[Law]:
+        """The law of every normal; of sides with laws of their own the numbers tell which."""
+        laws = self.law
         try:
-            return list(map(self.law, np.mod(normals, TURN).tolist()))  # type: ignore[arg-type]
+            if isinstance(laws, Law):
+                return [laws] * normals.size
+            each = [laws[k] for k in sides] if isinstance(laws, tuple) else [*map(laws, np.mod(normals, TURN).tolist())]
         except AsperityError:
             raise
         except (TypeError, ValueError) as reason:
             raise InputError(
                 f"law: expected a function from the direction of a normal to a law, it failed: {reason}"
             ) from reason
+        for law in each:
+            if not isinstance(law, Law) or law.frame != "paper":
+                raise InputError(f"law: expected one in the paper's convention, got {law!r}")
+        return each
 
     def _changes(self) -> tuple[tuple[Law, ...], Floats]:
         """The laws along curves, and the normals between them; none if there are many, as of a continuous change."""
         if isinstance(self.law, Law) or self.radius is None:
             return (self.law,) if isinstance(self.law, Law) else (), np.empty(0)
         at = TURN / STEPS * np.arange(STEPS)
-        laws = self._laws_at(at)
+        laws = self._laws_at(at, at)
         keys = [_key(law) for law in laws]
         changed = [k for k in range(STEPS - 1) if keys[k] != keys[k + 1]]
         if len(changed) > MOST_CHANGES:
             return (), np.empty(0)
 
         def unchanged(normals: Floats) -> NDArray[np.bool_]:
-            return np.array([_key(law) == keys[k] for law, k in zip(self._laws_at(normals), changed, strict=True)])
+            return np.array([_key(law) == keys[k] for law, k in zip(self._laws_at(normals, at), changed, strict=True)])
 
-        return tuple({**dict(zip(keys, laws, strict=True))}.values()), bisected(
-            at[changed], at[changed] + at[1], unchanged
-        )
+        return tuple(dict(zip(keys, laws, strict=True)).values()), bisected(at[changed], at[changed] + at[1], unchanged)
 
     def _rule(self, edges: Floats) -> tuple[Floats, Floats]:
         """The sides, then Gauss nodes between the edges: normals and lengths."""

@@ -31,7 +31,8 @@ ROW_SUM_TOLERANCE = 1e-9
 SAME_EDGE = 32.0 * EPS
 # Relative rounding of an entry of a matrix on finer bins: three masses, each of a few roundings.
 ENTRY_ROUNDING = 16.0 * EPS
-# Position of the node that stands for a whole interval: no angle of a grid, at which it would pass for an atom. Matrices of masses in memory.
+# Position of the node that stands for a whole interval: no angle of a grid, at which it would pass for an atom.
+# Matrices of masses in memory.
 INSIDE, MATRICES = 0.5 * (5.0**0.5 - 1.0), 4
 
 
