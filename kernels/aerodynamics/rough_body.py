@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -19,6 +20,7 @@ from ...core.checks import (
     generator,
     positive_number,
     sequence,
+    shaped,
     whole_number,
 )
 from ...core.errors import AsperityError, InputError
@@ -130,10 +132,10 @@ class RoughBody(Summary):
     _show = "law perimeter"
 
     def __post_init__(self) -> None:
-        normals, lengths, cuts = (
-            np.atleast_1d(finite_array(name, getattr(self, name))) for name in ("normals", "lengths", "breakpoints")
-        )
-        if normals.shape != lengths.shape or normals.ndim != 1:
+        given = ("normals", "lengths", "breakpoints")
+        arrays = [np.atleast_1d(finite_array(name, getattr(self, name))) for name in given]
+        normals, lengths, cuts = (shaped(name, array, "n") for name, array in zip(given, arrays, strict=True))
+        if normals.size != lengths.size:
             raise InputError(f"lengths: expected one for each of {normals.size} normals, got shape {lengths.shape}")
         if lengths.min(initial=1.0) <= 0.0:
             raise InputError(f"lengths: expected numbers greater than 0, got {lengths.min():g}")
@@ -144,9 +146,7 @@ class RoughBody(Summary):
                 raise InputError(
                     f"law: expected one, a function or {normals.size}, one for every side, got {len(laws)}"
                 )
-        if isinstance(laws, Law) and laws.frame != "paper":
-            raise InputError(f"law: expected one in the paper's convention, got {laws!r}")
-        for name, value in (("normals", normals), ("lengths", lengths), ("breakpoints", cuts)):
+        for name, value in zip(given, (normals, lengths, cuts), strict=True):
             object.__setattr__(self, name, frozen(value))
         object.__setattr__(self, "law", laws)
         found, changes = self._changes()
@@ -185,9 +185,9 @@ class RoughBody(Summary):
     @classmethod
     def polygon(cls, law: Laws, vertices: ArrayLike) -> RoughBody:
         """A convex polygon with counterclockwise vertices, shape (n, 2)."""
-        points = finite_array("vertices", vertices)
-        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
-            raise InputError(f"vertices: expected at least three points, got shape {points.shape}")
+        points = shaped("vertices", vertices, "n", 2)
+        if len(points) < 3:
+            raise InputError(f"vertices: expected at least three points, got {len(points)}")
         side = np.roll(points, -1, axis=0) - points
         after = np.roll(side, -1, axis=0)
         turn = np.arctan2(side[:, 0] * after[:, 1] - side[:, 1] * after[:, 0], np.sum(side * after, axis=1))
@@ -344,9 +344,10 @@ class RoughBody(Summary):
         """The law of every normal; of sides with laws of their own the numbers tell which."""
         laws = self.law
         try:
-            if isinstance(laws, Law):
-                return [laws] * normals.size
-            each = [laws[k] for k in sides] if isinstance(laws, tuple) else [*map(laws, np.mod(normals, TURN).tolist())]
+            if isinstance(laws, (Law, tuple)):
+                each = [laws] * normals.size if isinstance(laws, Law) else [laws[k] for k in sides]
+            else:
+                each = [laws(normal) for normal in np.mod(normals, TURN).tolist()]
         except AsperityError:
             raise
         except (TypeError, ValueError) as reason:
@@ -360,19 +361,21 @@ class RoughBody(Summary):
 
     def _changes(self) -> tuple[tuple[Law, ...], Floats]:
         """The laws along curves, and the normals between them; none if there are many, as of a continuous change."""
-        if isinstance(self.law, Law) or self.radius is None:
-            return (self.law,) if isinstance(self.law, Law) else (), np.empty(0)
         at = TURN / STEPS * np.arange(STEPS)
-        laws = self._laws_at(at, at)
+        none = np.empty(0, dtype=np.intp)
+        laws = [] if self.radius is None else self._laws_at(at, none)
         keys = [_key(law) for law in laws]
-        changed = [k for k in range(STEPS - 1) if keys[k] != keys[k + 1]]
+        changed = [k for k, (key, after) in enumerate(pairwise(keys)) if key != after]
         if len(changed) > MOST_CHANGES:
             return (), np.empty(0)
 
         def unchanged(normals: Floats) -> NDArray[np.bool_]:
-            return np.array([_key(law) == keys[k] for law, k in zip(self._laws_at(normals, at), changed, strict=True)])
+            return np.array(
+                [_key(law) == keys[k] for k, law in zip(changed, self._laws_at(normals, none), strict=True)]
+            )
 
-        return tuple(dict(zip(keys, laws, strict=True)).values()), bisected(at[changed], at[changed] + at[1], unchanged)
+        low = at[np.array(changed, dtype=np.intp)]
+        return tuple(dict(zip(keys, laws, strict=True)).values()), bisected(low, low + at[1], unchanged)
 
     def _rule(self, edges: Floats) -> tuple[Floats, Floats]:
         """The sides, then Gauss nodes between the edges: normals and lengths."""

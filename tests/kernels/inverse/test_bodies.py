@@ -252,7 +252,9 @@ def test_integrals_hold_for_any_jump_kink_and_strip():
         )
         for function, exact in kinds:
             for tolerance in (1e-2, 1e-9):
-                (value,), (error,), _ = integral(lambda n, f=function: np.stack([f(n), 1e-14 + 0.0 * n]), edges, tolerance)
+                (value,), (error,), _ = integral(
+                    lambda n, f=function: np.stack([f(n), 1e-14 + 0.0 * n]), edges, tolerance
+                )
                 assert abs(value - exact) <= error < tolerance
 
 
