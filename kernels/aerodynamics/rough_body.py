@@ -178,7 +178,7 @@ class RoughBody(Summary):
         along, across = (np.sin, np.cos) if a > b else (np.cos, np.sin)
         # (a b)^2 / ((a cos n)^2 + (b sin n)^2)^(3/2), without products that overflow
         return cls(
-            (), (), law, lambda n: largest * (ratio / np.hypot(ratio * along(n), across(n))) ** 3,
+            np.empty(0), np.empty(0), law, lambda n: largest * (ratio / np.hypot(ratio * along(n), across(n))) ** 3,
             np.append(cuts, finite_array("breakpoints", breakpoints)),
         )  # fmt: skip
 
@@ -338,16 +338,16 @@ class RoughBody(Summary):
                 _, here, weights = found.setdefault(key, (part, [], []))
                 here.append(k)
                 weights.append(weight)
-        return [(law, np.array(here), weights * lengths[here]) for law, here, weights in found.values()]
+        return [(law, np.array(here), np.array(weights) * lengths[here]) for law, here, weights in found.values()]
 
     def _laws_at(self, normals: Floats, sides: Indices) -> list[Law]:
         """The law of every normal; of sides with laws of their own the numbers tell which."""
         laws = self.law
         try:
-            if isinstance(laws, (Law, tuple)):
-                each = [laws] * normals.size if isinstance(laws, Law) else [laws[k] for k in sides]
-            else:
+            if callable(laws):
                 each = [laws(normal) for normal in np.mod(normals, TURN).tolist()]
+            else:
+                each = [laws] * normals.size if isinstance(laws, Law) else [laws[k] for k in sides]
         except AsperityError:
             raise
         except (TypeError, ValueError) as reason:
@@ -361,7 +361,7 @@ class RoughBody(Summary):
 
     def _changes(self) -> tuple[tuple[Law, ...], Floats]:
         """The laws along curves, and the normals between them; none if there are many, as of a continuous change."""
-        at = TURN / STEPS * np.arange(STEPS)
+        at = np.asarray(TURN / STEPS * np.arange(STEPS), dtype=np.float64)
         none = np.empty(0, dtype=np.intp)
         laws = [] if self.radius is None else self._laws_at(at, none)
         keys = [_key(law) for law in laws]

@@ -125,17 +125,16 @@ def integral(function: Callable[[Floats], Floats], edges: Floats, tolerance: flo
     """
     low, high = edges[:-1], edges[1:]
     part, halved, ends = tolerance / low.size, 0, [edges]
-    total: Floats | float = 0.0
-    error: Floats | float = 0.0
+    total, error = np.zeros(1), np.zeros(1)
     while low.size:
         half = 0.5 * (high - low)
         values = function(((low + half)[:, None] + half[:, None] * NODES).ravel())
         found = values.reshape(len(values), low.size, -1) @ COEFFICIENTS.T * (high - low)[:, None]
         missed = np.abs(found[:-1, :, -LAST:]).max(axis=2)
         more = (missed.max(axis=0) > part + found[-1, :, 0]) & (halved < MOST_HALVED)
-        total += found[:, ~more, 0].sum(axis=1)
-        error += missed[:, ~more].sum(axis=1)
-        middle, halved = (low + half)[more], halved + np.count_nonzero(more)
+        total = total + found[:, ~more, 0].sum(axis=1)
+        error = error + missed[:, ~more].sum(axis=1)
+        middle, halved = (low + half)[more], halved + int(np.count_nonzero(more))
         ends.append(middle)
         low, high = np.append(low[more], middle), np.append(middle, high[more])
     return total[:-1], error + total[-1], np.unique(np.concatenate(ends))
