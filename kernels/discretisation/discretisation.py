@@ -123,13 +123,13 @@ def discretise(
     8. ``by_interval_masses`` (quadrature): `LeastResistanceLaw`, in `Bins`.
     9. ``by_map`` (quadrature): deterministic laws.
     10. ``by_conditionals`` (quadrature): any other law whose conditional distributions have errors; laws that average
-       over entry points only in `Legendre`.
+        over entry points only in `Legendre`.
     11. ``by_sobol_rays`` (qmc): laws driven by one uniform number.
     12. ``by_adaptive_angles`` (quadrature): any wall without further parts or isometries.
     13. ``by_independent_rays`` (monte-carlo): any law.
 
-    Methods 1 to 10 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the other
-    frame from its inner law, a composition from its factors if none of them needs rays. Methods 11 to 13 come last. A
+    Methods 1 to 10 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the
+    other frame from its inner law, a composition from its factors if none of them needs rays. Methods 11 to 13 come last. A
     wall is the sum of its `parts`.
 
     A law of matrices, with Lambertian reflection and isometries, in `Bins` that refine the matrices' is exact (auto).
