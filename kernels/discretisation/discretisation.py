@@ -129,8 +129,8 @@ def discretise(
     13. ``by_independent_rays`` (monte-carlo): any law.
 
     Methods 1 to 10 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the
-    other frame from its inner law, a composition from its factors if none of them needs rays. Methods 11 to 13 come last. A
-    wall is the sum of its `parts`.
+    other frame from its inner law, a composition from its factors if none of them needs rays. Methods 11 to 13 come
+    last. A wall is the sum of its `parts`.
 
     A law of matrices, with Lambertian reflection and isometries, in `Bins` that refine the matrices' is exact (auto).
 
