@@ -184,7 +184,10 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Profile.in_unit": {"unit": "nm"},
     "Profile.detrended": {"degree": 1},
     "RollingCharts": {"spacing": np.pi / 30.0, "scale": 1.0},
-    "RoughBody": {"normals": 2.0 * np.pi * np.arange(3) / 3.0, "lengths": [1.0, 1.0, 1.0]},
+    "RoughBody": {
+        "normals": 2.0 * np.pi * np.arange(3) / 3.0, "lengths": [1.0, 1.0, 1.0], "radius": np.ones_like,
+        "breakpoints": [1.0],
+    },
     "SatelliteDisk": {"size": 0.1, "angles": [0.0, 1.0, 3.0, 5.0]},
     "SatelliteLaw.draw_limit": {"samples": 4},
     "TriangularTeethLaw": {"angle": 1.0},

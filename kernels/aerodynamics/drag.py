@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, instance, positive_number
 from ...core.errors import InputError
-from ...core.estimates import Estimate, student_95
+from ...core.estimates import Estimate, Summary, student_95
 from ...core.long_runs import TIME_LIMIT, reported
 from ...geometry.scene.scene import SEGMENT_TIME
 from ..bases.basis import Basis
@@ -36,6 +36,20 @@ MOST_HALVINGS = 3
 MATRIX_FRACTION = 0.5
 # Angles per panel, at Gauss nodes of another rule, at which the polynomials are compared with the cost.
 PROBES = 17
+
+
+@dataclass(frozen=True, repr=False)
+class StreamForce(Summary):
+    """The force of a parallel stream on a body, in units of the momentum flux of the stream.
+
+    Attributes
+    ----------
+    along, across : Estimate
+        Components along the stream (the resistance) and across it, positive to its left.
+    """
+
+    along: Estimate
+    across: Estimate
 
 
 def air_resistance(theta: Floats, outgoing: Floats) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,16 +23,18 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import AccuracyError, InputError
-from ...core.estimates import Estimate, Summary, mean_of_strata
+from ...core.estimates import Summary, mean_of_strata
 from ...geometry import Arc, Container
 from ..bases.measure import SINE
-from .drag import scaled
+from .drag import StreamForce, scaled
 
 # Reflections of a particle at most.
 MOST_REFLECTIONS = 100_000
 FEWEST_RAYS = 100
 # Directions and offsets, relative to the body's width, that differ by less count as unchanged: a few roundings a hit.
 UNCHANGED = 1e-9
+# Fraction of the area in which polygons that touch overlap by rounding.
+OVERLAP = 1e-12
 # Points of a region's boundary at which its tangents are compared, to see that it is convex.
 BOUNDARY_POINTS = 4096
 
@@ -66,7 +69,8 @@ class PolygonalBody(Summary):
     Raises
     ------
     InputError
-        If there are no polygons, one has fewer than three vertices or no area, or two neighbouring vertices coincide.
+        If there are no polygons, one has fewer than three vertices or no area, or two neighbouring vertices coincide;
+        if a boundary meets itself, or polygons overlap.
 
     Source: Rudzis 2022, section 1.2.7; A. Plakhov, "Exterior Billiards" (2012).
 
@@ -82,11 +86,15 @@ class PolygonalBody(Summary):
     polygons: tuple[Floats, ...]
     _starts: Floats = field(init=False, repr=False)
     _sides: Floats = field(init=False, repr=False)
+    _outline: Any = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.polygons, Sequence) or not len(self.polygons):
             raise InputError("polygons: expected a list of polygons, each a list of points")
-        found = []
+        from shapely import Polygon, union_all
+        from shapely.validation import explain_validity
+
+        found, outlines = [], []
         for number, polygon in enumerate(self.polygons):
             points = finite_array(f"polygons[{number}]", polygon)
             if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 3:
@@ -95,7 +103,20 @@ class PolygonalBody(Summary):
             area = 0.5 * float(np.sum(points[:, 0] * after[:, 1] - points[:, 1] * after[:, 0]))
             if area == 0.0 or np.any(np.all(points == after, axis=1)):
                 raise InputError(f"polygons[{number}]: expected distinct neighbours and an area, got {points.tolist()}")
+            if not (outline := Polygon(points)).is_valid:
+                raise InputError(
+                    f"polygons[{number}]: expected a boundary that meets itself nowhere, got "
+                    f"{explain_validity(outline)}; cut the polygon there"
+                )
+            outlines.append(outline)
             found.append(frozen(points if area > 0.0 else points[::-1]))
+        total, whole = sum(outline.area for outline in outlines), union_all(outlines)
+        if total - whole.area > OVERLAP * total:
+            raise InputError(
+                f"polygons: expected disjoint interiors, got polygons that overlap in an area of "
+                f"{total - whole.area:.3g}; replace those that overlap by their union"
+            )
+        object.__setattr__(self, "_outline", whole)
         object.__setattr__(self, "polygons", tuple(found))
         object.__setattr__(self, "_starts", frozen(np.concatenate(found)))
         sides = np.concatenate([np.roll(points, -1, axis=0) - points for points in found])
@@ -112,15 +133,19 @@ class PolygonalBody(Summary):
         Raises
         ------
         InputError
-            If a shape is wrong or a velocity is 0.
+            If a shape is wrong, a velocity is 0, or a start is inside the body.
         AccuracyError
             If a particle has not left after 10^5 reflections.
         """
+        from shapely import contains_xy
+
         at = shaped("position", position, "n", 2).copy()
         moving = shaped("velocity", velocity, len(at), 2)
         size = np.hypot(moving[:, 0], moving[:, 1])
         if np.any(size == 0.0):
             raise InputError("velocity: expected vectors other than 0")
+        if (within := contains_xy(self._outline, *at.T)).any():
+            raise InputError(f"position: expected starts outside of the body, got {at[within][0].tolist()}")
         moving = moving / size[:, None]
         lengths = np.hypot(self._sides[:, 0], self._sides[:, 1])
         normals = np.stack([self._sides[:, 1], -self._sides[:, 0]], axis=1) / lengths[:, None]
@@ -307,7 +332,7 @@ def _convex(region: Container) -> Container:
 
 
 @dataclass(frozen=True, repr=False)
-class BodyForce(Summary):
+class BodyForce(StreamForce):
     """The force of a parallel stream on a body, in units of the momentum flux.
 
     Attributes
@@ -321,8 +346,6 @@ class BodyForce(Summary):
         Fraction of the particles within this width that leave on the line on which they came: 1 for an invisible body.
     """
 
-    along: Estimate
-    across: Estimate
     width: float
     unchanged: float
 

@@ -9,8 +9,8 @@ from ...core.long_runs import NUMBERS_AT_ONCE
 from ..bases.assembly import largest_square_sum
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
-from ..bases.panels import Panels
 from ..expectations.angle_panels import NODES, AnglePanels
+from ..expectations.basis_means import functions_of
 from ..laws.law import DrivenLaw, Law, knows_errors
 from ..laws.structure import is_compound, lists_branches
 from ..matrices.matrix import KernelMatrix
@@ -62,10 +62,7 @@ def action_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
     error is the sum over the panels of the difference from Gauss's rule, which is safe even if P e_j jumps on a panel,
     and of the errors of the conditional distributions.
     """
-    breaks, inside = law.breakpoints(FIRST_BREAKPOINTS)[0], basis.edges[1:-1]
-    degree = basis.degree if isinstance(basis, Panels) else 0 if basis.is_partition else basis.nodes_per_interval
-    if basis.is_polynomial:
-        inside, degree = np.empty(0), max(1, basis.size - 1)
+    breaks, (degree, inside) = law.breakpoints(FIRST_BREAKPOINTS)[0], functions_of(basis)
     edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, breaks)))
     low, high = edges[:-1], edges[1:]
     total, error, spent = np.zeros((basis.size, basis.size)), 0.0, 0

@@ -15,9 +15,12 @@ from ..bases.bins import Bins
 from ..bases.intervals import bisected
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
+from ..expectations.basis_means import functions_of
 from ..laws.density import DensityLaw, cut_by_edges, split_panels
 from ..laws.involution import InvolutionLaw, jumps_of_map
+from ..laws.law import Law
 from ..laws.least_resistance import LeastResistanceLaw
+from ..laws.matrix_law import finite_matrix, uniform_on_bins
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..matrices.matrix import KernelMatrix
 from .method import Budget, computed, rounding, until_converged
@@ -45,6 +48,16 @@ def by_eigenvalues(law: HenyeyGreensteinLaw, basis: Legendre, budget: Budget) ->
     diagonal = np.diag(law.g ** np.arange(float(basis.size)))
     how = "eigenvalues g^l of the polynomials of degree l, to rounding"
     return computed(diagonal, basis, "exact", EPS * basis.size**0.5, how, "bound")
+
+
+def by_blocks(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix of transitions between bins, from the means of the functions over each bin."""
+    inner = finite_matrix(law)
+    assert inner is not None  # as `acts_on_bins` asks
+    means = uniform_on_bins(inner.basis.edges, *functions_of(basis)).in_basis(basis)
+    symmetric = means.T @ (inner.flux @ means)
+    error = float(inner.error) + rounding(inner.basis) + rounding(basis)
+    return computed(symmetric, basis, "exact", error, "integrals over bins, to rounding", "bound")
 
 
 def by_density(law: DensityLaw, basis: Basis, budget: Budget) -> KernelMatrix:

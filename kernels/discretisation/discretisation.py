@@ -117,19 +117,20 @@ def discretise(
     2. ``by_isometry_table`` (exact): isometries on intervals of angles, with probabilities, such as polygonal walls.
     3. ``by_branches`` (exact): any other law that lists its isometries and is not a composition.
     4. ``by_eigenvalues`` (exact): Henyey-Greenstein scattering, in `Legendre`.
-    5. ``by_arc_polygons`` (quadrature): circular arcs.
-    6. ``by_density`` (quadrature): laws with a density.
-    7. ``by_interval_masses`` (quadrature): `LeastResistanceLaw`, in `Bins`.
-    8. ``by_map`` (quadrature): deterministic laws.
-    9. ``by_conditionals`` (quadrature): any other law whose conditional distributions have errors; laws that average
-       over entry points only in `Legendre`.
-    10. ``by_sobol_rays`` (qmc): laws driven by one uniform number.
-    11. ``by_adaptive_angles`` (quadrature): any wall without further parts or isometries.
-    12. ``by_independent_rays`` (monte-carlo): any law.
+    5. ``by_blocks`` (exact): matrices on bins, and chains of them with Lambertian reflection and ideal isometries.
+    6. ``by_arc_polygons`` (quadrature): circular arcs.
+    7. ``by_density`` (quadrature): laws with a density.
+    8. ``by_interval_masses`` (quadrature): `LeastResistanceLaw`, in `Bins`.
+    9. ``by_map`` (quadrature): deterministic laws.
+    10. ``by_conditionals`` (quadrature): any other law whose conditional distributions have errors; laws that average
+        over entry points only in `Legendre`.
+    11. ``by_sobol_rays`` (qmc): laws driven by one uniform number.
+    12. ``by_adaptive_angles`` (quadrature): any wall without further parts or isometries.
+    13. ``by_independent_rays`` (monte-carlo): any law.
 
-    Methods 1 to 9 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the other
-    frame from its inner law, a composition from its factors if none of them needs rays. Methods 10 to 12 come last. A
-    wall is the sum of its `parts`.
+    Methods 1 to 10 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the
+    other frame from its inner law, a composition from its factors if none of them needs rays. Methods 11 to 13 come
+    last. A wall is the sum of its `parts`.
 
     A law of matrices, with Lambertian reflection and isometries, in `Bins` that refine the matrices' is exact (auto).
 

@@ -21,6 +21,7 @@ from ..laws.density import DensityLaw
 from ..laws.involution import InvolutionLaw
 from ..laws.law import Combination, Composition, Law, SpecularFrame, sum_of
 from ..laws.least_resistance import LeastResistanceLaw
+from ..laws.matrix_law import acts_on_bins
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import LONGEST_WORD, has_chain, holds_of_all, lists_branches, multiplied_out
 from ..matrices.defects import SymmetryDefect
@@ -29,7 +30,7 @@ from ..walls.circular_arc import CircularArcLaw
 from ..walls.wall_law import WallLaw, traced_wall
 from .actions import by_conditionals, has_conditionals
 from .arcs import by_arc_polygons
-from .densities import by_density, by_eigenvalues, by_interval_masses, by_map
+from .densities import by_blocks, by_density, by_eigenvalues, by_interval_masses, by_map
 from .isometries import by_branches
 from .isometry_tables import by_isometry_table
 from .method import Budget, Method, MethodName
@@ -47,6 +48,7 @@ METHODS: tuple[Method, ...] = (
     Method(
         "exact", lambda law, basis: isinstance(law, HenyeyGreensteinLaw) and isinstance(basis, Legendre), by_eigenvalues
     ),
+    Method("exact", lambda law, _: acts_on_bins(law), by_blocks),
     Method("quadrature", lambda law, _: isinstance(law, CircularArcLaw), by_arc_polygons),
     # `by_conditionals` integrates the three smooth functions of Directions for each incoming angle on the law's panels
     Method(

@@ -127,21 +127,20 @@ def cells_and_atoms(terms: Terms, theta: Floats, edges: Floats, tolerance: float
             total += weight * first.masses(edges) @ matrix.array
             wrong += weight * (first.error + float(matrix.error) / (np.sqrt(matrix.weights.min()) if sup else 1.0))
             continue
-        # one distribution for all angles
-        incoming = theta[:1] if term.law.is_lambertian else theta
+        incoming, back = term.law._distinct(theta)
         given = term.law._conditionals(incoming, tolerance, 0, edges[1:-1])
-        error = np.where(np.isnan(given.error), UNKNOWN, given.error)
+        error = np.where(np.isnan(given.error), UNKNOWN, given.error)[back]
         table = term.law.isometry_table() if term.has_atoms and not sup else None
         # of a mean over theta, unresolved rays change no more than their fraction
         wrong += weight * (error if table is None else 2.0 * table.unresolved)
         if term.has_atoms:
-            position, mass = given.atoms()
+            position, mass = (part[back] for part in given.atoms())
             atoms.append(np.stack((position, weight * mass / mass.sum(axis=1, keepdims=True))))
             continue
         level = is_flat_top(term.law, incoming, given)
-        total += weight * given._replace(weights=np.where(level, 0.0, given.weights)).masses(edges)
+        total += weight * given._replace(weights=np.where(level, 0.0, given.weights)).masses(edges)[back]
         if level.any():
-            flat = np.bincount(given.owner, weights=np.where(level, given.weights, 0.0), minlength=theta.size)
+            flat = np.bincount(given.owner, weights=np.where(level, given.weights, 0.0), minlength=incoming.size)[back]
             position = np.pi - theta if not isinstance(term.law, SpecularFrame) else theta
             atoms.append(np.stack((position, weight * flat))[..., None])
     position, mass = np.concatenate(atoms, axis=2)

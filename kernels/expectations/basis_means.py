@@ -44,6 +44,14 @@ def height_of(basis: Basis, vectors: Floats) -> float:
     return float(np.abs(basis.evaluate(angle) @ vectors).max())
 
 
+def functions_of(basis: Basis) -> tuple[int, Floats]:
+    """Degree of the functions of a basis as `Law.conditionals` counts it, and the edges between which they have it."""
+    if basis.is_polynomial:
+        return max(1, basis.size - 1), np.empty(0)
+    degree = basis.degree if isinstance(basis, Panels) else 0 if basis.is_partition else basis.nodes_per_interval
+    return degree, basis.edges[1:-1]
+
+
 def means_of_basis(basis: Basis, nodes: Floats, weights: Floats, starts: NDArray[np.int64]) -> Floats:
     """The weighted sums of all basis functions over groups of angles, shape (groups, size).
 

@@ -123,13 +123,14 @@ class Law(ABC):
         if not flat.size:
             # Only the function determines the shape of its values.
             return np.empty(incoming.shape + given(np.empty(incoming.shape)).shape[incoming.ndim :])
+        flat, back = self._distinct(flat)
         degree, start, step = degree_of(given), 0, FIRST_ANGLES
         while start < flat.size:
             part = self._conditionals(flat[start : start + step], TOLERANCE, degree, np.empty(0))
             found.append(part.mean(given))
             start += step
             step = max(1, NODES_AT_ONCE * part.error.size // part.nodes.size)
-        mean = np.concatenate(found)
+        mean = np.concatenate(found)[back]
         return mean.reshape(incoming.shape + mean.shape[1:])
 
     def conditionals(
@@ -233,6 +234,10 @@ class Law(ABC):
     @abstractmethod
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """`conditionals` for checked arguments."""
+
+    def _distinct(self, theta: Floats) -> tuple[Floats, NDArray[np.intp]]:
+        """Angles among those given that have all their conditional distributions, and which of them each angle has."""
+        return theta, np.arange(theta.size)
 
     def _repr_html_(self) -> str:
         known = {True: "yes", False: "no", None: "not known"}

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import lru_cache, reduce
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, common_shape, finite_array, frozen, given
 from ...core.errors import InputError
@@ -16,10 +16,11 @@ from ..bases.basis import Basis, Frame
 from ..bases.bins import Bins
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE
+from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from .density import NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw, split_panels
 from .ideal import LambertianLaw
-from .law import IsometryLaw, Law, set_properties
+from .law import Composition, IsometryLaw, Law, set_properties
 from .phase_function import HenyeyGreensteinLaw
 from .structure import Rules, fold, holds_of_all
 
@@ -30,6 +31,9 @@ ROW_SUM_TOLERANCE = 1e-9
 SAME_EDGE = 32.0 * EPS
 # Relative rounding of an entry of a matrix on finer bins: three masses, each of a few roundings.
 ENTRY_ROUNDING = 16.0 * EPS
+# Position of the node that stands for a whole interval: no angle of a grid, at which it would pass for an atom.
+# Matrices of masses in memory.
+INSIDE, MATRICES = 0.5 * (5.0**0.5 - 1.0), 4
 
 
 class MatrixLaw(DensityLaw):
@@ -121,6 +125,22 @@ class MatrixLaw(DensityLaw):
         """The inner edges of the bins; none are left out."""
         return self.edges[1:-1], 0.0
 
+    def _distinct(self, theta: Floats) -> tuple[Floats, NDArray[np.intp]]:
+        """One angle of each bin."""
+        _, first, back = np.unique(cell_among(self.edges, theta), return_index=True, return_inverse=True)
+        return theta[first], back
+
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """The nodes of all bins; for functions that are constant between edges one node between each two of them."""
+        cell = cell_among(self.edges, theta)
+        if degree:
+            within = uniform_on_bins(self.edges, degree, edges)
+            weights, nodes = self.array[cell][:, within.owner] * within.weights, within.nodes
+        else:
+            whole = np.concatenate(([0.0], edges, [np.pi]))
+            weights, nodes = _masses_between(self, whole.tobytes())[cell], whole[:-1] + INSIDE * np.diff(whole)
+        return Conditionals.of_atoms(np.broadcast_to(nodes, weights.shape), weights, ENTRY_ROUNDING)
+
     def adjoint(self) -> MatrixLaw:
         """The law of W^-1 P^T W with bin masses W; raises InputError if P does not preserve sin(theta) d theta."""
         if self.reversible:
@@ -147,6 +167,23 @@ class MatrixLaw(DensityLaw):
 
     def __repr__(self) -> str:
         return f"MatrixLaw({self.array.shape[0]} bins)"
+
+
+def uniform_on_bins(bins: Floats, degree: int, edges: Floats) -> Conditionals:
+    """The uniform distribution of cos(theta') in each bin, for functions of a degree between edges, to rounding."""
+    cuts = np.unique(np.concatenate((bins, edges)))
+    low, high = cuts[:-1], cuts[1:]
+    stiffness = stiffness_between(edges, degree, low, high) + high - low
+    owner, nodes, weights = gauss_nodes(cell_among(bins, 0.5 * (low + high)), low, high, stiffness)
+    error = np.full(bins.size - 1, ENTRY_ROUNDING)
+    return Conditionals.of_lists(owner, nodes, weights * SINE.density(nodes), error)
+
+
+@lru_cache(maxsize=MATRICES)
+def _masses_between(law: MatrixLaw, edges: bytes) -> Floats:
+    """Masses between edges from 0 to pi after each bin."""
+    whole = np.frombuffer(edges)
+    return np.asarray(law.array @ uniform_on_bins(law.edges, 0, whole[1:-1]).masses(whole))
 
 
 def finite_matrix(law: Law, functions: int = 0, edges: Floats | None = None) -> KernelMatrix | None:
@@ -184,6 +221,12 @@ def finite_matrix(law: Law, functions: int = 0, edges: Floats | None = None) -> 
     if functions and any(matrix.beyond or ()):
         return _matrix_on(law, split_panels(common, 2 + 2 * functions // matrix.size))
     return matrix
+
+
+def acts_on_bins(law: Law) -> bool:
+    """Whether a law is a matrix, or a chain of matrices, Lambertian reflection and ideal isometries with a matrix."""
+    factors = law.laws if isinstance(law, Composition) else (law,)
+    return any(isinstance(part, MatrixLaw) for part in factors) and holds_of_all(law, _is_finite)
 
 
 def _is_finite(law: Law) -> bool:

@@ -8,11 +8,13 @@ from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels
+from ...kernels.bases.intervals import cell_among
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
 from ...kernels.expectations.arcs import ArcMeans
-from ...kernels.expectations.basis_means import Means, height_of, weighted_means
+from ...kernels.expectations.basis_means import Means, functions_of, height_of, weighted_means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
+from ...kernels.laws.matrix_law import ENTRY_ROUNDING, MatrixLaw, uniform_on_bins
 from ...kernels.laws.structure import holds_of_all
 from ...kernels.walls.conditionals import is_chaotic, is_few, traced_conditionals
 from ...kernels.walls.wall_law import traced_wall
@@ -62,6 +64,10 @@ def expectations(law: Law, basis: Basis) -> Means:
             return images @ flip, errors
 
         return mirrored
+    if isinstance(law, MatrixLaw):
+        rows = law.array @ uniform_on_bins(law.edges, *functions_of(basis)).in_basis(basis)
+        exact = np.full(len(rows), ENTRY_ROUNDING)
+        return lambda theta, tolerance: (rows[cell := cell_among(law.edges, theta)], exact[cell])
     if isinstance(law, LambertianLaw):
         return lambda theta, tolerance: (np.tile(basis.constant, (theta.size, 1)), np.zeros(theta.size))
     return _of_nodes(law, basis)
@@ -85,10 +91,7 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
 
 def _of_nodes(law: Law, basis: Basis) -> Means:
     """Expectations from conditional distributions. Those of a traced wall share what they find at other angles."""
-    edges, degree = np.empty(0), max(1, basis.size - 1)
-    if not basis.is_polynomial:
-        edges = basis.edges[1:-1]
-        degree = basis.degree if isinstance(basis, Panels) else 0 if basis.is_partition else basis.nodes_per_interval
+    degree, edges = functions_of(basis)
     wall = traced_wall(law)
     shared = None if wall is None or not is_few(wall) else traced_conditionals(wall, degree, edges)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.spatial
 import sympy as sp
 
 import asperity
@@ -22,6 +23,7 @@ RAISED = {"InputError", "WallError", "FileExistsRefusal", "AccuracyError", "warn
 DOORS = {"instance", "sequence"}
 ADVICE = re.compile(r"\b(pass|use|take|give|call|write|for example|such as)\b", re.IGNORECASE)
 X, H = np.linspace(0.0, 1.0, 5), np.array([0.0, 0.2, 0.1, 0.3, 0.0])
+BOX = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 DISK, LAW, WALL, P = geo.Disk(), ker.lambertian(), geo.koch(1), ker.discretise(ker.lambertian(), ker.Bins(4))
 SPECULAR, Z = LAW.in_specular_frame(), sp.Symbol("z")
 
@@ -71,6 +73,10 @@ REMEDIES = {
     "pass ker.CollisionLaw(law, disk), or ker.smooth(disk) and ker.no_slip(disk)": (
         lambda: ker.play(geo.Container.circle(), LAW, [0.0, 0.0], [0.1, 1.0, 0.2], 3),
         lambda: [ker.CollisionLaw(LAW, DISK), ker.smooth(DISK), ker.no_slip(DISK)],
+    ),
+    "pass points[scipy.spatial.ConvexHull(points).vertices]": (
+        lambda: ker.RoughBody.polygon(LAW, np.tile(BOX, (2, 1))),
+        lambda: ker.RoughBody.polygon(LAW, BOX[scipy.spatial.ConvexHull(np.tile(BOX, (2, 1))).vertices]),
     ),
     "use P.tensor(Q)": (lambda: ker.discretise(LAW, ker.TensorBasis((ker.Bins(2), ker.Bins(2)))), lambda: P.tensor(P)),
     "use kind='pseudometric'": (

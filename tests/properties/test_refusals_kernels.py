@@ -32,6 +32,8 @@ LEANING = geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)])
 ANGLES = ker.Legendre(5), ker.Legendre(4, weight="sin2")
 FLOOR, PLACES = geo.Wall.from_vertices([(0, -1), (1, -1)]), ker.PositionLaw([0.0, 1.0], [MIRROR])
 ALONG = ker.CollisionAlongWall(PLACES, DISK)
+SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+PENTAGON = [(math.cos(0.4 * math.pi * k), math.sin(0.4 * math.pi * k)) for k in range(5)]
 BODY = ker.PolygonalBody([[(-2.5, -1.5), (-1.0, -1.5), (-2.5, 0.0)]])
 PLATE = [geo.Segment((0.2, -0.1), (0.4, -0.1)), geo.Segment((0.4, -0.1), (0.2, -0.1))]
 ROOM, SEATS = geo.Container.polygon([(0, 0), (9, 0), (9, 6), (0, 6)]), [[2, 3], [6, 3]]
@@ -326,7 +328,18 @@ REFUSED = {
         (lambda: BODY.scatter_in_circle(10, 0, radius=0.1), "to contain"),
         (lambda: ker.spin_force(MIRROR.in_specular_frame(), 0.1), "convention"),
         (lambda: BODY.force(0.0, 10), "rays"),
-        (lambda: ker.RoughBody.polygon([MIRROR], [(0, 0), (1, 0), (0, 1)]), "one for every element"),
+        (lambda: ker.RoughBody.polygon([MIRROR], [(0, 0), (1, 0), (0, 1)]), "one for every side"),
+        (lambda: ker.RoughBody.ellipse([MIRROR] * 720, 2.0, 1.0), "one for every side"),
+        (lambda: ker.RoughBody.polygon(MIRROR, 2 * SQUARE), "in sum 2 times"),
+        (lambda: ker.RoughBody.polygon(MIRROR, [PENTAGON[2 * k % 5] for k in range(5)]), "in sum 2 times"),
+        (lambda: ker.RoughBody.polygon(MIRROR, [(0, 0), (1, 0), (2, 0)]), "convex"),
+        (lambda: ker.RoughBody((), (), MIRROR), "of length 0"),
+        (lambda: ker.RoughBody((), (), MIRROR, radius=np.cos), "at least 0"),
+        (lambda: ker.RoughBody((), (), MIRROR, radius=lambda n: 2.0 + np.cos(n)), "misses itself"),
+        (lambda: ker.PolygonalBody([SQUARE[:1] + 2 * SQUARE[1:]]), "meets itself nowhere"),
+        (lambda: ker.PolygonalBody([[PENTAGON[2 * k % 5] for k in range(5)]]), "meets itself nowhere"),
+        (lambda: ker.PolygonalBody([SQUARE, [(0.5, 0.5), (2, 0.5), (2, 2)]]), "disjoint interiors"),
+        (lambda: ker.PolygonalBody([SQUARE]).scatter([[0.5, 0.5]], [[1.0, 0.0]]), "outside of the body"),
         (lambda: ker.RoughBody.polygon(MIRROR, [(0, 0), (1, 2), (1, 0)]), "against the clock"),
         (lambda: ker.RoughBody.disk(lambda: MIRROR), "law: expected a function from the direction"),
         (lambda: ker.RoughBody.disk(lambda normal: math.sqrt(-1.0 - normal)), "math domain error"),
@@ -334,7 +347,7 @@ REFUSED = {
         (lambda: ker.RoughBody.disk(MIRROR).resistance(cost=lambda u, v: np.exp(1j * u)), "expected numbers"),
         (lambda: ker.RoughBody.disk(MIRROR).resistance(cost=lambda u, v: math.cos(u - v)), "vectorised"),
         (lambda: ker.RoughBody.disk(MIRROR).resistance(directions=lambda u: np.ones(7)), "vectorised"),
-        *((lambda law=law: ker.RoughBody.disk(law), "law: expected one in") for law in (None, 1.0, DISK, int)),
+        *((lambda law=law: ker.RoughBody.disk(law), "law: expected") for law in (None, 1.0, DISK, int)),
     ],
     "distances": [
         (lambda: ker.distance(matrix(np.eye(2), ker.Bins(2)), matrix(np.eye(3), ker.Bins(3))), "different bases"),

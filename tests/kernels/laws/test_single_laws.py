@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import time
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from numpy.polynomial import legendre
 from asperity import kernels as ker
 from asperity.errors import AccuracyError, InputError
 from asperity.estimates import Estimate
+from asperity.kernels.bases.directions import Directions
 from asperity.kernels.laws.phase_function import HenyeyGreensteinLaw
 
 THETA = np.array([1e-12, 1e-4, 0.2, 0.9, math.pi / 2, 2.2, 3.0, math.pi - 1e-4, math.pi - 1e-12])
@@ -148,12 +150,65 @@ def test_a_matrix_law_moves_bins_as_its_matrix_says(size: int, seed: int) -> Non
     assert np.allclose(law.edges, np.arccos(1.0 - 2.0 * np.arange(size + 1) / size), atol=1e-12)
 
 
-def test_a_matrix_law_measures_reversibility_with_the_masses_of_its_bins() -> None:
-    def on_bins(array: list[list[float]], edges: list[float]) -> ker.KernelMatrix:
-        basis = ker.Bins(np.array(edges))
-        root = np.sqrt(basis.weights)
-        return ker.KernelMatrix(root[:, None] * np.array(array) / root, basis, EXACT)
+def on_bins(array, edges) -> ker.KernelMatrix:
+    basis = ker.Bins(np.array(edges))
+    root = np.sqrt(basis.weights)
+    return ker.KernelMatrix(root[:, None] * np.array(array) / root, basis, EXACT)
 
+
+def random_matrix_law(size: int, seed: int = 4) -> ker.MatrixLaw:
+    """On unequal bins, with a tenth of the entries."""
+    rng = np.random.default_rng(seed)
+    array = rng.random((size, size)) * (rng.random((size, size)) < 0.1) + np.eye(size)
+    edges = np.concatenate(([0.0], np.sort(rng.uniform(0.0, math.pi, size - 1)), [math.pi]))
+    return ker.MatrixLaw(on_bins(array / array.sum(axis=1, keepdims=True), edges))
+
+
+BASES = [
+    ker.Legendre(12), ker.Panels([0.0, 0.4, 1.7, math.pi], 3), ker.Panels(np.linspace(0.0, math.pi, 50), 1),
+    ker.Bins(7), ker.Bins(60), Directions(),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("basis", BASES, ids=repr)
+@pytest.mark.parametrize("kind", ["alone", "mirrored", "squared", "mixed"])
+def test_the_matrix_of_a_law_on_bins_is_that_of_a_rule_between_all_edges(kind, basis) -> None:
+    law = random_matrix_law(40)
+    edges = np.concatenate((law.edges, basis.edges, math.pi - basis.edges))
+    angle, weight = ker.SINE.quadrature(np.unique(edges), 16)
+    cell = np.searchsorted(law.edges, angle) - 1
+    after = law.array[cell][:, cell] * (weight / np.bincount(cell, weight)[cell])
+    values, mirrored = basis.evaluate(angle), basis.evaluate(math.pi - angle)
+    whole, images = {
+        "alone": (law, after @ values),
+        "mirrored": (law @ ker.specular(), after @ mirrored),
+        "squared": (law @ law, after @ (after @ values)),
+        "mixed": (0.25 * law + 0.75 * ker.specular(), 0.25 * after @ values + 0.75 * mirrored),
+    }[kind]
+    exact = (weight[:, None] * values).T @ images
+    found = ker.discretise(whole, basis)
+    assert found.method == "exact" and np.linalg.norm(found.symmetric - exact) <= float(found.error) < 1e-11
+
+
+def test_two_thousand_states_take_seconds() -> None:
+    law = random_matrix_law(2000)
+    begun = time.process_time()
+    found, matrix = ker.resistance(law), ker.discretise(law, ker.Legendre(16))
+    means = law.apply(lambda a: np.stack([np.cos(a), np.sin(a)], axis=-1), 0.5 * (law.edges[1:] + law.edges[:-1]))
+    distance = ker.distance(law, ker.lambertian(), kind="pseudometric")
+    # it took minutes when every incoming angle was integrated over all bins
+    assert time.process_time() - begun < 30.0
+    low, high = law.edges[:-1], law.edges[1:]
+    masses = 0.5 * (np.cos(low) - np.cos(high))
+    cosine = 0.25 * (np.sin(high) ** 2 - np.sin(low) ** 2) / masses
+    sine = 0.25 * (high - low - 0.5 * (np.sin(2.0 * high) - np.sin(2.0 * low))) / masses
+    np.testing.assert_allclose(means, law.array @ np.stack([cosine, sine], axis=-1), atol=1e-8)
+    exact = 0.75 * (1.0 + masses @ (cosine * (law.array @ cosine) + sine * (law.array @ sine)))
+    assert abs(found.value - exact) <= found.error + 1e-9 and found.error < 1e-10
+    assert float(matrix.error) < 1e-10 and distance.error < 1e-3
+
+
+def test_a_matrix_law_measures_reversibility_with_the_masses_of_its_bins() -> None:
     # masses 1/4 and 3/4: detailed balance needs P[0, 1] = 3 P[1, 0]
     edges = [0.0, math.pi / 3, math.pi]
     assert ker.MatrixLaw(on_bins([[0.4, 0.6], [0.2, 0.8]], edges)).reversible is True
