@@ -25,7 +25,7 @@ GROUPS = 32
 
 @dataclass(frozen=True, repr=False)
 class ChannelPaths(Summary):
-    """Positions along a channel of particles that start at 0 on a wall, with the invariant distribution of angles.
+    """Positions along a channel of particles that start at 0 on a wall, with angles as sin(theta)/2 d theta.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class ChannelPaths(Summary):
         return Estimate(float(value.mean()), half + excess, "estimate", f"{len(value)} paths to t = {self.times[-1]:g}")
 
     def limit_variance(self) -> Estimate:
-        r"""The variance of the limit of X_t/(t ln t)^(1/2) in a straight channel.
+        r"""The variance of the limit of X_t/(t ln t)^(1/2) in a straight channel, of laws that preserve sin(theta) d theta.
 
         It is half of `diffusivity`, although E[X_t^2] grows like D t ln t: half of this comes from few flights that are
         longer than t^(1/2). The slope of -2 ln E[cos(l X_t)]/(l^2 t) in ln t with l = c t^(-1/2), a weighted least
