@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, TypeAlias, get_args, overload
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -176,32 +176,30 @@ def transmission(
     given = law if isinstance(law, DirectionLaw) else in_paper_frame(law)
     diffuse, rest = _without_specular(given)
     if diffuse * far <= EPS:
-        how = "a particle has this many diffuse reflections at most"
-        return Estimate(1.0, diffuse * far, "bound", how if diffuse else "specular reflection keeps the velocity")
+        return Estimate(1.0, diffuse * far, "bound", "no more particles are reflected otherwise than specularly")
     found = _found(given, rest, diffuse, section, far, wanted, source)
-    low, high = (min(max(end, 0.0), 1.0) for end in (found.value - found.error, found.value + found.error))
-    inside = high < found.value + found.error or low > found.value - found.error
-    return replace(found, value=0.5 * (low + high), error=0.5 * (high - low)) if inside else found
+    ends = found.value - found.error, found.value + found.error
+    low, high = np.clip(ends, 0.0, 1.0).tolist()
+    return found if (low, high) == ends else replace(found, value=0.5 * (low + high), error=0.5 * (high - low))
 
 
 def _found(
-    law: Law | DirectionLaw, rest: Law | DirectionLaw, diffuse: float, section: Section, length: float,
-    tolerance: float, rng: np.random.Generator,
+    law: Law | DirectionLaw, rest: Any, diffuse: float, section: Section, length: float, tolerance: float,
+    rng: np.random.Generator,
 ) -> Estimate:  # fmt: skip
     """The transmission of a law that with probability ``diffuse`` reflects by ``rest``, else specularly."""
-    if isinstance(rest, DirectionLaw):
-        enter = _entered_in_tube if section == "tube" else _entered_in_channel
-        turn = partial(_leave, rest, section, diffuse, rng)
-        return _by_flights(section, length, tolerance, rng, enter, turn, diffuse)
-    assert isinstance(law, Law)
-    if rest == lambertian() and diffuse * length <= LONGEST * GEOMETRIES[section].width:
+    enter, longest = ENTRIES[section], LONGEST * GEOMETRIES[section].width
+    if isinstance(law, DirectionLaw):
+        return _by_flights(
+            section, length, tolerance, rng, enter, partial(_leave, rest, section, diffuse, rng), diffuse
+        )
+    if rest == lambertian() and diffuse * length <= longest:
         return _by_integral_equation(GEOMETRIES[section], diffuse, length)
     if section == "channel":
         smooth = _by_polynomials(law, length, tolerance, rng)
         if smooth.error <= tolerance:
             return smooth
-        turn = partial(_turn, rest, diffuse, rng)
-        least = 2.0 * smooth.error
+        turn, least = partial(_turn, rest, diffuse, rng), 2.0 * smooth.error
         flown = _by_flights(section, length, tolerance, rng, _entered_in_plane, turn, diffuse, least=least)
         return min(smooth, flown, key=lambda found: found.error)
     if rest != lambertian():
@@ -210,16 +208,11 @@ def _found(
             f"does not tell the direction of its grooves, got {law!r}"
         )
     raise InputError(
-        f"length: in a tube expected at most {LONGEST * GEOMETRIES[section].width:g} radii over the diffuse fraction, "
-        f"got {length:g} and {diffuse:g}"
+        f"length: in a tube expected at most {longest:g} radii over the diffuse fraction, got {length:g}, {diffuse:g}"
     )
 
 
-@overload
-def _without_specular(law: Law) -> tuple[float, Law]: ...
-@overload
-def _without_specular(law: DirectionLaw) -> tuple[float, DirectionLaw]: ...
-def _without_specular(law: Law | DirectionLaw) -> tuple[float, Law | DirectionLaw]:
+def _without_specular(law: Law | DirectionLaw) -> tuple[float, Any]:
     """The probability of reflections that are not known to be specular, and their law."""
     if isinstance(law, DirectionLaw):
         found = [(weight, *_without_specular(in_paper_frame(laws[0].law)), laws) for weight, laws in law.parts]
@@ -501,27 +494,13 @@ def _flown(length: float, x: Floats, direction: Floats, reflect: Reflections) ->
 
 
 def _entered_in_plane(number: int, length: float, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Where particles are first reflected diffusely, of those that are, and their angles to the wall."""
+    """Where particles are first reflected diffusely, of those that are, and their angles to the wall.
 
-    def stopped(distance: Floats) -> Floats:
-        """The fraction that meets a wall within the distance."""
-        return np.asarray(2.0 * distance / (1.0 + distance + np.sqrt(1.0 + distance**2)))
-
-    # the fraction diffuse^2 k (1 - diffuse)^(k-1) stopped(length/k) is that of particles at k times the place of a
-    # first collision; k is drawn with the factor k or without it, whichever leaves less to reject
-    each = float(stopped(np.array(length)))
-    flights = rng.geometric(diffuse, number).astype(np.float64)
-    if diffuse * length >= each:
-        flights += rng.geometric(diffuse, number) - 1.0
-        chance = stopped(length / flights) / each
-    else:
-        chance = flights * stopped(length / flights) / length
-    flights = flights[rng.random(number) < chance]
-    # the fraction that is stopped before x is uniform between 0 and its value at the end
-    fraction = stopped(length / flights) * rng.random(flights.size)
-    x = 0.5 * fraction * (2.0 - fraction) / (1.0 - fraction)
-    # at x the cosine of the angle is uniform above that of the ray from the opposite corner
-    return flights * x, 2.0 * np.arcsin(np.sqrt(rng.random(x.size) * GEOMETRIES["channel"].beyond(x)))
+    The k-th collision is the diffuse one with probability diffuse (1 - diffuse)^(k-1), at k - 1 + U flights.
+    """
+    angle = np.arcsin(rng.random(number))
+    x = (rng.geometric(diffuse, number) - rng.random(number)) / np.tan(angle)
+    return x[x < length], angle[x < length]
 
 
 def _turn(law: Law, diffuse: float, rng: np.random.Generator, angle: Floats) -> tuple[Floats, Floats]:
@@ -550,11 +529,15 @@ def _entered_in_tube(number: int, length: float, diffuse: float, rng: np.random.
 def _entering(number: int, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats, Floats, Floats]:
     """Directions of the cosine law about the axis, the component along it and two others; then numbers of flights.
 
-    k has the probability diffuse^2 k (1 - diffuse)^(k-1), see `_entered_in_plane`.
+    The place of the first diffuse reflection is k times that of the first collision, with the probability
+    diffuse^2 k (1 - diffuse)^(k-1): of flights of equal length s both are uniform between multiples of s.
     """
     square, turn = rng.random(number), 2.0 * np.pi * rng.random(number)
     flights = rng.geometric(diffuse, (2, number)).sum(axis=0) - 1.0
     return np.sqrt(1.0 - square), np.sqrt(square) * np.cos(turn), np.sqrt(square) * np.sin(turn), flights
+
+
+ENTRIES = {"channel": _entered_in_channel, "tube": _entered_in_tube}
 
 
 def _leave(

@@ -48,7 +48,7 @@ def test_a_measured_table_is_refused_until_rows_and_columns_are_divided_by_their
     table[0] += [0.05, -0.05, 0.0]
     with pytest.raises(InputError, match="divide rows and columns by their sums in turn"):
         spec.diffusivity(ker.MatrixLaw(table))
-    with pytest.raises(InputError, match="its adjoint is not a law.*divide rows and columns"):
+    with pytest.raises(InputError, match=r"its adjoint is not a law.*divide rows and columns"):
         ker.MatrixLaw(table).adjoint()
     for _ in range(50):
         table /= table.sum(axis=0)
