@@ -153,8 +153,8 @@ def mixing_time(
 def _from_worst(kernel: Law | KernelMatrix | Spectrum, within: float, distance: Distance) -> int:
     """The least number of steps, at least 1, from the worst state of a finite chain, by powers of its matrix."""
     matrix = finite_matrix(kernel) if isinstance(kernel, Law) else kernel
-    points = isinstance(kernel, Law) and matrix is not None and any(matrix.beyond or ())
-    if not isinstance(matrix, KernelMatrix) or not matrix.basis.is_partition or points:
+    is_chain = isinstance(matrix, KernelMatrix) and matrix.basis.is_partition
+    if not isinstance(matrix, KernelMatrix) or not is_chain or (isinstance(kernel, Law) and any(matrix.beyond or ())):
         raise InputError(
             f"start: expected 'density' of {shortened(kernel)}, no chain of finitely many states; for one of a "
             "matrix on bins pass ker.discretise(law, ker.Bins(64))"
