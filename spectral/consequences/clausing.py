@@ -494,13 +494,27 @@ def _flown(length: float, x: Floats, direction: Floats, reflect: Reflections) ->
 
 
 def _entered_in_plane(number: int, length: float, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Where particles are first reflected diffusely, of those that are, and their angles to the wall.
+    """Where particles are first reflected diffusely, of those that are, and their angles to the wall."""
 
-    The k-th collision is the diffuse one with probability diffuse (1 - diffuse)^(k-1), at k - 1 + U flights.
-    """
-    angle = np.arcsin(rng.random(number))
-    x = (rng.geometric(diffuse, number) - rng.random(number)) / np.tan(angle)
-    return x[x < length], angle[x < length]
+    def stopped(distance: Floats) -> Floats:
+        """The fraction that meets a wall within the distance."""
+        return np.asarray(2.0 * distance / (1.0 + distance + np.sqrt(1.0 + distance**2)))
+
+    # the fraction diffuse^2 k (1 - diffuse)^(k-1) stopped(length/k) is that of particles at k times the place of a
+    # first collision; k is drawn with the factor k or without it, whichever leaves less to reject
+    each = float(stopped(np.array(length)))
+    flights = rng.geometric(diffuse, number).astype(np.float64)
+    if diffuse * length >= each:
+        flights += rng.geometric(diffuse, number) - 1.0
+        chance = stopped(length / flights) / each
+    else:
+        chance = flights * stopped(length / flights) / length
+    flights = flights[rng.random(number) < chance]
+    # the fraction that is stopped before x is uniform between 0 and its value at the end
+    fraction = stopped(length / flights) * rng.random(flights.size)
+    x = 0.5 * fraction * (2.0 - fraction) / (1.0 - fraction)
+    # at x the cosine of the angle is uniform above that of the ray from the opposite corner
+    return flights * x, 2.0 * np.arcsin(np.sqrt(rng.random(x.size) * GEOMETRIES["channel"].beyond(x)))
 
 
 def _turn(law: Law, diffuse: float, rng: np.random.Generator, angle: Floats) -> tuple[Floats, Floats]:
