@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, check_memory, choice, finite_array, generator, shaped, whole_number
+from ...core.checks import Floats, Rng, angles, check_memory, choice, finite_array, generator, shaped, whole_number
 from ...core.errors import InputError
 
 WeightName = Literal["sin", "sin2"]
@@ -44,8 +44,11 @@ class AngularMeasure:
     __array_ufunc__ = None
 
     def density(self, angle: ArrayLike) -> Floats:
-        """Density with respect to d angle."""
-        sine = np.sin(finite_array("angle", angle))
+        """Density with respect to d angle, at angles in [0, pi]."""
+        at = finite_array("angle", angle)
+        if at.size and not 0.0 <= at.min() <= at.max() <= np.pi:
+            angles("angle", at)
+        sine = np.sin(at)
         return np.asarray(0.5 * sine if self.name == "sin" else (2.0 / np.pi) * sine * sine)
 
     def mass(self, low: ArrayLike, high: ArrayLike) -> Floats:

@@ -86,10 +86,15 @@ class GasRecord(BilliardRecord):
         first = int(burn_in * len(duration))
         duration, rotation = duration[first:], rotation[first:]
         if not len(duration):
-            return Estimate(float(self.rotational_energy[0] / self.energy[0].sum()), math.inf, "estimate", "no event")
+            why = "initial state: no event after the burn-in"
+            return Estimate(float(self.rotational_energy[0] / self.energy[0].sum()), math.inf, "estimate", why)
         value = float(rotation @ duration / duration.sum())
-        if len(duration) < FEWEST_EVENTS * self.velocity.shape[1]:
-            return Estimate(value, math.inf, "estimate", "mean over a time too short for an error")
+        needed = FEWEST_EVENTS * self.velocity.shape[1]
+        if len(duration) < needed:
+            why = (
+                f"mean over {len(duration)} events after the burn-in; an error needs {needed}, {FEWEST_EVENTS} per disk"
+            )
+            return Estimate(value, math.inf, "estimate", why)
         error = max(_batch_error(duration, rotation - value, count) for count in BATCHES)
         return Estimate(value, error, "estimate", f"mean over time, 95 % from {BATCHES[0]} batches or fewer")
 

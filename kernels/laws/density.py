@@ -9,7 +9,7 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, common_shape, finite_array, frozen
+from ...core.checks import Floats, angles, common_shape, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
@@ -98,15 +98,13 @@ class DensityLaw(Law):
 
     # ---- methods that a subclass with its own formula overrides -----------------------------------------------
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
-        """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
-        theta, theta_out = finite_array("theta", theta), finite_array("theta_out", theta_out)
-        shape = common_shape(theta=theta, theta_out=theta_out)
+        """p(theta, theta') with respect to d theta', for angles in (0, pi), in the shape to which both broadcast."""
+        theta, theta_out = angle_pair(theta, theta_out)
         value = finite_array("density", Vectorised(self._function, scalar=True)(theta, theta_out))
         if value.size and value.min() < -NEGATIVE_TOLERANCE * max(1.0, float(value.max())):
-            worst = np.unravel_index(int(np.argmin(value)), shape)
-            where_worst = np.broadcast_to(theta, shape)[worst], np.broadcast_to(theta_out, shape)[worst]
+            where_worst = [one.flat[int(np.argmin(value))] for one in np.broadcast_arrays(theta, theta_out)]
             raise InputError(
-                f"density: expected values of at least 0, got {value[worst]:g} at theta = {where_worst[0]:g}, "
+                f"density: expected values of at least 0, got {value.min():g} at theta = {where_worst[0]:g}, "
                 f"theta' = {where_worst[1]:g}"
             )
         return np.asarray(np.maximum(value, 0.0))
@@ -144,9 +142,7 @@ class DensityLaw(Law):
                 self.outgoing_breakpoints,
             )
         except InputError as reason:
-            raise InputError(
-                f"{self!r} does not preserve sin(theta) d theta, so its adjoint is not a law ({reason})"
-            ) from reason
+            raise not_invariant(self, str(reason), "its adjoint is not a law") from reason
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Gauss rules between the edges of the law's panels and the given ones.
@@ -231,6 +227,21 @@ class DensityLaw(Law):
         exact = np.cumsum(mass.sum(axis=-1), axis=-1)
         table = np.cumsum(_cell_masses(edges, self.density(probes[:, None], clipped_inside(edges))), axis=-1)
         return float(np.max(np.abs(exact / exact[:, -1:] - table / table[:, -1:])))
+
+
+def not_invariant(law: Law, defect: str, reason: str) -> InputError:
+    """The refusal of a law that does not preserve sin(theta) d theta."""
+    return InputError(
+        f"law: expected one that preserves sin(theta) d theta, or else {reason}; got {law!r} (defect {defect}). Of "
+        "measured transition probabilities divide rows and columns by their sums in turn, on bins of equal measure"
+    )
+
+
+def angle_pair(theta: ArrayLike, theta_out: ArrayLike) -> tuple[Floats, Floats]:
+    """Angles theta and theta' at which a density is asked for, in (0, pi), in shapes that broadcast."""
+    incoming, outgoing = angles("theta", theta), angles("theta_out", theta_out)
+    common_shape(theta=incoming, theta_out=outgoing)
+    return incoming, outgoing
 
 
 def split_panels(edges: Floats, parts: int) -> Floats:

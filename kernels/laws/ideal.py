@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, common_shape, finite_array, number_between
+from ...core.checks import Floats, finite_array, number_between
 from ..bases.measure import SINE
-from .density import DensityLaw
+from .density import DensityLaw, angle_pair
 from .law import Combination, specular
 
 
@@ -26,8 +26,8 @@ class LambertianLaw(DensityLaw):
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """sin(theta')/2, in the shape to which the two arguments broadcast."""
-        density = SINE.density(theta_out)
-        return np.broadcast_to(density, common_shape(theta=finite_array("theta", theta), theta_out=density))
+        incoming, outgoing = angle_pair(theta, theta_out)
+        return np.broadcast_to(SINE.density(outgoing), np.broadcast_shapes(incoming.shape, outgoing.shape))
 
     def panels(self, theta: Floats) -> Floats:
         """One panel."""

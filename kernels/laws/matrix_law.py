@@ -8,7 +8,7 @@ from functools import lru_cache, reduce
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, common_shape, finite_array, frozen, given
+from ...core.checks import Floats, finite_array, frozen, given
 from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
@@ -18,7 +18,7 @@ from ..bases.intervals import cell_among
 from ..bases.measure import SINE
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from .density import NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw, split_panels
+from .density import NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw, angle_pair, not_invariant, split_panels
 from .ideal import LambertianLaw
 from .law import Composition, IsometryLaw, Law, set_properties
 from .phase_function import HenyeyGreensteinLaw
@@ -112,8 +112,7 @@ class MatrixLaw(DensityLaw):
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
-        theta, theta_out = finite_array("theta", theta), finite_array("theta_out", theta_out)
-        common_shape(theta=theta, theta_out=theta_out)
+        theta, theta_out = angle_pair(theta, theta_out)
         source, target = cell_among(self.edges, theta), cell_among(self.edges, theta_out)
         return np.asarray(self.array[source, target] * SINE.density(theta_out) / self._masses[target])
 
@@ -148,9 +147,7 @@ class MatrixLaw(DensityLaw):
         reverse = self.array.T * self._masses / self._masses[:, None]
         defect = float(np.max(np.abs(reverse.sum(axis=1) - 1.0)))
         if defect > ROW_SUM_TOLERANCE:
-            raise InputError(
-                f"{self!r} does not preserve sin(theta) d theta (defect {defect:.2g}), so its adjoint is not a law"
-            )
+            raise not_invariant(self, f"{defect:.2g}", "its adjoint is not a law")
         law = object.__new__(MatrixLaw)
         law._fill(reverse, self.edges, self.frame)
         return law

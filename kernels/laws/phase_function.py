@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, common_shape, finite_array, number_between, shaped, whole_number
+from ...core.checks import Floats, finite_array, number_between, shaped, whole_number
 from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.measure import SINE
-from .density import DensityLaw
+from .density import DensityLaw, angle_pair
 
 
 @dataclass(frozen=True, repr=False)
@@ -62,8 +62,7 @@ class HenyeyGreensteinLaw(DensityLaw):
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
         from scipy.special import elliprg
 
-        theta, theta_out = finite_array("theta", theta), finite_array("theta_out", theta_out)
-        common_shape(theta=theta, theta_out=theta_out)
+        theta, theta_out = angle_pair(theta, theta_out)
         weight = 2.0 * SINE.density(theta_out)
         # g < 0 is g > 0 followed by theta' -> pi - theta'. As sums of squares, A - B and A + B have no cancellation.
         g, target = abs(self.g), theta_out if self.g >= 0.0 else np.pi - theta_out

@@ -135,17 +135,17 @@ def multiplied_out(law: Law) -> Law:
     """
     words = words_of(law) if has_chain(law) else None
     if words is not None:
-        law = _sum_of_words((weight, word) for word, weight in words.items())
+        law = sum_of_words((weight, word) for word, weight in words.items())
     factors: Rules[Word] = Rules(
         lambda leaf: (leaf,),
-        lambda terms: (_sum_of_words(terms),),
+        lambda terms: (sum_of_words(terms),),
         lambda words: tuple(chain.from_iterable(words)),
         lambda word: (*word, specular()),
     )
     return law_of(fold(law, factors))
 
 
-def _sum_of_words(terms: Iterable[tuple[float, Word]]) -> Law:
+def sum_of_words(terms: Iterable[tuple[float, Word]]) -> Law:
     """The sum in the paper's frame, also of words that `law_of` writes as laws in the other frame."""
     laws: list[tuple[float, Law]] = []
     for weight, word in terms:
@@ -167,7 +167,7 @@ def law_of(word: Word) -> Law:
         return word[0]
     if len(word) == 2 and word[1] == specular():
         if isinstance(word[0], Combination):
-            return _sum_of_words((weight, (term, word[1])) for weight, term in word[0].terms)
+            return sum_of_words((weight, (term, word[1])) for weight, term in word[0].terms)
         return SpecularFrame.of(word[0])
     return Composition(word)
 

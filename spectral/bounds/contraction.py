@@ -1,11 +1,18 @@
-"""Laws that are not known to be self-adjoint in their convention, and their norm on functions of mean 0."""
+"""Laws that are not known to preserve the measure, or to be self-adjoint, and their norm on functions of mean 0."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...core.errors import AccuracyError
-from ...kernels import Law
+from ...kernels import Law, Legendre, discretise
+from ...kernels.laws.density import not_invariant
+from ...kernels.laws.matrix_law import finite_matrix
+from ...kernels.laws.structure import holds_of_all
+
+# Polynomials whose means a law must keep to this tolerance beyond the error of their matrix; one of known error above
+# UNKNOWN decides nothing.
+POLYNOMIALS, TOLERANCE, UNKNOWN = 16, 1e-6, 0.05
 
 
 def self_adjoint_elsewhere(law: Law) -> Law | None:
@@ -44,6 +51,33 @@ def refuse_unless_self_adjoint(law: Law) -> None:
             f"{law!r} is not symmetric with respect to sin(theta) d theta: its spectrum need not be real. "
             "Use law @ law.adjoint() if that is what you mean",
             np.inf,
+        )
+
+
+def refuse_unless_invariant(law: Law, reason: str) -> None:
+    """Raise an InputError if a law does not preserve sin(theta) d theta; ``reason`` says what this is needed for.
+
+    Reversible laws preserve it, and so do their sums, products and laws in the other convention. Of other laws of
+    finitely many states the masses of all bins are compared, else the means of 16 Legendre polynomials after one
+    reflection, to 1e-6 beyond the error of their matrix.
+
+    Raises
+    ------
+    AccuracyError
+        If this error exceeds .05, so that it is not known.
+    """
+    if holds_of_all(law, lambda leaf: leaf.reversible is True):
+        return
+    matrix = finite_matrix(law)
+    if matrix is None:
+        matrix = discretise(law, Legendre(POLYNOMIALS), tolerance=TOLERANCE)
+    constant, error = matrix.basis.project(np.ones_like), float(matrix.error)
+    defect = float(np.linalg.norm(constant @ matrix.symmetric - constant))
+    if defect > error + TOLERANCE:
+        raise not_invariant(law, f"{defect:.2g}", reason)
+    if not error <= UNKNOWN:
+        raise AccuracyError(
+            f"law: it is not known whether {law!r} preserves sin(theta) d theta ({matrix.method})", error
         )
 
 

@@ -196,6 +196,8 @@ def enclosures(
         law = law.law
     instance("law", law, Law, "ker.WallLaw(wall)")
     refuse_unless_self_adjoint(law)
+    if law.reversible is None:
+        check_reversible(discretise(law, Legendre(MORE_DEGREES), tolerance=MATRIX_TOLERANCE))
     own = finite_matrix(law)
     matrix = finite_matrix(law, k + 1) if own is not None and own.size > 1 else None
     if matrix is not None:

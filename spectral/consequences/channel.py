@@ -45,7 +45,7 @@ TOGETHER = 4096
 
 @dataclass(frozen=True, repr=False)
 class ExitTimes(Summary):
-    """Times to leave -L < x < L, for particles that start at x = 0 with the invariant distribution of angles.
+    """Times to leave -L < x < L, for particles that start at x = 0 with the angles' distribution sin(theta)/2 d theta.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class ExitTimes(Summary):
 
         The value is the slope over the upper half of the lengths. The error is the half width of its 95 % interval, by
         the delta method over particles, plus the difference from the slope over the lower half. It is the limit only if
-        the lengths are well above ``Diffusivity.onset``.
+        the lengths are well above ``Diffusivity.onset``, and the law preserves sin(theta) d theta.
         """
         log = np.log(self.lengths)
         middle = len(log) // 2

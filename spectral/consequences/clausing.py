@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from ...core.estimates import NORMAL_95, RULE_OF_THREE, Estimate, student_95
 from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...kernels import KernelMatrix, Law, Legendre, discretise, lambertian, specular
-from ...kernels.hemisphere.hemisphere_law import DirectionLaw
-from ...kernels.laws.structure import words_of
+from ...kernels.hemisphere.hemisphere_law import DirectionLaw, HemisphereCombination
+from ...kernels.laws.structure import sum_of_words, words_of
 from .channel import LARGEST, in_paper_frame, reflected
 
 Section = Literal["channel", "tube"]
@@ -28,9 +29,10 @@ Reflections: TypeAlias = Callable[[Floats], tuple[Floats, Floats]]
 NODES = (8, 10)
 # Longest diffuse channel, in the unit in which the kernel begins to fall; rounding of a diffuse reflection.
 LONGEST, ROUNDING = 1e5, 64.0 * EPS
-# Least diffuse fraction of the integral equation, and the terms of its kernel in units of the inverse fraction: the
-# terms beyond sum to less than rounding. Knots of their spline for each factor of e in length.
-LEAST_DIFFUSE, TERMS, KNOTS = 0.01, 50.0, 50
+# Flights up to a diffuse reflection in units of the inverse diffuse fraction, beyond which the sum of probabilities is
+# below rounding, and the Gauss nodes for those from 2^j to 2^(j+1) - 1: functions of the inverse number, analytic but
+# for the imaginary axis, have the relative error 5.8^-24. Knots of the spline for each factor of e in length.
+FLIGHTS, RULE, KNOTS = 50.0, 12, 50
 # Other laws: polynomials of the cosine, with the nodes of a panel; those of the first matrix; the largest number of
 # both that does not shorten the panels at the ends; limit on the unknowns, a few seconds.
 LEVELS, FIRST_SIZE, FULL_PANELS, MOST_UNKNOWNS = ((8, 4), (16, 6), (32, 8), (64, 6)), 32, 16, 4000
@@ -42,8 +44,8 @@ MOST_KEPT = 0.5
 # Tolerance of the matrix, in the Frobenius norm, of which the transmission shows little.
 MATRIX_TOLERANCE = 0.1
 # Particles at a time, the limit on their reflections, about ten seconds of a law with a closed form, and the particles
-# of which one reflection takes as long as the calls that it needs.
-TOGETHER, MOST_REFLECTIONS, LEAST_TOGETHER = 2**16, 5 * 10**7, 500
+# of which one reflection takes as long as the calls that it needs. Batches within the limit at least.
+TOGETHER, MOST_REFLECTIONS, LEAST_TOGETHER, BATCHES = 2**16, 5 * 10**7, 500, 8
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ def transmission(
     section : {"channel", "tube"}
         Two parallel walls, or a round tube.
     tolerance : float
-        The wanted error. Diffuse walls and mixtures with specular ones reach 1e-8.
+        The wanted error. Diffuse walls and mixtures with specular ones, of any fraction, reach 1e-8.
     rng : None, int or numpy.random.Generator
         The source of the rays of other laws.
 
@@ -123,13 +125,14 @@ def transmission(
     Estimate
         The error is that reached. Laws that smooth, such as those of arcs, meet 1e-4 in seconds. For flights the error
         exceeds the tolerance where 5 x 10^7 reflections do not reach it (ten seconds to a minute): an error of 1e-4
-        takes up to 10^8 particles, each with about as many reflections as the length has widths.
+        takes up to 10^8 particles, each with about as many reflections as the length has widths. Runs of specular
+        reflections count as one: a law with the fraction a of others has a times as many. The interval is in [0, 1].
 
     Raises
     ------
     InputError
-        If an argument is not as described, the tube has another planar law, a tube with these is longer than
-        2 x 10^5 radii or has a diffuse fraction between 0 and 0.01.
+        If an argument is not as described, the tube has another planar law, or a tube with these has a length times
+        diffuse fraction of more than 2 x 10^5 radii.
 
     Notes
     -----
@@ -144,7 +147,7 @@ def transmission(
     polynomials of its cosine, 8 to 64, it solves N such equations, coupled by the matrix of the law; the error is the
     largest change from N to 2 N polynomials, with a discount for earlier ones, plus that by the error of the matrix.
     Where it misses the tolerance, for laws near isometries, such as those of straight pieces, and in tubes, particles
-    are simulated from their first collision on; the fraction that has none is exact.
+    are simulated from their first reflection on that is not specular; the fraction that has none is exact.
 
     Source: P. Clausing, Ann. Phys. 404 (1932) 961.
 
@@ -170,44 +173,61 @@ def transmission(
     far = number_between("length", length, 0.0, LARGEST)
     choice("section", section, get_args(Section))
     wanted, source = positive_number("tolerance", tolerance), generator(rng)
+    given = law if isinstance(law, DirectionLaw) else in_paper_frame(law)
+    diffuse, rest = _without_specular(given)
+    if diffuse * far <= EPS:
+        return Estimate(1.0, diffuse * far, "bound", "no more particles are reflected otherwise than specularly")
+    found = _found(given, rest, diffuse, section, far, wanted, source)
+    ends = found.value - found.error, found.value + found.error
+    low, high = np.clip(ends, 0.0, 1.0).tolist()
+    return found if (low, high) == ends else replace(found, value=0.5 * (low + high), error=0.5 * (high - low))
+
+
+def _found(
+    law: Law | DirectionLaw, rest: Any, diffuse: float, section: Section, length: float, tolerance: float,
+    rng: np.random.Generator,
+) -> Estimate:  # fmt: skip
+    """The transmission of a law that with probability ``diffuse`` reflects by ``rest``, else specularly."""
+    enter, longest = ENTRIES[section], LONGEST * GEOMETRIES[section].width
     if isinstance(law, DirectionLaw):
-        enter = _entered_in_tube if section == "tube" else _entered_in_channel
-        return _by_flights(section, far, wanted, source, enter, lambda arriving: _leave(law, section, arriving, source))
-    paper, geometry = in_paper_frame(law), GEOMETRIES[section]
-    diffuse = _diffuse_fraction(paper)
-    if diffuse == 0.0:
-        return Estimate(1.0, 0.0, "bound", "specular reflection keeps the direction along the axis")
-    in_reach = far <= LONGEST * geometry.width
-    if diffuse is not None and diffuse >= LEAST_DIFFUSE and in_reach:
-        return _by_integral_equation(geometry, diffuse, far)
+        return _by_flights(
+            section, length, tolerance, rng, enter, partial(_leave, rest, section, diffuse, rng), diffuse
+        )
+    if rest == lambertian() and diffuse * length <= longest:
+        return _by_integral_equation(GEOMETRIES[section], diffuse, length)
     if section == "channel":
-        smooth = _by_polynomials(paper, far, wanted, source)
-        if smooth.error <= wanted:
+        smooth = _by_polynomials(law, length, tolerance, rng)
+        if smooth.error <= tolerance:
             return smooth
-        flown = _by_flights(
-            section, far, wanted, source, _entered_in_plane, lambda angle: _turn(paper, angle, source),
-            least=2.0 * smooth.error,
-        )  # fmt: skip
+        turn, least = partial(_turn, rest, diffuse, rng), 2.0 * smooth.error
+        flown = _by_flights(section, length, tolerance, rng, _entered_in_plane, turn, diffuse, least=least)
         return min(smooth, flown, key=lambda found: found.error)
-    if diffuse is None:
+    if rest != lambertian():
         raise InputError(
             "law: in a tube expected lambertian(), maxwell(a) or HemisphereLaw(law, orientation), because a planar law "
             f"does not tell the direction of its grooves, got {law!r}"
         )
     raise InputError(
-        f"length: in a tube expected at most {LONGEST * geometry.width:g} radii and a diffuse "
-        f"fraction of at least {LEAST_DIFFUSE:g}, got {far:g} and {diffuse:g}"
+        f"length: in a tube expected at most {longest:g} radii over the diffuse fraction, got {length:g}, {diffuse:g}"
     )
 
 
-def _diffuse_fraction(law: Law) -> float | None:
-    """The weight of diffuse reflection in a mixture of it with specular reflection; None for other laws."""
+def _without_specular(law: Law | DirectionLaw) -> tuple[float, Any]:
+    """The probability of reflections that are not known to be specular, and their law."""
+    if isinstance(law, DirectionLaw):
+        found = [(weight, *_without_specular(in_paper_frame(laws[0].law)), laws) for weight, laws in law.parts]
+        terms = [
+            (weight, laws) if len(laws) > 1 else (weight * part, (replace(laws[0], law=rest),))
+            for weight, part, rest, laws in found
+        ]
+        total = math.fsum(weight for weight, _ in terms)
+        return total, HemisphereCombination(tuple((weight / (total or 1.0), laws) for weight, laws in terms))
     words = words_of(law)
     if words is None:
-        return None
-    diffuse = sum(weight for word, weight in words.items() if word == (lambertian(),))
-    others = {word for word, weight in words.items() if weight} - {(lambertian(),), (specular(),)}
-    return None if others else float(diffuse)
+        return 1.0, law
+    rest = {word: weight for word, weight in words.items() if set(word) != {specular()} or len(word) % 2 == 0}
+    total = math.fsum(rest.values()) if len(rest) < len(words) else 1.0
+    return total, sum_of_words((weight / total, word) for word, weight in rest.items()) if rest else law
 
 
 # ---- the integral equation -----------------------------------------------------------------------------------------
@@ -287,10 +307,35 @@ class _Flights:
     resolved: float
 
 
+def _runs(diffuse: float) -> tuple[Floats, Floats]:
+    """Numbers of flights from one diffuse reflection to the next, and their probabilities, as a quadrature.
+
+    Sums over k = 2^j, ..., 2^(j+1) - 1 by the Gauss rule for these numbers, from the discrete Chebyshev polynomials.
+    """
+    from scipy.linalg import eigh_tridiagonal
+
+    if diffuse == 1.0:
+        return np.ones(1), np.ones(1)
+    number, weight = [], []
+    for size in 2.0 ** np.arange(math.log2(FLIGHTS / diffuse) + 1.0):
+        order = np.arange(1.0, min(size, RULE))
+        beside = order * np.sqrt((1.0 - (order / size) ** 2) / (16.0 * order**2 - 4.0))
+        node, vector = eigh_tridiagonal(np.full(order.size + 1, 0.5 - 0.5 / size), beside)
+        number.append(size * (1.0 + node))
+        weight.append(size * vector[0] ** 2)
+    flights = np.concatenate(number)
+    return flights, np.concatenate(weight) * diffuse * np.exp((flights - 1.0) * math.log1p(-diffuse))
+
+
+def _direct(geometry: _Geometry, diffuse: float, length: float) -> float:
+    """The fraction of the entering particles that pass without a diffuse reflection."""
+    terms, chance = _runs(diffuse)
+    return float(chance * diffuse * terms @ geometry.passing(length / terms))
+
+
 def _diffuse_flights(geometry: _Geometry, diffuse: float, length: float) -> _Flights:
     """Flights from one diffuse reflection to the next."""
-    terms = np.arange(1, math.ceil(TERMS / diffuse) + 1 if diffuse < 1.0 else 2)
-    chance = np.asarray(diffuse * (1.0 - diffuse) ** (terms - 1), dtype=np.float64)
+    terms, chance = _runs(diffuse)
 
     def averaged(function: Function, z: Floats, factor: Floats) -> Floats:
         return np.asarray(sum(one * function(z / k) for k, one in zip(terms, factor, strict=True)))
@@ -309,10 +354,9 @@ def _diffuse_flights(geometry: _Geometry, diffuse: float, length: float) -> _Fli
         distance = np.abs(z)
         return (spline(np.arcsinh(distance / geometry.width)) if terms.size > 1 else kernel(distance))[..., None]
 
-    direct = float(averaged(geometry.passing, np.array(length), diffuse * terms * chance))
     return _Flights(
         arriving, lambda z: np.ones((*z.shape, 1)), lambda z: averaged(geometry.beyond, z, chance)[..., None],
-        np.ones(1), 2.0 * diffuse, direct, geometry.width, geometry.width,
+        np.ones(1), 2.0 * diffuse, _direct(geometry, diffuse, length), geometry.width, geometry.width,
     )  # fmt: skip
 
 
@@ -401,23 +445,26 @@ def _by_flights(
     length: float,
     tolerance: float,
     rng: np.random.Generator,
-    enter: Callable[[float, np.random.Generator], tuple[Floats, Floats]],
+    enter: Callable[[int, float, float, np.random.Generator], tuple[Floats, Floats]],
     reflect: Reflections,
+    diffuse: float = 1.0,
     *,
     least: float = math.inf,
 ) -> Estimate:
-    """The fraction without collision, exactly, and of the others the fraction that leaves at the far end, by rays.
+    """The fraction without a diffuse reflection, exactly, and of the others the fraction that passes, by rays.
 
     Flights end early if by their spread they would not come below the error ``least`` at the limit of their work.
     """
-    direct = float(GEOMETRIES[section].passing(np.array(length)))
+    direct = _direct(GEOMETRIES[section], diffuse, length)
+    # a particle has diffuse * length reflections on average: some are enough that all leave within the limit
+    together = int(min(max(MOST_REFLECTIONS / (BATCHES * (1.0 + diffuse * length)), LEAST_TOGETHER), TOGETHER))
     through = particles = unresolved = work = 0
     value, error = math.nan, math.inf
     while error > tolerance and work < MOST_REFLECTIONS:
-        x, direction = enter(length, rng)
+        x, direction = enter(together, length, diffuse, rng)
         particles += x.size
         passed, left, done = _flown(length, x, direction, reflect)
-        through, unresolved, work = through + passed, unresolved + left, work + done + TOGETHER
+        through, unresolved, work = through + passed, unresolved + left, work + done + together
         count = max(particles, 1)
         fraction, half = through / count, 0.5 * unresolved / count
         spread = NORMAL_95 * math.sqrt(fraction * (1.0 - fraction) / count)
@@ -446,49 +493,73 @@ def _flown(length: float, x: Floats, direction: Floats, reflect: Reflections) ->
     return through, x.size, work
 
 
-def _entered_in_plane(length: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Where particles first meet a wall of the channel, and their angles to it."""
-    passing = GEOMETRIES["channel"].passing(np.array(length))
-    # the fraction that passes x without collision is uniform between its values at the ends
-    fraction = 1.0 - (1.0 - passing) * rng.random(TOGETHER)
-    x = 0.5 * (1.0 - fraction) * (1.0 + fraction) / fraction
+def _entered_in_plane(number: int, length: float, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Where particles are first reflected diffusely, of those that are, and their angles to the wall."""
+
+    def stopped(distance: Floats) -> Floats:
+        """The fraction that meets a wall within the distance."""
+        return np.asarray(2.0 * distance / (1.0 + distance + np.sqrt(1.0 + distance**2)))
+
+    # the fraction diffuse^2 k (1 - diffuse)^(k-1) stopped(length/k) is that of particles at k times the place of a
+    # first collision; k is drawn with the factor k or without it, whichever leaves less to reject
+    each = float(stopped(np.array(length)))
+    flights = rng.geometric(diffuse, number).astype(np.float64)
+    if diffuse * length >= each:
+        flights += rng.geometric(diffuse, number) - 1.0
+        chance = stopped(length / flights) / each
+    else:
+        chance = flights * stopped(length / flights) / length
+    flights = flights[rng.random(number) < chance]
+    # the fraction that is stopped before x is uniform between 0 and its value at the end
+    fraction = stopped(length / flights) * rng.random(flights.size)
+    x = 0.5 * fraction * (2.0 - fraction) / (1.0 - fraction)
     # at x the cosine of the angle is uniform above that of the ray from the opposite corner
-    return x, 2.0 * np.arcsin(np.sqrt(rng.random(TOGETHER) * GEOMETRIES["channel"].beyond(x)))
+    return flights * x, 2.0 * np.arcsin(np.sqrt(rng.random(x.size) * GEOMETRIES["channel"].beyond(x)))
 
 
-def _turn(law: Law, angle: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+def _turn(law: Law, diffuse: float, rng: np.random.Generator, angle: Floats) -> tuple[Floats, Floats]:
     outgoing = reflected(law, np.pi - angle, rng)
-    return 1.0 / np.tan(outgoing), outgoing
+    return rng.geometric(diffuse, outgoing.shape) / np.tan(outgoing), outgoing
 
 
 # Directions in space have components along the axis, across it in the wall, and along the normal into the interior.
-def _entered_in_channel(length: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Where particles first meet a wall, and their directions; those that meet none are left out."""
-    along, across, normal = _entering(rng)
-    x = along * rng.random(TOGETHER) / np.abs(normal)
+def _entered_in_channel(number: int, length: float, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Where particles are first reflected diffusely, and their directions; those that are not are left out."""
+    along, across, normal, flights = _entering(number, diffuse, rng)
+    x = flights * along * rng.random(number) / np.abs(normal)
     return x[x < length], np.stack((along, across, -np.abs(normal)), axis=1)[x < length]
 
 
-def _entered_in_tube(length: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    along, y, z = _entering(rng)
+def _entered_in_tube(number: int, length: float, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    along, y, z, flights = _entering(number, diffuse, rng)
     # from the point (radius, 0) of the opening along (y, z) to the point (1 in length) of the wall
-    radius, square = np.sqrt(rng.random(TOGETHER)), y * y + z * z
+    radius, square = np.sqrt(rng.random(number)), y * y + z * z
     time = (np.sqrt(square * (1.0 - radius) * (1.0 + radius) + (radius * y) ** 2) - radius * y) / square
-    x, at_y, at_z = along * time, radius + time * y, time * z
+    x, at_y, at_z = flights * along * time, radius + time * y, time * z
     direction = np.stack((along, at_y * z - at_z * y, -(at_y * y + at_z * z)), axis=1)
     return x[x < length], direction[x < length]
 
 
-def _entering(rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-    """Directions of the cosine law about the axis: the component along it, and two others."""
-    square, turn = rng.random(TOGETHER), 2.0 * np.pi * rng.random(TOGETHER)
-    return np.sqrt(1.0 - square), np.sqrt(square) * np.cos(turn), np.sqrt(square) * np.sin(turn)
+def _entering(number: int, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats, Floats, Floats]:
+    """Directions of the cosine law about the axis, the component along it and two others; then numbers of flights.
+
+    The place of the first diffuse reflection is k times that of the first collision, with the probability
+    diffuse^2 k (1 - diffuse)^(k-1): of flights of equal length s both are uniform between multiples of s.
+    """
+    square, turn = rng.random(number), 2.0 * np.pi * rng.random(number)
+    flights = rng.geometric(diffuse, (2, number)).sum(axis=0) - 1.0
+    return np.sqrt(1.0 - square), np.sqrt(square) * np.cos(turn), np.sqrt(square) * np.sin(turn), flights
 
 
-def _leave(law: DirectionLaw, section: Section, arriving: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+ENTRIES = {"channel": _entered_in_channel, "tube": _entered_in_tube}
+
+
+def _leave(
+    law: DirectionLaw, section: Section, diffuse: float, rng: np.random.Generator, arriving: Floats
+) -> tuple[Floats, Floats]:
     """Displacements along the axis after a reflection, and the directions in the frame of the next place."""
     outgoing = law.sample(arriving, rng)
     along, across, normal = outgoing.T
     # the chord of a circle meets it at both ends with the same components, but for the sign of the normal one
     time = 1.0 / normal if section == "channel" else 2.0 * normal / (across**2 + normal**2)
-    return along * time, outgoing * [1.0, 1.0, -1.0]
+    return rng.geometric(diffuse, time.size) * along * time, outgoing * [1.0, 1.0, -1.0]

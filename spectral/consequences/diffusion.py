@@ -15,6 +15,7 @@ from ...core.estimates import NORMAL_95, ErrorKind, Estimate, Summary
 from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...kernels import Law
+from ..bounds.contraction import refuse_unless_invariant
 from ..essential.edge import grazing_symbol
 from .channel import Arrangement, in_paper_frame, refuse_kept_sines, simulated_times
 
@@ -78,7 +79,8 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     r"""The slope D of L^2/tau(L) against ln(L/r) for the mean exit time tau of a long channel: see `Diffusivity`.
 
     It is the same number for all walls that turn grazing flights. For the diffusivity of a channel of given length use
-    `channel_diffusivity`. A `UserWarning` says so where D is the slope beyond a length of 1000 r only.
+    `channel_diffusivity`, which is L^2/(2 tau): far out it grows like half of D ln(L/r), because the factor 1/2 of
+    Fick's law is not in D. A `UserWarning` says so where D is the slope beyond a length of 1000 r only.
 
     Parameters
     ----------
@@ -101,7 +103,8 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     InputError
         If the law preserves the direction of grazing rays, like specular reflection: D is infinite. If every ray leaves
         at its own or at the mirrored angle, as at rectangular teeth: the length of all flights of a particle is then
-        the same, so that the particles do not share one diffusivity.
+        the same, so that the particles do not share one diffusivity. If the law does not preserve sin(theta) d theta:
+        its particles drift or have flights of another distribution, and L^2/tau has no slope.
     AccuracyError
         If the limit at grazing is not known well enough to bound D; ``defect`` is the error of zeta.
 
@@ -148,8 +151,8 @@ class ChannelDiffusivity(Summary):
     lengths : array, shape (n,)
         Increasing values of L, half of the distance between the ends.
     times, time_errors : array, shape (n,)
-        Mean exit times tau(L) of particles that start at x = 0 on a wall with the invariant distribution of angles,
-        and half widths of their 95 % intervals.
+        Mean exit times tau(L) of particles that start at x = 0 on a wall with angles as sin(theta)/2
+        d theta, and half widths of their 95 % intervals.
     onset : float
         As of `Diffusivity`: the logarithmic law holds for L well above it. ``inf`` also where `diffusivity` refuses the
         law.
@@ -190,7 +193,10 @@ def channel_diffusivity(
     speed: float = 1.0,
     arrangement: Arrangement = "mirror",
 ) -> ChannelDiffusivity:
-    """The diffusivity of channels of given lengths between two rough walls, from simulated mean exit times.
+    """The diffusivity L^2/(2 tau) of channels of given lengths between two rough walls, by simulated exit times tau.
+
+    Without the 1/2, L^2/tau grows like D ln(L/r) in long channels, with the slope D of `diffusivity`. Particles start
+    with the distribution sin(theta)/2 d theta, which the law need not preserve.
 
     Parameters
     ----------
@@ -247,6 +253,7 @@ def channel_diffusivity(
 def logarithmic_slope(law: Law, radius: float, speed: float, arrangement: Arrangement) -> Diffusivity:
     """`diffusivity` without a warning."""
     paper = in_paper_frame(law)
+    refuse_unless_invariant(paper, "L^2/tau has no slope in ln L; channel_diffusivity(law, lengths) simulates channels")
     scale = 4.0 * positive_number("radius", radius) * positive_number("speed", speed) / np.pi
     choice("arrangement", arrangement, get_args(Arrangement))
     symbol = grazing_symbol(paper)

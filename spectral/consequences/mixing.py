@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
-from ...core.checks import choice, number_between
-from ...core.errors import AccuracyError
+from ...core.checks import Floats, choice, number_between, shortened
+from ...core.errors import AccuracyError, InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
 from ...kernels import KernelMatrix, Law
-from ...kernels.laws.matrix_law import not_a_law
+from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..gap.gap import modulus_gap
 
 Distance = Literal["L2", "total variation", "chi-square"]
+Start = Literal["density", "worst"]
 
 # Number of eigenvalues computed for a matrix, and wanted error of the gap of a law.
 SOUGHT, TOLERANCE = 6, 1e-4
+# Limit on the squarings of a matrix: the numbers of steps beyond are no integers in float64.
+MOST_SQUARINGS = 53
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,19 +33,23 @@ class MixingTime(Summary):
     Attributes
     ----------
     steps : int
-        Sufficient number of steps for every initial density f with ||f - 1|| = ``initial``.
+        Sufficient number of steps for every initial density f with ||f - 1|| = ``initial``, or with ``start="worst"``
+        for every initial angle.
     earliest : int
-        For ``distance="L2"`` and ``"chi-square"`` fewer steps are not sufficient for the worst such density. It is 0
-        for ``"total variation"``, which has no such bound.
+        For ``distance="L2"`` and ``"chi-square"`` fewer steps are not sufficient for the worst such density, and with
+        ``start="worst"`` for the worst angle. It is 0 for ``"total variation"`` of densities, which has no such bound.
     relaxation_time : Estimate
         -1/ln(slem), in steps.
     slem : Estimate
         The largest modulus in the spectrum off the constants.
     distance : {"L2", "total variation", "chi-square"}
     initial : float
-        ||f - 1|| in L^2 of the invariant probability measure.
+        ||f - 1|| in L^2 of the invariant probability measure; inf for ``start="worst"``.
     kind : {"bound", "estimate"}
-        Kind of ``steps``, the same as for ``slem``, whose upper end is used.
+        Kind of ``steps``, the same as for ``slem``, whose upper end is used. From the worst start ``steps`` are those
+        of the transition probabilities as they are, to rounding.
+    start : {"density", "worst"}
+        Where the chain begins: in a density of this norm, or at the worst angle.
     """
 
     steps: int
@@ -51,7 +59,8 @@ class MixingTime(Summary):
     distance: Distance
     initial: float
     kind: ErrorKind
-    _show = "distance initial earliest relaxation_time slem kind"
+    start: Start = "density"
+    _show = "distance start initial earliest relaxation_time slem kind"
     _unit = "times in steps"
     _more = ".relaxation_time.method, .slem.method"
 
@@ -68,8 +77,12 @@ def mixing_time(
     distance: Distance = "total variation",
     *,
     initial: float = 1.0,
+    start: Start = "density",
 ) -> MixingTime:
-    r"""The number of steps until a distribution with a density in L^2 is close to the invariant distribution.
+    r"""The number of steps until a distribution is close to the invariant distribution.
+
+    By default the chain begins with a density at the distance ``initial`` from the invariant one, not at the worst
+    start: a particle at one angle has no density, and after a reflection one that may be far larger.
 
     Parameters
     ----------
@@ -82,6 +95,9 @@ def mixing_time(
     initial : float
         ||f - 1|| of the initial density f with respect to sin(theta)/2 d theta. A particle that starts at one angle has
         a density after the first reflection by a law that has one.
+    start : {"density", "worst"}
+        ``"worst"``: at the worst angle, as mixing times of finite chains are defined. For laws of finitely many states,
+        such as `MatrixLaw`, and for matrices on bins, of which it is the time of their own chain.
 
     Returns
     -------
@@ -90,9 +106,9 @@ def mixing_time(
     Raises
     ------
     AccuracyError
-        If the law has no gap, or its slem is not known to be less than 1.
+        If the law has no gap, or its slem is not known to be less than 1; if rounding hides the worst start.
     InputError
-        If an argument is not as described.
+        If an argument is not as described, or the worst start is asked for of another kernel.
 
     Notes
     -----
@@ -105,9 +121,15 @@ def mixing_time(
     >>> found = mixing_time(ker.maxwell(0.5), 0.01, "L2")
     >>> found.steps, found.earliest, round(float(found.relaxation_time), 4)
     (7, 7, 1.4427)
+
+    A chain of two states with the eigenvalue .8 has the distance .8^n/2 from either state:
+
+    >>> mixing_time(ker.MatrixLaw([[0.9, 0.1], [0.1, 0.9]]), 0.1, start="worst").steps
+    8
     """
     within = number_between("within", within, 0.0, np.inf)
     choice("distance", distance, get_args(Distance))
+    choice("start", start, get_args(Start))
     if not isinstance(kernel, Law | KernelMatrix | Spectrum):
         raise not_a_law("kernel", "a Law, a KernelMatrix or a Spectrum", kernel)
     size = number_between("initial", initial, 0.0, np.inf, closed="low")
@@ -119,10 +141,43 @@ def mixing_time(
         raise AccuracyError(
             f"the law is not known to have a gap: 1 - slem = {gap}, so no mixing time can be given", 1.0 - least
         )
+    if start == "worst":
+        steps = _from_worst(kernel, within, distance)
+        return MixingTime(steps, steps, relaxation_time(gap), slem, distance, math.inf, slem.kind, start)
     norm = {"L2": within, "total variation": 2.0 * within, "chi-square": float(np.sqrt(within))}[distance]
     target = norm / size if size else np.inf
     earliest = 0 if distance == "total variation" else _steps(most, target)
     return MixingTime(_steps(least, target), earliest, relaxation_time(gap), slem, distance, size, slem.kind)
+
+
+def _from_worst(kernel: Law | KernelMatrix | Spectrum, within: float, distance: Distance) -> int:
+    """The least number of steps, at least 1, from the worst state of a finite chain, by powers of its matrix."""
+    matrix = finite_matrix(kernel) if isinstance(kernel, Law) else kernel
+    is_chain = isinstance(matrix, KernelMatrix) and matrix.basis.is_partition
+    if not isinstance(matrix, KernelMatrix) or not is_chain or (isinstance(kernel, Law) and any(matrix.beyond or ())):
+        raise InputError(
+            f"start: expected 'density' of {shortened(kernel)}, no chain of finitely many states; for one of a "
+            "matrix on bins pass ker.discretise(law, ker.Bins(64))"
+        )
+    weights = np.asarray(matrix.weights)
+
+    def is_far(array: Floats) -> bool:
+        rest = np.abs(array / weights - 1.0)
+        norm = 0.5 * rest @ weights if distance == "total variation" else rest**2 @ weights
+        return bool(norm.max() > (within**2 if distance == "L2" else within))
+
+    powers = [np.asarray(matrix.array)]
+    while is_far(powers[-1]):
+        if len(powers) > MOST_SQUARINGS:
+            raise AccuracyError("start: rounding hides when the chain is so near its invariant distribution", within)
+        square = powers[-1] @ powers[-1]
+        powers.append(square / square.sum(axis=1, keepdims=True))
+    reached, steps = np.eye(len(weights)), 1
+    for exponent in reversed(range(len(powers) - 1)):
+        further = reached @ powers[exponent]
+        if is_far(further):
+            reached, steps = further, steps + 2**exponent
+    return steps
 
 
 def slem_from_gap(gap: Estimate) -> Estimate:

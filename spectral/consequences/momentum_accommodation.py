@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.estimates import FEW, NORMAL_95, ErrorKind, Estimate, Summary, with_error
 from ...core.long_runs import reported
 from ...core.rounding import EPS
-from ...kernels import SINE, Law, Panels, discretise
+from ...kernels import SINE, Law, Panels, PolygonLaw, WallLaw, discretise
 from ...kernels.bases.basis import Basis
 from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
 from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
@@ -34,8 +34,13 @@ PANELS, DEGREE = 4, 10
 PANELS_MISS = 1e-14
 # Angles at which coefficients are given by default: midpoints of so many cells of equal measure, none at a pole.
 DEFAULT_ANGLES = 32
-# A momentum this close to the accommodated one leaves nothing to divide by.
-POLE = 1e-9
+# A momentum this close to the accommodated one leaves nothing to divide by; near it errors are divided by little.
+POLE, NEAR_POLE = 1e-9, 0.1
+# What is said there of a coefficient that missed the tolerance.
+SINGULAR = (
+    " (its definition is singular at 0 degrees; maxwell_fraction_at is not)",
+    " (its definition is singular at 38.24 degrees; maxwell_fraction_at is not)",
+)
 # Draws at each angle, of laws whose conditional means have no error of their own.
 DRAWS = 2**12
 # Panels of the coarser rule of the misfit, the nodes on each, and breakpoints of the law that are edges too.
@@ -69,7 +74,8 @@ class Accommodation(Summary):
         Their errors, of the kind ``kind_at``.
     tangential_missed, normal_missed : array of bool, shape (n,)
         Where such an error is larger than the tolerance times the coefficient, or the coefficient is not defined: at
-        normal incidence the tangential one is nan, with an infinite error.
+        normal incidence the tangential one is nan, with an infinite error. Coefficients are quotients whose divisors
+        are 0 there and, of the normal one, at 38.24 degrees, where sin(theta) = pi/4: nearby errors are large.
     maxwell_fraction_at, maxwell_fraction_errors : array of shape (n,)
         The f in [0, 1] whose Maxwell law has the nearest mean reflected velocity at the angle, defined at normal
         incidence too, and its error.
@@ -102,12 +108,15 @@ class Accommodation(Summary):
         return {**super()._facts(), **(self.by_angle() if self.theta.size <= FEW else {})}
 
     def by_angle(self) -> dict[str, str]:
-        """The coefficients in words, by the angle from the normal."""
+        """The coefficients in words, by the angle from the normal, with a word where a pole enlarges the error."""
         found = {}
         tangential = zip(self.tangential_at, self.tangential_errors, strict=True)
         normal = zip(self.normal_at, self.normal_errors, strict=True)
-        for degrees, *pair in zip(self.incidence_deg, tangential, normal, strict=True):
+        missed = zip(self.tangential_missed, self.normal_missed, strict=True)
+        near = (np.abs(_complete(self.theta)) < NEAR_POLE) & (np.abs(_complete(self.theta)) >= POLE)
+        for degrees, *pair, bad, close in zip(self.incidence_deg, tangential, normal, missed, near, strict=True):
             words = ["not defined" if np.isnan(one[0]) else with_error(*map(float, one)) for one in pair]
+            words = [text + why * bool(k and m) for text, why, k, m in zip(words, SINGULAR, bad, close, strict=True)]
             found[f"at {degrees:.6g} degrees"] = f"tangential {words[0]}, normal {words[1]}"
         return found
 
@@ -290,6 +299,9 @@ def _parts(law: Law, tolerance: float, rng: np.random.Generator) -> list[tuple[f
         return [(outer * weight, part) for outer, parts in terms for weight, part in parts]
     slopes = slopes_of(law)
     slopes = slopes if slopes is not None and slopes.steepest > 0.0 else None
+    if slopes is not None and isinstance(law, PolygonLaw):
+        # grazing rays are traced at once, one by one their isometries are listed
+        law = WallLaw(law.wall)
     words = None if slopes or not (has_chain(law) or law.frame == "specular") else words_of(law)
     found = {law: 1.0} if words is None else {law_of(word): weight for word, weight in words.items()}
     return [(weight, _Changes(one, slopes, tolerance, rng)) for one, weight in found.items()]

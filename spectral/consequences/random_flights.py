@@ -25,7 +25,7 @@ GROUPS = 32
 
 @dataclass(frozen=True, repr=False)
 class ChannelPaths(Summary):
-    """Positions along a channel of particles that start at 0 on a wall, with the invariant distribution of angles.
+    """Positions along a channel of particles that start at 0 on a wall, with angles as sin(theta)/2 d theta.
 
     Attributes
     ----------
@@ -69,12 +69,12 @@ class ChannelPaths(Summary):
     def limit_variance(self) -> Estimate:
         r"""The variance of the limit of X_t/(t ln t)^(1/2) in a straight channel.
 
-        It is half of `diffusivity`, although E[X_t^2] grows like D t ln t: half of this comes from few flights that are
-        longer than t^(1/2). The slope of -2 ln E[cos(l X_t)]/(l^2 t) in ln t with l = c t^(-1/2), a weighted least
-        squares line through all times. The error is a half width of 95 % from leaving out each of 32 groups of
-        particles, plus the amount by which the slope of the later half of the times differs beyond its sampling error,
-        plus the change of the slope by an unknown term of relative size (speed t/radius)^(-1/2), which flights cause
-        that are under way at t.
+        The law must preserve sin(theta) d theta. It is half of `diffusivity`, although E[X_t^2] grows like D t ln t:
+        half of this comes from few flights that are longer than t^(1/2). The slope of -2 ln E[cos(l X_t)]/(l^2 t) in ln
+        t with l = c t^(-1/2), a weighted least squares line through all times. The error is a half width of 95 % from
+        leaving out each of 32 groups of particles, plus the amount by which the slope of the later half of the times
+        differs beyond its sampling error, plus the change of the slope by an unknown term of relative size (speed
+        t/radius)^(-1/2), which flights cause that are under way at t.
 
         Raises
         ------

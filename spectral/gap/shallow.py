@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.checks import Floats
-from ...kernels import CircularArcLaw, Law, WallLaw
+from ...kernels import CircularArcLaw, Law, PolygonLaw, WallLaw
 from ...kernels.bases.measure import gauss_on_intervals, gauss_rule
 from ...kernels.laws.law import Combination, IsometryLaw, SpecularFrame
 from ..essential.edge import EssentialEdge
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from ...geometry import Wall
     from ...geometry.curves.curve import Curve
 
-# Largest slope, in radians, and limit on the pieces.
-STEEPEST, MOST_PIECES = 0.1, 64
+# Largest slope, in radians, and limit on the curved pieces.
+STEEPEST, MOST_CURVED = 0.1, 64
 # A ray steeper than ONCE times the steepest slope s meets the wall once, because it leaves steeper than s. Less steep
 # rays leave within WITHIN times s of grazing.
 ONCE, WITHIN = 3.0, 5.0
@@ -256,14 +256,14 @@ def slopes_of(law: Law) -> Slopes | None:
         from ...geometry import focusing_arcs
 
         return _slopes_of_wall(focusing_arcs(law.half_angle))
-    return _slopes_of_wall(law.wall) if isinstance(law, WallLaw) else None
+    return _slopes_of_wall(law.wall) if isinstance(law, (WallLaw, PolygonLaw)) else None
 
 
 def _slopes_of_wall(wall: Wall) -> Slopes | None:
     """The slopes of a wall, or None unless it is a graph with small slopes."""
     from ...geometry import Segment
 
-    if not wall.closes or len(wall.pieces) > MOST_PIECES:
+    if not wall.closes or sum(not isinstance(piece, Segment) for piece in wall.pieces) > MOST_CURVED:
         return None
     angles, weights, turns = [], [], [np.inf]
     for piece in wall.cell.pieces:

@@ -99,7 +99,11 @@ REFUSED = {
         (density(lambda a, b: np.ones(5)), "vectorised"),
         (density(lambda a, b: np.full(np.broadcast_shapes(a.shape, b.shape), math.nan)), "finite"),
         (density(3.0), "function of"),  # type: ignore[arg-type]
-        (lambda: ker.DensityLaw(lambda a, b: 1.0 / math.pi).adjoint(), "does not preserve sin"),
+        (lambda: ker.DensityLaw(lambda a, b: 1.0 / math.pi).adjoint(), "one that preserves sin"),
+        *((lambda law=law, pair=pair: law.density(*pair), f"^{name}: expected angles in the open interval")
+          for law in (HG(0.5), DIFFUSE, ker.MatrixLaw([[1.0]]), ker.DensityLaw(lambda a, b: 0.5 * np.sin(b)))
+          for name, pair in (("theta_out", (1.0, -1.0)), ("theta", (4.0, 1.0)), ("theta_out", (1.0, [1.0, math.pi])))),
+        (lambda: ker.SINE.density([1.0, -1.0]), "^angle: expected angles in the open interval"),
         (lambda: ker.InvolutionLaw(lambda t: np.arccos(np.cos(t) / 2.0)), "expected an involution"),
         # a rotation of u preserves the measure and is no involution (ledger S1.08)
         (lambda: ker.InvolutionLaw(lambda t: np.arccos(1.0 - np.mod(0.6 - np.cos(t), 2.0))), "expected an involution"),
@@ -453,7 +457,7 @@ REFUSED = {
             ({"tolerance": 0.0}, "tolerance: expected a number greater than 0"),
             ({"section": "tube", "law": ARC}, "law: in a tube expected lambertian"),
             ({"section": "tube", "length": 2.1e5}, r"length: in a tube expected at most 200000 radii"),
-            ({"section": "tube", "law": ker.maxwell(0.001)}, "diffuse fraction of at least 0.01"),
+            ({"section": "tube", "law": ker.maxwell(0.5), "length": 5e5}, "over the diffuse fraction, got 500000, 0.5"),
             ({"law": 2.0 * DIFFUSE}, "weights"),
             ({"law": 0.5 * ker.HemisphereLaw(ARC), "section": "tube"}, "weights"),
             ({"law": ker.CollisionLaw(ARC, DISK)}, "law: expected a Law"),

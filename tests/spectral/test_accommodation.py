@@ -231,3 +231,30 @@ def test_angles_at_which_the_tolerance_is_missed_are_named():
     # the mean over so few rays has an error all the same, and it holds
     assert 0.0 < found.tangential_errors[0] < 0.2 * found.tangential_at[0]
     assert not spec.accommodation(ker.specular(), theta=[0.5]).tangential_missed.any()
+
+
+@pytest.mark.parametrize("kind", [ker.WallLaw, ker.PolygonLaw])
+def test_measured_profiles_of_small_heights_have_errors_relative_to_the_coefficients(kind):
+    """Of 4 heights or 200, of size 1e-6: as many pieces as they have."""
+    rng = np.random.default_rng(0)
+    for number in (5, 201):
+        heights = 1e-6 * rng.uniform(-1.0, 0.0, number) / number
+        heights[[0, -1]] = 0.0
+        wall = geo.Wall.from_profile(np.linspace(0.0, 1.0, number), heights)
+        found = spec.accommodation(kind(wall), theta=[0.6, 1.2, 2.0])
+        vertices = np.array([*(piece.start for piece in wall.cell.pieces), wall.cell.pieces[-1].end]) / wall.period
+        exact = np.array([exact_coefficients(vertices, angle) for angle in found.theta])
+        assert np.all(np.abs(found.tangential_at - exact[:, 0]) <= found.tangential_errors + 1e-12 * exact[:, 0])
+        assert np.all(np.abs(found.normal_at - exact[:, 1]) <= found.normal_errors + 1e-12 * np.abs(exact[:, 1]))
+        for one in (found.tangential, found.normal, found.maxwell_fraction):
+            assert 0.0 < one.error < 1e-6 * one.value
+        assert not found.tangential_missed.any() and found.misfit.error < 0.2 * found.misfit.value
+
+
+def test_a_coefficient_that_misses_its_tolerance_beside_a_pole_says_so():
+    law = ker.WallLaw(geo.dispersing_arcs(1.0))
+    words = spec.accommodation(law @ law, 1e-4, incidence_deg=[3.0, 20.0, 40.0]).by_angle()
+    assert "tangential" in words["at 3 degrees"].split(" (its definition is singular at 0 degrees")[0]
+    assert words["at 40 degrees"].endswith("(its definition is singular at 38.24 degrees; maxwell_fraction_at is not)")
+    assert "singular" not in words["at 20 degrees"]
+    assert "singular" not in str(spec.accommodation(ker.maxwell(0.25), incidence_deg=[0.0, 3.0, 40.0]).by_angle())

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import AccuracyError
+from asperity.errors import AccuracyError, InputError
 
 # ---- parities ---------------------------------------------------------------------------------------------------
 
@@ -35,6 +35,46 @@ def test_mixing_times_bound_the_distance_that_powers_of_the_matrix_have():
         after = np.linalg.matrix_power(matrix.array, found.steps) @ density
         assert measure(after) <= 0.05
         assert found.earliest <= found.steps
+
+
+@pytest.mark.parametrize("distance", ["total variation", "L2", "chi-square"])
+def test_mixing_times_from_the_worst_start_are_those_of_powers_one_by_one(distance):
+    rng = np.random.default_rng(0)
+    flux = rng.random((7, 7)) ** 6 + 3.0 * np.eye(7)
+    for kernel in (ker.discretise(ker.henyey_greenstein(0.8), ker.Bins(24)), ker.MatrixLaw(doubly(flux))):
+        chain = np.asarray(kernel.array)
+        weights = np.asarray(getattr(kernel, "weights", np.full(len(chain), 1.0 / len(chain))))
+
+        def far(power, weights=weights):
+            rest = np.abs(power / weights - 1.0)
+            return {"L2": np.sqrt(rest**2 @ weights), "total variation": 0.5 * rest @ weights,
+                    "chi-square": rest**2 @ weights}[distance].max()  # fmt: skip
+
+        for within in (0.5, 0.25, 0.01):
+            found = spec.mixing_time(kernel, within, distance, start="worst")
+            power, steps = chain, 1
+            while far(power) > within:
+                power, steps = power @ chain, steps + 1
+            assert found.steps == found.earliest == steps and found.start == "worst"
+            # a density at distance 1 is nearer than an angle
+            assert spec.mixing_time(kernel, within, distance).steps <= steps + 1
+
+
+def doubly(flux):
+    """A symmetric array with rows of sum 1."""
+    array = flux + flux.T
+    for _ in range(500):
+        root = np.sqrt(array.sum(axis=1))
+        array = array / root / root[:, None]
+    return array
+
+
+def test_the_worst_start_needs_finitely_many_states():
+    for kernel in (ker.maxwell(0.5), ker.henyey_greenstein(0.5), spec.spectrum(ker.maxwell(0.5), 2)):
+        with pytest.raises(InputError, match=r"start: expected 'density'.*pass ker.discretise\(law, ker.Bins\(64\)\)"):
+            spec.mixing_time(kernel, start="worst")
+    assert spec.mixing_time(ker.lambertian(), start="worst").steps == 1
+    assert spec.mixing_time(ker.discretise(ker.maxwell(0.5), ker.Bins(64)), start="worst").steps >= 2
 
 
 def test_the_eigenfunctions_that_are_drawn_are_the_legendre_polynomials():

@@ -156,6 +156,10 @@ class Estimate(Summary):
     def __float__(self) -> float:
         return float(self.value)
 
+    def _facts(self) -> Mapping[str, object]:
+        # the method says why nothing is known
+        return {**super()._facts(), **({"method": self.method} if math.isinf(self.error) else {})}
+
     def __str__(self) -> str:
         return with_error(self.value, self.error)
 
