@@ -89,12 +89,22 @@ def check_open_wall(pieces: Pieces, islands: Sequence[Pieces], period: float, si
 
 
 def check_crossings(
-    pieces: Pieces, islands: Sequence[Pieces], period: float, depth: float, origin: Point, numbers: Sequence[int]
+    paths: Sequence[Pieces],
+    given: Sequence[Pieces],
+    period: float,
+    depth: float,
+    origin: Point,
+    numbers: Sequence[int],
 ) -> None:
-    """Raise a WallError if pieces cross; touching is allowed. ``numbers`` and ``origin`` are for the message."""
-    found = find_crossing(pieces, period, depth, islands, numbers)
+    """Raise a WallError if pieces of a path and its islands cross; touching is allowed.
+
+    The same paths as ``given``, with ``numbers`` of the pieces, and ``origin`` are for the message: a part of a curve
+    may be too short to tell a cusp from a slit.
+    """
+    found = find_crossing(paths[0], period, depth, paths[1:], range(len(paths[0])))
     if found is None:
         return
+    found = find_crossing(given[0], period, depth, given[1:], numbers) or found
     x, y = (found.point[0] + origin[0]) % period, found.point[1] + origin[1]
     point = f"({x:.6g}, {y:.6g})"
     if found.is_slit:
