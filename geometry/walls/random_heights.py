@@ -152,8 +152,8 @@ def random_wall(
     points : int
         Number of heights, at equal distances.
     rms_slope, rms_height : float, optional
-        The root mean squared slope of the wall as it is made, or its height about the mean, of which one is given: the
-        squares are expected values over all random walls, a single wall deviates. With a callable both may be left
+        The root mean squared slope of the wall as it is made, or its height about the mean, between its vertices too,
+        of which one is given: the squares are expected values over all random walls, a single wall deviates. With a callable both may be left
         out; its powers are then taken as they are.
     period : float
     smooth : bool
@@ -191,13 +191,15 @@ def random_wall(
     # a frequency and its negative; the highest one of an even number of points has no other
     modes = np.append(np.full((number - 1) // 2 + 1, 2.0), np.ones(1 - number % 2))
     squares = modes * powers / width
+    step = width / number
     if rms_slope is not None and rms_height is None:
-        transfer = _smooth_slopes(wave, width / number, number) if smooth else _chord(wave, width / number) ** 2
+        transfer = _smooth_slopes(wave, step, number) if smooth else _chord(wave, step) ** 2
         slope = number_between("rms_slope", rms_slope, 0.0, LARGEST_COORDINATE)
         powers = powers * slope**2 / _positive_sum(squares * transfer)
     elif rms_height is not None and rms_slope is None:
         height = number_between("rms_height", rms_height, 0.0, LARGEST_COORDINATE)
-        powers = powers * height**2 / _positive_sum(squares)
+        transfer = _smooth_squares(wave, step, number) if smooth else (2.0 + np.cos(wave * step)) / 3.0
+        powers = powers * height**2 / _positive_sum(squares * transfer)
     elif rms_slope is not None or not callable(spectrum):
         raise InputError(
             f"rms_slope: expected one of rms_slope and rms_height, got rms_slope={rms_slope}, rms_height={rms_height}"
@@ -238,11 +240,22 @@ def _chord(wave: Floats, step: float) -> Floats:
 
 def _smooth_slopes(wave: Floats, step: float, points: int) -> Floats:
     """Mean squared slope of the cubics through a wave of unit modulus: of each, a quadratic form of its ends."""
-    chord = _chord(wave, step)
-    # the interpolating polynomial has no slope from the highest frequency of an even number of points
-    slope = np.where(2.0 * np.arange(len(wave)) == points, 0.0, wave)
+    chord, slope = _chord(wave, step), _slopes(wave, points)
     mixed = chord * slope * np.cos(0.5 * wave * step)
     return np.asarray(1.2 * chord**2 - 0.4 * mixed + slope**2 * (4.0 - np.cos(wave * step)) / 15.0)
+
+
+def _smooth_squares(wave: Floats, step: float, points: int) -> Floats:
+    """Mean squared height of the cubics through a wave of unit modulus: of each, a quadratic form of its ends."""
+    rise, turn = step * _slopes(wave, points), wave * step
+    return np.asarray(
+        (312.0 + 108.0 * np.cos(turn) + rise * (52.0 * np.sin(turn) + rise * (8.0 - 6.0 * np.cos(turn)))) / 420.0
+    )
+
+
+def _slopes(wave: Floats, points: int) -> Floats:
+    """Slopes of the interpolating polynomial at its points, none from the highest frequency of an even number."""
+    return np.where(2.0 * np.arange(len(wave)) == points, 0.0, wave)
 
 
 def _synthesised(powers: Floats, points: int, period: float, rng: np.random.Generator) -> Floats:
