@@ -24,6 +24,8 @@ ADVICE = re.compile(r"\b(pass|use|take|give|call|write|for example|such as)\b", 
 X, H = np.linspace(0.0, 1.0, 5), np.array([0.0, 0.2, 0.1, 0.3, 0.0])
 DISK, LAW, WALL, P = geo.Disk(), ker.lambertian(), geo.koch(1), ker.discretise(ker.lambertian(), ker.Bins(4))
 SPECULAR, Z = LAW.in_specular_frame(), sp.Symbol("z")
+CUSP = geo.Bezier([(-1, 0), (1, 1), (-1, 1), (1, 0)])
+ROOF = (geo.Segment((1, 0), (0, 3)), geo.Segment((0, 3), (-1, 0)))
 
 # A part of the message, the call that it refuses, and the one that it advises.
 REMEDIES = {
@@ -67,6 +69,10 @@ REMEDIES = {
     "pass ker.CollisionLaw(law, disk), or ker.smooth(disk) and ker.no_slip(disk)": (
         lambda: ker.play(geo.Container.circle(), LAW, [0.0, 0.0], [0.1, 1.0, 0.2], 3),
         lambda: [ker.CollisionLaw(LAW, DISK), ker.smooth(DISK), ker.no_slip(DISK)],
+    ),
+    "pass both parts of curve.split(": (
+        lambda: geo.Container.from_curves([CUSP, *ROOF]),
+        lambda: geo.Container.from_curves([*CUSP.split(0.5), *ROOF]),
     ),
     "use P.tensor(Q)": (lambda: ker.discretise(LAW, ker.TensorBasis((ker.Bins(2), ker.Bins(2)))), lambda: P.tensor(P)),
     "use kind='pseudometric'": (

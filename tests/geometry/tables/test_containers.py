@@ -31,6 +31,15 @@ TABLES = {
     "raised": geo.Container.from_curves(
         [geo.Bezier([(-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1)]), geo.Bezier([(1, 1), (0.3, 1), (-1, 1)])]
     ),
+    # handles retracted at one end, at both, so that the piece is straight, and a cusp at which a curve was split
+    "handles": geo.Container.from_curves([
+        geo.Bezier([(-1, 0), (-1, 0), (0.4, -0.9), (1, 0)]), geo.Bezier([(1, 0), (1, 0), (1, 1), (1, 1)]),
+        geo.Bezier([(1, 1), (0.2, 1.8), (0, 1), (0, 1)]), geo.Bezier([(0, 1), (-0.5, 1.4), (-1, 0), (-1, 0)]),
+    ]),
+    "cusp": geo.Container.from_curves([
+        *geo.Bezier([(-1, 0), (1, 1), (-1, 1), (1, 0)]).split(0.5),
+        geo.Segment((1, 0), (0, 3)), geo.Segment((0, 3), (-1, 0)),
+    ]),
 }  # fmt: skip
 
 
