@@ -38,25 +38,21 @@ def merged(path: tuple[Curve, ...], is_loop: bool = False) -> tuple[Curve, ...]:
     >>> merged((Segment((0, 0), (1, -1)), Segment((1, -1), (3, -3)), Segment((3, -3), (4, 0))))
     (Segment(start=(0.0, 0.0), end=(3.0, -3.0)), Segment(start=(3.0, -3.0), end=(4.0, 0.0)))
     """
-    points, before, straight = (
-        point_array([*(p.start for p in path), path[-1].end]),
-        np.arange(-1, len(path) - 1),
-        straight_in(path),
-    )
-    starts, ends, size = points[:-1], points[1:], np.abs(points).max(axis=0)
+    straight, before = straight_in(path), np.arange(-1, len(path) - 1)
+    starts, ends = (point_array(getattr(piece, name) for piece in path) for name in ("start", "end"))
+    size = np.maximum(np.abs(starts).max(axis=0), np.abs(ends[-1]))
     level = straight & (starts[before, 1] == 0.0) & (ends[:, 1] == 0.0)
     able = (straight == straight[before]) & (level | (starts[:, 1] != 0.0))
     able[0] &= is_loop
     able &= ~straight | _between(starts[before], starts, ends, size)
     for k in np.flatnonzero(able & ~straight).tolist():
-        able[k] = _whole((path[k - 1], path[k]), size) is not None
+        able[k] = bool(_whole((path[k - 1], path[k]), size))
     if not able.any():
         return path
     first = int(np.argmin(able))
     path, firsts = path[first:] + path[:first], np.flatnonzero(~np.roll(able, -first)).tolist() or [0]
     groups = [path[low:high] for low, high in pairwise([*firsts, len(path)])]
-    wholes = [_whole(group, size) for group in groups]
-    return tuple(piece for group, whole in zip(groups, wholes, strict=True) for piece in (whole and [whole]) or group)
+    return tuple(piece for group in groups for piece in _whole(group, size) or group)
 
 
 def _between(start: Floats, points: Floats, end: Floats, size: Floats) -> NDArray[np.bool_]:
@@ -67,20 +63,19 @@ def _between(start: Floats, points: Floats, end: Floats, size: Floats) -> NDArra
     return np.asarray(near & (along > 0.0) & (along < np.sum(whole**2, axis=1)))
 
 
-def _whole(parts: tuple[Curve, ...], size: Floats) -> Curve | None:
-    """Return the curve whose consecutive parts are the given pieces of one kind; None if there is none."""
+def _whole(parts: tuple[Curve, ...], size: Floats) -> list[Curve]:
+    """Return the curve whose consecutive parts are the given pieces of one kind; an empty list if there is none."""
     start, end = parts[0].start, parts[-1].end
     if isinstance(parts[0], Segment):
         joints = point_array(piece.start for piece in parts[1:])
-        return Segment(start, end) if _between(np.array([start]), joints, np.array([end]), size).all() else None
+        return [Segment(start, end)] if _between(np.array([start]), joints, np.array([end]), size).all() else []
     if end < start:
         # in one direction of the two, so that coincident faces stay coincident
-        whole = _whole(tuple(part.reversed() for part in reversed(parts)), size)
-        return whole and whole.reversed()
-    whole = parts[0]
+        return [p.reversed() for p in _whole(tuple(part.reversed() for part in reversed(parts)), size)]
+    whole: Curve | None = parts[0]
     for part in parts[1:]:
         whole = whole and joined(whole, part, SAME_PIECE * float(size.max()))
-    return whole
+    return [whole] if whole else []
 
 
 def joined(before: Curve, after: Curve, tolerance: float) -> Curve | None:

@@ -87,10 +87,9 @@ class Wall(Cell):
         self._fill(path, width, loops, unit)
         if loops:
             check_open_wall(path, loops, width, size)
-        cell, top = self.cell, self._highest
+        top = self._highest
         given, numbers = (path, range(len(path))) if top is None else (top.pieces, top.numbers)
-        paths = (cell.pieces, *cell.islands), (given, *loops)
-        check_crossings(*paths, width, cell.depth, self.origin, numbers)
+        check_crossings(self.cell, (given, *loops), self.origin, numbers)
         if not self.closes:
             check_open_wall(path, loops, width, size)
 
