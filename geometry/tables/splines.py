@@ -24,6 +24,8 @@ ROOT_STEPS = 220
 HALVINGS = 56
 # First guesses of a projection onto the curve, and Newton steps from the nearest.
 GUESSES, NEWTON_STEPS = 129, 8
+# Local minima of the distance from a point along a cubic.
+MOST_NEAREST = 3
 # Steps where B' = 0 at an end, to which each step takes a third of the parameter.
 STILL_STEPS = 48
 # Panels and nodes of Gauss quadrature of the speed.
@@ -145,15 +147,21 @@ def parameter_of(curve: Bezier, position: Floats) -> Floats:
     low, high = _ends(curve)
     guesses = np.linspace(0.0, 1.0, GUESSES)
     guesses = guesses[(guesses >= low) & (guesses <= high)]
-    grid = _values(a, guesses)[0]
-    s = guesses[np.argmin(np.hypot(*np.moveaxis(position[:, np.newaxis] - grid, -1, 0)), axis=1)]
+    away = np.hypot(*np.moveaxis(position[:, np.newaxis] - _values(a, guesses)[0], -1, 0))
+    # the nearest guess may lie on another branch of a fold than the nearest point
+    beside = np.pad(away, ((0, 0), (1, 1)), constant_values=np.inf)
+    away = np.where(away <= np.minimum(beside[:, :-2], beside[:, 2:]), away, np.inf)
+    chosen = np.argsort(away, axis=1)[:, :MOST_NEAREST]
+    s, position = guesses[chosen], position[:, np.newaxis]
     for _ in range(NEWTON_STEPS if len(guesses) == GUESSES else STILL_STEPS):
         point, first, second = _values(a, s)
         off = point - position
-        slope = np.sum(first * first + off * second, axis=1)
-        slope = np.where(slope > 0.0, slope, np.sum(first * first, axis=1))
-        s = np.clip(s - np.sum(off * first, axis=1) / slope, low, high)
-    return np.asarray(s)
+        slope = np.sum(first * first + off * second, axis=-1)
+        slope = np.where(slope > 0.0, slope, np.sum(first * first, axis=-1))
+        s = np.clip(s - np.sum(off * first, axis=-1) / slope, low, high)
+    reached = np.hypot(*np.moveaxis(_values(a, s)[0] - position, -1, 0))
+    reached[np.isinf(np.take_along_axis(away, chosen, axis=1))] = np.inf
+    return np.take_along_axis(s, np.argmin(reached, axis=1)[:, np.newaxis], axis=1)[:, 0]
 
 
 def touch(curve: Bezier, position: Floats) -> tuple[Floats, Floats, Floats]:
