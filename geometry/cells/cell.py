@@ -13,6 +13,7 @@ from ...core.estimates import Estimate
 from ..curves.curve import Curve, Point, point_array
 from ..curves.segment import Segment
 from .hollow import Hollow, flat_tops, hollows_between
+from .merging import merged
 from .origin import HighestPoint, highest_point_of
 from .regularity import largest_curvature_of, singular_points_of
 
@@ -127,9 +128,10 @@ class Cell:
 
     @cached_property
     def cell(self) -> Self:
-        """The same wall moved so that a highest point is the origin; the wall itself if it does not close.
+        """The wall of all computations: moved so that a highest point is the origin if it closes, and of fewest pieces.
 
-        If the ends of the given period cut a curve in two, ``cell`` joins the parts to one piece.
+        Consecutive parts of one straight side, arc or Bezier curve are joined to one piece if their joints are on it to
+        rounding, also at the ends of the period. Otherwise it is the wall itself.
 
         Examples
         --------
@@ -137,10 +139,13 @@ class Cell:
         >>> geo.Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).cell.vertices.tolist()
         [[0.0, 0.0], [0.5, -1.0], [1.0, 0.0]]
         """
-        if self._highest is None or self._highest.pieces is self.pieces:
+        pieces = merged(self.pieces if self._highest is None else self._highest.pieces)
+        islands = tuple(merged(loop, is_loop=True) for loop in self.islands)
+        if pieces is self.pieces and all(one is loop for one, loop in zip(islands, self.islands, strict=True)):
             return self
         cell = object.__new__(type(self))
-        cell._fill(self._highest.pieces, self.period, (), self.unit)
+        cell._fill(pieces, self.period, islands, self.unit)
+        vars(cell)["cell"] = cell
         return cell
 
     @property

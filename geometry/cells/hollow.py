@@ -21,7 +21,7 @@ class Hollow:
         The opening is left < x < right at the level of the wall's highest points.
     first, last : int
         ``wall.cell.pieces[first:last]`` is the boundary of the hollow from its left end to its right end. A wall that
-        begins at (0, 0) is its own ``cell``.
+        begins at (0, 0), and no side or curve of which is cut in parts, is its own ``cell``.
     """
 
     left: float

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, instance, whole_number
+from ...core.checks import Floats, finite_array, finite_number, frozen, instance, shortened, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Summary
 from ..curves.curve import LARGEST_COORDINATE
@@ -137,8 +137,8 @@ def heights_of(name: str, value: ArrayLike) -> Floats:
         if given.dtype.kind in "cSUmMV":
             raise TypeError("of another kind")
         array = np.ma.filled(given.astype(np.float64), np.nan)
-    except (TypeError, ValueError, OverflowError) as reason:
-        raise InputError(f"{name}: expected numbers, got {value!r}") from reason
+    except Exception as reason:  # foreign objects fail in their own way
+        raise InputError(f"{name}: expected numbers, got {shortened(value)}") from reason
     return np.where(np.isfinite(array), array, np.nan)
 
 

@@ -13,7 +13,7 @@ from ..curves.arc import Arc
 from ..curves.curve import Curve
 from ..curves.segment import Segment
 from .cell import Cell
-from .origin import joined
+from .hollow import flat_tops
 
 # Distance up to which points of mirror images agree, relative to the wall's size. A mirrored point rounds once, but
 # the two halves of a wall may have been computed by formulas of about fifty operations.
@@ -40,7 +40,7 @@ def has_mirror_axis(wall: Cell) -> bool:
             any(_agree(loop[k:] + loop[:k], other, tolerance) for other in images for k in range(len(loop)))
             for loop in islands
         )
-    own = _steps(_closed_up(wall.pieces, tolerance))
+    own = _steps(_closed_up(wall))
     other = _mirrored(own)
     starts = np.flatnonzero(np.abs(own - other[0]).max(axis=(1, 2)) <= tolerance)
     if len(starts) > MANY_STARTS:
@@ -61,13 +61,12 @@ def _may_agree(own: Floats, other: Floats, tolerance: float) -> NDArray[np.bool_
     return np.asarray(squares - 2.0 * correlation <= 2.0 * len(own) * tolerance**2 + CORRELATION_ULPS * EPS * squares)
 
 
-def _closed_up(pieces: Sequence[Curve], tolerance: float) -> Sequence[Curve]:
-    """Return the pieces as a cycle; the last and the first are joined if they are parts of one curve."""
-    if len(pieces) < 2:
+def _closed_up(wall: Cell) -> Sequence[Curve]:
+    """Return the pieces of a wall as a cycle; a flat top that the ends of the period cut is joined."""
+    pieces, last = wall.pieces, len(wall.pieces) - 1
+    if last < 1 or not {0, last} <= set(flat_tops(pieces, wall.vertices)):
         return pieces
-    last, first = pieces[-1], pieces[0].moved(pieces[-1].end[0], 0.0)
-    whole = joined(last, first, tolerance)
-    return pieces if whole is None else (whole, *pieces[1:-1])
+    return (Segment(pieces[-1].start, (wall.period + pieces[0].end[0], 0.0)), *pieces[1:-1])
 
 
 def _with_bottom_starts(islands: Sequence[Sequence[Curve]]) -> list[tuple[Curve, ...]]:

@@ -6,25 +6,15 @@ the cell that begins there, for any given start of the period and any height of 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.rounding import EPS
-from ..curves.arc import Arc
-from ..curves.bezier import Bezier
 from ..curves.crossings import directions_of
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
-
-# Two pieces are parts of one curve if it passes within this distance, relative to the wall's size, of their joint and
-# of points of both. The joint is computed by a few dozen operations, and shifting the cell rounds once more.
-SAME_PIECE = 64.0 * EPS
-# Parameters at which the parts are compared with the whole curve.
-INNER = np.array([0.25, 0.5, 0.75])
 
 
 @dataclass(frozen=True)
@@ -38,7 +28,7 @@ class HighestPoint:
     origin : (float, float)
         The position of (0, 0) in the coordinates of the wall.
     numbers : tuple of int
-        For every piece its index in the wall, of a joined piece that of its first part.
+        For every piece its index in the wall.
     """
 
     pieces: tuple[Curve, ...]
@@ -64,17 +54,11 @@ def highest_point_of(path: tuple[Curve, ...], joints: Floats, period: float) -> 
     if np.any(np.all(vertices[1:] == vertices[:-1], axis=1) & np.any(given != 0.0, axis=1)):
         return None
     points = [(px, py) for px, py in vertices.tolist()]
-    pieces = [
+    pieces = tuple(
         Segment(start, end) if isinstance(path[k], Segment) else path[k].moved(float(shift), -y).pinned(start, end)
         for k, shift, (start, end) in zip(order, shifts, pairwise(points), strict=True)
-    ]
-    seam = count - first
-    if 0 < seam < count:
-        whole = joined(pieces[seam - 1], pieces[seam], SAME_PIECE * _size(vertices))
-        if whole is not None:
-            pieces[seam - 1 : seam + 1] = [whole]
-            del order[seam]
-    return HighestPoint(tuple(pieces), (x, y), tuple(order))
+    )
+    return HighestPoint(pieces, (x, y), tuple(order))
 
 
 def _above_a_plate(path: tuple[Curve, ...], joints: Floats, top: int) -> int:
@@ -109,66 +93,3 @@ def first_top(vertices: Floats, period: float) -> int | None:
     most[1:] = np.maximum(most[1:], np.maximum.accumulate(x)[:-1] + period)
     found = tops[(least >= x) & (most <= x + period)]
     return int(found[0]) if len(found) else None
-
-
-def joined(before: Curve, after: Curve, tolerance: float) -> Curve | None:
-    """Return the curve whose two consecutive parts are the given pieces within ``tolerance``; None if none exists.
-
-    Examples
-    --------
-    >>> joined(Segment((0, 0), (1, -1)), Segment((1, -1), (3, -3)), 1e-15)
-    Segment(start=(0.0, 0.0), end=(3.0, -3.0))
-    """
-    if isinstance(before, Segment) and isinstance(after, Segment):
-        return _joined_segments(before, after, tolerance)
-    if isinstance(before, Arc) and isinstance(after, Arc):
-        return _joined_arcs(before, after, tolerance)
-    if isinstance(before, Bezier) and isinstance(after, Bezier):
-        return _joined_beziers(before, after, tolerance)
-    return None
-
-
-def _joined_segments(before: Segment, after: Segment, tolerance: float) -> Segment | None:
-    (ax, ay), (bx, by), (cx, cy) = before.start, before.end, after.end
-    dx, dy = cx - ax, cy - ay
-    length = math.hypot(dx, dy)
-    along, across = (bx - ax) * dx + (by - ay) * dy, (bx - ax) * dy - (by - ay) * dx
-    if not 0.0 < along < length * length or abs(across) > tolerance * length:
-        return None
-    return Segment(before.start, after.end)
-
-
-def _joined_arcs(before: Arc, after: Arc, tolerance: float) -> Arc | None:
-    span = 2.0 * (before.half_span + after.half_span)
-    if before.direction != after.direction or span > 2.0 * math.pi:
-        return None
-    end = before.start_angle + before.direction * span
-    whole = Arc(before.center, before.semi_axes, before.start_angle, end).pinned(before.start, after.end)
-    return whole if _are_parts(whole, before, after, before.half_span / (0.5 * span), tolerance) else None
-
-
-def _joined_beziers(before: Bezier, after: Bezier, tolerance: float) -> Bezier | None:
-    if before.degree != after.degree:
-        return None
-    first, second = (np.array(part.control_points) for part in (before, after))
-    # each distance is proportional to the derivative at the joint times the part's fraction of the parameter
-    left, right = math.dist(first[-1], first[-2]), math.dist(second[1], second[0])
-    if left == 0.0 or right == 0.0:
-        return None
-    fraction = left / (left + right)
-    inner = [first[0] + (first[1] - first[0]) / fraction]
-    if before.degree == 3:
-        inner.append(second[-1] + (second[-2] - second[-1]) / (1.0 - fraction))
-    whole = Bezier([before.start, *(tuple(p) for p in inner), after.end])
-    return whole if _are_parts(whole, before, after, fraction, tolerance) else None
-
-
-def _are_parts(whole: Curve, before: Curve, after: Curve, fraction: float, tolerance: float) -> bool:
-    """Whether the joint and points of both parts lie on the whole curve at the corresponding parameters."""
-    given = np.concatenate([before.point(INNER), [before.end], after.point(INNER)])
-    found = whole.point(np.concatenate([fraction * INNER, [fraction], fraction + (1.0 - fraction) * INNER]))
-    return bool(np.abs(given - found).max() <= tolerance)
-
-
-def _size(vertices: Floats) -> float:
-    return float(np.ptp(vertices, axis=0).max())

@@ -19,6 +19,7 @@ from ...core.rounding import EPS
 from ..curves.crossings import find_crossing
 from ..curves.curve import Curve, Point, point_array
 from ..curves.segment import Segment
+from .cell import Cell
 
 # Distance, relative to the wall's size, up to which the ends of two pieces join; enough for input of ten digits.
 JOIN_TOLERANCE = 1e-9
@@ -88,14 +89,17 @@ def check_open_wall(pieces: Pieces, islands: Sequence[Pieces], period: float, si
                 )
 
 
-def check_crossings(
-    pieces: Pieces, islands: Sequence[Pieces], period: float, depth: float, origin: Point, numbers: Sequence[int]
-) -> None:
-    """Raise a WallError if pieces cross; touching is allowed. ``numbers`` and ``origin`` are for the message."""
-    found = find_crossing(pieces, period, depth, islands, numbers)
+def check_crossings(cell: Cell, given: Sequence[Pieces], origin: Point, numbers: Sequence[int]) -> None:
+    """Raise a WallError if pieces of a cell cross; touching is allowed.
+
+    Its path and islands as they were ``given``, with ``numbers`` of the pieces of the path, and ``origin`` are for the
+    message: they do not decide, because a part of a curve may be too short to tell a cusp from a slit.
+    """
+    found = find_crossing(cell.pieces, cell.period, cell.depth, cell.islands, range(len(cell.pieces)))
     if found is None:
         return
-    x, y = (found.point[0] + origin[0]) % period, found.point[1] + origin[1]
+    found = find_crossing(given[0], cell.period, cell.depth, given[1:], numbers) or found
+    x, y = (found.point[0] + origin[0]) % cell.period, found.point[1] + origin[1]
     point = f"({x:.6g}, {y:.6g})"
     if found.is_slit:
         raise WallError(

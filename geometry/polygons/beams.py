@@ -118,7 +118,7 @@ def beams_of(
     Parameters
     ----------
     hollow_vertices : array_like of shape (n, 2)
-        The chain from (left, 0) to (right, 0), with the hollow above it: ``wall.vertices[h.first : h.last + 1]``.
+        The chain from (left, 0) to (right, 0), with the hollow above it: ``wall.cell.vertices[h.first : h.last + 1]``.
     tolerance : float
         Largest unresolved fraction of the flux.
     max_beams : int

@@ -16,7 +16,6 @@ from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
-from ..curves.curvature import largest_curvature
 from ..curves.curve import Curve
 from ..curves.segment import Segment
 from . import splines
@@ -70,13 +69,16 @@ def size_of(curves: Sequence[Curve]) -> float:
 
 
 def checked_curves(curves: Sequence[Curve]) -> tuple[Piece, ...]:
-    """Return the curves as a tuple; raise an InputError if one is of another kind, or has a cusp."""
+    """Return the curves as a tuple; raise an InputError if one is of another kind, or has a cusp between its ends."""
     pieces: list[Piece] = []
     for index, piece in enumerate(curves):
         if not isinstance(piece, (Segment, Arc, Bezier)):
             raise InputError(f"curves: expected Segments, Arcs and Beziers, got {shortened(piece)} at index {index}")
-        if isinstance(piece, Bezier) and not math.isfinite(largest_curvature(piece)[0]):
-            raise InputError(f"curves: expected Bezier curves without cusps, got {piece} at index {index}; split it")
+        if isinstance(piece, Bezier) and (cusp := splines.cusp_of(piece)) is not None:
+            raise InputError(
+                f"curves: expected Bezier curves without cusps between their ends, got {piece} at index {index}; "
+                f"pass both parts of curve.split({cusp!r})"
+            )
         pieces.append(piece)
     if not pieces:
         return ()

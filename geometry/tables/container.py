@@ -107,7 +107,7 @@ class Container(Summary):
         Raises
         ------
         InputError
-            If there is no curve, a Bezier curve has a cusp, or the curves do not form loops as described.
+            If there is no curve, a Bezier curve has a cusp between its ends, or the curves form no loops as described.
 
         Examples
         --------

@@ -10,15 +10,24 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..curves.bezier import Bezier
+from ..curves.curvature import STILL
 
 # Sine of the angle to the tangent up to which a path along a wall that bends towards it is not resolved.
 GRAZE = 64.0 * EPS
+# Parameter next to an end at which B' = 0, as where a handle is retracted: B differs from the end by rounding there.
+NEXT_TO_END = 2.0**-26
+# Parameters from which on a cusp is not one of an end.
+INSIDE = 2.0**-20
 # Limit on steps for a root; every fourth is a bisection, of which 53 suffice.
 ROOT_STEPS = 220
 # Halvings after which an interval of parameters has the width of rounding.
 HALVINGS = 56
 # First guesses of a projection onto the curve, and Newton steps from the nearest.
 GUESSES, NEWTON_STEPS = 129, 8
+# Local minima of the distance from a point along a cubic.
+MOST_NEAREST = 3
+# Steps where B' = 0 at an end, to which each step takes a third of the parameter.
+STILL_STEPS = 48
 # Panels and nodes of Gauss quadrature of the speed.
 PANELS, NODES = 32, 12
 
@@ -28,6 +37,22 @@ def _values(coefficients: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
     a0, a1, a2, a3 = coefficients
     t = s[..., np.newaxis]
     return a0 + t * (a1 + t * (a2 + t * a3)), a1 + t * (2.0 * a2 + 3.0 * t * a3), 2.0 * a2 + 6.0 * t * a3
+
+
+def _ends(curve: Bezier, slack: float = 0.0) -> tuple[float, float]:
+    """Return the first and the last parameter with B' other than 0, beyond the ends by the length ``slack`` if so."""
+    speed = np.hypot(*_values(curve.powers, np.array([0.0, 1.0]))[1].T)
+    still = speed <= STILL * np.abs(curve.powers[1:]).sum()
+    beyond = np.where(still, -NEXT_TO_END, slack / np.where(still, 1.0, speed)).tolist()
+    return -beyond[0], 1.0 + beyond[1]
+
+
+def cusp_of(curve: Bezier) -> float | None:
+    """Return a parameter between the ends of a curve at which B' = 0, None if there is none."""
+    turns = np.array([s for axis in (0, 1) for s in curve.turning_points(axis)])
+    speed = np.hypot(*_values(curve.powers, turns)[1].T)
+    inside = (turns > INSIDE) & (turns < 1.0 - INSIDE)
+    return next(iter(turns[inside & (speed <= STILL * np.abs(curve.powers[1:]).sum())].tolist()), None)
 
 
 def arrival(
@@ -46,9 +71,7 @@ def arrival(
         s0 = parameter_of(curve, position)
         divided = np.array([c[1] + s0 * (c[2] + s0 * c[3]), c[2] + s0 * c[3], c[3], np.zeros_like(s0)])
         c = np.where(own, divided, c)
-    ends = np.hypot(*_values(a, np.array([0.0, 1.0]))[1].T)
-    low, high = -slack / ends[0], 1.0 + slack / ends[1]
-    roots = _roots(c, low, high)
+    roots = _roots(c, *_ends(curve, slack))
     point, tangent, _ = _values(a, roots)
     speed = np.hypot(tangent[..., 0], tangent[..., 1])
     normal = turn * np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1) / speed[..., np.newaxis]
@@ -68,7 +91,7 @@ def _tangency(curve: Bezier, position: Floats, v: Floats, own: NDArray[np.bool_]
     """
     speed, found = np.hypot(v[:, 0], v[:, 1]), np.full(len(position), np.inf)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for end in (0.0, 1.0):
+        for end in _ends(curve):
             s = np.where(own, parameter_of(curve, position) if np.any(own) else end, end)
             point, first, second = _values(curve.powers, s)
             size = np.hypot(first[:, 0], first[:, 1])
@@ -77,7 +100,7 @@ def _tangency(curve: Bezier, position: Floats, v: Floats, own: NDArray[np.bool_]
             off = point - position
             time = np.where(own, 0.0, np.sum(off * v, axis=1) / speed**2)
             aside = np.where(own, 0.0, np.abs(off[:, 0] * v[:, 1] - off[:, 1] * v[:, 0]) / speed)
-            onward = own | ((np.sum(first * v, axis=1) > 0.0) == (end == 0.0))
+            onward = own | ((np.sum(first * v, axis=1) > 0.0) == (end < 0.5))
             near = bends & onward & (aside <= slack) & (time * speed >= -slack)
             along = near & np.where(own, up <= GRAZE * speed, np.abs(up) <= GRAZE * speed)
             found = np.where(along, np.minimum(found, np.maximum(time, 0.0)), found)
@@ -121,16 +144,24 @@ def _roots(c: Floats, low: float, high: float) -> Floats:
 def parameter_of(curve: Bezier, position: Floats) -> Floats:
     """Return the parameters (n,) in [0, 1] of the points of the curve nearest to points (n, 2) next to it."""
     a = curve.powers
+    low, high = _ends(curve)
     guesses = np.linspace(0.0, 1.0, GUESSES)
-    grid = _values(a, guesses)[0]
-    s = guesses[np.argmin(np.hypot(*np.moveaxis(position[:, np.newaxis] - grid, -1, 0)), axis=1)]
-    for _ in range(NEWTON_STEPS):
+    guesses = guesses[(guesses >= low) & (guesses <= high)]
+    away = np.hypot(*np.moveaxis(position[:, np.newaxis] - _values(a, guesses)[0], -1, 0))
+    # the nearest guess may lie on another branch of a fold than the nearest point
+    beside = np.pad(away, ((0, 0), (1, 1)), constant_values=np.inf)
+    away = np.where(away <= np.minimum(beside[:, :-2], beside[:, 2:]), away, np.inf)
+    chosen = np.argsort(away, axis=1)[:, :MOST_NEAREST]
+    s, position = guesses[chosen], position[:, np.newaxis]
+    for _ in range(NEWTON_STEPS if len(guesses) == GUESSES else STILL_STEPS):
         point, first, second = _values(a, s)
         off = point - position
-        slope = np.sum(first * first + off * second, axis=1)
-        slope = np.where(slope > 0.0, slope, np.sum(first * first, axis=1))
-        s = np.clip(s - np.sum(off * first, axis=1) / slope, 0.0, 1.0)
-    return np.asarray(s)
+        slope = np.sum(first * first + off * second, axis=-1)
+        slope = np.where(slope > 0.0, slope, np.sum(first * first, axis=-1))
+        s = np.clip(s - np.sum(off * first, axis=-1) / slope, low, high)
+    reached = np.hypot(*np.moveaxis(_values(a, s)[0] - position, -1, 0))
+    reached[np.isinf(np.take_along_axis(away, chosen, axis=1))] = np.inf
+    return np.take_along_axis(s, np.argmin(reached, axis=1)[:, np.newaxis], axis=1)[:, 0]
 
 
 def touch(curve: Bezier, position: Floats) -> tuple[Floats, Floats, Floats]:

@@ -152,9 +152,9 @@ def random_wall(
     points : int
         Number of heights, at equal distances.
     rms_slope, rms_height : float, optional
-        The root mean squared slope of the wall as it is made, or its height about the mean, of which one is given: the
-        squares are expected values over all random walls, a single wall deviates. With a callable both may be left
-        out; its powers are then taken as they are.
+        The root mean squared slope of the wall as it is made, or its height about the mean, between its vertices too,
+        of which one is given: the squares are expected values over all random walls, a single wall deviates. With a
+        callable both may be left out; its powers are then taken as they are.
     period : float
     smooth : bool
         Whether the heights are joined by cubics with continuous slopes, which are those of the trigonometric polynomial
@@ -191,13 +191,12 @@ def random_wall(
     # a frequency and its negative; the highest one of an even number of points has no other
     modes = np.append(np.full((number - 1) // 2 + 1, 2.0), np.ones(1 - number % 2))
     squares = modes * powers / width
-    if rms_slope is not None and rms_height is None:
-        transfer = _smooth_slopes(wave, width / number, number) if smooth else _chord(wave, width / number) ** 2
-        slope = number_between("rms_slope", rms_slope, 0.0, LARGEST_COORDINATE)
-        powers = powers * slope**2 / _positive_sum(squares * transfer)
-    elif rms_height is not None and rms_slope is None:
-        height = number_between("rms_height", rms_height, 0.0, LARGEST_COORDINATE)
-        powers = powers * height**2 / _positive_sum(squares)
+    wanted = rms_height if rms_slope is None else rms_slope
+    if wanted is not None and (rms_slope is None or rms_height is None):
+        name, order = ("rms_height", 0) if rms_slope is None else ("rms_slope", 1)
+        size = number_between(name, wanted, 0.0, LARGEST_COORDINATE)
+        transfer = _mean_squares(wave, width / number, number, smooth, order)
+        powers = powers * size**2 / _positive_sum(squares * transfer)
     elif rms_slope is not None or not callable(spectrum):
         raise InputError(
             f"rms_slope: expected one of rms_slope and rms_height, got rms_slope={rms_slope}, rms_height={rms_height}"
@@ -231,18 +230,16 @@ def _positive_sum(squares: Floats) -> float:
     return total
 
 
-def _chord(wave: Floats, step: float) -> Floats:
-    """Slope of the chords of sines of these wave numbers and unit amplitude."""
-    return np.asarray(2.0 * np.sin(0.5 * wave * step) / step)
+def _mean_squares(wave: Floats, step: float, points: int, smooth: bool, order: int) -> Floats:
+    """Mean squared heights (order 0) or slopes (1) of the walls through waves of unit modulus."""
+    from scipy.interpolate import CubicHermiteSpline
 
-
-def _smooth_slopes(wave: Floats, step: float, points: int) -> Floats:
-    """Mean squared slope of the cubics through a wave of unit modulus: of each, a quadratic form of its ends."""
-    chord = _chord(wave, step)
+    ends = np.exp(1j * np.outer([0.0, step], wave))
     # the interpolating polynomial has no slope from the highest frequency of an even number of points
-    slope = np.where(2.0 * np.arange(len(wave)) == points, 0.0, wave)
-    mixed = chord * slope * np.cos(0.5 * wave * step)
-    return np.asarray(1.2 * chord**2 - 0.4 * mixed + slope**2 * (4.0 - np.cos(wave * step)) / 15.0)
+    slopes = 1j * np.where(2.0 * np.arange(len(wave)) == points, 0.0, wave) * ends
+    pieces = CubicHermiteSpline([0.0, step], ends, slopes if smooth else np.diff(ends, axis=0).repeat(2, axis=0) / step)
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    return np.asarray(0.5 * weights @ np.abs(pieces(0.5 * step * (1.0 + nodes), order)) ** 2)
 
 
 def _synthesised(powers: Floats, points: int, period: float, rng: np.random.Generator) -> Floats:

@@ -48,7 +48,8 @@ class Wall(Cell):
     ----------
     pieces : tuple of pieces
         Each piece starts exactly at the end of the piece before. A curve whose top touches the level of the wall's
-        highest points is cut there, so there may be more pieces than were given.
+        highest points is cut there, so there may be more pieces than were given. Computations use those of ``cell``,
+        in which parts of one side or curve are joined.
 
     Raises
     ------
@@ -86,8 +87,9 @@ class Wall(Cell):
         self._fill(path, width, loops, unit)
         if loops:
             check_open_wall(path, loops, width, size)
-        numbers = range(len(path)) if self._highest is None else self._highest.numbers
-        check_crossings(self.cell.pieces, loops, width, self.cell.depth, self.origin, numbers)
+        top = self._highest
+        given, numbers = (path, range(len(path))) if top is None else (top.pieces, top.numbers)
+        check_crossings(self.cell, (given, *loops), self.origin, numbers)
         if not self.closes:
             check_open_wall(path, loops, width, size)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checkpoints import Stored
-from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
+from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shaped, shortened, whole_number
 from ...core.errors import InputError
 from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...geometry.tables.boundary import FlightStatus
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from ...geometry import Container, Disk
     from ...geometry.tables.boundary import Touch
 
+# Relative change of the energy of a disk at a wall that is rounding.
+SAME_ENERGY = 1e-9
 # Disks of a part: their random numbers depend on its number alone.
 TOGETHER = 1024
 
@@ -35,7 +37,7 @@ class Reflector(Protocol):
     def disk(self) -> Disk: ...
 
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
-        """Outgoing (v1, v2, omega) for incoming ones with v2 < 0; the wall is below the disk."""
+        """Outgoing (v1, v2, omega) with v2 > 0, of equal energy, for incoming ones with v2 < 0; the wall is below."""
         ...
 
 
@@ -81,8 +83,9 @@ def play(
     Raises
     ------
     InputError
-        If a shape is wrong, a centre is outside, a law is one of angles, or the laws do not match the walls; if the
-        checkpoint is of another simulation.
+        If a shape is wrong, a centre is outside, a law is one of angles, or the laws do not match the walls; if a law
+        of your own returns no velocities, some into the wall, or some of another energy; if the checkpoint is of
+        another simulation.
 
     Notes
     -----
@@ -227,6 +230,21 @@ def check_inside(container: Container, centres: Floats) -> None:
 
 
 def reflected(point: Touch, law: Reflector, moving: Floats, rng: np.random.Generator) -> Floats:
-    """Velocities (n, 3) after a collision with a wall at these points; nan where the law found none."""
+    """Velocities (n, 3) after a collision with a wall at these points; nan where a true disk has none.
+
+    Raises an InputError if a law does not return velocities away from the wall with the energy of the incoming ones.
+    """
     incoming = point.incoming(moving)
-    return point.outgoing(law.attempt(incoming, rng) if isinstance(law, SatelliteLaw) else law.sample(incoming, rng))
+    if isinstance(law, SatelliteLaw):
+        return point.outgoing(law.attempt(incoming, rng))
+    outgoing = shaped(f"laws: what {shortened(law)} returns", law.sample(incoming.copy(), rng), len(incoming), 3)
+    before, after = (law.disk.inner(w, w) for w in (incoming, outgoing))
+    wrong = ~((outgoing[:, 1] > 0.0) & (np.abs(after - before) <= SAME_ENERGY * before))
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise InputError(
+            f"laws: expected velocities (v1, v2, omega) with v2 > 0 and the energy {0.5 * before[k]:.10g} of the "
+            f"incoming {incoming[k].tolist()}, got {outgoing[k].tolist()} of energy {0.5 * after[k]:.10g} from "
+            f"{shortened(law)} at {point.position[k].tolist()}; the wall is below in these coordinates"
+        )
+    return point.outgoing(outgoing)

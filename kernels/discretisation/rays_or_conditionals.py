@@ -36,7 +36,7 @@ def by_rays_or_conditionals(law: WallLaw, basis: Basis, budget: Budget) -> Kerne
     The error does not grow if the tolerance falls.
     """
     # on panels, mostly between the factors of a chain, rays would have to resolve hundreds of functions
-    if (len(law.wall.pieces) <= FEW_PIECES or isinstance(basis, Panels)) and law.isometry_table() is not None:
+    if (len(law.wall.cell.pieces) <= FEW_PIECES or isinstance(basis, Panels)) and law.isometry_table() is not None:
         return by_isometry_table(law, basis, budget)
     sampler = SobolSampler(law, basis, budget.rng)
     first = _by_rays(sampler, replace(budget, rays=min(FIRST_RAYS, budget.rays)))
@@ -64,5 +64,5 @@ def _by_rays(sampler: SobolSampler, budget: Budget) -> KernelMatrix | None:
 
 def _has_conditionals(law: WallLaw, basis: Basis, budget: Budget) -> bool:
     """Whether the conditional distributions at the first panels are affordable."""
-    few = law.wall.closes and len(law.wall.pieces) <= MOST_PIECES
+    few = law.wall.closes and len(law.wall.cell.pieces) <= MOST_PIECES
     return few and first_segments(law.wall, basis) <= FRACTION_OF_PANELS * budget.segments

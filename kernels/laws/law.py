@@ -184,7 +184,7 @@ class Law(ABC):
             Numbers of incoming angles, the middles of equal intervals, and of probabilities, 0 and 1 among them; at
             least 2.
         tolerance : float
-            Wanted error of the distribution functions. Rough walls may not reach it.
+            Wanted error of the distribution functions. Rough walls may not reach it; the table says so.
 
         Returns
         -------
@@ -206,7 +206,7 @@ class Law(ABC):
         """
         wanted = number_between("tolerance", tolerance, EPS, 1.0, closed="low high")
         parts = [(weight, _with_atoms(part, wanted)) for weight, part in self.parts]
-        return tabulated(parts, n_in, n_out, self.frame, repr(self))
+        return tabulated(parts, self.sample, n_in, n_out, wanted, self.frame, repr(self))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles of a law made of isometries theta' = +-theta + const.

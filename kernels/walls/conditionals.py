@@ -24,7 +24,7 @@ MANY_SEGMENTS, MOST_PILOT_SEGMENTS = 15_000, 400_000
 
 def is_few(wall: Wall) -> bool:
     """Whether the wall has at most `MOST_PIECES` pieces; the cost per angle is about their number squared."""
-    return len(wall.pieces) + sum(map(len, wall.islands)) <= MOST_PIECES
+    return len(wall.cell.pieces) + sum(map(len, wall.cell.islands)) <= MOST_PIECES
 
 
 class WallConditionals:

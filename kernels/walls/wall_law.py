@@ -244,11 +244,11 @@ def hollow_law(cell: Wall, hollow: Hollow) -> Law | None:
 
 def beams_law(wall: Wall) -> Law | None:
     """The law of a polygonal wall from beams; None if these do not resolve within about a second."""
-    if not (wall.is_polygonal and wall.closes and len(wall.pieces) <= MOST_PIECES):
+    if not (wall.is_polygonal and wall.closes and len(wall.cell.pieces) <= MOST_PIECES):
         return None
-    if len(wall.pieces) > FEW_PIECES:
+    if len(wall.cell.pieces) > FEW_PIECES:
         # the other beams reduce the unresolved fraction at most by a factor of a hundred
-        few = max(FEW_BEAMS, BEAMS_A_PIECE * len(wall.pieces))
+        few = max(FEW_BEAMS, BEAMS_A_PIECE * len(wall.cell.pieces))
         probe = PolygonLaw(wall, max_beams=min(few, MOST_BEAMS))
         if not probe.resolves(100.0 * EXACT_ENOUGH):
             return None

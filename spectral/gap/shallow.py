@@ -263,7 +263,7 @@ def _slopes_of_wall(wall: Wall) -> Slopes | None:
     """The slopes of a wall, or None unless it is a graph with small slopes."""
     from ...geometry import Segment
 
-    if not wall.closes or sum(not isinstance(piece, Segment) for piece in wall.pieces) > MOST_CURVED:
+    if not wall.closes or sum(not isinstance(piece, Segment) for piece in wall.cell.pieces) > MOST_CURVED:
         return None
     angles, weights, turns = [], [], [np.inf]
     for piece in wall.cell.pieces:

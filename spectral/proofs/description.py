@@ -74,8 +74,8 @@ def _family(law: Law, whole: Law) -> dict[str, Any]:
 
 def _curvature(law: WallLaw) -> float | None:
     """K of a wall of bumps of radius period/K; None of another wall."""
-    pieces = [piece for piece in law.wall.pieces if isinstance(piece, Arc)]
-    if len(pieces) != 2 or len(law.wall.pieces) != 2:
+    pieces = [piece for piece in law.wall.cell.pieces if isinstance(piece, Arc)]
+    if len(pieces) != 2 or len(law.wall.cell.pieces) != 2:
         return None
     size = float(law.wall.period)
     curvature = size / float(pieces[0].semi_axes[0])

@@ -145,7 +145,8 @@ def study(
     # what may be refused comes before the work
     degrees = None if incidence is None else numbers_of(incidence)
     if table is not None:
-        WallLaw(found_wall).table(*TABLE_SIZE).save(table, overwrite=force)
+        written = WallLaw(found_wall).table(*TABLE_SIZE)
+        written.save(table, overwrite=force)
     with removed_on_failure(out):
         if out is not None:
             # refuse before the work, not after it
@@ -157,7 +158,9 @@ def study(
             text = report.to_json() if as_json else report.summary(verbose=verbose, by_angle=degrees is not None)
             click.echo(text)
         if table is not None and not quiet:
-            click.echo(f"wrote      {table}", err=as_json)
+            reached = f"distribution error {written.distribution_error:.2g}, {written.tolerance:g} wanted"
+            missed = f" ({reached})" * (written.distribution_error > written.tolerance)
+            click.echo(f"wrote      {table}{missed}", err=as_json)
         if out is not None:
             for path in report.save(out, overwrite=force, picture_format=picture_format, dpi=dpi):
                 if not quiet:

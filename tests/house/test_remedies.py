@@ -26,6 +26,8 @@ X, H = np.linspace(0.0, 1.0, 5), np.array([0.0, 0.2, 0.1, 0.3, 0.0])
 BOX = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 DISK, LAW, WALL, P = geo.Disk(), ker.lambertian(), geo.koch(1), ker.discretise(ker.lambertian(), ker.Bins(4))
 SPECULAR, Z = LAW.in_specular_frame(), sp.Symbol("z")
+CUSP = geo.Bezier([(-1, 0), (1, 1), (-1, 1), (1, 0)])
+ROOF = (geo.Segment((1, 0), (0, 3)), geo.Segment((0, 3), (-1, 0)))
 
 # A part of the message, the call that it refuses, and the one that it advises.
 REMEDIES = {
@@ -77,6 +79,10 @@ REMEDIES = {
     "pass points[scipy.spatial.ConvexHull(points).vertices]": (
         lambda: ker.RoughBody.polygon(LAW, np.tile(BOX, (2, 1))),
         lambda: ker.RoughBody.polygon(LAW, BOX[scipy.spatial.ConvexHull(np.tile(BOX, (2, 1))).vertices]),
+    ),
+    "pass both parts of curve.split(": (
+        lambda: geo.Container.from_curves([CUSP, *ROOF]),
+        lambda: geo.Container.from_curves([*CUSP.split(0.5), *ROOF]),
     ),
     "use P.tensor(Q)": (lambda: ker.discretise(LAW, ker.TensorBasis((ker.Bins(2), ker.Bins(2)))), lambda: P.tensor(P)),
     "use kind='pseudometric'": (

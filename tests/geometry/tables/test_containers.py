@@ -31,6 +31,15 @@ TABLES = {
     "raised": geo.Container.from_curves(
         [geo.Bezier([(-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1)]), geo.Bezier([(1, 1), (0.3, 1), (-1, 1)])]
     ),
+    # handles retracted at one end, at both, so that the piece is straight, and a cusp at which a curve was split
+    "handles": geo.Container.from_curves([
+        geo.Bezier([(-1, 0), (-1, 0), (0.4, -0.9), (1, 0)]), geo.Bezier([(1, 0), (1, 0), (1, 1), (1, 1)]),
+        geo.Bezier([(1, 1), (0.2, 1.8), (0, 1), (0, 1)]), geo.Bezier([(0, 1), (-0.5, 1.4), (-1, 0), (-1, 0)]),
+    ]),
+    "cusp": geo.Container.from_curves([
+        *geo.Bezier([(-1, 0), (1, 1), (-1, 1), (1, 0)]).split(0.5),
+        geo.Segment((1, 0), (0, 3)), geo.Segment((0, 3), (-1, 0)),
+    ]),
 }  # fmt: skip
 
 
@@ -191,3 +200,15 @@ def test_tangents_and_curvatures_of_bezier_walls_are_derivatives():
     np.testing.assert_allclose(slope, ends[1].tangent, atol=1e-8)
     left = np.stack([-ends[1].tangent[:, 1], ends[1].tangent[:, 0]], axis=1)
     np.testing.assert_allclose(turned, ends[1].curvature[:, None] * left, atol=1e-6)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_disk_is_reflected_by_the_side_of_a_thin_fold_that_it_meets(side):
+    # both sides are nearer to each other than guesses along the curve
+    fold = geo.Bezier([(1.052, 0), (1.0521, 0.0003), (1.184, 0.487), (1.0555, 0)])
+    corners = [(1.0555, 0), (2.4, 0), (2.4, 5), (0, 5), (0, 0), (1.052, 0)]
+    table = geo.Container.from_curves([fold, *map(geo.Segment, corners, corners[1:])])
+    start = np.column_stack([np.full(40, 1.1 + 0.5 * side), np.linspace(0.02, 0.2, 40)])
+    record = ker.play(table, ker.smooth(DISK), start, [-side, 0.0, 0.0], 1)
+    assert np.all(record.wall[1] == 0)
+    np.testing.assert_allclose(record.energy[1], record.energy[0], rtol=1e-14)

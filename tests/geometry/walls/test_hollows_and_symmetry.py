@@ -31,9 +31,9 @@ def test_every_graph_of_a_function_is_a_wall(steps):
     for left, right in pairwise(hollows):
         assert left.right <= right.left and left.last <= right.first
     for hollow in hollows:
-        assert tuple(wall.vertices[hollow.first]) == (hollow.left, 0.0)
-        assert tuple(wall.vertices[hollow.last]) == (hollow.right, 0.0)
-        assert np.all(wall.vertices[hollow.first + 1 : hollow.last, 1] < 0.0)
+        assert tuple(wall.cell.vertices[hollow.first]) == (hollow.left, 0.0)
+        assert tuple(wall.cell.vertices[hollow.last]) == (hollow.right, 0.0)
+        assert np.all(wall.cell.vertices[hollow.first + 1 : hollow.last, 1] < 0.0)
 
 
 def test_a_plate_of_zero_thickness_does_not_split_its_hollow():

@@ -48,6 +48,8 @@ def test_heights_have_the_given_correlations(points, shape):
     whole = np.append(rho, rho[1 : (points + 1) // 2][::-1])
     # the mean height is taken away
     rho = (rho - whole.mean()) / (rho[0] - whole.mean())
+    # the mean square along a side between heights with the correlation r is (2 + r)/3 of that of the heights
+    rho = 3.0 * rho / (2.0 + rho[1])
     for k, expected in enumerate(rho):
         assert abs(z_score(found[:, k], 0.09 * expected)) < FAR
 
@@ -76,8 +78,24 @@ def test_squared_slopes_of_smooth_walls_have_the_given_mean():
     assert abs(z_score(np.array(found), 0.04)) < FAR
 
 
+@pytest.mark.parametrize("points", [9, 12])
+@pytest.mark.parametrize("smooth", [False, True])
+def test_squared_heights_along_a_wall_have_the_given_mean(points, smooth):
+    # so coarse that the vertices of polygons have 1.2 times the height
+    found, at = [], 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
+    weight = 0.5 * np.polynomial.legendre.leggauss(4)[1]
+    for k in range(WALLS // 2):
+        rng = np.random.default_rng([2, k])
+        wall = geo.random_wall(geo.HeightCorrelation(0.1), points, rms_height=0.03, smooth=smooth, rng=rng)
+        runs = np.array([piece.end[0] - piece.start[0] for piece in wall.pieces])
+        heights = np.array([piece.point(at)[:, 1] for piece in wall.pieces])
+        mean, square = (float(np.sum(runs[:, None] * weight * heights**power)) for power in (1, 2))
+        found.append(square - mean**2)
+    assert abs(z_score(np.array(found), 0.03**2)) < FAR
+
+
 def test_smooth_walls_pass_through_the_heights_of_the_polygon_without_corners():
-    asked = {"spectrum": geo.HeightCorrelation(0.2), "points": 24, "rms_height": 0.05, "rng": 5}
+    asked = {"spectrum": lambda q: 1e-3 * np.exp(-((0.1 * q) ** 2)), "points": 24, "rng": 5}
     polygon, smooth = geo.random_wall(**asked), geo.random_wall(**asked, smooth=True)
     ends = np.array([piece.start for piece in smooth.pieces])
     on_grid = np.isclose(ends[:, 0] * 24, np.round(ends[:, 0] * 24))
@@ -94,7 +112,7 @@ def test_few_frequencies_too_have_normal_heights():
     heights = vertices(
         spectrum=lambda q: np.where(q < 7.0, 1.0, 0.0), points=8, rms_height=1.0
     )  # wave numbers 2 pi, 4 pi, ...
-    squares = np.mean(centred(heights) ** 2, axis=1)
+    squares = np.mean(centred(heights) ** 2, axis=1) * (2.0 + np.cos(2.0 * np.pi / 8)) / 3.0
     # the squared amplitude of a complex normal coefficient is exponential
     assert stats.kstest(squares, "expon").pvalue > 1e-4
 
@@ -109,7 +127,11 @@ def test_self_affine_heights_are_those_of_the_library():
     ).heights()  # fmt: skip
     wall = geo.random_wall(geo.SelfAffine(0.6, longest=0.9, shortest=0.12), 65, rms_height=0.1, period=2.0, rng=8)
     top = int(np.argmax(theirs))
-    np.testing.assert_allclose(wall.vertices[:-1, 1], np.roll(theirs, -top) - theirs[top], atol=1e-14)
+    # of theirs the vertices have the height in the mean over all walls, of ours the sides
+    own, their = wall.vertices[:-1, 1], np.roll(theirs, -top) - theirs[top]
+    factor = own.min() / their.min()
+    np.testing.assert_allclose(own, factor * their, atol=1e-14)
+    assert 1.0 < factor < 1.3
 
 
 def test_a_power_spectral_density_is_taken_as_it_is():

@@ -11,7 +11,8 @@ from asperity import kernels as ker
 from asperity.errors import WallError
 from asperity.geometry import Arc, Bezier, Segment
 from asperity.geometry.cells.hollow import Hollow
-from asperity.geometry.cells.origin import first_top, joined
+from asperity.geometry.cells.merging import joined, merged
+from asperity.geometry.cells.origin import first_top
 from asperity.geometry.tracing.tracing import entries
 
 LOW = geo.Wall.from_vertices([(0, -1.3), (0.2, -0.9), (0.7, -0.3), (0.8, -1.5), (1, -1.3)])
@@ -103,13 +104,14 @@ def test_a_cell_begins_on_the_upper_face_of_a_plate(plate):
 
 def test_pieces_that_the_period_cuts_are_one():
     curve = Bezier([(0, 0), (0.2, -1), (0.9, -0.7), (1, -0.1)])
-    for whole in (Segment((0, 0), (3, -4)), Arc((0, 0), (1, 2), 3.0, 0.5), Arc((0, 0), 1e7, -1.6, -1.5999), curve):
+    for whole in (Arc((0, 0), (1, 2), 3.0, 0.5), Arc((0, 0), 1e7, -1.6, -1.5999), curve):
         before, after = whole.split(0.3)
         back = joined(before, after, 1e-14 * max(1.0, abs(whole.end[1])))
         assert back is not None
         np.testing.assert_allclose(back.point([0.2, 0.6]), whole.point([0.2, 0.6]), atol=1e-8, rtol=1e-14)
-    assert joined(Segment((0, 0), (1, -1)), Segment((1, -1), (2, -2 - 1e-9)), 1e-14) is None
-    assert joined(Segment((0, 0), (1, -1)), Segment((1, -1), (0.5, -0.5)), 1e-14) is None
+    for far in ((2, -2 - 1e-9), (0.5, -0.5)):
+        path = (Segment((0, 0), (1, -1)), Segment((1, -1), far))
+        assert merged(path) is path
     assert joined(Arc((0, 0), 1.0, 3.0, 4.0), Arc((0, 0), 1.0, 4.0, 3.0), 1e-14) is None
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.errors import InputError
 
 IRRATIONAL = (0.1, 2.0)
 # arctan(sqrt(m/J)) = pi p/q
@@ -115,3 +116,53 @@ def test_the_true_disk_in_a_strip_does_what_its_limit_law_does():
         widths.append(np.log(record.extent()))
     difference = widths[0].mean() - widths[1].mean()
     assert abs(difference) < 4.5 * math.sqrt((widths[0].var() + widths[1].var()) / n)
+
+
+class Own:
+    """A law of a wall as a user writes it, by a function of the incoming velocities."""
+
+    disk = geo.Disk()
+
+    def __init__(self, function):
+        self.function = function
+
+    def sample(self, velocity, rng=None):
+        return self.function(velocity)
+
+
+MIRROR = np.array([1.0, -1.0, 1.0])
+
+
+def turned_in_place(velocity):
+    velocity *= MIRROR
+    return velocity
+
+
+def test_a_reflector_of_a_users_own_moves_disks_as_smooth_walls_do():
+    room, start = geo.Container.stadium(), ([0.1, 0.2], [0.6, 0.8, 0.1])
+    smooth = ker.play(room, ker.smooth(geo.Disk()), *start, 8)
+    for function in (lambda v: v * MIRROR, lambda v: (v * MIRROR).tolist(), turned_in_place):
+        assert np.allclose(ker.play(room, Own(function), *start, 8).position, smooth.position, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda v: v, r"with v2 > 0 and the energy 0\.5025.* at \[[-\d.]+, [-\d.]+\]"),
+        (lambda v: 1.1 * v * MIRROR, r"of energy 0\.608"),
+        (lambda v: v * MIRROR * [0.0, 1.0, 1.0], "and the energy"),
+        (lambda v: np.where(v < 0.0, np.nan, v), "finite numbers"),
+        (lambda v: (v * MIRROR)[:, :2], r"expected shape \(1, 3\), got \(1, 2\)"),
+        (lambda v: (v * MIRROR)[0], r"expected shape \(1, 3\), got \(3,\)"),
+        (lambda v: None, "returns: expected"),
+        (lambda v: "up", "returns: expected"),
+        (lambda v: v * MIRROR * (1 + 0j), "returns: expected"),
+    ],
+)
+def test_a_reflector_that_does_not_reflect_is_refused(function, message):
+    law, room = Own(function), geo.Container.polygon([(0, 0), (8, 0), (8, 8), (0, 8)])
+    with pytest.raises(InputError, match=message):
+        ker.play(room, law, [2.0, 3.0], [0.6, 0.8, 0.1], 3)
+    with pytest.raises(InputError, match=message):
+        pair = ker.PairLaw(ker.retroreflection(), geo.Disk())
+        ker.play_gas(room, pair, [[2, 3], [6, 3]], [[0.6, 0.8, 0.1], [0, 0, 0]], 3, law)

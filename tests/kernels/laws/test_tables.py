@@ -154,9 +154,24 @@ def test_files_are_replaced_on_request_only_and_other_formats_are_refused(tmp_pa
     assert sorted(path.name for path in Path(tmp_path).iterdir()) == sorted(names)
 
 
-def test_the_error_of_a_law_that_does_not_know_it_is_nan():
+def test_the_error_of_a_law_that_does_not_know_it_is_found_by_drawing():
     table = (ker.henyey_greenstein(0.5) @ ker.TriangularTeethLaw(0.7)).table(4, 4)
-    assert np.isnan(table.distribution_error) and 0.0 < table.error < 1.0
+    assert 1e-4 < table.distribution_error < 0.02 and 0.0 < table.error < 1.0
+
+
+def test_a_table_of_a_measured_profile_says_that_it_misses_the_tolerance_and_by_how_much(tmp_path):
+    rng = np.random.default_rng(7)
+    height = 0.02 * np.cumsum(rng.normal(size=2000))
+    law = ker.WallLaw(geo.Wall.from_profile(np.linspace(0.0, 10.0, 2000), height - height.mean()))
+    table = law.table(2, 9)
+    assert 1e-4 < table.distribution_error < 0.03
+    assert "(above the tolerance)" in repr(table) and "above" not in repr(ker.lambertian().table(2, 3))
+    assert any("(above the tolerance), 0.0001 wanted" in line for line in table._header())
+    for theta, quantile in zip(table.theta, table.quantile, strict=True):
+        drawn = np.sort(law.reflect_with_status(rng.random(200_000), np.full(200_000, theta))[0])
+        off = np.searchsorted(drawn, quantile[1:-1]) / drawn.size - table.probability[1:-1]
+        # the quantiles are those between cells of angles
+        assert np.abs(off).max() < table.distribution_error + 0.01
 
 
 PAGE = (Path(__file__).parents[3] / "docs" / "tables.md").read_text(encoding="utf-8")

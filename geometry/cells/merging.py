@@ -1,0 +1,126 @@
+"""Pieces that are parts of one segment, arc or Bezier curve, joined to one: rays do not depend on where it was cut."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.checks import Floats
+from ...core.rounding import EPS
+from ..curves.arc import Arc
+from ..curves.bezier import Bezier
+from ..curves.crossings import straight_in
+from ..curves.curve import Curve, point_array
+from ..curves.segment import Segment
+
+# Two pieces are parts of one curve if it passes within this distance, relative to the wall's size, of their joint and
+# of points of both. The joint is computed by a few dozen operations, and shifting the cell rounds once more.
+SAME_PIECE = 64.0 * EPS
+# Joints lie on one side within this distance, relative to the largest x and the largest y: a point of a side is
+# computed by three operations, and a wall is moved and stretched after that.
+ON_SIDE = 8.0 * EPS
+# Radians between the angles at which parts of one ellipse meet; what is tested here first is only whether they may be.
+SAME_ANGLE = 1e-6
+# Parameters at which the parts are compared with the whole curve.
+INNER = np.array([0.25, 0.5, 0.75])
+
+
+def merged(path: tuple[Curve, ...], is_loop: bool = False) -> tuple[Curve, ...]:
+    """Return the path without the joints at which nothing changes; the path itself if there are none.
+
+    Joints at height 0 stay, because hollows end there, except between level segments.
+
+    Examples
+    --------
+    >>> merged((Segment((0, 0), (1, -1)), Segment((1, -1), (3, -3)), Segment((3, -3), (4, 0))))
+    (Segment(start=(0.0, 0.0), end=(3.0, -3.0)), Segment(start=(3.0, -3.0), end=(4.0, 0.0)))
+    """
+    straight, before = straight_in(path), np.arange(-1, len(path) - 1)
+    starts, ends = (point_array(getattr(piece, name) for piece in path) for name in ("start", "end"))
+    size = np.maximum(np.abs(starts).max(axis=0), np.abs(ends[-1]))
+    level = straight & (starts[before, 1] == 0.0) & (ends[:, 1] == 0.0)
+    able = (straight == straight[before]) & (level | (starts[:, 1] != 0.0))
+    able[0] &= is_loop
+    able &= ~straight | _between(starts[before], starts, ends, size)
+    for k in np.flatnonzero(able & ~straight).tolist():
+        able[k] = bool(_whole((path[k - 1], path[k]), size))
+    if not able.any():
+        return path
+    first = int(np.argmin(able))
+    path, firsts = path[first:] + path[:first], np.flatnonzero(~np.roll(able, -first)).tolist() or [0]
+    groups = [path[low:high] for low, high in pairwise([*firsts, len(path)])]
+    return tuple(piece for group in groups for piece in _whole(group, size) or group)
+
+
+def _between(start: Floats, points: Floats, end: Floats, size: Floats) -> NDArray[np.bool_]:
+    """Return whether points lie between two others on the straight line, to rounding; all of shape (n, 2)."""
+    step, whole = points - start, end - start
+    along, across = np.sum(step * whole, axis=1), step[:, 0] * whole[:, 1] - step[:, 1] * whole[:, 0]
+    near = np.abs(across) <= ON_SIDE * (np.abs(whole) @ size[::-1])
+    return np.asarray(near & (along > 0.0) & (along < np.sum(whole**2, axis=1)))
+
+
+def _whole(parts: tuple[Curve, ...], size: Floats) -> list[Curve]:
+    """Return the curve whose consecutive parts are the given pieces of one kind; an empty list if there is none."""
+    start, end = parts[0].start, parts[-1].end
+    if isinstance(parts[0], Segment):
+        joints = point_array(piece.start for piece in parts[1:])
+        return [Segment(start, end)] if _between(np.array([start]), joints, np.array([end]), size).all() else []
+    if end < start:
+        # in one direction of the two, so that coincident faces stay coincident
+        return [p.reversed() for p in _whole(tuple(part.reversed() for part in reversed(parts)), size)]
+    whole: Curve | None = parts[0]
+    for part in parts[1:]:
+        whole = whole and joined(whole, part, SAME_PIECE * float(size.max()))
+    return [whole] if whole else []
+
+
+def joined(before: Curve, after: Curve, tolerance: float) -> Curve | None:
+    """Return the arc or Bezier curve of two consecutive parts within ``tolerance``; None if there is none.
+
+    Examples
+    --------
+    >>> joined(Arc((0, 0), 1.0, 3.5, 4.0), Arc((0, 0), 1.0, 4.0, 5.5), 1e-15)
+    Arc(center=(0.0, 0.0), semi_axes=1.0, start=3.5, end=5.5)
+    """
+    if isinstance(before, Arc) and isinstance(after, Arc):
+        return _joined_arcs(before, after, tolerance)
+    if isinstance(before, Bezier) and isinstance(after, Bezier):
+        return _joined_beziers(before, after, tolerance)
+    return None
+
+
+def _joined_arcs(before: Arc, after: Arc, tolerance: float) -> Arc | None:
+    span = 2.0 * (before.half_span + after.half_span)
+    turn = math.remainder(after.start_angle - before.end_angle, 2.0 * math.pi)
+    if before.direction != after.direction or span > 2.0 * math.pi + SAME_ANGLE or abs(turn) > SAME_ANGLE:
+        return None
+    end = before.start_angle + before.direction * min(span, 2.0 * math.pi)
+    whole = Arc(before.center, before.semi_axes, before.start_angle, end).pinned(before.start, after.end)
+    return whole if _are_parts(whole, before, after, before.half_span / (0.5 * span), tolerance) else None
+
+
+def _joined_beziers(before: Bezier, after: Bezier, tolerance: float) -> Bezier | None:
+    if before.degree != after.degree:
+        return None
+    first, second = (np.array(part.control_points) for part in (before, after))
+    # each distance is proportional to the derivative at the joint times the part's fraction of the parameter
+    left, right = math.dist(first[-1], first[-2]), math.dist(second[1], second[0])
+    if left == 0.0 or right == 0.0:
+        return None
+    fraction = left / (left + right)
+    inner = [first[0] + (first[1] - first[0]) / fraction]
+    if before.degree == 3:
+        inner.append(second[-1] + (second[-2] - second[-1]) / (1.0 - fraction))
+    whole = Bezier([before.start, *(tuple(p) for p in inner), after.end])
+    return whole if _are_parts(whole, before, after, fraction, tolerance) else None
+
+
+def _are_parts(whole: Curve, before: Curve, after: Curve, fraction: float, tolerance: float) -> bool:
+    """Whether the joint and points of both parts lie on the whole curve at the corresponding parameters."""
+    given = np.concatenate([before.point(INNER), [before.end], after.point(INNER)])
+    found = whole.point(np.concatenate([fraction * INNER, [fraction], fraction + (1.0 - fraction) * INNER]))
+    return bool(np.abs(given - found).max() <= tolerance)
