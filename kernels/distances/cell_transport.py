@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -37,101 +36,77 @@ PAIRS_AT_ONCE = 2**18
 
 @dataclass(frozen=True)
 class Cells:
-    """The occupied cells of a measure on the n x n cells between edges, from its ``moments``, shape (n, 3, n, 3).
+    """The occupied cells of a measure on the square, with all lengths in `DIAGONAL`.
 
-    The moments are the integrals of x^k y^l, with x and y the angles from the middles of their cells, in `DIAGONAL`.
+    Attributes
+    ----------
+    size : int
+        Cells along a side.
+    place, mass, mean, spread : ndarray
+        Row and column, shape (2, cells); mass; mean, (cells, 2); covariances xx, xy, yy, (3, cells).
+    low, high, radius : ndarray
+        Corners of each cell from its mean, (cells, 2), and the largest distance from it.
+    along, length, line : ndarray
+        Directions and half lengths of cells that count as lines, and which cells do so.
+    deviation, dropped : float
+        The mean distance, times the mass, of the points from the lines and points for which cells count, and the mass
+        of cells that count as empty.
     """
 
-    edges: Floats
-    moments: Floats
+    size: int
+    place: NDArray[np.intp]
+    mass: Floats
+    mean: Floats
+    spread: Floats
+    low: Floats
+    high: Floats
+    radius: Floats
+    along: Floats
+    length: Floats
+    line: NDArray[np.bool_]
+    deviation: float
+    dropped: float
 
-    @cached_property
-    def place(self) -> NDArray[np.intp]:
-        """Row and column of each cell, shape (2, cells)."""
-        return np.stack(np.nonzero(self.moments[:, 0, :, 0] > NO_MASS))
-
-    @property
-    def dropped(self) -> float:
-        """The mass of cells that count as empty."""
-        masses = self.moments[:, 0, :, 0]
-        return float(np.abs(masses[masses <= NO_MASS]).sum())
-
-    def _moment(self, k: int, m: int) -> Floats:
-        return np.asarray(self.moments[self.place[0], k, self.place[1], m])
-
-    @cached_property
-    def mass(self) -> Floats:
-        return self._moment(0, 0)
-
-    @cached_property
-    def _half(self) -> Floats:
-        return 0.5 * np.diff(self.edges)[self.place.T] / DIAGONAL
-
-    @cached_property
-    def _shift(self) -> Floats:
-        mean = np.stack((self._moment(1, 0), self._moment(0, 1)), axis=-1) / self.mass[:, None]
-        return np.clip(mean, -self._half, self._half)
-
-    @cached_property
-    def mean(self) -> Floats:
-        return 0.5 * (self.edges[:-1] + self.edges[1:])[self.place.T] / DIAGONAL + self._shift
-
-    @cached_property
-    def low(self) -> Floats:
-        """The lower left corner of each cell from its mean, shape (cells, 2)."""
-        return -self._half - self._shift
-
-    @cached_property
-    def high(self) -> Floats:
-        return self._half - self._shift
-
-    @cached_property
-    def radius(self) -> Floats:
-        return np.hypot(*np.maximum(-self.low, self.high).T)
-
-    @cached_property
-    def spread(self) -> Floats:
-        """Covariances xx, xy, yy, shape (3, cells)."""
-        (x, y), (wide, tall) = self._shift.T, self._half.T
-        xx = np.clip(self._moment(2, 0) / self.mass - x * x, 0.0, wide**2)
-        yy = np.clip(self._moment(0, 2) / self.mass - y * y, 0.0, tall**2)
+    @staticmethod
+    def of(edges: Floats, moments: Floats) -> Cells:
+        """From the integrals of x^k y^l over n x n cells, shape (n, 3, n, 3), x and y from the middles of cells."""
+        masses, half = moments[:, 0, :, 0], 0.5 * np.diff(edges) / DIAGONAL
+        place = np.stack(np.nonzero(masses > NO_MASS))
+        mass, (wide, tall) = masses[tuple(place)], half[place]
+        x, y, xx, xy, yy = (
+            moments[place[0], k, place[1], m] / mass for k, m in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+        )
+        x, y = np.clip(x, -wide, wide), np.clip(y, -tall, tall)
+        xx, yy = np.clip(xx - x * x, 0.0, wide**2), np.clip(yy - y * y, 0.0, tall**2)
         most = np.sqrt(xx * yy)
-        return np.stack((xx, np.clip(self._moment(1, 1) / self.mass - x * y, -most, most), yy))
-
-    @cached_property
-    def _axes(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Directions and half lengths of cells that count as lines, which cells do so, and what that costs."""
-        xx, xy, yy = self.spread
-        angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+        xy = np.clip(xy - x * y, -most, most)
+        shift, corner = np.stack((x, y), axis=-1), half[place.T]
+        low, high = -corner - shift, corner - shift
+        reach = np.maximum(-low, high)
+        radius, angle = np.hypot(*reach.T), 0.5 * np.arctan2(2.0 * xy, xx - yy)
         along = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
-        middle, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-        wide, narrow = np.sqrt(middle + half), np.sqrt(np.maximum(middle - half, 0.0))
-        line, point = narrow < FLAT * self.radius, wide < FLAT * self.radius
-        length = np.where(point, 0.0, (np.maximum(-self.low, self.high) * np.abs(along)).sum(axis=-1))
-        return along, length, line, np.where(line, narrow, 0.0) + np.where(point, wide, 0.0)
-
-    @property
-    def deviation(self) -> float:
-        """The mean distance, times the mass, of the points from the lines and points for which cells count."""
-        return float(self.mass @ self._axes[3])
-
-    @property
-    def is_points(self) -> bool:
-        """Whether each cell contains one point."""
-        return not self.spread.any()
+        centre, spread = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+        longer, shorter = np.sqrt(centre + spread), np.sqrt(np.maximum(centre - spread, 0.0))
+        line, point = shorter < FLAT * radius, longer < FLAT * radius
+        length = np.where(point, 0.0, (reach * np.abs(along)).sum(axis=-1))
+        deviation = float(mass @ (np.where(line, shorter, 0.0) + np.where(point, longer, 0.0)))
+        mean, dropped = 0.5 * (edges[:-1] + edges[1:])[place.T] / DIAGONAL + shift, np.abs(masses[masses <= NO_MASS])
+        covariance, size = np.stack((xx, xy, yy)), half.size
+        return Cells(
+            size, place, mass, mean, covariance, low, high, radius, along, length, line, deviation, float(dropped.sum())
+        )
 
     def support(self, cell: NDArray[np.intp], slope: Floats) -> Floats:
         """The largest values of linear functions of the points of cells, less those at the means."""
-        along, length, line, _ = self._axes
         box = np.maximum(self.low[cell] * slope, self.high[cell] * slope).sum(axis=-1)
-        return np.where(line[cell], np.abs((along[cell] * slope).sum(axis=-1)) * length[cell], box)
+        return np.where(self.line[cell], np.abs((self.along[cell] * slope).sum(axis=-1)) * self.length[cell], box)
 
     def slopes(self, values: Floats, steepest: float) -> Floats:
         """Gradients of planes fitted to values at the means in a window around each cell, shape (cells, 2)."""
         from scipy.ndimage import uniform_filter
 
         def mean(given: Floats) -> Floats:
-            table = np.zeros((self.edges.size - 1,) * 2)
+            table = np.zeros((self.size, self.size))
             table[tuple(self.place)] = given
             return np.asarray(uniform_filter(table, WINDOW, mode="constant")[tuple(self.place)])
 
@@ -154,7 +129,7 @@ def transport_bounds(one: Cells, other: Cells, order: float) -> tuple[float, flo
     --------
     >>> masses = np.zeros((2, 2, 3, 2, 3))
     >>> masses[0, 0, 0, 0, 0] = masses[1, 0, 0, 1, 0] = 1.0
-    >>> low, high = transport_bounds(*(Cells(np.array([0.0, 1.0, 2.0]), part) for part in masses), 1.0)
+    >>> low, high = transport_bounds(*(Cells.of(np.array([0.0, 1.0, 2.0]), part) for part in masses), 1.0)
     >>> round(low * DIAGONAL, 12), round(high * DIAGONAL, 12)
     (1.0, 1.0)
     """
@@ -163,15 +138,17 @@ def transport_bounds(one: Cells, other: Cells, order: float) -> tuple[float, flo
         return 0.0, dropped + float(one.mass.sum() + other.mass.sum())
     left, right, staying = one.mass.copy(), other.mass.copy(), 0.0
     if order == 1.0:  # common mass may stay
-        cells = one.edges.size - 1
-        _, i, j = np.intersect1d(*(part.place[0] * cells + part.place[1] for part in (one, other)), return_indices=True)
+        number = (part.place[0] * part.size + part.place[1] for part in (one, other))
+        _, i, j = np.intersect1d(*number, return_indices=True)
         common = np.minimum(left[i], right[j])
         staying = float(common @ _costs(one, other, i, j, order))
         left[i] -= common
         right[j] -= common
     rest = [np.flatnonzero(part > NO_MASS) for part in (left, right)]
-    lacking = dropped + abs(float(left.sum() - right.sum())) + sum(
-        float(part.sum() - part[some].sum()) for part, some in zip((left, right), rest, strict=True)
+    lacking = (
+        dropped
+        + abs(float(left.sum() - right.sum()))
+        + sum(float(part.sum() - part[some].sum()) for part, some in zip((left, right), rest, strict=True))
     )
     if not (rest[0].size and rest[1].size):
         return 0.0, staying + lacking
@@ -179,7 +156,7 @@ def transport_bounds(one: Cells, other: Cells, order: float) -> tuple[float, flo
     i, j = np.nonzero(plan)
     upper = staying + lacking + float(plan[i, j] @ _costs(one, other, rest[0][i], rest[1][j], order))
     # each of the sums may lack mass, and reduced costs are zero to rounding
-    if one.is_points and other.is_points:
+    if not (one.spread.any() or other.spread.any()):
         return max(upper - 2.0 * lacking - SOLVER_ROUNDING * float(left.sum()), 0.0), upper
     if order == 1.0:
         # both ends of the potentials that the plan allows: the middle is smoother
@@ -264,9 +241,7 @@ def _least_costs(one: Cells, other: Cells, slopes: list[Floats], order: float) -
         value = (tangent * shift).sum(axis=-1)
         if order > 1.0:
             value -= (order - 1.0) * size ** (order / (order - 1.0))
-        return np.asarray(
-            value - one.support(i, slopes[0][i] - tangent) - other.support(j, tangent - slopes[1][j])
-        )
+        return np.asarray(value - one.support(i, slopes[0][i] - tangent) - other.support(j, tangent - slopes[1][j]))
 
     def at_means(shift: Floats, length: Floats) -> Floats:
         unit = np.divide(shift, length[..., None], out=np.zeros_like(shift), where=length[..., None] > 0.0)

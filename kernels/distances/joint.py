@@ -12,6 +12,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.estimates import ErrorKind, Estimate
 from ...core.long_runs import progress_bar
+from ...core.rounding import EPS
 from ..bases.bins import Bins
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE
@@ -24,7 +25,7 @@ from .cell_transport import DIAGONAL, Cells, transport_bounds
 from .distributions import CellsAndAtoms, Term, Terms, cells_and_atoms, terms_of
 from .resampling import cell_middles, matrices_error, stochastic_rows
 
-# Limit on the pairs of occupied cells, at about 100 bytes and some microseconds per pair, and on the cells along a side.
+# Limits on the pairs of occupied cells, at 100 bytes and some microseconds per pair, and on the cells along a side.
 MOST_PAIRS, MOST_CELLS = 2**21, 768
 # The same limit for matrices, whose cells are points.
 MOST_POINT_PAIRS = 2**22
@@ -112,13 +113,13 @@ def joint_law_distance(first: Law, second: Law, order: float, tolerance: float) 
             staying, matched = 0.0, False
             if order == 1.0:
                 one, other, staying, matched = _matched([side.known() for side in sides], edges, one, other)
-            cells = Cells(edges, one), Cells(edges, other)
+            cells = Cells.of(edges, one), Cells.of(edges, other)
             bounds = transport_bounds(*cells, order)
             found = _roots(bounds[0] - wrong - more, bounds[1] + staying + wrong + more, order)
             bar.update()
             low, high = max(low, found[0]), min(high, found[1])
-            error = 0.5 * (high - low) + sum(own)
-            following = _next_size(size, cells, (high - low) / max(2.0 * (tolerance - sum(own)), 1e-12))
+            error = 0.5 * abs(high - low) + sum(own)
+            following = _next_size(size, cells, (high - low) / max(2.0 * (tolerance - sum(own)), sum(own), EPS))
             if error <= tolerance or following <= size:
                 break
             size = following
@@ -126,7 +127,7 @@ def joint_law_distance(first: Law, second: Law, order: float, tolerance: float) 
     if order > 1.0 and error > tolerance:  # distances do not fall with the order
         least = joint_law_distance(first, second, 1.0, tolerance)
         low, kind = max(low, least.value - least.error), kind if least.kind == "bound" else "estimate"
-        error = 0.5 * (high - low) + sum(own)
+        error = 0.5 * abs(high - low) + sum(own)
     how = f"a potential and a plan on {size} x {size} cells, between {low:.8g} and {high:.8g}"
     return Estimate(0.5 * (low + high), error, kind, how)
 
@@ -203,11 +204,11 @@ def _atoms_in_cells(law: CellsAndAtoms, edges: Floats) -> tuple[Floats, Floats, 
 
 
 def _next_size(size: int, cells: tuple[Cells, Cells], excess: float) -> int:
-    """The cells along a side that divide the width of the bounds by the excess, of order 2, within the limits; else 0."""
+    """The cells along a side that reduce the width of the bounds by the excess, with order 2; 0 beyond the limits."""
     dimensions = sum(2 if part.mass.size > AREA * size else 1 for part in cells)
     pairs = cells[0].mass.size * cells[1].mass.size
     room = min((MOST_PAIRS / max(pairs, 1)) ** (1.0 / dimensions), MOST_CELLS / size)
-    growth = min(MORE * excess**0.5, room)
+    growth = min(MORE * max(excess, 0.0) ** 0.5, room)
     return 0 if room < LEAST_GROWTH else MULTIPLE * math.ceil(growth * size / MULTIPLE)
 
 
@@ -218,8 +219,8 @@ def _roots(low: float, high: float, order: float) -> tuple[float, float]:
 def joint_matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float) -> Estimate:
     """W_p between the flux measures of two matrices, as point masses in the middle of the cells.
 
-    The result is exact up to ``MOST_POINT_PAIRS`` pairs of occupied cells. For more pairs neighbouring cells are merged, and
-    the result is the middle of two bounds.
+    The result is exact up to ``MOST_POINT_PAIRS`` pairs of occupied cells. For more pairs neighbouring cells are
+    merged, and the result is the middle of two bounds.
     """
     own = matrices_error(first, second, order, False)
     fluxes = [matrix.weights[:, None] * stochastic_rows(matrix) for matrix in (first, second)]
@@ -234,7 +235,9 @@ def joint_matrix_distance(first: KernelMatrix, second: KernelMatrix, order: floa
             power = ((middles - cell_middles(merged)[owner]) / DIAGONAL)[:, None] ** np.arange(3)
             table = np.zeros((merged.size - 1, 3, middles.size))
             table[owner, :, np.arange(middles.size)] = power
-            cells = [Cells(merged, np.einsum("ikx,xy,jly->ikjl", table, flux, table, optimize=True)) for flux in fluxes]
+            cells = [
+                Cells.of(merged, np.einsum("ikx,xy,jly->ikjl", table, flux, table, optimize=True)) for flux in fluxes
+            ]
             if cells[0].mass.size * cells[1].mass.size <= MOST_POINT_PAIRS:
                 break
         low, high = _roots(*transport_bounds(cells[0], cells[1], order), order)

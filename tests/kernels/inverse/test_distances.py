@@ -242,7 +242,7 @@ def test_bounds_from_moments_of_cells_contain_the_linear_programme_of_the_points
         x, y = ((part - middle[place]) / DIAGONAL).T
         for k, m in itertools.product(range(3), repeat=2):
             np.add.at(moments, (place[:, 0], k, place[:, 1], m), mass * x**k * y**m)
-        cells.append(Cells(edges, moments))
+        cells.append(Cells.of(edges, moments))
     cost = np.hypot(*(points[0][:, None] - points[1]).transpose(2, 0, 1))
     exact = ot.emd2(*masses, cost**order)
     low, high = (DIAGONAL**order * bound for bound in transport_bounds(*cells, order))

@@ -1,6 +1,5 @@
 """Matrices from counted pairs: small tables by hand, moments by enumeration, quantiles of known distributions."""
 
-import itertools
 import math
 from collections.abc import Sequence
 
