@@ -99,7 +99,8 @@ class Cells:
     def support(self, cell: NDArray[np.intp], slope: Floats) -> Floats:
         """The largest values of linear functions of the points of cells, less those at the means."""
         box = np.maximum(self.low[cell] * slope, self.high[cell] * slope).sum(axis=-1)
-        return np.where(self.line[cell], np.abs((self.along[cell] * slope).sum(axis=-1)) * self.length[cell], box)
+        flat = np.abs((self.along[cell] * slope).sum(axis=-1)) * self.length[cell]
+        return np.asarray(np.where(self.line[cell], flat, box))
 
     def slopes(self, values: Floats, steepest: float) -> Floats:
         """Gradients of planes fitted to values at the means in a window around each cell, shape (cells, 2)."""
@@ -257,5 +258,5 @@ def _least_costs(one: Cells, other: Cells, slopes: list[Floats], order: float) -
     for start in range(0, near[0].size, PAIRS_AT_ONCE):
         i, j = (side[start : start + PAIRS_AT_ONCE] for side in near)
         for slope in (slopes[0][i], slopes[1][j]):
-            found[i, j] = np.maximum(found[i, j], bound(i, j, lambda *_, slope=slope: slope))  # type: ignore[misc]
+            found[i, j] = np.maximum(found[i, j], bound(i, j, lambda *_, slope=slope: slope))
     return found
