@@ -20,6 +20,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.checks import Floats
+from asperity.core.errors import AccuracyError
 from asperity.kernels.aerodynamics import drag
 from asperity.kernels.discretisation.method import Budget, MethodName
 from asperity.kernels.laws.law import DrivenLaw
@@ -64,6 +65,16 @@ def pairs(basis: ker.Basis, invariant: bool, symmetrise: bool, rng: np.random.Ge
     theta = ker.SINE.sample(PAIRS, rng) if invariant else np.pi * rng.beta(1.2, 1.6, PAIRS)
     found = ker.estimate(theta, TEETH.sample(theta, rng), basis, symmetrise, invariant=invariant)
     return np.linalg.norm(found.symmetric - truth(TEETH, basis)), found.error
+
+
+def few_pairs(law: ker.Law, number: int, bins: int, symmetrise: bool, rng: np.random.Generator) -> Errors:
+    """A matrix from a few pairs; nothing is claimed where a bin has none."""
+    theta, basis = ker.SINE.sample(number, rng), ker.Bins(bins)
+    try:
+        found = ker.estimate(theta, law.sample(theta, rng), basis, symmetrise, invariant=True)
+    except AccuracyError:
+        return 0.0, 1.0
+    return np.linalg.norm(found.symmetric - truth(law, basis)), found.error
 
 
 def eigenvalue(law: ker.Law, basis: ker.Basis, method: MethodName, which: str, rng: np.random.Generator) -> Errors:
@@ -155,6 +166,9 @@ def estimates() -> dict[str, Callable[[np.random.Generator], Errors]]:
         add(flat_distance, law, method)
     for basis, *flags in product((ker.Bins(4), ker.Bins(12), ker.Legendre(6)), (True, False), (False, True)):
         add(pairs, basis, *flags)
+    few = [(10, 2), (12, 3), (40, 4), (160, 16)]
+    for law, numbers, symmetrise in product((ker.lambertian(), TEETH, MAXWELL), few, (False, True)):
+        add(few_pairs, law, *numbers, symmetrise)
     for law, basis in ((TEETH, ker.Bins(8)), (TEETH, ker.Legendre(6)), (ARC, ker.Bins(12)), (ARC, ker.Legendre(6))):
         for method, which in product(("monte-carlo", "qmc"), ("gap", "slem")):
             add(eigenvalue, law, basis, method, which)

@@ -17,7 +17,8 @@ from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..expectations.basis_means import functions_of
 from ..laws.density import DensityLaw, cut_by_edges, split_panels
-from ..laws.involution import InvolutionLaw, jumps_of_map
+from ..laws.interval_exchange import IntervalExchangeLaw
+from ..laws.involution import InvolutionLaw
 from ..laws.law import Law
 from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.matrix_law import finite_matrix, uniform_on_bins
@@ -65,9 +66,9 @@ def by_density(law: DensityLaw, basis: Basis, budget: Budget) -> KernelMatrix:
     return _settled(*density_matrix(law, basis, budget.tolerance), basis)
 
 
-def by_map(law: InvolutionLaw, basis: Basis, budget: Budget) -> KernelMatrix:
+def by_map(law: InvolutionLaw | IntervalExchangeLaw, basis: Basis, budget: Budget) -> KernelMatrix:
     """The matrix of a deterministic law by rules on intervals between the jumps of its map, which are halved."""
-    return _settled(*map_matrix(law.map, basis, budget.tolerance), basis)
+    return _settled(*map_matrix(law.map, law.breakpoints(0)[0], basis, budget.tolerance), basis)
 
 
 def by_interval_masses(law: LeastResistanceLaw, basis: Bins, budget: Budget) -> KernelMatrix:
@@ -172,9 +173,11 @@ def _density_rule(law: DensityLaw, basis: Basis, edges: Floats, order: int) -> F
     return total if values is not None else basis.normalisation[:, None] * total * basis.normalisation
 
 
-def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: float) -> tuple[Floats, float]:
+def map_matrix(
+    map_angle: Callable[[Floats], Floats], jumps: Floats, basis: Basis, tolerance: float
+) -> tuple[Floats, float]:
     """<e_i, e_j o T> for a measure-preserving map T, and the difference of the last two levels as error estimate."""
-    ends = np.concatenate(([0.0], jumps_of_map(map_angle), [np.pi]))
+    ends = np.concatenate(([0.0], jumps, [np.pi]))
     width = np.diff(ends)[:, None] * GRADING
     graded = (ends[:-1, None] + width).ravel(), (ends[1:, None] - width).ravel()
     edges = np.unique(np.concatenate((basis.edges, ends, *graded)))

@@ -18,6 +18,7 @@ from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, mirror_image, mirror_refinement
 from ..bases.panels import Panels
 from ..laws.density import DensityLaw
+from ..laws.interval_exchange import IntervalExchangeLaw
 from ..laws.involution import InvolutionLaw
 from ..laws.law import Combination, Composition, Law, SpecularFrame, sum_of
 from ..laws.least_resistance import LeastResistanceLaw
@@ -59,7 +60,7 @@ METHODS: tuple[Method, ...] = (
         lambda law, basis: isinstance(law, LeastResistanceLaw) and isinstance(basis, Bins),
         by_interval_masses,
     ),
-    Method("quadrature", lambda law, _: isinstance(law, InvolutionLaw), by_map),
+    Method("quadrature", lambda law, _: isinstance(law, (InvolutionLaw, IntervalExchangeLaw)), by_map),
     Method("quadrature", has_conditionals, by_conditionals),
 )
 # Methods with rays. They are tried if no method above accepts the law and its parts do not give its matrix.

@@ -1,14 +1,12 @@
-"""Upper bounds of W_1 between measures on a square of cells, by plans on ever smaller cells.
+"""Bounds of W_p between measures on a square of cells, from the masses, means and covariances of their cells.
 
-Only the difference of the measures is transported, because common mass may stay. On the coarsest cells the transport
-problem is solved with all pairs of cells, on the next with the pairs beside those of the plan before, by a sparse
-network simplex. A plan between the masses of cells, at their means, costs at most what `_plan_cost` says, whichever
-pairs it uses.
+A plan between cells bounds the distance from above, a potential that is affine on each cell from below: both hold for
+all measures with these moments.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,160 +15,248 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
+from ...core.rounding import EPS
 
-# Cells along a side with which plans begin, and pairs of cells of a sparse problem, at most a few seconds.
-CELLS_AT_START, MOST_SPARSE = 16, 2**18
-MOST_PIVOTS = 10**8
-# Masses below this fraction of the total count as 0.
-NO_MASS = 1e-15
-# Largest distance on the square.
+# Largest distance on the square, the unit of length here, so that powers neither overflow nor exceed 1.
 DIAGONAL = float(np.hypot(np.pi, np.pi))
+MOST_PIVOTS = 10**8
+# Cells of smaller mass, mostly rounding, count as empty, and their mass as moved along the diagonal.
+NO_MASS = 1e-13
+# The solver stops at reduced costs of 10 eps times the largest cost; the rest is for the rounding of its sums.
+SOLVER_ROUNDING = 64.0 * EPS
+# A cell whose mass deviates from a line, or from a point, by less than this fraction of its radius in the root of the
+# mean square counts as one there, and the deviation is paid for.
+FLAT = 0.05
+# Slopes of potentials are fitted to windows of so many cells. Pairs of cells nearer than this many radii choose among
+# three tangents of the cost; for others that at their means is nearly the best.
+WINDOW, NEAR = 3, 8.0
+UNEVEN = 4
+PAIRS_AT_ONCE = 2**18
 
 
 @dataclass(frozen=True)
-class Level:
-    """An upper bound of W_1 from ``cells`` times ``cells`` cells."""
+class Cells:
+    """The occupied cells of a measure on the square, with all lengths in `DIAGONAL`.
 
-    cells: int
-    upper: float
+    Attributes
+    ----------
+    size : int
+        Cells along a side.
+    place, mass, mean, spread : ndarray
+        Row and column, shape (2, cells); mass; mean, (cells, 2); covariances xx, xy, yy, (3, cells).
+    low, high, radius : ndarray
+        Corners of each cell from its mean, (cells, 2), and the largest distance from it.
+    along, length, line : ndarray
+        Directions and half lengths of cells that count as lines, and which cells do so.
+    deviation, dropped : float
+        The mean distance, times the mass, of the points from the lines and points for which cells count, and the mass
+        of cells that count as empty.
+    """
 
-
-@dataclass(frozen=True)
-class _Masses:
-    """The occupied cells of a level: indices, masses, means, covariances xx, xy, yy, and radii about the means."""
-
-    cell: NDArray[np.intp]
+    size: int
+    place: NDArray[np.intp]
     mass: Floats
     mean: Floats
     spread: Floats
+    low: Floats
+    high: Floats
     radius: Floats
+    along: Floats
+    length: Floats
+    line: NDArray[np.bool_]
+    deviation: float
+    dropped: float
 
     @staticmethod
-    def of(points: Floats, array: Floats, level: int) -> _Masses:
-        """The point masses ``array`` on the square of ``points``, in ``level`` times ``level`` blocks of equal size."""
-        place = np.argwhere(array > NO_MASS)
-        weight, position = array[tuple(place.T)], points[place]
-        block = place // (points.size // level)
-        number, owner = np.unique(block @ np.array([level, 1]), return_inverse=True)
-        mass = np.asarray(np.bincount(owner, weight), dtype=np.float64)
+    def of(edges: Floats, moments: Floats) -> Cells:
+        """From the integrals of x^k y^l over n x n cells, shape (n, 3, n, 3), x and y from the middles of cells."""
+        masses, half = moments[:, 0, :, 0], 0.5 * np.diff(edges) / DIAGONAL
+        place = np.stack(np.nonzero(masses > NO_MASS))
+        mass, (wide, tall) = masses[tuple(place)], half[place]
+        x, y, xx, xy, yy = (
+            moments[place[0], k, place[1], m] / mass for k, m in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+        )
+        x, y = np.clip(x, -wide, wide), np.clip(y, -tall, tall)
+        xx, yy = np.clip(xx - x * x, 0.0, wide**2), np.clip(yy - y * y, 0.0, tall**2)
+        most = np.sqrt(xx * yy)
+        xy = np.clip(xy - x * y, -most, most)
+        shift, corner = np.stack((x, y), axis=-1), half[place.T]
+        low, high = -corner - shift, corner - shift
+        reach = np.maximum(-low, high)
+        radius, angle = np.hypot(*reach.T), 0.5 * np.arctan2(2.0 * xy, xx - yy)
+        along = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
+        centre, spread = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+        longer, shorter = np.sqrt(centre + spread), np.sqrt(np.maximum(centre - spread, 0.0))
+        line, point = shorter < FLAT * radius, longer < FLAT * radius
+        length = np.where(point, 0.0, (reach * np.abs(along)).sum(axis=-1))
+        deviation = float(mass @ (np.where(line, shorter, 0.0) + np.where(point, longer, 0.0)))
+        mean, dropped = 0.5 * (edges[:-1] + edges[1:])[place.T] / DIAGONAL + shift, np.abs(masses[masses <= NO_MASS])
+        covariance, size = np.stack((xx, xy, yy)), half.size
+        return Cells(
+            size, place, mass, mean, covariance, low, high, radius, along, length, line, deviation, float(dropped.sum())
+        )
 
-        def average(values: Floats) -> Floats:
-            return np.asarray(np.bincount(owner, weight * values) / mass)
+    def support(self, cell: NDArray[np.intp], slope: Floats) -> Floats:
+        """The largest values of linear functions of the points of cells, less those at the means."""
+        box = np.maximum(self.low[cell] * slope, self.high[cell] * slope).sum(axis=-1)
+        flat = np.abs((self.along[cell] * slope).sum(axis=-1)) * self.length[cell]
+        return np.asarray(np.where(self.line[cell], flat, box))
 
-        mean = np.stack([average(position[:, axis]) for axis in (0, 1)], axis=-1)
-        x, y = (position - mean[owner]).T
-        radius = np.zeros(mass.size)
-        np.maximum.at(radius, owner, np.hypot(x, y))
-        spread = np.stack([average(x * x), average(x * y), average(y * y)], axis=-1)
-        cell = np.stack(np.divmod(number, level), axis=-1).astype(np.intp)
-        return _Masses(cell, mass, mean, spread, radius)
+    def slopes(self, values: Floats, steepest: float) -> Floats:
+        """Gradients of planes fitted to values at the means in a window around each cell, shape (cells, 2)."""
+        from scipy.ndimage import uniform_filter
 
-    @property
-    def size(self) -> int:
-        return self.mass.size
+        def mean(given: Floats) -> Floats:
+            table = np.zeros((self.size, self.size))
+            table[tuple(self.place)] = given
+            return np.asarray(uniform_filter(table, WINDOW, mode="constant")[tuple(self.place)])
+
+        count = mean(np.ones(values.size))
+        x, y, f = sides = (*self.mean.T, values)
+        mx, my, mf = (mean(side) / count for side in sides)
+        xx, xy, yy, xf, yf = (
+            mean(a * b) / count - c * d
+            for a, b, c, d in ((x, x, mx, mx), (x, y, mx, my), (y, y, my, my), (x, f, mx, mf), (y, f, my, mf))
+        )
+        xx, yy = xx + FLAT * EPS**0.5, yy + FLAT * EPS**0.5
+        found = np.stack((yy * xf - xy * yf, xx * yf - xy * xf), axis=-1) / (xx * yy - xy * xy)[:, None]
+        return np.asarray(found / np.maximum(np.hypot(*found.T) / steepest, 1.0)[:, None])
 
 
-@dataclass(frozen=True)
-class _Plan:
-    source: NDArray[np.intp]
-    target: NDArray[np.intp]
-    mass: Floats
-
-
-def levels_of_transport(points: Floats, difference: Floats, most_cells: int) -> Iterator[Level]:
-    """Upper bounds of W_1 between the positive and the negative part of an array on the square of points, ever closer.
-
-    Each level has twice the cells of the one before. The last has ``most_cells``, or is the last that divides the
-    number of points and fits the limits.
+def transport_bounds(one: Cells, other: Cells, order: float) -> tuple[float, float]:
+    """Bounds of W_p^p between measures of equal mass, in the unit `DIAGONAL`.
 
     Examples
     --------
-    >>> array = np.array([[0.5, -0.5], [-0.5, 0.5]])
-    >>> [float(level.upper) for level in levels_of_transport(np.array([1.0, 2.0]), array, 2)]
-    [1.0]
+    >>> masses = np.zeros((2, 2, 3, 2, 3))
+    >>> masses[0, 0, 0, 0, 0] = masses[1, 0, 0, 1, 0] = 1.0
+    >>> low, high = transport_bounds(*(Cells.of(np.array([0.0, 1.0, 2.0]), part) for part in masses), 1.0)
+    >>> round(low * DIAGONAL, 12), round(high * DIAGONAL, 12)
+    (1.0, 1.0)
     """
-    cells = min(CELLS_AT_START, most_cells)
-    one, other = (_Masses.of(points, sign * difference, cells) for sign in (1.0, -1.0))
-    if not one.size or not other.size:
-        yield Level(cells, 0.0)
-        return
-    plan = _plan(one, other, np.indices((one.size, other.size)).reshape(2, -1))
-    while plan is not None:
-        yield Level(cells, _plan_cost(one, other, plan))
-        cells *= 2
-        if cells > most_cells or points.size % cells:
-            return
-        source, target = one.cell[plan.source], other.cell[plan.target]
-        one, other = (_Masses.of(points, sign * difference, cells) for sign in (1.0, -1.0))
-        pairs = _next_pairs(source, target, one, other, cells)
-        if pairs.shape[1] > MOST_SPARSE:
-            return
-        plan = _plan(one, other, pairs)
-
-
-def _plan(one: _Masses, other: _Masses, pairs: NDArray[np.intp]) -> _Plan | None:
-    """The best plan that uses only these pairs; None if rounding leaves no plan on a part of all pairs."""
-    import ot
-    from scipy.sparse import coo_array
-
-    every = pairs.shape[1] == one.size * other.size
-    length = np.linalg.norm(one.mean[pairs[0]] - other.mean[pairs[1]], axis=1)
-    shape = (one.size, other.size)
-    cost: Any = length.reshape(shape) if every else coo_array((length, tuple(pairs)), shape=shape)
-    total = one.mass.sum()
-    found, log = ot.emd(one.mass / total, other.mass / other.mass.sum(), cost, numItermax=MOST_PIVOTS, log=True)
-    if log["warning"]:
-        if every:
-            raise AccuracyError(f"optimal transport: {log['warning']}", float("nan"))
-        return None
-    flow = coo_array(found)
-    used = flow.data > 0.0
-    return _Plan(flow.row[used].astype(np.intp), flow.col[used].astype(np.intp), total * flow.data[used])
-
-
-def _plan_cost(one: _Masses, other: _Masses, plan: _Plan) -> float:
-    r"""A bound of the cost of a plan between the masses of cells, independent in each pair of cells.
-
-    Let Z be the difference of the points and d the length of its mean. E|Z| <= sqrt(E|Z|^2) = sqrt(d^2 + var Z). If the
-    component a along the mean is at least s > 0, |Z| <= a + b^2 / (2 s) with the component b across. The smaller bound
-    counts.
-    Mass that the plan lacks by rounding travels along the diagonal.
-    """
-    shift = one.mean[plan.source] - other.mean[plan.target]
-    length = np.hypot(*shift.T)
-    xx, xy, yy = (one.spread[plan.source] + other.spread[plan.target]).T
-    x, y = np.divide(shift.T, length, out=np.zeros_like(shift.T), where=length > 0.0)
-    across = np.maximum(y * y * xx - 2.0 * x * y * xy + x * x * yy, 0.0)
-    least = length - one.radius[plan.source] - other.radius[plan.target]
-    sharp = length + np.divide(0.5 * across, least, out=np.full_like(length, np.inf), where=least > 0.0)
-    bound = np.minimum(np.sqrt(length**2 + xx + yy), sharp)
-    lacking = sum(
-        float(np.abs(np.bincount(index, plan.mass, part.size) - part.mass).sum())
-        for index, part in ((plan.source, one), (plan.target, other))
+    dropped = one.dropped + other.dropped
+    if not (one.mass.size and other.mass.size):
+        return 0.0, dropped + float(one.mass.sum() + other.mass.sum())
+    left, right, staying = one.mass.copy(), other.mass.copy(), 0.0
+    if order == 1.0:  # common mass may stay
+        number = (part.place[0] * part.size + part.place[1] for part in (one, other))
+        _, i, j = np.intersect1d(*number, return_indices=True)
+        common = np.minimum(left[i], right[j])
+        staying = float(common @ _costs(one, other, i, j, order))
+        left[i] -= common
+        right[j] -= common
+    rest = [np.flatnonzero(part > NO_MASS) for part in (left, right)]
+    lacking = (
+        dropped
+        + abs(float(left.sum() - right.sum()))
+        + sum(float(part.sum() - part[some].sum()) for part, some in zip((left, right), rest, strict=True))
     )
-    return float(plan.mass @ bound) + DIAGONAL * lacking
+    if not (rest[0].size and rest[1].size):
+        return 0.0, staying + lacking
+    plan, above, below = _solved(_powers(one.mean[rest[0]], other.mean[rest[1]], order), left[rest[0]], right[rest[1]])
+    i, j = np.nonzero(plan)
+    upper = staying + lacking + float(plan[i, j] @ _costs(one, other, rest[0][i], rest[1][j], order))
+    # each of the sums may lack mass, and reduced costs are zero to rounding
+    if not (one.spread.any() or other.spread.any()):
+        return max(upper - 2.0 * lacking - SOLVER_ROUNDING * float(left.sum()), 0.0), upper
+    if order == 1.0:
+        # both ends of the potentials that the plan allows: the middle is smoother
+        sides = (one.mean[rest[0]], above), (other.mean[rest[1]], below)
+        values = [_middle(part.mean, *sides) for part in (one, other)]
+    else:
+        values = [above, below]
+    slopes = [part.slopes(value, order) for part, value in zip((one, other), values, strict=True)]
+    cost = _least_costs(one, other, slopes, order)
+    found = float(np.sum(_solved(cost, one.mass, other.mass)[0] * cost))
+    # slopes differ by twice the steepest at most
+    unsure = 2.0 * order * (one.deviation + other.deviation) + 2.0 * lacking
+    unsure += SOLVER_ROUNDING * float(one.mass.sum() * np.abs(cost).max())
+    return min(max(found - unsure, 0.0), upper), upper
 
 
-def _next_pairs(
-    source: NDArray[np.intp], target: NDArray[np.intp], one: _Masses, other: _Masses, level: int
-) -> NDArray[np.intp]:
-    """Pairs of cells of half the size: those in the cells of the plan, and those with one cell beside."""
-    rows, columns = (_numbers(part, level) for part in (one, other))
-    inner, around = range(2), range(-1, 3)
-    keys = []
-    for first, second in ((inner, around), (around, inner)):
-        offsets = np.stack(np.meshgrid(first, first, second, second, indexing="ij"), axis=-1).reshape(-1, 4)
-        for offset in offsets:
-            # the table has an empty frame one cell wide
-            i = rows[tuple((2 * source + offset[:2] + 1).T)]
-            j = columns[tuple((2 * target + offset[2:] + 1).T)]
-            both = (i >= 0) & (j >= 0)
-            keys.append(i[both] * other.size + j[both])
-    return np.stack(np.divmod(np.unique(np.concatenate(keys)), other.size))
+def _solved(cost: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats, Floats]:
+    """The best plan between masses, and potentials f and g with f_i - g_j at most the costs."""
+    import ot
+
+    log: dict[str, Any]
+    plan, log = ot.emd(first / first.sum(), second / second.sum(), cost, numItermax=MOST_PIVOTS, log=True)
+    if log["warning"]:
+        raise AccuracyError(f"optimal transport: {log['warning']}", float("nan"))
+    return np.asarray(min(first.sum(), second.sum()) * plan), log["u"], -log["v"]
 
 
-def _numbers(part: _Masses, level: int) -> NDArray[np.intp]:
-    """The number of each occupied cell, -1 for others, with a frame of -1."""
-    table = np.full((level + 2, level + 2), -1, dtype=np.intp)
-    table[tuple(part.cell.T + 1)] = np.arange(part.size)
-    return table
+def _powers(first: Floats, second: Floats, order: float) -> Floats:
+    from scipy.spatial.distance import cdist
+
+    return np.asarray(cdist(first, second) ** order)
+
+
+def _middle(points: Floats, above: tuple[Floats, Floats], below: tuple[Floats, Floats]) -> Floats:
+    """The mean of the largest and the smallest 1-Lipschitz function through values below and above.
+
+    One of them is enough if the other has far more values.
+    """
+    found = []
+    if below[1].size <= UNEVEN * above[1].size:
+        found.append((_powers(points, below[0], 1.0) + below[1]).min(axis=1))
+    if above[1].size <= UNEVEN * below[1].size:
+        found.append((above[1] - _powers(points, above[0], 1.0)).max(axis=1))
+    return np.asarray(np.mean(found, axis=0))
+
+
+def _costs(one: Cells, other: Cells, i: NDArray[np.intp], j: NDArray[np.intp], order: float) -> Floats:
+    r"""Bounds of E|Z|^p for the difference Z of independent points of pairs of cells.
+
+    Let d be the length of its mean and v the sum of its variances. For p up to 2, E|Z|^p <= (d^2 + v)^(p/2), and for
+    p = 1, if the component a along the mean is at least s > 0, also |Z| <= a + b^2 / (2 s) with the component b across.
+    For larger p the second derivatives of |z|^p are at most p (p - 1) |z|^(p-2).
+    """
+    shift, reach = one.mean[i] - other.mean[j], one.radius[i] + other.radius[j]
+    length = np.hypot(*shift.T)
+    xx, xy, yy = one.spread[:, i] + other.spread[:, j]
+    if order > 2.0:
+        bent = length**order + 0.5 * order * (order - 1.0) * (length + reach) ** (order - 2.0) * (xx + yy)
+        return np.asarray(np.minimum(bent, (length + reach) ** order))
+    bound = (length**2 + xx + yy) ** (0.5 * order)
+    if order == 1.0:
+        x, y = np.divide(shift.T, length, out=np.zeros_like(shift.T), where=length > 0.0)
+        across, least = np.maximum(y * y * xx - 2.0 * x * y * xy + x * x * yy, 0.0), length - reach
+        more = np.divide(0.5 * across, least, out=np.full_like(length, np.inf), where=least > 0.0)
+        bound = np.minimum(bound, length + more)
+    return np.asarray(bound)
+
+
+def _least_costs(one: Cells, other: Cells, slopes: list[Floats], order: float) -> Floats:
+    r"""Costs c_ij such that f_i - g_j <= c_ij makes affine functions of these slopes potentials of abs(x - y)^p.
+
+    With any t, abs(z)^p >= t z - (p - 1) (abs(t) / p)^(p / (p - 1)). So c_ij is the value of this at the difference of
+    the means, less the largest values of (slope_i - t) x in the one cell and of (t - slope_j) y in the other.
+    """
+    rows, columns = np.arange(one.mass.size)[:, None], np.arange(other.mass.size)
+
+    def bound(i: NDArray[np.intp], j: NDArray[np.intp], chosen: Callable[[Floats, Floats], Floats]) -> Floats:
+        shift = one.mean[i] - other.mean[j]
+        length = np.hypot(shift[..., 0], shift[..., 1])
+        tangent = chosen(shift, length)
+        size = np.hypot(tangent[..., 0], tangent[..., 1]) / order
+        value = (tangent * shift).sum(axis=-1)
+        if order > 1.0:
+            value -= (order - 1.0) * size ** (order / (order - 1.0))
+        return np.asarray(value - one.support(i, slopes[0][i] - tangent) - other.support(j, tangent - slopes[1][j]))
+
+    def at_means(shift: Floats, length: Floats) -> Floats:
+        unit = np.divide(shift, length[..., None], out=np.zeros_like(shift), where=length[..., None] > 0.0)
+        return order * length[..., None] ** (order - 1.0) * unit
+
+    found = np.empty((one.mass.size, other.mass.size))
+    step = max(1, PAIRS_AT_ONCE // other.mass.size)
+    for start in range(0, one.mass.size, step):
+        some = rows[start : start + step]
+        found[some[:, 0]] = bound(some, columns, at_means)
+    reach = NEAR * (one.radius[:, None] + other.radius)
+    near = np.nonzero(_powers(one.mean, other.mean, 1.0) < reach)
+    for start in range(0, near[0].size, PAIRS_AT_ONCE):
+        i, j = (side[start : start + PAIRS_AT_ONCE] for side in near)
+        for slope in (slopes[0][i], slopes[1][j]):
+            found[i, j] = np.maximum(found[i, j], bound(i, j, lambda *_, slope=slope: slope))
+    return found

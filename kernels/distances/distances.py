@@ -59,8 +59,7 @@ def distance(
         ``"joint"``: W_p between the measures sin(theta)/2 d theta P(theta, d theta') on the square, which is at most
         the value of ``"rows"``. ``"pseudometric"``: the paper's pseudometric, see the notes; it does not depend on p.
     tolerance : float
-        Wanted error between laws. If it is not reached, ``error`` is larger. ``"joint"`` uses it for order 1
-        and reaches about 1e-3.
+        Wanted error between laws. If it is not reached, ``error`` is larger; see the notes for ``"joint"``.
 
     Returns
     -------
@@ -88,11 +87,14 @@ def distance(
     laws, because noise partly cancels. The distance of matrices can be far below the distance of their laws if these
     vary within cells: two involutions may have the same matrix.
 
-    *Joint* distances of matrices are exact up to 4 million pairs of occupied cells (160 MB). For more pairs, cells are
-    merged, and the error covers the effect. At orders above a few dozen, rounding removes the p-th powers of all but
-    the longest distances, and the result is the middle of a bracket. Laws are compared on 128 bins, for order 1 on 512
-    (256 if the tolerance is at least 4e-3), where plans on ever smaller cells give upper bounds. The error is estimated
-    from the changes of these bounds when cells are halved and bins are merged.
+    *Joint* distances are the middle of two bounds, for which the square is divided into cells: the cost of a plan, with
+    the spread within cells, and a potential that is affine on each cell. ``kind`` is "bound" if the masses of the cells
+    have bounds and, for order 1, no mass of both laws in one cell was taken as common. Within the limits, some seconds
+    and at most 2 million pairs of cells, the error reaches 1e-5 to 1e-4 if both laws consist of atoms, 2e-4 to 4e-3 at
+    order 1 if one has a density. At higher orders it can be a fifth of the value between two densities. Curves of atoms
+    that nearly coincide are told apart at the width of a cell, 1/250 to 1/100. Matrices are exact up to 4 million pairs
+    of occupied cells (160 MB); for more, cells are merged and bounded likewise. At orders above a few dozen, rounding
+    removes the p-th powers of all but the longest distances.
 
     *The pseudometric* is the sum over k, l >= 0 of 2^(-k-l-2) times the absolute difference of the means of
     cos(k theta) cos(l theta') under the flux measures, whose weak convergence it metrises. The error includes the

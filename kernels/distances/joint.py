@@ -2,218 +2,246 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import islice
-from typing import Any
+import math
+from dataclasses import replace
+from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.errors import AccuracyError
-from ...core.estimates import Estimate
+from ...core.estimates import ErrorKind, Estimate
 from ...core.long_runs import progress_bar
 from ...core.rounding import EPS
-from ..bases.basis import Basis
 from ..bases.bins import Bins
+from ..bases.intervals import cell_among
+from ..bases.measure import SINE
+from ..bases.panels import Panels
 from ..discretisation.discretisation import discretise
-from ..expectations.distribution_functions import Distributions
 from ..laws.law import Law
-from ..matrices.matrix import KernelMatrix, joint_kind
-from .cell_transport import MOST_PIVOTS, NO_MASS, Level, levels_of_transport
+from ..matrices.matrix import KernelMatrix, frobenius_error, joint_kind
+from ..sampling.estimation import estimate
+from .cell_transport import DIAGONAL, Cells, transport_bounds
+from .distributions import CellsAndAtoms, Term, Terms, cells_and_atoms, terms_of
 from .resampling import cell_middles, matrices_error, stochastic_rows
-from .rowwise import matrix_distance
-from .transport import power_mean, wasserstein
 
-# Limit on the pairs of occupied cells for an exact solution, at about 40 bytes per pair, 160 MB, and a few seconds.
-MOST_PAIRS = 2**22
-# Bins on which laws are compared, for p > 1 and for p = 1, and the tolerance of their matrices.
-LAW_BINS, FINE_LAW_BINS, LAW_TOLERANCE = 128, 512, 1e-7
-# If the wanted error is at least this, half as many bins are enough for p = 1.
-ROUGH = 4e-3
-# Merging bins has an effect of second order: 1 + 4 parts after two steps, and 1 part after one.
-EXPECTED_RATIO = 5.0
-# If the changes of upper bounds fall by this factor, the rest is between these parts of the last change, which belong
-# to orders of convergence from 2.6 to 1.3; else it is between 0 and the last change.
-FALL, REST = 2.2, (0.2, 0.7)
-# The solver stops at reduced costs of 10 eps times the largest cost; the rest is for the rounding of its sums.
-SOLVER_ROUNDING = 64.0 * EPS
-# If rounding changes the distance by more than this, a bracket is computed.
-SMALL_DOUBT = 1e-6
-# Directions of the lower bound by projection.
-DIRECTIONS = 32
+# Limits on the pairs of occupied cells, at 100 bytes and some microseconds per pair, and on the cells along a side.
+MOST_PAIRS, MOST_CELLS = 2**21, 768
+# The same limit for matrices, whose cells are points.
+MOST_POINT_PAIRS = 2**22
+# Cells along a side for a first result, and by how much more than expected there are then.
+FIRST_CELLS, MORE = 32, 1.1
+# If the limits allow less than this growth, the bounds gain little. Of mirror-symmetric laws a multiple of 4 has fewer
+# cells in which curves cross.
+LEAST_GROWTH, MULTIPLE = 1.5, 4
+# More occupied cells than this multiple of those along a side lie on areas, else on curves.
+AREA = 6
+# The tolerance of the matrices of laws, as a fraction of the wanted error and between these limits, and that of
+# conditional distributions for the mass that both laws have in common.
+LAW_PART, LAW_TOLERANCES, COMMON_TOLERANCE = 0.01, (1e-10, 1e-5), 1e-6
+# Bins on which the error of a sampled law is that of the distance of resamples, and its rays.
+SAMPLED_BINS, RAYS = 32, 2**20
+# Incoming angles for each cell at which mass in common is found, and angles times cells in memory at a time.
+NODES, MASSES_AT_ONCE = 8, 2**22
+# Smaller differences of weights are rounding.
+SAME_WEIGHT = 1e-14
 
 
-def joint_law_distance(first: Law, second: Law, order: float, tolerance: float, bins: int | None = None) -> Estimate:
-    """W_p between the flux measures of two laws, from their matrices on bins; the error is an estimate.
+class _Side(NamedTuple):
+    """Terms of a law with their weights, and of those that only rays know the drawn angles."""
 
-    For p = 1 the number of ``bins`` may be chosen, a multiple of 64.
+    terms: Terms
+    drawn: list[tuple[Floats, Floats] | None]
+
+    @staticmethod
+    def of(terms: Terms, order: float) -> tuple[_Side, float]:
+        """The terms, and the error of W_p from the rays."""
+        drawn, error = [], 0.0
+        for weight, term in terms:
+            rays = None
+            if discretise(term.law, Bins(SAMPLED_BINS), tolerance=LAW_TOLERANCES[1]).samples:
+                rng = np.random.default_rng(0)
+                theta = SINE.quantile((np.arange(RAYS) + rng.random(RAYS)) / RAYS)
+                rays = theta, term.law.sample(theta, rng)
+                counted = estimate(*rays, Bins(SAMPLED_BINS))
+                exact = replace(counted, counts=None, error=frobenius_error(0.0, "bound", ""))
+                error += weight ** (1.0 / order) * matrices_error(counted, exact, order, False)
+            drawn.append(rays)
+        return _Side(terms, drawn), error
+
+    def known(self) -> Terms:
+        """The terms whose conditional distributions are known."""
+        return [term for term, rays in zip(self.terms, self.drawn, strict=True) if rays is None]
+
+    def moments(self, edges: Floats, tolerance: float) -> tuple[Floats, float, bool]:
+        """The moments of `Cells`, a bound of the mass that is wrong in them, and whether it is one for certain."""
+        basis, size = Panels(edges, 2), edges.size - 1
+        angle, weight = basis.measure.quadrature(edges, basis.nodes_per_interval)
+        panel, values = basis.local(angle)
+        power = ((angle - cell_middles(edges)[panel]) / DIAGONAL)[:, None] ** np.arange(3)
+        table = (weight[:, None, None] * power[:, :, None] * values[:, None, :]).reshape(size, -1, 3, 3).sum(axis=1)
+        total, error, certain = np.zeros((size, 3, size, 3)), 0.0, True
+        for (share, term), rays in zip(self.terms, self.drawn, strict=True):
+            if rays is not None:
+                total += share * _counted(rays, edges)
+                certain = False
+                continue
+            found = discretise(term.law, basis, tolerance=tolerance)
+            symmetric = found.symmetric.reshape(size, 3, size, 3)
+            total += share * np.einsum("ika,iajb,jlb->ikjl", table, symmetric, table, optimize=True)
+            error += share * float(found.error)
+            certain &= found.error.kind == "bound"
+        return total, error, certain
+
+
+def joint_law_distance(first: Law, second: Law, order: float, tolerance: float) -> Estimate:
+    """W_p between the flux measures of two laws: the middle of two bounds, from ever more cells.
+
+    For p = 1 only the difference of the laws matters, so that equal terms cancel. Mass that both laws send from one
+    angle to the same cell stays within the cell, at the cost of moving it there.
     """
-    if order != 1.0:
-        basis = Bins(LAW_BINS)
-        pair = [discretise(law, basis, tolerance=LAW_TOLERANCE) for law in (first, second)]
-        return joint_matrix_distance(pair[0], pair[1], order, of_laws=True)
-    basis = Bins(bins or FINE_LAW_BINS // (2 if tolerance >= ROUGH else 1))
-    pair = [discretise(law, basis, tolerance=LAW_TOLERANCE) for law in (first, second)]
+    parts = _differing(terms_of(first), terms_of(second)) if order == 1.0 else (terms_of(first), terms_of(second))
+    if not (parts[0] and parts[1]):
+        return Estimate(0.0, 0.0, "bound", "equal laws")
+    sides, own = zip(*(_Side.of(part, order) for part in parts), strict=True)
+    low, high, size = 0.0, np.inf, FIRST_CELLS
     with progress_bar(None, "transport", "distance") as bar:
-        return _between_fine(pair[0], pair[1], tolerance, bar)
+        while True:
+            edges = np.linspace(0.0, np.pi, size + 1)
+            wanted = float(np.clip(LAW_PART * tolerance, *LAW_TOLERANCES))
+            (one, wrong, certain), (other, more, also) = (side.moments(edges, wanted) for side in sides)
+            staying, matched = 0.0, False
+            if order == 1.0:
+                one, other, staying, matched = _matched([side.known() for side in sides], edges, one, other)
+            cells = Cells.of(edges, one), Cells.of(edges, other)
+            bounds = transport_bounds(*cells, order)
+            found = _roots(bounds[0] - wrong - more, bounds[1] + staying + wrong + more, order)
+            bar.update()
+            low, high = max(low, found[0]), min(high, found[1])
+            error = 0.5 * abs(high - low) + sum(own)
+            following = _next_size(size, cells, (high - low) / max(2.0 * (tolerance - sum(own)), sum(own), EPS))
+            if error <= tolerance or following <= size:
+                break
+            size = following
+    kind: ErrorKind = "bound" if certain and also and not matched else "estimate"
+    if order > 1.0 and error > tolerance:  # distances do not fall with the order
+        least = joint_law_distance(first, second, 1.0, tolerance)
+        low, kind = max(low, least.value - least.error), kind if least.kind == "bound" else "estimate"
+        error = 0.5 * abs(high - low) + sum(own)
+    how = f"a potential and a plan on {size} x {size} cells, between {low:.8g} and {high:.8g}"
+    return Estimate(0.5 * (low + high), error, kind, how)
 
 
-def _between_fine(first: KernelMatrix, second: KernelMatrix, tolerance: float, bar: Any) -> Estimate:
-    """W_1 between laws: upper bounds for point masses in the middle of the bins, and the effect of the bins.
-
-    The effect is estimated by the changes of the bound when bins are merged, once and twice. The second change is
-    expected to be five times the first. The larger one of both estimates counts, up to the largest possible effect.
-    """
-    own = matrices_error(first, second, 1.0, False)
-    flux = [matrix.weights[:, None] * stochastic_rows(matrix) for matrix in (first, second)]
-    fine, *merged = islice(_levels(first.basis, flux[0], flux[1], 1.0), 3)
-    found = _refined(fine, 0.5 * tolerance, first.basis.size, bar)
-    uppers = {level.cells: level.upper for level in found}
-    changes = []
-    for level in merged:
-        coarse = _refined(level, 0.0, min(level[0].size, found[-1].cells), bar)[-1]
-        changes.append(abs(uppers[coarse.cells] - coarse.upper))
-    step = max(changes[0], changes[1] / EXPECTED_RATIO)
-    step = min(step, sum(_within_cells(first.basis, part, 1.0) for part in flux))
-    value, rest = _limit([level.upper for level in found])
-    how = f"upper bounds by transport on up to {found[-1].cells} x {found[-1].cells} cells, to {rest:.2g}"
-    return Estimate(value, own + rest + step, "estimate", f"{how}, and {step:.2g} from {first.basis!r}")
+def _differing(first: Terms, second: Terms) -> tuple[Terms, Terms]:
+    """The terms of the positive and of the negative part of a difference, without those that cancel."""
+    total: dict[str, tuple[float, Term]] = {}
+    for sign, terms in ((1.0, first), (-1.0, second)):
+        for weight, term in terms:
+            before = next((key for key, (_, known) in total.items() if known.law == term.law), str(len(total)))
+            total[before] = (total[before][0] if before in total else 0.0) + sign * weight, term
+    both = [[(sign * w, term) for w, term in total.values() if sign * w > SAME_WEIGHT] for sign in (1.0, -1.0)]
+    return both[0], both[1]
 
 
-def _refined(level: tuple[Basis, Floats, Floats, float], wanted: float, most_cells: int, bar: Any) -> list[Level]:
-    """Upper bounds of W_1 from ever smaller cells, until the limit is known to the wanted error."""
-    found = []
-    for bound in levels_of_transport(cell_middles(level[0].edges), level[1] - level[2], most_cells):
-        found.append(bound)
-        bar.update()
-        if len(found) > 2 and _limit([each.upper for each in found])[1] <= wanted:
-            break
+def _counted(rays: tuple[Floats, Floats], edges: Floats) -> Floats:
+    """The moments of drawn pairs of angles."""
+    size, found = edges.size - 1, np.zeros((edges.size - 1, 3, edges.size - 1, 3))
+    place = [cell_among(edges, side) for side in rays]
+    shift = [(side - cell_middles(edges)[cell]) / DIAGONAL for side, cell in zip(rays, place, strict=True)]
+    for k, m in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)):
+        weight = shift[0] ** k * shift[1] ** m / shift[0].size
+        found[:, k, :, m] = np.bincount(place[0] * size + place[1], weight, size**2).reshape(size, size)
     return found
 
 
-def _limit(uppers: list[float]) -> tuple[float, float]:
-    """The limit of upper bounds from cells that were halved, and its error."""
-    if len(uppers) < 2:
-        return 0.5 * uppers[-1], 0.5 * uppers[-1]
-    changes = np.abs(np.diff(uppers))
-    low, high = REST if len(changes) > 1 and changes[-2] >= FALL * changes[-1] else (0.0, 1.0)
-    return max(float(uppers[-1] - 0.5 * (low + high) * changes[-1]), 0.0), float(0.5 * (high - low) * changes[-1])
+def _matched(sides: list[Terms], edges: Floats, one: Floats, other: Floats) -> tuple[Floats, Floats, float, bool]:
+    """Both measures without mass in common, what the rest costs in `DIAGONAL`, and whether there was any.
+
+    Atoms of both laws in a cell are matched from the same incoming angle, densities where they agree on both halves of
+    the cell.
+    """
+    size = edges.size - 1
+    fine = np.sort(np.concatenate((edges, cell_middles(edges))))
+    angle, weight = SINE.quadrature(edges, NODES)
+    common, cost = np.zeros((size, size)), 0.0
+    step = NODES * max(1, MASSES_AT_ONCE // (NODES * fine.size))
+    for start in range(0, angle.size, step):
+        some = slice(start, start + step)
+        laws = [cells_and_atoms(terms, angle[some], fine, COMMON_TOLERANCE, False) for terms in sides if terms]
+        if len(laws) < 2:
+            return one, other, 0.0, False
+        halves = [law.cells.reshape(-1, size, 2) for law in laws]
+        (mass, mean, spread), (mass2, mean2, spread2) = (_atoms_in_cells(law, edges) for law in laws)
+        uneven = np.abs(np.diff(halves[0] - halves[1], axis=2)[..., 0]) @ np.diff(edges) / 4.0
+        same = np.minimum(mass, mass2)
+        moved = uneven + np.sum(same * (np.abs(mean - mean2) + spread + spread2), axis=1)
+        cost += float(weight[some] @ moved) / DIAGONAL
+        same = weight[some, None] * (same + np.minimum(halves[0].sum(axis=2), halves[1].sum(axis=2)))
+        common[start // NODES : (start + step) // NODES] = same.reshape(-1, NODES, size).sum(axis=1)
+    masses = one[:, 0, :, 0], other[:, 0, :, 0]
+    common = np.clip(common, 0.0, np.minimum(*masses))
+    # the smaller mass keeps its mean, the difference stays exact
+    parts = [np.divide(m - common, m, out=np.zeros_like(m), where=m > 0.0)[:, None, :, None] for m in masses]
+    less = (masses[0] < masses[1])[:, None, :, None]
+    difference = one - other
+    rest = np.where(less, parts[0] * one, difference + parts[1] * other)
+    return rest, np.where(less, parts[0] * one - difference, parts[1] * other), cost, bool(common.any())
 
 
-def joint_matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, of_laws: bool = False) -> Estimate:
-    """W_p between the flux measures of two matrices; see `_joint`."""
-    with progress_bar(None, "transport", "distance") as bar:
-        return _joint(first, second, order, of_laws, bar)
+def _atoms_in_cells(law: CellsAndAtoms, edges: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of the atoms at each incoming angle the mass in each cell, their mean, and the mean distance from it."""
+    size = edges.size - 1
+    place = np.arange(len(law.mass))[:, None] * size + cell_among(edges, law.position)
+
+    def summed(values: Floats) -> Floats:
+        return np.bincount(place.ravel(), values.ravel(), len(law.mass) * size).astype(np.float64)
+
+    mass = summed(law.mass)
+    inverse = np.divide(1.0, mass, out=np.zeros_like(mass), where=mass > 0.0)
+    mean = inverse * summed(law.mass * law.position)
+    spread = inverse * summed(law.mass * np.abs(law.position - mean[place]))
+    return mass.reshape(-1, size), mean.reshape(-1, size), spread.reshape(-1, size)
 
 
-def _joint(first: KernelMatrix, second: KernelMatrix, order: float, of_laws: bool, bar: Any) -> Estimate:
-    r"""W_p between the flux measures of two matrices, as point masses in the middle of the cells.
+def _next_size(size: int, cells: tuple[Cells, Cells], excess: float) -> int:
+    """The cells along a side that reduce the width of the bounds by the excess, with order 2; 0 beyond the limits."""
+    dimensions = sum(2 if part.mass.size > AREA * size else 1 for part in cells)
+    pairs = cells[0].mass.size * cells[1].mass.size
+    room = min((MOST_PAIRS / max(pairs, 1)) ** (1.0 / dimensions), MOST_CELLS / size)
+    growth = min(MORE * max(excess, 0.0) ** 0.5, room)
+    return 0 if room < LEAST_GROWTH else MULTIPLE * math.ceil(growth * size / MULTIPLE)
 
-    The result is exact up to ``MOST_PAIRS`` pairs of occupied cells. For more pairs, neighbouring cells are merged.
-    Merging moves masses by known distances, which gives a bracket. Further bounds are the distance of kind ``"rows"``
-    (from above) and W_p of projections to lines (from below). The error is the difference from the next coarser level
-    if it is smaller than the bracket. Where rounding spoils p-th powers, the result is the middle of the bracket.
+
+def _roots(low: float, high: float, order: float) -> tuple[float, float]:
+    return DIAGONAL * max(low, 0.0) ** (1.0 / order), DIAGONAL * max(high, 0.0) ** (1.0 / order)
+
+
+def joint_matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float) -> Estimate:
+    """W_p between the flux measures of two matrices, as point masses in the middle of the cells.
+
+    The result is exact up to ``MOST_POINT_PAIRS`` pairs of occupied cells. For more pairs neighbouring cells are
+    merged, and the result is the middle of two bounds.
     """
     own = matrices_error(first, second, order, False)
-    flux, flux2 = (matrix.weights[:, None] * stochastic_rows(matrix) for matrix in (first, second))
-    levels = _levels(first.basis, flux, flux2, order)
-    basis, one, other, moved = next(level for level in levels if _pairs(*level[1:3], order) <= MOST_PAIRS)
-    merged = basis != first.basis
-    value, doubt = _solved(basis, one, other, order)
-    bar.update()
-    exact = joint_kind(first, second)
-    if not (merged or of_laws) and doubt <= SMALL_DOUBT:
-        return Estimate(value, own + doubt, exact, f"optimal transport between the occupied cells of {basis!r}")
-    upper = float(matrix_distance(first, second, order, False))
-    lower = _largest_projection(first.basis, flux, flux2, order)
-    bar.update()
-    moved += doubt
-    low, high = max(lower, value - moved), min(upper, value + moved)
-    coarser = next(levels, None) if merged or of_laws else None
-    step = np.inf if coarser is None else abs(_solved(*coarser[:3], order)[0] - value) + doubt
-    how = f"optimal transport on {basis!r}"
-    if of_laws:
-        moved += sum(_within_cells(first.basis, part, order) for part in (flux, flux2))
-        return Estimate(value, own + min(step, moved), "estimate", how + " and coarser")
-    value = float(np.clip(value, low, high)) if merged else 0.5 * (low + high)
-    bound = max(high - value, value - low)
-    if bound <= step:
-        return Estimate(value, own + bound, exact, how + f", bracketed by ({low:.6g}, {high:.6g})")
-    return Estimate(value, own + step, "estimate", how + f" and coarser, within ({low:.6g}, {high:.6g})")
-
-
-def _levels(basis: Basis, one: Floats, other: Floats, order: float) -> Iterator[tuple[Basis, Floats, Floats, float]]:
-    """Fluxes on successively coarser cells, and the total W_p distance by which merging has moved both of them."""
-    start = cell_middles(basis.edges)
-    parent = np.arange(basis.size)
-    fluxes = [one, other]
-    while True:
-        middles = cell_middles(basis.edges)[parent]
-        square = (start - middles) ** 2
-        step = np.sqrt(square[:, None] + square).ravel()
-        moved = sum(float(power_mean(step, flux.ravel(), order)) for flux in (one, other))
-        yield basis, fluxes[0], fluxes[1], moved
-        coarse = basis.coarsened()
-        if coarse is None:
-            return
-        owner = np.asarray(coarse[1].argmax(axis=0))
-        merge = (np.arange(coarse[0].size)[:, None] == owner).astype(np.float64)
-        fluxes = [merge @ flux @ merge.T for flux in fluxes]
-        basis, parent = coarse[0], owner[parent]
-
-
-def _masses(one: Floats, other: Floats, order: float) -> tuple[Floats, Floats]:
-    """The masses to transport: for p = 1 only the differences, because common mass may stay."""
-    if order == 1.0:
-        one, other = np.maximum(one - other, 0.0), np.maximum(other - one, 0.0)
-    return np.where(one > NO_MASS, one, 0.0), np.where(other > NO_MASS, other, 0.0)
-
-
-def _pairs(one: Floats, other: Floats, order: float) -> int:
-    parts = _masses(one, other, order)
-    return int(np.count_nonzero(parts[0]) * np.count_nonzero(parts[1]))
-
-
-def _solved(basis: Basis, one: Floats, other: Floats, order: float) -> tuple[float, float]:
-    """W_p between fluxes on the cells, and its error from the rounding of the p-th power."""
-    import ot
-    from scipy.spatial.distance import cdist
-
-    parts = _masses(one, other, order)
-    total = float(parts[0].sum())
-    if total <= NO_MASS or not parts[1].any():
-        return 0.0, 0.0
-    points = cell_middles(basis.edges)
-    source, target = (np.argwhere(part > 0.0) for part in parts)
-    length = cdist(points[source], points[target])
-    longest = float(length.max()) or 1.0
-    cost = (length / longest) ** order
-    weights = [part[part > 0.0] for part in parts]
-    value, log = ot.emd2(
-        weights[0] / weights[0].sum(), weights[1] / weights[1].sum(), cost, numItermax=MOST_PIVOTS, log=True
-    )
-    if log["warning"]:
-        raise AccuracyError(f"optimal transport: {log['warning']}", float("nan"))
-    power = max(total * float(value), 0.0)
-    low, found, high = (
-        longest * moved ** (1.0 / order)
-        for moved in (max(power - SOLVER_ROUNDING * total, 0.0), power, power + SOLVER_ROUNDING * total)
-    )
-    return found, max(high - found, found - low)
-
-
-def _largest_projection(basis: Basis, one: Floats, other: Floats, order: float) -> float:
-    """The largest W_p of the projections to lines through the origin, a lower bound of W_p in the plane."""
-    points = cell_middles(basis.edges)
-    largest = 0.0
-    for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
-        position = (np.cos(angle) * points[:, None] + np.sin(angle) * points).reshape(1, -1)
-        first, second = (Distributions.of_atoms(position, flux.reshape(1, -1)) for flux in (one, other))
-        largest = max(largest, float(wasserstein(first, second, order)[0]))
-    return largest
-
-
-def _within_cells(basis: Basis, flux: Floats, order: float) -> float:
-    """A bound of W_p between a flux measure and the point masses in the middle of its cells."""
-    half = 0.5 * np.diff(basis.edges)
-    return float(power_mean(np.hypot(half[:, None], half).ravel(), flux.ravel(), order))
+    fluxes = [matrix.weights[:, None] * stochastic_rows(matrix) for matrix in (first, second)]
+    if order == 1.0:  # common mass may stay
+        difference = fluxes[0] - fluxes[1]
+        fluxes = [np.maximum(difference, 0.0), np.maximum(-difference, 0.0)]
+    edges, middles = first.basis.edges, cell_middles(first.basis.edges)
+    with progress_bar(None, "transport", "distance") as bar:
+        for block in count(1):
+            merged = np.append(edges[:-1:block], edges[-1])
+            owner = np.arange(middles.size) // block
+            power = ((middles - cell_middles(merged)[owner]) / DIAGONAL)[:, None] ** np.arange(3)
+            table = np.zeros((merged.size - 1, 3, middles.size))
+            table[owner, :, np.arange(middles.size)] = power
+            cells = [
+                Cells.of(merged, np.einsum("ikx,xy,jly->ikjl", table, flux, table, optimize=True)) for flux in fluxes
+            ]
+            if cells[0].mass.size * cells[1].mass.size <= MOST_POINT_PAIRS:
+                break
+        low, high = _roots(*transport_bounds(cells[0], cells[1], order), order)
+        bar.update()
+    where = f"{first.basis!r}" if block == 1 else f"{merged.size - 1} x {merged.size - 1} cells of {first.basis!r}"
+    how = f"optimal transport between {where}, between {low:.8g} and {high:.8g}"
+    return Estimate(0.5 * (low + high), own + 0.5 * (high - low), joint_kind(first, second), how)

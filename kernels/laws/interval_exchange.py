@@ -94,6 +94,10 @@ class IntervalExchangeLaw(Law):
         angle = SINE.quantile(np.clip(moved, 0.0, 1.0))
         return clipped_inside(np.where(self.partner[piece] == piece, theta, angle))
 
+    def map(self, theta: Floats) -> Floats:
+        """`image` also at 0 and pi, which rounding can give."""
+        return self.image(clipped_inside(theta))
+
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """All angles between two pieces; none are left out."""
         return np.asarray(SINE.quantile(self.starts[1:])), 0.0

@@ -39,6 +39,8 @@ UNSURE_DIMENSIONS = 1.5
 # Entries of a part that are compared with those of the other parts; larger arrays are compared in some rows only.
 MOST_COMPARED = 2**20
 WORST_NAMED = 8
+# Pairs by which the Lambertian law weighs before any is counted.
+PRIOR = 1.0
 
 
 def with_missed_events(matrix: KernelMatrix, rays: int) -> KernelMatrix:
@@ -274,49 +276,51 @@ def _moments_of_counts(counts: Counts | Floats, basis: Basis, symmetrise: bool) 
     if not symmetrise:
         # Entry (i, j) of the array is C_ij w_i h_i h_j / N_i, and each row is an independent multinomial.
         rows = counts.sum(axis=1)
-        found = [_squared_norms([(counts[some], normalisation**2)], rows[some]) for some in row_blocks(len(rows))]
+        found = [
+            _squared_norms([(counts[some], normalisation**2, weights)], rows[some]) for some in row_blocks(len(rows))
+        ]
         mean, variance = (np.concatenate(part) for part in zip(*found, strict=True))
-        scale = (weights * normalisation / rows) ** 2
+        scale = (weights * normalisation) ** 2
         return float(scale @ mean), float(scale**2 @ variance)
-    # A pair counts one half at each of its two entries, or fully on the diagonal.
-    number = float(counts.sum())
 
-    def blocks() -> Iterator[tuple[Counts | Floats, Floats]]:
+    def blocks() -> Iterator[tuple[Counts | Floats, Floats, Floats]]:
+        # A pair counts one half at each of its two entries, or fully on the diagonal.
         for some in row_blocks(len(weights)):
-            squares = np.outer(normalisation[some], normalisation) ** 2 / number**2
+            squares, prior = (np.outer(part[some], part) for part in (normalisation**2, weights))
             first, upper = some.start, np.triu(np.ones(squares.shape, dtype=np.bool_), some.start + 1)
             pairs = [np.diagonal(counts[some], first), (counts[some] + counts[:, some].T)[upper]]
             weight = [np.diagonal(squares, first), 0.5 * squares[upper]]
-            yield np.concatenate(pairs)[None], np.concatenate(weight)
+            expected = [np.diagonal(prior, first), 2.0 * prior[upper]]
+            yield np.concatenate(pairs)[None], np.concatenate(weight), np.concatenate(expected)
 
-    mean, variance = _squared_norms(blocks(), np.array([number]))
+    mean, variance = _squared_norms(blocks(), np.array([float(counts.sum())]))
     return float(mean[0]), float(variance[0])
 
 
-def _squared_norms(blocks: Iterable[tuple[Counts | Floats, Floats]], number: Counts | Floats) -> tuple[Floats, Floats]:
-    """Mean and variance of sum_j w_j (C_j - N p_j)^2 for multinomial rows C of N pairs, both estimated from C.
+def _squared_norms(
+    blocks: Iterable[tuple[Counts | Floats, Floats, Floats]], number: Counts | Floats
+) -> tuple[Floats, Floats]:
+    """Mean and variance of sum_j w_j (C_j / N - p_j)^2 for multinomial counts C of N pairs, given C.
 
-    The cells j come block by block, each as C and w. The number equals the sum of
-    k(x, y) = sum_j w_j (1[x = j] - p_j) (1[y = j] - p_j) over all pairs (x, y) of the N draws, so
-    its variance is N Var k(x, x) + 2 N (N - 1) E k(x, y)^2. The first term dominates if most counts are 0 or 1; without
-    it the counts would be treated as normal.
+    The cells j come block by block, each as C, w and the probabilities q of the Lambertian law. Before the counts p
+    has a Dirichlet distribution with the parameters ``PRIOR`` q, afterwards with C + ``PRIOR`` q: so cells that no pair
+    met, and single pairs, have an error too. The covariance is taken as that of N draws from the mean, which exceeds
+    Dirichlet's by (``PRIOR`` + 1) / N: with the latter 160 pairs in 16 cells are covered in 61 % instead of 93 %.
     """
     number = np.asarray(number, dtype=np.float64)  # the square of a number of pairs can exceed int64
-    sums = np.zeros((6, number.size))
-    for counts, weight in blocks:
-        fraction = counts / number[:, None]
-        # An unbiased estimate of p^2, because the bias matters for small counts.
-        square = np.maximum(fraction * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
-        tilted = weight * (1.0 - 2.0 * fraction)
+    total = number + PRIOR
+    sums = np.zeros((9, number.size))
+    for counts, weight, expected in blocks:
+        mean = (counts + PRIOR * expected) / total[:, None]
+        bias, tilted = counts / number[:, None] - mean, mean * (1.0 - 2.0 * mean)
         sums += [
-            np.einsum("ij,j->i", fraction * (1.0 - fraction), weight), fraction @ weight,
-            np.einsum("ij,ij->i", fraction, tilted**2), np.einsum("ij,ij->i", fraction, tilted),
-            np.einsum("ij,j->i", square * (1.0 - 2.0 * fraction), weight**2), square @ weight,
+            bias**2 @ weight, (mean * (1.0 - mean)) @ weight, (mean * tilted) @ weight**2, mean**2 @ weight,
+            (tilted * (1.0 - 2.0 * mean)) @ weight**2, tilted @ weight,
+            (bias**2 * mean) @ weight**2, (bias * mean) @ weight, (bias * (1.0 - mean) * tilted) @ weight**2,
         ]  # fmt: skip
-    # A single pair does not determine its spread, which is then overestimated.
-    mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * sums[0], sums[1])
-    own, other = sums[2] - sums[3] ** 2, sums[4] + sums[5] ** 2
-    return mean, number * np.maximum(own, 0.0) + 2.0 * number * (number - 1.0) * np.maximum(other, 0.0)
+    own = 2.0 * (sums[2] + sums[3] ** 2) / number**2 + 6.0 * (sums[4] - sums[5] ** 2) / number**3
+    shifted = 4.0 * (sums[6] - sums[7] ** 2) / number - 8.0 * sums[8] / number**2
+    return sums[0] + sums[1] / number, np.maximum(own + shifted, 0.0)
 
 
 def _quantile(mean: float, variance: float) -> float:

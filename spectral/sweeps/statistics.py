@@ -12,6 +12,8 @@ from ...core.estimates import LEVEL, NORMAL_95, Estimate, student_95
 
 # Fewer values tell nothing of their spread.
 FEWEST = 4
+# Values that differ by less than this many roundings are equal.
+ROUNDINGS = 64.0
 
 
 def mean_estimate(values: Sequence[float], errors: Sequence[float]) -> Estimate:
@@ -29,7 +31,7 @@ def mean_estimate(values: Sequence[float], errors: Sequence[float]) -> Estimate:
     """
     known = np.asarray(values, dtype=np.float64)
     number = len(known)
-    deviation = float(known.std(ddof=1))
+    deviation = _deviation(known)
     skewness, excess = _shape(known)
     z = NORMAL_95
     further = z * (skewness**2 * (z**4 + 2.0 * z**2 - 3.0) / 18.0 - excess * (z**2 - 3.0) / 12.0) / number
@@ -49,7 +51,7 @@ def spread_estimate(values: Sequence[float], errors: Sequence[float]) -> Estimat
 
     known = np.asarray(values, dtype=np.float64)
     number = len(known)
-    deviation = float(known.std(ddof=1))
+    deviation = _deviation(known)
     low, high = (math.sqrt((number - 1) / float(chdtri(number - 1, 0.5 * (1.0 + end * LEVEL)))) for end in (-1, 1))
     squares = (known - known.mean()) ** 2 * (number / (number - 1))
     below = max(deviation**2 - mean_estimate(squares.tolist(), [0.0] * number).error, 0.0)
@@ -58,10 +60,16 @@ def spread_estimate(values: Sequence[float], errors: Sequence[float]) -> Estimat
     return Estimate(deviation, side + own, "estimate", f"standard deviation of {number} realisations")
 
 
+def _deviation(values: Floats) -> float:
+    """The standard deviation; 0 for values that are equal to rounding."""
+    equal = np.ptp(values) <= ROUNDINGS * np.spacing(np.abs(values).max())
+    return 0.0 if equal else float(values.std(ddof=1))
+
+
 def _shape(values: Floats) -> tuple[float, float]:
     """Skewness and excess kurtosis, with their bias for normal values removed; 0 for equal values."""
     from scipy.stats import kurtosis, skew
 
-    if np.ptp(values) <= 4.0 * np.spacing(np.abs(values).max()):
+    if not _deviation(values):
         return 0.0, 0.0
     return float(skew(values, bias=False)), float(kurtosis(values, bias=False))

@@ -102,6 +102,18 @@ def test_errors_of_the_single_values_are_added():
     assert abs(smaller.std(ddof=1) - values.std(ddof=1)) <= difference
 
 
+@pytest.mark.parametrize(
+    ("values", "spread"), [([0.1] * 7, 0.0), ([1 / 3, 1 / 3 + 1e-15] * 5, 0.0), ([0.1, 0.3] * 4, np.sqrt(0.08 / 7))]
+)
+def test_values_equal_to_rounding_have_the_spread_0_and_no_warning(values, spread):
+    # of the values 0.1 and 0.3 the squared deviations are equal
+    errors = [1e-3] * len(values)
+    mean, found = mean_estimate(values, errors), spread_estimate(values, errors)
+    assert found.value == pytest.approx(spread, abs=1e-15) and (spread > 0.0 or found.value == 0.0)
+    assert mean.value == pytest.approx(np.mean(values)) and mean.error >= 1e-3
+    assert spread > 0.0 or (mean.error == pytest.approx(1e-3) and found.error <= 1.1e-3)
+
+
 def test_equal_values_have_no_spread_but_their_errors():
     assert spread_estimate([0.1] * 5, [0.25] * 5) == Estimate(
         np.std([0.1] * 5, ddof=1), 0.25 * np.sqrt(1.25), "estimate", "standard deviation of 5 realisations"
