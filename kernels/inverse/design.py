@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,10 @@ GRID = 12
 # On the grid values may have this multiple of the wanted error: neighbours differ by more.
 GRID_SLACK = 10.0
 MOST_STEPS = 200
+# Pairs of members, one below and one above a wanted value, between which a root is looked for: a family may jump.
+CROSSINGS = 8
+# Letters of the first refusal that a summary shows.
+LONGEST = 120
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,13 +44,20 @@ class WallDesign(Summary):
     value : Estimate
         The objective of that member; the error says nothing about better members that the grid missed.
     tried : ndarray, shape (members, parameters + 1)
-        All parameters tried, in order, with the objective of each.
+        The parameters of all members that have an objective, in order, with its value.
+    refused : tuple of str
+        The members without one, with the reason; they were left out.
     """
 
     parameters: Floats
     member: Wall | Law
     value: Estimate
     tried: Floats
+    refused: tuple[str, ...] = ()
+
+    def _facts(self) -> Mapping[str, object]:
+        left = f"{len(self.refused)} members, the first {self.refused[0]}"[:LONGEST] if self.refused else None
+        return {**super()._facts(), "refused": left}
 
 
 @reported("wall design")
@@ -70,7 +81,7 @@ def design_wall(
     bounds : sequence of (float, float)
         Smallest and largest value of each parameter; the ends themselves are not tried on the grid.
     wanted : {"min", "max"} or float
-        A number: the member whose objective is nearest to it.
+        A number: the member whose objective is that number within the tolerance, or nearest to it.
     tolerance : float
         Wanted error of the objective. At an extremum inside the bounds the parameters are good to about its square
         root only.
@@ -84,12 +95,15 @@ def design_wall(
     Raises
     ------
     InputError
-        If the bounds are not increasing pairs, or another argument is not as described.
+        If the bounds are not increasing pairs, no member on the grid has an objective, or another argument is not as
+        described.
 
     Notes
     -----
-    One parameter: Brent's method between the neighbours of the best grid point; more: Nelder and Mead's, in the
-    parameters as fractions of their bounds.
+    Extrema of one parameter: Brent's method between the neighbours of the best grid point; of more: Nelder and Mead's,
+    in the parameters as fractions of their bounds. A number: Brent's root finder along the shortest line between two
+    members on both sides of it; without such members that of an extremum. Members that raise a ValueError or an
+    ArithmeticError, as all refusals are, or whose objective is no finite real number, are left out.
 
     Examples
     --------
@@ -107,30 +121,102 @@ def design_wall(
         raise InputError(f"wanted: expected 'min', 'max' or a number, got {wanted!r}")
     goal = wanted if isinstance(wanted, str) else finite_number("wanted", wanted)
     whole_number("grid", grid, 3)
-    positive_number("tolerance", tolerance)
-    tried: list[list[float]] = []
-
-    def loss(value: float) -> float:
-        if isinstance(goal, float):
-            return abs(value - goal)
-        return value if goal == "min" else -value
-
-    def estimate(member: Wall | Law, error: float) -> Estimate:
-        return objective(member if isinstance(member, Law) else WallLaw(member), error)
-
-    def loss_at(fractions: Any, error: float) -> float:
-        parameters = (limits[:, 0] + fractions * (limits[:, 1] - limits[:, 0])).tolist()
-        tried.append([*parameters, float(estimate(family(*parameters), error))])
-        return loss(tried[-1][-1])
-
+    # the value of a crossing may miss the wanted one by the half of the tolerance that its error leaves
+    tolerance = positive_number("tolerance", tolerance) * (0.5 if isinstance(goal, float) else 1.0)
+    search = _Search(objective, family, limits, goal)
     axis = (np.arange(grid) + 0.5) / grid
     points = np.stack(np.meshgrid(*[axis] * len(limits), indexing="ij"), axis=-1).reshape(-1, len(limits))
-    start = points[int(np.argmin([loss_at(point, GRID_SLACK * tolerance) for point in points]))]
-    _improve(lambda fractions: loss_at(fractions, tolerance), start, 1.0 / grid, tolerance)
-    best = min(tried, key=lambda entry: loss(entry[-1]))
-    parameters = frozen(best[:-1])
-    member = family(*parameters.tolist())
-    return WallDesign(parameters, member, estimate(member, tolerance), frozen(tried))
+    for point in points:
+        search.value(point, GRID_SLACK * tolerance)
+    if not search.tried:
+        raise InputError(
+            f"family: expected members with an objective within {bounds!r}, got none among {len(points)}; the first "
+            f"is {search.refused[0]}; change the bounds, the family or the objective"
+        )
+    start, coarse = search.best(), len(search.tried)
+    search.value(start.fractions, tolerance)
+    if not search.crosses(tolerance):
+        _improve(lambda fractions: search.loss_at(fractions, tolerance), start.fractions, 1.0 / grid, tolerance)
+        # an extremum between two grid points may lie beyond the wanted value
+        search.crosses(tolerance)
+    best = search.best(coarse)
+    tried = frozen([[*each.parameters, float(each.value)] for each in search.tried])
+    return WallDesign(frozen(best.parameters), best.member, best.value, tried, tuple(search.refused))
+
+
+class _Trial(NamedTuple):
+    """A member of a family at a point of the unit cube, with its objective."""
+
+    fractions: Floats
+    parameters: list[float]
+    member: Wall | Law
+    value: Estimate
+
+
+class _Search:
+    """The members tried, and those that refuse."""
+
+    def __init__(
+        self, objective: Objective, family: Callable[..., Wall | Law], limits: Floats, goal: str | float
+    ) -> None:
+        self.objective, self.family, self.limits, self.goal = objective, family, limits, goal
+        self.tried: list[_Trial] = []
+        self.refused: list[str] = []
+
+    def value(self, fractions: Any, error: float) -> float:
+        """The objective of a member to an error; nan if it refuses."""
+        fractions = np.array(fractions, dtype=np.float64).reshape(-1)
+        parameters = (self.limits[:, 0] + fractions * (self.limits[:, 1] - self.limits[:, 0])).tolist()
+        try:
+            member = self.family(*parameters)
+            value = self.objective(member if isinstance(member, Law) else WallLaw(member), error)
+            found = finite_number("objective", value)
+        except (ValueError, ArithmeticError) as reason:
+            self.refused.append(f"({', '.join(f'{one:.6g}' for one in parameters)}): {reason}")
+            return np.nan
+        self.tried.append(_Trial(fractions, parameters, member, value))
+        return found
+
+    def loss(self, trial: _Trial) -> float:
+        value = float(trial.value)
+        if isinstance(self.goal, float):
+            return abs(value - self.goal)
+        return value if self.goal == "min" else -value
+
+    def loss_at(self, fractions: Any, error: float) -> float:
+        """The loss of a member; of one that refuses the largest known."""
+        found = self.value(fractions, error)
+        return max(map(self.loss, self.tried)) if np.isnan(found) else self.loss(self.tried[-1])
+
+    def best(self, first: int = 0) -> _Trial:
+        """The trial of the least loss, from the given one on if there are any."""
+        return min(self.tried[first:] or self.tried, key=self.loss)
+
+    def crosses(self, error: float) -> bool:
+        """Whether a member has the wanted number within ``error``: by roots between members on both sides of it."""
+        from scipy.optimize import brentq
+
+        if not isinstance(self.goal, float):
+            return False
+        goal, count = self.goal, len(self.tried)
+        above = [trial for trial in self.tried if float(trial.value) >= goal]
+        below = [trial for trial in self.tried if float(trial.value) < goal]
+        pairs = [(one.fractions, other.fractions) for one in above for other in below]
+        for one, other in sorted(pairs, key=lambda pair: float(np.linalg.norm(pair[0] - pair[1])))[:CROSSINGS]:
+
+            def excess(t: float, one: Floats = one, other: Floats = other) -> float:
+                found = self.value(one + t * (other - one), error) - goal
+                # the root finder ends at 0
+                return 0.0 if abs(found) <= error else found
+
+            try:
+                brentq(excess, 0.0, 1.0, disp=False)
+            except ValueError:
+                # a member on the line refuses, or at its ends the smaller error shows one side only
+                continue
+            if any(self.loss(trial) <= error for trial in self.tried[count:]):
+                return True
+        return False
 
 
 def _improve(loss: Callable[[Any], float], start: Floats, spacing: float, tolerance: float) -> None:
