@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -27,8 +28,8 @@ GRID_SLACK = 10.0
 MOST_STEPS = 200
 # Pairs of members, one below and one above a wanted value, between which a root is looked for: a family may jump.
 CROSSINGS = 8
-# Letters of the first refusal that a summary shows.
-LONGEST = 120
+# Letters of a refusal that are kept.
+LONGEST = 80
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,10 +55,6 @@ class WallDesign(Summary):
     value: Estimate
     tried: Floats
     refused: tuple[str, ...] = ()
-
-    def _facts(self) -> Mapping[str, object]:
-        left = f"{len(self.refused)} members, the first {self.refused[0]}"[:LONGEST] if self.refused else None
-        return {**super()._facts(), "refused": left}
 
 
 @reported("wall design")
@@ -123,25 +120,48 @@ def design_wall(
     whole_number("grid", grid, 3)
     # the value of a crossing may miss the wanted one by the half of the tolerance that its error leaves
     tolerance = positive_number("tolerance", tolerance) * (0.5 if isinstance(goal, float) else 1.0)
-    search = _Search(objective, family, limits, goal)
+    tried: list[_Trial] = []
+    refused: list[str] = []
+
+    def value(fractions: Any, error: float) -> float:
+        """The objective of a member to an error; nan if it refuses."""
+        given = np.array(fractions, dtype=np.float64).reshape(-1)
+        parameters = (limits[:, 0] + given * (limits[:, 1] - limits[:, 0])).tolist()
+        try:
+            member = family(*parameters)
+            found = objective(member if isinstance(member, Law) else WallLaw(member), error)
+            tried.append(_Trial(given, parameters, member, found, finite_number("objective", found)))
+        except (ValueError, ArithmeticError) as reason:
+            refused.append(f"({', '.join(f'{one:.6g}' for one in parameters)}): {reason}"[:LONGEST])
+            return np.nan
+        return tried[-1].number
+
+    def loss(trial: _Trial) -> float:
+        return abs(trial.number - goal) if isinstance(goal, float) else trial.number * (1.0 if goal == "min" else -1.0)
+
+    def loss_at(fractions: Any) -> float:
+        # of a member that refuses the largest loss known
+        return max(map(loss, tried)) if np.isnan(value(fractions, tolerance)) else loss(tried[-1])
+
     axis = (np.arange(grid) + 0.5) / grid
     points = np.stack(np.meshgrid(*[axis] * len(limits), indexing="ij"), axis=-1).reshape(-1, len(limits))
     for point in points:
-        search.value(point, GRID_SLACK * tolerance)
-    if not search.tried:
+        value(point, GRID_SLACK * tolerance)
+    if not tried:
         raise InputError(
             f"family: expected members with an objective within {bounds!r}, got none among {len(points)}; the first "
-            f"is {search.refused[0]}; change the bounds, the family or the objective"
+            f"is {refused[0]}; change the bounds, the family or the objective"
         )
-    start, coarse = search.best(), len(search.tried)
-    search.value(start.fractions, tolerance)
-    if not search.crosses(tolerance):
-        _improve(lambda fractions: search.loss_at(fractions, tolerance), start.fractions, 1.0 / grid, tolerance)
-        # an extremum between two grid points may lie beyond the wanted value
-        search.crosses(tolerance)
-    best = search.best(coarse)
-    tried = frozen([[*each.parameters, float(each.value)] for each in search.tried])
-    return WallDesign(frozen(best.parameters), best.member, best.value, tried, tuple(search.refused))
+    start, coarse = min(tried, key=loss).fractions, len(tried)
+    value(start, tolerance)
+    if not (isinstance(goal, float) and _crossed(value, tried, goal, tolerance)):
+        _improve(loss_at, start, 1.0 / grid, tolerance)
+        if isinstance(goal, float):
+            # an extremum between members on the grid may lie beyond the wanted value
+            _crossed(value, tried, goal, tolerance)
+    best = min(tried[coarse:] or tried, key=loss)
+    found = frozen([[*each.parameters, each.number] for each in tried])
+    return WallDesign(frozen(best.parameters), best.member, best.value, found, tuple(refused))
 
 
 class _Trial(NamedTuple):
@@ -151,72 +171,31 @@ class _Trial(NamedTuple):
     parameters: list[float]
     member: Wall | Law
     value: Estimate
+    number: float
 
 
-class _Search:
-    """The members tried, and those that refuse."""
+def _crossed(value: Callable[[Any, float], float], tried: Sequence[_Trial], goal: float, error: float) -> bool:
+    """Whether a root of value - goal was found, within ``error``, between two members on both sides of the goal."""
+    from scipy.optimize import brentq
 
-    def __init__(
-        self, objective: Objective, family: Callable[..., Wall | Law], limits: Floats, goal: str | float
-    ) -> None:
-        self.objective, self.family, self.limits, self.goal = objective, family, limits, goal
-        self.tried: list[_Trial] = []
-        self.refused: list[str] = []
+    ends = [[one.fractions for one in tried if (one.number < goal) == below] for below in (True, False)]
+    pairs = sorted(product(*ends), key=lambda pair: float(np.linalg.norm(pair[1] - pair[0])))
+    for one, other in pairs[:CROSSINGS]:
+        count = len(tried)
 
-    def value(self, fractions: Any, error: float) -> float:
-        """The objective of a member to an error; nan if it refuses."""
-        fractions = np.array(fractions, dtype=np.float64).reshape(-1)
-        parameters = (self.limits[:, 0] + fractions * (self.limits[:, 1] - self.limits[:, 0])).tolist()
+        # the root finder ends at 0, and at nan of a member that refuses
+        def excess(t: float, one: Floats = one, step: Floats = other - one) -> float:
+            found = value(one + t * step, error) - goal
+            return 0.0 if abs(found) <= error else found
+
         try:
-            member = self.family(*parameters)
-            value = self.objective(member if isinstance(member, Law) else WallLaw(member), error)
-            found = finite_number("objective", value)
-        except (ValueError, ArithmeticError) as reason:
-            self.refused.append(f"({', '.join(f'{one:.6g}' for one in parameters)}): {reason}")
-            return np.nan
-        self.tried.append(_Trial(fractions, parameters, member, value))
-        return found
-
-    def loss(self, trial: _Trial) -> float:
-        value = float(trial.value)
-        if isinstance(self.goal, float):
-            return abs(value - self.goal)
-        return value if self.goal == "min" else -value
-
-    def loss_at(self, fractions: Any, error: float) -> float:
-        """The loss of a member; of one that refuses the largest known."""
-        found = self.value(fractions, error)
-        return max(map(self.loss, self.tried)) if np.isnan(found) else self.loss(self.tried[-1])
-
-    def best(self, first: int = 0) -> _Trial:
-        """The trial of the least loss, from the given one on if there are any."""
-        return min(self.tried[first:] or self.tried, key=self.loss)
-
-    def crosses(self, error: float) -> bool:
-        """Whether a member has the wanted number within ``error``: by roots between members on both sides of it."""
-        from scipy.optimize import brentq
-
-        if not isinstance(self.goal, float):
-            return False
-        goal, count = self.goal, len(self.tried)
-        above = [trial for trial in self.tried if float(trial.value) >= goal]
-        below = [trial for trial in self.tried if float(trial.value) < goal]
-        pairs = [(one.fractions, other.fractions) for one in above for other in below]
-        for one, other in sorted(pairs, key=lambda pair: float(np.linalg.norm(pair[0] - pair[1])))[:CROSSINGS]:
-
-            def excess(t: float, one: Floats = one, other: Floats = other) -> float:
-                found = self.value(one + t * (other - one), error) - goal
-                # the root finder ends at 0
-                return 0.0 if abs(found) <= error else found
-
-            try:
-                brentq(excess, 0.0, 1.0, disp=False)
-            except ValueError:
-                # a member on the line refuses, or at its ends the smaller error shows one side only
-                continue
-            if any(self.loss(trial) <= error for trial in self.tried[count:]):
-                return True
-        return False
+            brentq(excess, 0.0, 1.0, disp=False)
+        except ValueError:
+            # or the smaller error showed that the ends are on one side
+            continue
+        if any(abs(trial.number - goal) <= error for trial in tried[count:]):
+            return True
+    return False
 
 
 def _improve(loss: Callable[[Any], float], start: Floats, spacing: float, tolerance: float) -> None:

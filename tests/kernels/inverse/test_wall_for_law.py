@@ -207,7 +207,7 @@ def partial(a):
 def test_members_that_refuse_are_left_out_and_named(wanted, value):
     found = ker.design_wall(the_gap, partial, [(0.0, 1.0)], wanted, tolerance=1e-7)
     assert float(found.value) == pytest.approx(value, abs=1e-4)
-    assert found.refused[0] == "(0.375): no wall of this depth" and "members, the first (0.375): no" in repr(found)
+    assert found.refused[0] == "(0.375): no wall of this depth" and "refused    (0.375): no wall" in repr(found)
     assert any("diffuse_fraction: expected a number" in line for line in found.refused)
 
 
