@@ -27,7 +27,10 @@ class Tents(ker.Basis):
     steps: int
     fault: str = ""
     measure = ker.SINE
-    nodes_per_interval = 3
+
+    @property
+    def nodes_per_interval(self) -> int:
+        return 2 if self.fault == "too few nodes" else 16
 
     @property
     def size(self) -> int:
@@ -200,7 +203,10 @@ def broken_function(rng: Rng) -> Drawn:
 
 def broken_basis(rng: Rng) -> Drawn:
     """A basis that is not orthonormal, real, or smooth between its edges."""
-    faults = "edges of half of the kinks", "a function doubled", "complex", "transposed", "nan", "one function twice"
+    faults = (
+        "edges of half of the kinks", "a function doubled", "complex", "transposed", "nan", "one function twice",
+        "too few nodes",
+    )  # fmt: skip
     name, steps = str(rng.choice(faults)), 2 * int(rng.integers(2, 6))
     return Drawn(f"basis: {name}", lambda: (ker.henyey_greenstein(0.5), Tents(steps, name)), ("in_basis",))
 

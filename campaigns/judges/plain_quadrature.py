@@ -23,11 +23,10 @@ def rule(breaks: Iterable[float], nodes: int, levels: int = 12, widest: float = 
     """Angles and weights of d theta on (0, pi)."""
     ends = np.unique(np.clip([0.0, np.pi, *breaks], 0.0, np.pi))
     near = RATIO ** np.arange(levels, 0, -1)
-    edges = [np.zeros(1)]
-    for low, high in pairwise(ends):
-        middle = np.linspace(RATIO, 1.0 - RATIO, 2 + int((high - low) / widest))
-        edges += [low + (high - low) * np.concatenate([near[:-1], middle, 1.0 - near[:-1][::-1], [1.0]])]
-    cuts = np.unique(np.concatenate(edges))
+    near = np.concatenate([[0.0], near, 1.0 - near[::-1], [1.0]])
+    marks = np.unique(np.concatenate([low + (high - low) * near for low, high in pairwise(ends)]))
+    parts = [np.linspace(low, high, 1 + int((high - low) / widest), endpoint=False) for low, high in pairwise(marks)]
+    cuts = np.concatenate([*parts, [np.pi]])
     x, w = np.polynomial.legendre.leggauss(nodes)
     half = 0.5 * np.diff(cuts)[:, None]
     return (cuts[:-1, None] + half * (1.0 + x)).ravel(), (half * w).ravel()
