@@ -132,4 +132,6 @@ class Truth:
             between = 0.5 * (width + np.append(width[1:], 0.0))
             return float((weight * 0.5 * np.sin(angle)) @ (away @ between))
 
-        return by_two_rules(computed)
+        found = by_two_rules(computed)
+        # the widths of the panels differ less than their numbers of nodes
+        return Known(float(found.value), 4.0 * found.error)
