@@ -359,10 +359,11 @@ def broken_atoms(rng: Rng) -> Drawn:
 def broken_array(rng: Rng) -> Drawn:
     """An array that is no matrix of probabilities, or a map that is no involution of the measure."""
     array = random_rows(rng)
-    shift = np.roll(np.eye(4), 1, axis=1)
+    shift, negative = np.roll(np.eye(4), 1, axis=1), array.copy()
+    negative[0, 0], negative[0, -1] = -0.25, array[0, 0] + array[0, -1] + 0.25
     makes: dict[str, Callable[[], ker.Law]] = {
         "sums": lambda: ker.MatrixLaw(0.99 * array), "nan": lambda: ker.MatrixLaw(np.nan * array),
-        "negative": lambda: ker.MatrixLaw(2.0 * array - 1.0 / len(array)), "row": lambda: ker.MatrixLaw(array[0]),
+        "negative": lambda: ker.MatrixLaw(negative), "row": lambda: ker.MatrixLaw(array[0]),
         "not square": lambda: ker.MatrixLaw(array[:-1]), "complex": lambda: ker.MatrixLaw(array + 0j),
         "no involution": lambda: ker.InvolutionLaw(lambda x: 0.5 * x),
         "map beyond pi": lambda: ker.InvolutionLaw(lambda x: x + 1.0),
