@@ -317,7 +317,6 @@ def broken_sampler(rng: Rng) -> Drawn:
         "beyond pi": lambda x: x + 1.0, "negative": lambda x: x - 1.0, "nan": lambda x: np.where(x > 1.5, np.nan, x),
         "one less": lambda x: x[:-1], "one number": lambda x: 1.0, "texts": lambda x: x.astype(str),
         "complex": lambda x: x + 0j, "raises": lambda x: {}["no such key"], "None": lambda x: None,
-        "zero": lambda x: 0.0 * x,
     }  # fmt: skip
     name = str(rng.choice(list(faults)))
 

@@ -27,7 +27,8 @@ from campaigns.judges.plain_quadrature import Array, Known, Truth
 Rng = np.random.Generator
 # Refusals; of a good object an answer is useless if its error exceeds this fraction of its scale.
 REFUSALS, USELESS = (AsperityError, TypeError), 0.3
-# Calls of an object; standard errors of a sampled mean; relative error of numbers that carry none; seconds of a call.
+# Calls of an object; standard errors of a sampled mean; relative error of numbers that carry none; a call takes at most
+# these seconds of processor time.
 CALLS, SIGMAS, PLAIN, SECONDS = 3, 6.0, 1e-8, 60.0
 NOTHING = Known(0.0, 0.0)
 
@@ -242,13 +243,13 @@ def judge(case: Case) -> Iterator[Judged]:
             made = case.drawn.told()
             yield Judged("constructor", outcome="asked for breakpoints")
         for name in rng.choice(tools, min(CALLS, len(tools)), replace=False).tolist():
-            begun = time.monotonic()
+            begun = time.process_time()
             try:
                 answer = TOOLS[name](made, case.drawn.truth, rng)
             except Exception as reason:
                 yield refused(case, kind, name, reason)
                 continue
-            seconds = time.monotonic() - begun
+            seconds = time.process_time() - begun
             if not case.good:
                 yield Judged("broken", fault=f"{kind}, {name}: took it and gave {answer.value} +- {answer.error:.2g}")
             elif seconds > SECONDS:
