@@ -276,4 +276,6 @@ def refused(case: Case, kind: str, name: str, reason: Exception) -> Judged:
 
 
 QUESTION = "Do errors hold of what users write, and is what is broken refused?"
-CAMPAIGNS = (Campaign("users-objects", QUESTION, draw, judge, 2000, list(range(12)), seconds=400.0),)
+# Quick ones, of most kinds.
+SMALL = (0, 1, 2, 3, 6, 7, 8, 9, 12, 15, 17, 19, 21, 25, 27, 28, 29, 30, 33, 36, 39)
+CAMPAIGNS = (Campaign("users-objects", QUESTION, draw, judge, 2000, SMALL, seconds=400.0),)
