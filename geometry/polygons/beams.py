@@ -127,7 +127,8 @@ def beams_of(
     mirror_symmetric : bool
         Whether the hollow is its own mirror image, within rounding: then it is made so exactly, and only rays with
         theta < pi/2 are divided, and mirrored. ``rounding`` and ``offset_error`` bound what the change does. If it
-        is more than the rounding of some vertices, all rays are divided nevertheless.
+        is more than the rounding of some vertices, as in a hollow that is narrow beside its coordinates, all rays are
+        divided nevertheless.
     threads : int, optional
         By default one for each processor that this process may use. The result does not depend on it.
 
@@ -138,7 +139,7 @@ def beams_of(
     Raises
     ------
     InputError
-        If the chain is not a hollow, see `triangulated`, or not mirror-symmetric although said to be.
+        If the chain is not a hollow, see `triangulated`.
     WallError
         If the chain crosses itself.
 
@@ -159,7 +160,7 @@ def beams_of(
     number_between("tolerance", tolerance, 0.0, 1.0, closed="low")
     whole_number("max_beams", max_beams, 2)
     exact = symmetrised(checked_chain(hollow_vertices)) if mirror_symmetric else None
-    if exact is not None and exact.turn * len(exact.vertices) > max(tolerance, MOST_TURNED):
+    if exact is not None and exact.turn * len(exact.vertices) > MOST_TURNED:
         exact = None
     entrances, images = (2, 1.0) if exact is None else (1, 2.0)
     triangulation = triangulated(hollow_vertices if exact is None else exact.vertices)

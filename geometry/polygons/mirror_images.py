@@ -7,11 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.errors import InputError
 from ...core.rounding import UNIT_ROUNDOFF
-
-# Departure from symmetry, as a fraction of the hollow's size, beyond which its growth is not proportional to it.
-MOST_DEPARTURE = 1e-9
 
 
 class Symmetrised(NamedTuple):
@@ -51,15 +47,10 @@ class Symmetrised(NamedTuple):
 
 
 def symmetrised(chain: Floats) -> Symmetrised:
-    """Return the exactly symmetric hollow of a chain of different points that is symmetric within rounding.
+    """Return the exactly symmetric hollow of a chain of different points, and its distance from the chain.
 
     Of two vertices that are each other's images the one farther to the right stays; by Sterbenz's lemma the other is
     exact up to twice the width.
-
-    Raises
-    ------
-    InputError
-        If the departure from symmetry is no rounding.
 
     Examples
     --------
@@ -80,11 +71,6 @@ def symmetrised(chain: Floats) -> Symmetrised:
     size = float(np.hypot(*np.ptp(relative, axis=0)))
     rest = UNIT_ROUNDOFF * size if x.max() > 2.0 * width else 0.0
     shift = float(np.hypot(*change.T).max()) + rest
-    if shift > MOST_DEPARTURE * size:
-        raise InputError(
-            f"hollow_vertices: expected a hollow that is its own mirror image, got one that departs by {shift:.2g}; "
-            "leave out mirror_symmetric"
-        )
     lengths, changes = (np.hypot(*np.diff(points, axis=0).T) for points in (relative, change))
     turn = float(((changes + 2.0 * rest) / lengths).max())
     return Symmetrised(vertices, shift, turn, size)

@@ -180,10 +180,7 @@ class MirrorPair:
 
 
 def bezier_pieces(
-    curve: Callable[[Floats], CurvePoints],
-    onto: Callable[[Floats], CurvePoints],
-    ends: Interval,
-    tolerance: float,
+    curve: Callable[[Floats], CurvePoints], onto: Callable[[Floats], CurvePoints], ends: Interval, tolerance: float
 ) -> list[Bezier]:
     """Cubic pieces with the tangents of a curve at their ends and, by Gauss and Newton's method, between them.
 

@@ -24,6 +24,7 @@ SCALES, SAMPLES = (1e-3, 1e-4, 1e-5), (12, 16, 16)
 # The diameter of the last laws has fallen to this fraction of that of all where they converge, and has kept this one
 # where they do not.
 FALLEN, STANDING = 0.25, 0.5
+Verdict = Literal["converges", "does not converge", "undecided"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,7 +46,7 @@ class Dichotomy(Summary):
         The largest distance among the laws from the k-th on.
     """
 
-    verdict: Literal["converges", "does not converge", "undecided"]
+    verdict: Verdict
     scales: Floats
     distances: Floats
     errors: Floats
@@ -126,9 +127,7 @@ def dichotomy(
     )  # fmt: skip
 
 
-def _verdict(
-    diameters: Floats, widths: Floats, tolerance: float
-) -> Literal["converges", "does not converge", "undecided"]:
+def _verdict(diameters: Floats, widths: Floats, tolerance: float) -> Verdict:
     first, last, middle = diameters[0], diameters[-1], diameters[len(diameters) // 2]
     if last + widths[-1] <= tolerance or (last + widths[-1] <= FALLEN * middle and middle <= STANDING * first):
         return "converges"

@@ -107,11 +107,7 @@ class ExchangeHollow(Summary):
         return fraction_estimate(missed, theta.size, f"{theta.size} traced rays")
 
     def mean(
-        self,
-        function: Callable[[Floats, Floats], Floats],
-        unfollowed: float,
-        samples: int = SAMPLES,
-        rng: Rng = None,
+        self, function: Callable[[Floats, Floats], Floats], unfollowed: float, samples: int = SAMPLES, rng: Rng = None
     ) -> Estimate:
         """The mean of a function of the incoming and the outgoing angle over the flux through the opening.
 

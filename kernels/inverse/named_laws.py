@@ -13,18 +13,10 @@ from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.phase_function import henyey_greenstein
 from ..matrices.matrix import KernelMatrix, load_matrix
 
-PLAIN: Mapping[str, Callable[[], Law]] = MappingProxyType(
-    {
-        "lambertian": lambertian,
-        "specular": specular,
-        "retroreflection": retroreflection,
-        "least-resistance": LeastResistanceLaw,
-    }
-)
-WITH_NUMBER: Mapping[str, Callable[[float], Law]] = MappingProxyType(
-    {"maxwell": maxwell, "henyey-greenstein": henyey_greenstein}
-)
-NAMES = "lambertian, specular, retroreflection, least-resistance, maxwell:NUMBER, henyey-greenstein:NUMBER"
+LAWS: Mapping[str, Callable[..., Law]] = MappingProxyType({
+    "lambertian": lambertian, "specular": specular, "retroreflection": retroreflection,
+    "least-resistance": LeastResistanceLaw, "maxwell:NUMBER": maxwell, "henyey-greenstein:NUMBER": henyey_greenstein,
+})  # fmt: skip
 
 
 def law_from_text(text: str) -> Law | KernelMatrix:
@@ -41,15 +33,14 @@ def law_from_text(text: str) -> Law | KernelMatrix:
     0.25*lambertian() + 0.75*specular()
     """
     name, colon, number = text.partition(":")
-    if name in PLAIN and not colon:
-        return PLAIN[name]()
-    if name in WITH_NUMBER:
+    if name in LAWS and not colon:
+        return LAWS[name]()
+    if f"{name}:NUMBER" in LAWS:
         try:
-            return WITH_NUMBER[name](float(number))
+            given = float(number)
         except ValueError as reason:
-            if isinstance(reason, InputError):
-                raise
             raise InputError(f"law: expected a number after '{name}:', got {number!r}") from reason
+        return LAWS[f"{name}:NUMBER"](given)
     if exists(text):
         return load_matrix(text)
-    raise InputError(f"law: expected {NAMES}, or a file that KernelMatrix.save wrote, got {text!r}")
+    raise InputError(f"law: expected {', '.join(LAWS)}, or a file that KernelMatrix.save wrote, got {text!r}")

@@ -228,16 +228,8 @@ def wall_for(
         # traced hollows have an error, in the search and in the finished wall
         error = float(finished.error) + float(target_error) + abs(value - search.defect)
         bound = Estimate(excess, error, "estimate", "duality gap over the hollows of the last step")
-    return WallForLaw(
-        wall,
-        tuple(chosen),
-        frozen(weights),
-        defect,
-        bound,
-        frozen(np.array(search.history).reshape(-1, 3)),
-        wanted,
-        len(target),
-    )
+    history = frozen(np.array(search.history).reshape(-1, 3))
+    return WallForLaw(wall, tuple(chosen), frozen(weights), defect, bound, history, wanted, len(target))
 
 
 def collision_for(

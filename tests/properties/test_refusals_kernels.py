@@ -133,7 +133,6 @@ REFUSED = {
         (lambda: ker.MushroomLaw(FLAT), "MushroomGenerations"),
         (lambda: beams_of([(1, 0), (0.5, -1), (0, 0)]), "left < right"),
         (lambda: beams_of([(0, 0), (0.5, 1), (1, 0)]), "y <= 0"),
-        (lambda: beams_of([(0, 0), (0.3, -1), (1, 0)], mirror_symmetric=True), "own mirror image"),
     ],
     "sums and products": [
         (lambda: (0.3 * MIRROR + 0.6 * DIFFUSE).apply(np.cos, 1.0), r"expected a sum of 1, got 0\.89"),

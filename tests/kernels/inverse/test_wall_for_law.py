@@ -155,11 +155,73 @@ def test_alternating_cells_do_not_converge_and_flattening_ones_do():
     assert flattening.scales[0] == 1e-3
 
 
-def test_a_wanted_resistance_is_met():
-    found = ker.design_wall(ker.resistance, geo.focusing_arcs, [(0.2, 1.5)], wanted=1.2, tolerance=1e-8)
-    assert float(ker.resistance(ker.WallLaw(geo.focusing_arcs(float(found.parameters[0]))))) == pytest.approx(
-        1.2, abs=1e-6
-    )
+@pytest.mark.parametrize("fraction", [1e-9, 3e-9, 1e-8, 3e-8, 1e-7, 3e-7, 1e-6, 3e-6, 1e-5])
+def test_narrow_hollows_keep_their_accuracy_beside_a_flat_top(fraction):
+    # the coordinates of a hollow of width 1e-10 round to 1e-6 of it, which is symmetric no more
+    found = ker.wall_for(ker.maxwell(fraction))
+    assert float(found.defect) + found.defect.error < max(0.1 * fraction, 1e-11) and found.defect.error < 1e-11
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-8])
+@pytest.mark.parametrize("wanted", [1.1, 1.2, 1.3, 1.41])
+def test_a_wanted_resistance_is_met_within_the_tolerance(wanted, tolerance):
+    found = ker.design_wall(ker.resistance, geo.triangular_teeth, [(0.5, 3.0)], wanted, tolerance)
+    exact = float(ker.resistance(ker.TriangularTeethLaw(float(found.parameters[0])), 1e-12))
+    assert abs(exact - wanted) <= tolerance and found.refused == ()
+
+
+def the_gap(law, tolerance):
+    return spec.spectral_gap(law, tolerance)
+
+
+def peak(a, b=0.5):
+    # the gap of Maxwell's law is the diffuse fraction
+    return ker.maxwell(float(np.exp(-100.0 * ((a - 0.513) ** 2 + (b - 0.5) ** 2))))
+
+
+@pytest.mark.parametrize("bounds", [[(0.0, 1.0)], [(0.0, 1.0), (0.2, 0.9)]])
+def test_a_number_that_no_member_on_the_grid_reaches_is_met_between_them(bounds):
+    found = ker.design_wall(the_gap, peak, bounds, wanted=0.995, tolerance=1e-7, grid=5)
+    assert found.tried[: 5 ** len(bounds), -1].max() < 0.995 and abs(float(found.value) - 0.995) <= 1e-7
+
+
+def test_a_family_that_jumps_over_a_number_gives_the_nearest_member_or_another_crossing():
+    # from .2 to .6 at .5, and continuously through .4 and back at .82
+    def member(a):
+        return ker.maxwell(0.4 * a if a < 0.5 else 0.6 - 2.0 * (a - 0.72) if a > 0.72 else 0.6)
+
+    found = ker.design_wall(the_gap, member, [(0.0, 1.0)], wanted=0.4, tolerance=1e-7)
+    assert found.parameters[0] == pytest.approx(0.82, abs=1e-6)
+    near = ker.design_wall(the_gap, member, [(0.0, 0.7)], wanted=0.35, tolerance=1e-7)
+    assert float(near.value) == pytest.approx(0.2, abs=1e-3)
+
+
+def partial(a):
+    if 0.3 < a < 0.6:
+        raise ValueError("no wall of this depth")
+    # beyond .9 the law refuses
+    return ker.maxwell(a if a < 0.9 else 2.0)
+
+
+@pytest.mark.parametrize(("wanted", "value"), [(0.2, 0.2), (0.7, 0.7), ("max", 0.9), ("min", 0.0), (0.95, 0.9)])
+def test_members_that_refuse_are_left_out_and_named(wanted, value):
+    found = ker.design_wall(the_gap, partial, [(0.0, 1.0)], wanted, tolerance=1e-7)
+    assert float(found.value) == pytest.approx(value, abs=1e-4)
+    assert found.refused[0] == "(0.375): no wall of this depth" and "refused    (0.375): no wall" in repr(found)
+    assert any("diffuse_fraction: expected a number" in line for line in found.refused)
+
+
+@pytest.mark.parametrize(("odd", "said"), [(np.nan, "finite"), (np.inf, "finite"), (1j, "numbers")])
+def test_an_objective_that_is_no_number_is_never_the_best(odd, said):
+    def objective(law, tolerance):
+        gap = spec.spectral_gap(law, tolerance)
+        return gap if float(gap) < 0.5 else odd
+
+    for wanted, value in (("max", 0.5), ("min", 0.0), (0.3, 0.3)):
+        found = ker.design_wall(objective, ker.maxwell, [(0.0, 1.0)], wanted, tolerance=1e-6)
+        assert float(found.value) == pytest.approx(value, abs=1e-3) and said in found.refused[0]
+    with pytest.raises(InputError, match=rf"none among 12; the first is \(0.6.*{said}.*change the bounds"):
+        ker.design_wall(objective, ker.maxwell, [(0.6, 1.0)])
 
 
 def test_the_gap_is_an_objective():
