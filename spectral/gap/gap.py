@@ -16,6 +16,7 @@ from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.walls.wall_law import made_of_isometries
+from ..bounds.compact import compact_matrix
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
 from ..bounds.images import is_costly, suits_panels
@@ -254,6 +255,23 @@ def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generato
 
 def _by_refinement(law: Law, tolerance: float, rng: np.random.Generator, seconds: float) -> SpectralGap:
     """The gap from the quadratic form of 1 - P for shallow walls, or from enclosures and matrices."""
+    compact = compact_gap(law, seconds)
+    if compact is not None and compact.error <= tolerance:
+        return compact
+    found = _by_edge(law, tolerance, rng, seconds)
+    return compact if compact is not None and compact.error < found.error else found
+
+
+def compact_gap(law: Law, seconds: float) -> SpectralGap | None:
+    """The gap of a law of densities and isometries by Weyl's inequality; None for other laws, or if it takes long."""
+    with suppress(OutOfTime), time_limited((1.0 - RAYS_FRACTION) * seconds):
+        matrix = compact_matrix(law)
+        return None if matrix is None else gap_of_exact(matrix)
+    return None
+
+
+def _by_edge(law: Law, tolerance: float, rng: np.random.Generator, seconds: float) -> SpectralGap:
+    """The gap from the edge of the essential spectrum and from trial functions."""
     fraction, rest = without_identity(law)
     if fraction < 1.0:
         own = gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, rng, seconds)
