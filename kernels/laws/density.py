@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, common_shape, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
-from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.long_runs import NUMBERS_AT_ONCE, count_time
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.given import Vectorised
@@ -36,6 +36,8 @@ CHECK_NODES = 8
 PANEL_STIFFNESS = 12.0
 # Cells on each panel in the table of the cdf that is sampled.
 CELLS_PER_PANEL = 16
+# Nominal time of a value of a density, in seconds.
+VALUE_TIME = 2e-7
 # Incoming angles at which a density is examined; none is a rational multiple of pi, where a density is likely to jump.
 # One more lies between two breakpoints each, at this fraction of their distance.
 PROBES, BETWEEN = np.pi * (np.arange(24) + 0.5 * np.sqrt(5.0) - 1.0) / 24, 0.4567
@@ -160,6 +162,7 @@ class DensityLaw(Law):
         row, low, high, fraction = cut_by_edges(self.panels(theta), whole)
         stiffness = PANEL_STIFFNESS * fraction + stiffness_between(edges, degree, low, high)
         owner, outgoing, weight = gauss_nodes(row, low, high, stiffness)
+        count_time(VALUE_TIME * outgoing.size)
         weight *= self.density(theta[owner], outgoing)
         error = np.maximum(np.abs(np.bincount(owner, weights=weight, minlength=theta.size) - 1.0), self._row_error)
         return Conditionals.of_lists(owner, outgoing, weight, error)

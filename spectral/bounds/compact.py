@@ -13,12 +13,12 @@ from ...core.rounding import EPS
 from ...kernels import DensityLaw, KernelMatrix, Law, Panels
 from ...kernels.bases.measure import SINE, gauss_on_intervals
 from ...kernels.bases.mirror import reflection_matrix
-from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.density import VALUE_TIME
 from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.matrix_law import contains_reflection, with_beyond
-from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold, holds_of_all
 from ...kernels.matrices.matrix import frobenius_error
+from ..eigenvalues.dense import symmetric_half
 
 # Degree on a panel; Gauss nodes by which densities are projected on it, and others at which they are compared with
 # their projections.
@@ -26,24 +26,19 @@ DEGREE, KNOWN, SEEN = 13, 16, 17
 # Two more points for the comparison, at this distance from the ends of a panel: a jump may lie between an end and the
 # first node. Breakpoints and their mirror images have a rounding of a tenth of it.
 AT_END = 1e-14
-# First panels, limits on their number and on the halvings of one, and rounds in which those with most of the squares
-# that the matrix leaves out are halved.
-FIRST_PANELS, MOST_PANELS, MOST_HALVINGS, ROUNDS, FRACTION = 16, 90, 36, 4, 0.9
+# First panels, and limits on their number and on the halvings of one.
+FIRST_PANELS, MOST_PANELS, MOST_HALVINGS = 16, 128, 36
 # Wanted norm of what the matrix leaves out.
 GOAL = 1e-10
 # Factor of the squares at the nodes: a jump may lie anywhere between two of them.
 MARGIN = 2.0
-# Nominal time of a value of a density, in seconds.
-VALUE_TIME = 1e-7
-# Densities with known eigenvalues, for which Legendre polynomials are more exact.
-WITH_SERIES = (HenyeyGreensteinLaw, LambertianLaw)
 
 
 @lru_cache(maxsize=8)
 def compact_matrix(law: Law) -> KernelMatrix | None:
     r"""The matrix on panels of sums and products of densities and isometries, with an error that bounds eigenvalues.
 
-    None for other laws, and if a density is not known to be reversible.
+    None for other laws.
 
     Notes
     -----
@@ -52,45 +47,37 @@ def compact_matrix(law: Law) -> KernelMatrix | None:
     Reversible laws have the norm 1, so the errors of their products add up. By Weyl's inequality every eigenvalue is
     within the sum e of one of the matrix or of those beyond the panels (``KernelMatrix.beyond``), whatever the kinks.
     """
-    if not holds_of_all(law, lambda leaf: isinstance(leaf, (DensityLaw, IsometryLaw)) and leaf.reversible is True):
-        return None
-    densities: list[DensityLaw] = []
-    holds_of_all(law, lambda leaf: densities.append(leaf) is None)
-    densities = [leaf for leaf in dict.fromkeys(densities) if isinstance(leaf, DensityLaw)]
-    if all(isinstance(leaf, WITH_SERIES) for leaf in densities):
+    leaves: list[Law] = []
+    holds_of_all(law, lambda leaf: leaves.append(leaf) is None)
+    densities = [leaf for leaf in dict.fromkeys(leaves) if isinstance(leaf, DensityLaw)]
+    if not densities or not all(isinstance(leaf, (DensityLaw, IsometryLaw)) for leaf in leaves):
         return None
     mirrored = bool(law.mirror_symmetric) or contains_reflection(law)
-    edges = _first_edges(densities, mirrored)
-    for _ in range(ROUNDS):
-        basis = Panels(edges, DEGREE)
-        found = {leaf: _projected(leaf, basis) for leaf in densities}
-        squares = sum((rest for _, rest in found.values()), np.zeros(edges.size - 1))
-        worst = np.argsort(-squares)[: _room(edges, mirrored)]
-        worst = worst[np.cumsum(squares[worst]) <= FRACTION * squares.sum()]
-        if squares.sum() <= GOAL**2 or not worst.size:
-            break
-        edges = _joined(mirrored, edges, 0.5 * (edges[worst] + edges[worst + 1]))
-    rules: Rules[float] = Rules(
-        lambda leaf: float(np.sqrt(MARGIN * found[leaf][1].sum())) if leaf in found else 0.0,
-        lambda terms: sum(weight * error for weight, error in terms),
-        lambda errors: reduce(lambda one, other: one + other + one * other, errors, 0.0),
-        lambda error: error,
-    )
+    basis = Panels(_edges(densities, mirrored), DEGREE)
+    found = {leaf: _projected(leaf, basis) for leaf in densities}
+    # the error and the norm of each part
+    rules: Rules[tuple[float, float]] = Rules(
+        lambda leaf: (found[leaf][1], 1.0 if leaf.reversible else float(np.linalg.norm(found[leaf][0])))
+        if isinstance(leaf, DensityLaw) else (0.0, 1.0),
+        lambda terms: (sum(w * e for w, (e, _) in terms), sum(w * n for w, (_, n) in terms)),
+        lambda parts: reduce(lambda a, b: (a[0] * b[1] + a[1] * b[0] + a[0] * b[0], a[1] * b[1]), parts, (0.0, 1.0)),
+        lambda part: part,
+    )  # fmt: skip
     reflection = reflection_matrix(basis) if mirrored else np.eye(basis.size)
     whole = with_beyond(law, reflection, lambda leaf: found[leaf][0])
     matrix = whole[:-2, :-2]
-    lopsided = np.linalg.norm(matrix - reflection @ matrix @ reflection) if law.mirror_symmetric else 0.0
-    error = fold(law, rules) + float(lopsided) + basis.size * EPS
+    lopsided = float(np.linalg.norm(matrix - reflection @ matrix @ reflection)) if law.mirror_symmetric else 0.0
+    error = fold(law, rules)[0] + lopsided + basis.size * EPS
     how = f"Hilbert-Schmidt norm of what {basis.size} functions leave out, at points between"
     return KernelMatrix(
-        matrix, basis, frobenius_error(error, "estimate", how), method="quadrature",
-        law=repr(law), reversible=law.reversible, mirror_symmetric=law.mirror_symmetric, frame=law.frame,
+        matrix, basis, frobenius_error(error, "estimate", how), method="quadrature", law=repr(law),
+        reversible=law.reversible, mirror_symmetric=law.mirror_symmetric, frame=law.frame,
         beyond=(whole[-2, -2], whole[-1, -1]),
     )  # fmt: skip
 
 
-def _first_edges(densities: list[DensityLaw], mirrored: bool) -> Floats:
-    """Edges between which polynomials are near the densities at some incoming angles."""
+def _edges(densities: list[DensityLaw], mirrored: bool) -> Floats:
+    """Edges between which polynomials are near the densities at some incoming angles, as far as MOST_PANELS allow."""
     marks = [density.outgoing_breakpoints for density in densities]
     edges = _joined(mirrored, np.linspace(0.0, np.pi, FIRST_PANELS + 1), *marks)
     finest = min(density.resolution for density in densities)
@@ -98,7 +85,7 @@ def _first_edges(densities: list[DensityLaw], mirrored: bool) -> Floats:
     for _ in range(MOST_HALVINGS):
         parts = int(np.ceil(np.max(high - low) / finest))
         rest = sum(_misfit(density, low, high, parts) for density in densities)
-        worst = np.argsort(-rest)[: _room(edges, mirrored)]
+        worst = np.argsort(-rest)[: max(MOST_PANELS + 1 - edges.size, 0) // (1 + mirrored)]
         worst = worst[rest[worst] > GOAL**2 / MOST_PANELS]
         if not worst.size:
             break
@@ -120,8 +107,8 @@ def _misfit(density: DensityLaw, low: Floats, high: Floats, parts: int) -> Float
     return np.asarray((mass * (value - value @ projection.T) ** 2).sum(axis=2).mean(axis=0))
 
 
-def _projected(density: DensityLaw, basis: Panels) -> tuple[Floats, Floats]:
-    """The matrix of a density, and the squares of what it leaves out for the incoming angles of each panel."""
+def _projected(density: DensityLaw, basis: Panels) -> tuple[Floats, float]:
+    """The matrix of a density, and the Hilbert-Schmidt norm of what it leaves out."""
     low, high = basis.edges[:-1, None], basis.edges[1:, None]
 
     def at(position: Floats, weight: Floats) -> tuple[Floats, Floats, Floats]:
@@ -134,12 +121,12 @@ def _projected(density: DensityLaw, basis: Panels) -> tuple[Floats, Floats]:
     value, mass, functions = at(*gauss_on_intervals(*unit, KNOWN))
     transposed = functions.transpose(0, 2, 1)
     matrix = _blocks(transposed, _blocks(transposed, mass[:, None] * value * mass).T)
-    matrix = 0.5 * (matrix + matrix.T)
+    matrix = symmetric_half(matrix) if density.reversible else matrix
     position, weight = gauss_on_intervals(*unit, SEEN)
     ends = np.array([0.0, 1.0]), np.full(2, position[0])
     value, mass, functions = at(np.append(position, ends[0]), np.append(weight, ends[1]))
     rest = value - _blocks(functions, _blocks(functions, matrix).T)
-    return matrix, (mass * (rest * rest @ mass)).reshape(len(low), -1).sum(axis=1)
+    return matrix, float(np.sqrt(MARGIN * (mass @ (rest * rest) @ mass)))
 
 
 def _blocks(blocks: Floats, array: Floats) -> Floats:
@@ -151,11 +138,6 @@ def _kernel(density: DensityLaw, theta: Floats, outgoing: Floats) -> Floats:
     """The density with respect to the invariant measure."""
     count_time(VALUE_TIME * theta.size * outgoing.size)
     return np.asarray(density.density(theta, outgoing) / SINE.density(outgoing))
-
-
-def _room(edges: Floats, mirrored: bool) -> int:
-    """The number of panels that may still be halved, of which mirror images are halved too."""
-    return max(MOST_PANELS - edges.size, 0) // (1 + mirrored)
 
 
 def _joined(mirrored: bool, *edges: Floats) -> Floats:

@@ -14,7 +14,9 @@ from ...core.long_runs import TIME_LIMIT, OutOfTime, reported, time_limited
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
+from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
+from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.compact import compact_matrix
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
@@ -43,6 +45,8 @@ CLOSER, LARGEST_MISS = 0.25, 1e-3
 SURE_TOLERANCES = 1e-9, 1e-6
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
 PLANAR = 1e-2
+# Densities that are diagonal in Legendre polynomials, in which their enclosures are bounds.
+WITH_SERIES = (HenyeyGreensteinLaw, LambertianLaw)
 # Number of eigenvalues computed to find the least one.
 MODULI = 3
 
@@ -201,9 +205,10 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     0.5
     """
     matrix = None if made_of_isometries(law) else finite_matrix(law)
-    if matrix is not None:
+    compact = None if matrix is not None or isinstance(law, WITH_SERIES) else compact_matrix(law)
+    if matrix is not None or (compact is not None and float(compact.error) <= tolerance):
         refuse_unless_self_adjoint(law)
-        return gap_of_exact(matrix, modulus=True)
+        return gap_of_exact(matrix or compact, modulus=True)
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small
@@ -255,27 +260,22 @@ def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generato
 
 def _by_refinement(law: Law, tolerance: float, rng: np.random.Generator, seconds: float) -> SpectralGap:
     """The gap from the quadratic form of 1 - P for shallow walls, or from enclosures and matrices."""
-    compact = compact_gap(law, seconds)
-    if compact is not None and compact.error <= tolerance:
-        return compact
-    found = _by_edge(law, tolerance, rng, seconds)
-    return compact if compact is not None and compact.error < found.error else found
-
-
-def compact_gap(law: Law, seconds: float) -> SpectralGap | None:
-    """The gap of a law of densities and isometries by Weyl's inequality; None for other laws, or if it takes long."""
-    with suppress(OutOfTime), time_limited((1.0 - RAYS_FRACTION) * seconds):
-        matrix = compact_matrix(law)
-        return None if matrix is None else gap_of_exact(matrix)
-    return None
-
-
-def _by_edge(law: Law, tolerance: float, rng: np.random.Generator, seconds: float) -> SpectralGap:
-    """The gap from the edge of the essential spectrum and from trial functions."""
     fraction, rest = without_identity(law)
     if fraction < 1.0:
         own = gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, rng, seconds)
         return _scaled(own, fraction)
+    compact = compact_matrix(law) if not isinstance(law, WITH_SERIES) else None
+    if compact is None:
+        return _by_edge(law, tolerance, rng, seconds)
+    found = gap_of_exact(compact)
+    if found.error > max(tolerance, LARGEST_MISS * found.value):
+        with suppress(OutOfTime), time_limited(seconds):
+            return min(found, _by_edge(law, tolerance, rng, seconds), key=lambda one: one.error)
+    return found
+
+
+def _by_edge(law: Law, tolerance: float, rng: np.random.Generator, seconds: float) -> SpectralGap:
+    """The gap from the edge of the essential spectrum and from trial functions."""
     edge = essential_edge(law)
     small = shallow_gap(law, edge)
     if small is not None and small.error <= tolerance:
