@@ -12,7 +12,6 @@ from ...core.long_runs import count_time
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, KernelMatrix, Law, Panels
 from ...kernels.bases.measure import SINE, gauss_on_intervals
-from ...kernels.bases.mirror import reflection_matrix
 from ...kernels.laws.density import VALUE_TIME
 from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.matrix_law import contains_reflection, with_beyond
@@ -63,7 +62,8 @@ def compact_matrix(law: Law) -> KernelMatrix | None:
         lambda parts: reduce(lambda a, b: (a[0] * b[1] + a[1] * b[0] + a[0] * b[0], a[1] * b[1]), parts, (0.0, 1.0)),
         lambda part: part,
     )  # fmt: skip
-    reflection = reflection_matrix(basis) if mirrored else np.eye(basis.size)
+    # of a polynomial on a panel the mirror image is one on the mirrored panel
+    reflection = np.kron(np.eye(basis.size // (DEGREE + 1))[::-1], np.diag((-1.0) ** np.arange(DEGREE + 1)))
     whole = with_beyond(law, reflection, lambda leaf: found[leaf][0])
     matrix = whole[:-2, :-2]
     lopsided = float(np.linalg.norm(matrix - reflection @ matrix @ reflection)) if law.mirror_symmetric else 0.0
