@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, common_shape, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
-from ...core.long_runs import NUMBERS_AT_ONCE, count_time
+from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.given import Vectorised
@@ -162,7 +162,6 @@ class DensityLaw(Law):
         row, low, high, fraction = cut_by_edges(self.panels(theta), whole)
         stiffness = PANEL_STIFFNESS * fraction + stiffness_between(edges, degree, low, high)
         owner, outgoing, weight = gauss_nodes(row, low, high, stiffness)
-        count_time(VALUE_TIME * outgoing.size)
         weight *= self.density(theta[owner], outgoing)
         error = np.maximum(np.abs(np.bincount(owner, weights=weight, minlength=theta.size) - 1.0), self._row_error)
         return Conditionals.of_lists(owner, outgoing, weight, error)

@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.errors import AccuracyError
-from ...kernels import Law
+from ...kernels import Law, Legendre, discretise
+from ..eigenvalues.spectra import check_reversible
+
+# Size and tolerance of the matrix by which a law is examined.
+EXAMINED, EXAMINED_TOLERANCE = 8, 1e-3
 
 
 def self_adjoint_elsewhere(law: Law) -> Law | None:
@@ -25,7 +29,9 @@ def self_adjoint_elsewhere(law: Law) -> Law | None:
 
 
 def refuse_unless_self_adjoint(law: Law) -> None:
-    """Raise an AccuracyError if a law is not reversible or is reversible in the other frame only.
+    """Raise an AccuracyError if a law is not reversible, or reversible in the other frame only.
+
+    A law of which this is not known is examined by its matrix in a few polynomials.
 
     Raises
     ------
@@ -45,6 +51,8 @@ def refuse_unless_self_adjoint(law: Law) -> None:
             "Use law @ law.adjoint() if that is what you mean",
             np.inf,
         )
+    if law.reversible is None:
+        check_reversible(discretise(law, Legendre(EXAMINED), tolerance=EXAMINED_TOLERANCE))
 
 
 def why_not_self_adjoint(other: Law) -> str:

@@ -19,11 +19,10 @@ from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import Means, weighted_means
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
-from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
 from ...kernels.walls.conditionals import is_few
 from ...kernels.walls.wall_law import traced_wall
-from .images import expectations_of
+from .images import ROUNDED, expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
@@ -147,7 +146,7 @@ def residuals(
 
 def _knows_breakpoints(law: Law) -> bool:
     """Whether a law is smooth between its breakpoints, or is a wall's, whose conditional distributions tell more."""
-    smooth = isinstance(law, (HenyeyGreensteinLaw, LambertianLaw)) or traced_wall(law) is not None
+    smooth = isinstance(law, ROUNDED) or traced_wall(law) is not None
     return smooth or bool(np.isfinite(law.breakpoints(1)[1]))
 
 

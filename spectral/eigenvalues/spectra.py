@@ -297,7 +297,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
         matrix_error=0.0 if matrix.samples else float(matrix.error),
         parity=("none" if "none" in names or not names else "even", *(names[i] for i in chosen)),
         completeness=rest.method,
-        evidence=("the matrix of a law in bins beyond which the law is known",) if exact else (UNREFINED,),
+        evidence=("the matrix of a law that is known beyond its basis",) if exact else (UNREFINED,),
     )
 
 

@@ -14,14 +14,12 @@ from ...core.long_runs import TIME_LIMIT, OutOfTime, reported, time_limited
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
-from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
-from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.compact import compact_matrix
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
-from ..bounds.images import is_costly, suits_panels
+from ..bounds.images import ROUNDED, is_costly, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import adapted_trial_space
@@ -45,8 +43,6 @@ CLOSER, LARGEST_MISS = 0.25, 1e-3
 SURE_TOLERANCES = 1e-9, 1e-6
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
 PLANAR = 1e-2
-# Densities that are diagonal in Legendre polynomials, in which their enclosures are bounds.
-WITH_SERIES = (HenyeyGreensteinLaw, LambertianLaw)
 # Number of eigenvalues computed to find the least one.
 MODULI = 3
 
@@ -54,25 +50,31 @@ MODULI = 3
 def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
     """The gap from an indexed enclosure; None if it would be inaccurate, or take longer than `time_limited` allows."""
     if isinstance(law, DensityLaw):
-        found = (_gap_of_enclosures(law, number, tolerance) for number in (ENCLOSED, 2 * ENCLOSED))
+        found = (_gap_of_enclosures(law, number, tolerance, edge) for number in (ENCLOSED, 2 * ENCLOSED))
         return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
     if not suits_panels(law) or is_costly(law):
         return None
-    number = _number_to_enclose(law, edge)
-    gap = None if number is None else _gap_of_enclosures(law, number, tolerance)
+    number = _number_to_enclose(law, edge) or (ENCLOSED if edge.low == 0.0 else None)
+    gap = None if number is None else _gap_of_enclosures(law, number, tolerance, edge)
     if number is not None and gap is not None and tolerance < gap.error <= tolerance / CLOSER:
-        gap = _gap_of_enclosures(law, number, CLOSER * tolerance) or gap
+        gap = _gap_of_enclosures(law, number, CLOSER * tolerance, edge) or gap
     # other bases are hardly better than adapted panels
     return gap if gap is not None and gap.error <= max(tolerance, LARGEST_MISS * gap.value) else None
 
 
-def _gap_of_enclosures(law: Law, number: int, tolerance: float) -> SpectralGap | None:
+def _gap_of_enclosures(law: Law, number: int, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
     found = enclosures(law, number, tolerance=tolerance)
     listed = [item for item in found if item.label == "indexed" and item.index]
     top = max(listed, key=lambda item: item.value, default=None)
-    # no eigenvalue that is not listed may be larger
-    if top is None or top.low <= max(found.separation.radius, 0.0) or top.high >= 1.0:
+    if top is None or top.high >= 1.0:
         return None
+    # no eigenvalue that is not listed may be larger
+    if top.low <= max(found.separation.radius, 0.0):
+        reach = max(found.separation.radius, edge.high, top.high)
+        how = f"bounds of all eigenvalues; {found.method}"
+        evidence = (f"no eigenvalue off the constants is above {reach:.3g}: {found.separation.reason}", *edge.reasons)
+        value, error = 1.0 - 0.5 * (edge.low + reach), 0.5 * (reach - edge.low)
+        return SpectralGap(value, error, "estimate", how, "essential edge", evidence, law.frame)
     gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
     return SpectralGap(
         gap, error, top.kind, f"bounds of the eigenvalue; {found.method}", "isolated", (str(top),), law.frame
@@ -205,7 +207,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     0.5
     """
     matrix = None if made_of_isometries(law) else finite_matrix(law)
-    compact = None if matrix is not None or isinstance(law, WITH_SERIES) else compact_matrix(law)
+    compact = None if matrix is not None or isinstance(law, ROUNDED) else compact_matrix(law)
     if matrix is not None or (compact is not None and float(compact.error) <= tolerance):
         refuse_unless_self_adjoint(law)
         return gap_of_exact(matrix or compact, modulus=True)
@@ -264,7 +266,7 @@ def _by_refinement(law: Law, tolerance: float, rng: np.random.Generator, seconds
     if fraction < 1.0:
         own = gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, rng, seconds)
         return _scaled(own, fraction)
-    compact = compact_matrix(law) if not isinstance(law, WITH_SERIES) else None
+    compact = compact_matrix(law) if not isinstance(law, ROUNDED) else None
     if compact is None:
         return _by_edge(law, tolerance, rng, seconds)
     found = gap_of_exact(compact)
