@@ -30,8 +30,8 @@ FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
 HALF_ROUNDING = 1e-12
 # Default error of conditional expectations.
 MEAN_TOLERANCE = 1e-8
-# Where a law does not know all its breakpoints a jump may lie in any panel. The differences of two rules have this margin
-# then, and panels are cut at this fraction, because adapted trial functions fit the law at the nodes of their panels.
+# Where a law does not know all its breakpoints a jump may lie in any panel. The differences of two rules have this
+# margin then, and panels are cut at this fraction, because adapted trial functions fit the law at the nodes of theirs.
 MARGIN, CUT = 4.0, 0.4
 # Two points just inside the ends of a panel, and the values there of the polynomial through the values at the nodes.
 ENDS = (1.0 - 1e-6) * np.array([-1.0, 1.0])

@@ -15,8 +15,8 @@ from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold
 from ..eigenvalues.dense import symmetric_half
+from ..essential.compact import compact_matrix
 from ..essential.edge import essential_edge
-from .compact import compact_matrix
 from .oscillations import fast_top
 
 # For a law with eigenvalues g^l the power P^p is chosen with x = g^p near this value. Then the sum of the omitted
@@ -121,5 +121,7 @@ def _of_matrix(law: Law, listed: int) -> Separation | None:
     moduli = np.sort(np.abs(np.linalg.eigvalsh(symmetric_half(matrix.symmetric))))[::-1]
     skew = float(np.linalg.norm(matrix.symmetric - matrix.symmetric.T))
     radius = max(*np.abs(matrix.beyond), *moduli[listed : listed + 1]) + float(matrix.error) + skew
-    reason = f"next eigenvalue of a matrix at the distance {float(matrix.error):.3g} from the law: {matrix.error.method}"
+    reason = (
+        f"next eigenvalue of a matrix at the distance {float(matrix.error):.3g} from the law: {matrix.error.method}"
+    )
     return Separation(float(radius), matrix.error.kind, reason)

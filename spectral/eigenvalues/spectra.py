@@ -28,6 +28,7 @@ EARLIER_FRACTION = 0.25
 # 97 % of 156 gaps of walls and scatterings in Legendre polynomials and bins; at most the change itself for 81 %.
 ONE_MATRIX = 3.0
 UNREFINED = "one matrix: its basis was not refined, and the error estimates the distance from the law's eigenvalue"
+UNCOMPARED = "an error is infinite because its basis has no coarser one to compare with (`Basis.coarsened`)"
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 # A sampled matrix is rejected as irreversible if its antisymmetric part has a z-score above this. Under reversibility
 # the score is standard normal and exceeds 5 once in 3.5 million matrices.
@@ -204,6 +205,7 @@ class Spectrum(Summary):
         (True, 'estimate')
         """
         method = f"{self.basis!r}, {self.method}; algebraic + two-grid and matrix + {self.errors.quantile:.3g} sampling"
+        method += f"; {UNCOMPARED}" if UNCOMPARED in self.evidence else ""
         pairs = zip(self.values, self.errors.total(), strict=True)
         return tuple(Estimate(float(value), float(error), "estimate", method) for value, error in pairs)
 
@@ -283,6 +285,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
         gap_errors = gap_errors if len(rest.values) else errors.at(np.array([0]))
         gap, slem = min(gap, 1.0 - max(matrix.beyond)), max(slem, *np.abs(matrix.beyond).tolist())
     indices = np.append(0, 1 + chosen)
+    unknown_error = () if np.isfinite(discretisation).all() and np.isfinite(gap_errors.total()).all() else (UNCOMPARED,)
     return Spectrum(
         values=frozen(values[indices]),
         vectors=frozen(vectors[:, indices]),
@@ -297,7 +300,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
         matrix_error=0.0 if matrix.samples else float(matrix.error),
         parity=("none" if "none" in names or not names else "even", *(names[i] for i in chosen)),
         completeness=rest.method,
-        evidence=("the matrix of a law that is known beyond its basis",) if exact else (UNREFINED,),
+        evidence=("the matrix of a law that is known beyond its basis",) if exact else (UNREFINED, *unknown_error),
     )
 
 

@@ -16,7 +16,6 @@ from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.walls.wall_law import made_of_isometries
-from ..bounds.compact import compact_matrix
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
 from ..bounds.images import ROUNDED, is_costly, suits_panels
@@ -24,6 +23,7 @@ from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import adapted_trial_space
 from ..eigenvalues.spectra import ONE_MATRIX, UNREFINED, Spectrum, matrix_spectrum
+from ..essential.compact import compact_matrix
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .grooves import gap_of_grooves
@@ -180,6 +180,7 @@ def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
     evidence = (
         f"{UNREFINED}; the gap of the matrix itself is {with_error(found.gap, found.gap_errors.algebraic[0])}, an "
         "upper bound of the law's but for noise and the errors of entries",
+        *found.evidence[1:],
     )
     gap = SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
     return split_gap(matrix, gap) or (gap.cut_at_zero() if matrix.norm_bound == 1.0 else gap)

@@ -13,10 +13,10 @@ from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
-from ..bounds.compact import compact_matrix
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
 from ..bounds.images import ROUNDED, is_costly, suits_panels
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
+from ..essential.compact import compact_matrix
 
 # Sizes of Legendre bases for laws without known errors of expectations; the first suffices for ten eigenvalues of most.
 DEGREES = (48, 96)

@@ -84,7 +84,9 @@ def gap_of_exact(matrix: KernelMatrix, modulus: bool = False) -> SpectralGap:
     method = made_from(found, matrix.error.method if inexact else "algebraic error and rounding; the basis is exact")
     lowest = float(found.errors.total()[int(np.argmin(found.values))]) if modulus else 0.0
     error, edge = max(found.gap_error, lowest), max(even, odd, -min(even, odd) if modulus else 0.0)
-    verdict: Verdict = "no gap" if edge >= 1.0 else "isolated" if 1.0 - value - error > edge else "essential edge"
+    verdict: Verdict = "no gap" if edge >= 1.0 else "isolated"
+    if inexact and 1.0 - value - error <= edge < 1.0:
+        verdict = "essential edge"
     return SpectralGap(value, error, kind, method, verdict, (reason,), matrix.frame, found).cut_at_zero()
 
 

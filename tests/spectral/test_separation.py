@@ -54,7 +54,7 @@ def test_rounding_is_added_where_nothing_is_left():
 
 @pytest.mark.parametrize("listed", [1, 2, 3])
 def test_of_a_density_with_a_kink_on_the_diagonal_the_next_eigenvalue_and_the_norm_of_the_rest_are_left(listed):
-    """With u = sin(theta/2)^2 the kernel (u^2 + v^2)/2 - max(u, v) + 1/3 is the sum of 2 cos(k pi u) cos(k pi v)/(k pi)^2."""
+    """In u = sin(theta/2)^2 and v the kernel is 1 plus the sum of 10 cos(k pi u) cos(k pi v)/(k pi)^2."""
 
     def density(theta, out):
         u, v = np.sin(0.5 * theta) ** 2, np.sin(0.5 * out) ** 2
