@@ -47,13 +47,18 @@ def compact_matrix(law: Law) -> KernelMatrix | None:
     within the sum e of one of the matrix or of those beyond the panels (``KernelMatrix.beyond``), whatever the kinks.
     """
     leaves: list[Law] = []
-    holds_of_all(law, lambda leaf: leaves.append(leaf) is None)
+
+    def collected(leaf: Law) -> bool:
+        leaves.append(leaf)
+        return True
+
+    holds_of_all(law, collected)
     densities = [leaf for leaf in dict.fromkeys(leaves) if isinstance(leaf, DensityLaw)]
     if not densities or not all(isinstance(leaf, (DensityLaw, IsometryLaw)) for leaf in leaves):
         return None
     mirrored = bool(law.mirror_symmetric) or contains_reflection(law)
     basis = Panels(_edges(densities, mirrored), DEGREE)
-    found = {leaf: _projected(leaf, basis) for leaf in densities}
+    found: dict[Law, tuple[Floats, float]] = {leaf: _projected(leaf, basis) for leaf in densities}
     # the error and the norm of each part
     rules: Rules[tuple[float, float]] = Rules(
         lambda leaf: (found[leaf][1], 1.0 if leaf.reversible else float(np.linalg.norm(found[leaf][0])))
@@ -63,7 +68,8 @@ def compact_matrix(law: Law) -> KernelMatrix | None:
         lambda part: part,
     )  # fmt: skip
     # of a polynomial on a panel the mirror image is one on the mirrored panel
-    reflection = np.kron(np.eye(basis.size // (DEGREE + 1))[::-1], np.diag((-1.0) ** np.arange(DEGREE + 1)))
+    signs = np.diag((-1.0) ** np.arange(DEGREE + 1))
+    reflection = np.asarray(np.kron(np.eye(basis.size // (DEGREE + 1))[::-1], signs), dtype=np.float64)
     whole = with_beyond(law, reflection, lambda leaf: found[leaf][0])
     matrix = whole[:-2, :-2]
     lopsided = float(np.linalg.norm(matrix - reflection @ matrix @ reflection)) if law.mirror_symmetric else 0.0
@@ -84,7 +90,7 @@ def _edges(densities: list[DensityLaw], mirrored: bool) -> Floats:
     low, high = edges[:-1], edges[1:]
     for _ in range(MOST_HALVINGS):
         parts = int(np.ceil(np.max(high - low) / finest))
-        rest = sum(_misfit(density, low, high, parts) for density in densities)
+        rest = np.sum([_misfit(density, low, high, parts) for density in densities], axis=0)
         worst = np.argsort(-rest)[: max(MOST_PANELS + 1 - edges.size, 0) // (1 + mirrored)]
         worst = worst[rest[worst] > GOAL**2 / MOST_PANELS]
         if not worst.size:
@@ -145,7 +151,7 @@ def _joined(mirrored: bool, *edges: Floats) -> Floats:
     joint = np.concatenate(edges)
     if not mirrored:
         joint = np.sort(joint)
-        return joint[np.append(np.diff(joint) > 4.0 * AT_END, True)]
+        return np.asarray(joint[np.append(np.diff(joint) > 4.0 * AT_END, True)])
     lower = np.unique(np.minimum(joint, np.pi - joint))
     lower = lower[np.diff(lower, append=0.5 * np.pi) > 4.0 * AT_END]
     return np.concatenate((lower, [0.5 * np.pi], np.pi - lower[::-1]))

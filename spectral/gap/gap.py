@@ -209,9 +209,10 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     """
     matrix = None if made_of_isometries(law) else finite_matrix(law)
     compact = None if matrix is not None or isinstance(law, ROUNDED) else compact_matrix(law)
-    if matrix is not None or (compact is not None and float(compact.error) <= tolerance):
+    near = compact if matrix is None else matrix
+    if near is not None and (near is matrix or float(near.error) <= tolerance):
         refuse_unless_self_adjoint(law)
-        return gap_of_exact(matrix or compact, modulus=True)
+        return gap_of_exact(near, modulus=True)
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small
