@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.long_runs import NUMBERS_AT_ONCE, count_time
 from ...core.rounding import EPS
 from ..bases.assembly import add_products
 from ..bases.basis import Basis
@@ -16,7 +16,7 @@ from ..bases.intervals import bisected
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..expectations.basis_means import functions_of
-from ..laws.density import DensityLaw, cut_by_edges, split_panels
+from ..laws.density import VALUE_TIME, DensityLaw, cut_by_edges, split_panels
 from ..laws.interval_exchange import IntervalExchangeLaw
 from ..laws.involution import InvolutionLaw
 from ..laws.law import Law
@@ -119,6 +119,7 @@ def _conditional_levels(law: DensityLaw, basis: Basis, edges: Floats, outer: Flo
     level, spent = 0, 0
     while level < 2 or spent + _conditional_cost(law, edges, outer, order) <= MOST_DENSITY_VALUES:
         spent += _conditional_cost(law, edges, outer, order)
+        count_time(VALUE_TIME * _conditional_cost(law, edges, outer, order))
         yield _conditional_rule(law, basis, edges, outer, order)
         order, level = 2 * order, level + 1
 
@@ -150,6 +151,7 @@ def _density_levels(law: DensityLaw, basis: Basis, edges: Floats) -> Iterator[Fl
         order = 4 if intervals <= 512 else 2 if intervals <= 1024 else 1
     level = 0
     while level < 2 or (intervals * order) ** 2 <= MOST_DENSITY_VALUES:
+        count_time(VALUE_TIME * (intervals * order) ** 2)
         yield _density_rule(law, basis, edges, order)
         order, level = 2 * order, level + 1
 

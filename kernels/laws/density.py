@@ -36,7 +36,11 @@ CHECK_NODES = 8
 PANEL_STIFFNESS = 12.0
 # Cells on each panel in the table of the cdf that is sampled.
 CELLS_PER_PANEL = 16
-PROBES = 24
+# Nominal time of a value of a density, in seconds.
+VALUE_TIME = 2e-7
+# Incoming angles at which a density is examined; none is a rational multiple of pi, where a density is likely to jump.
+# One more lies between two breakpoints each, at this fraction of their distance.
+PROBES, BETWEEN = np.pi * (np.arange(24) + 0.5 * np.sqrt(5.0) - 1.0) / 24, 0.4567
 
 
 class DensityLaw(Law):
@@ -55,7 +59,7 @@ class DensityLaw(Law):
         The given breakpoints inside (0, pi), in increasing order.
     reversible, mirror_symmetric : bool
         Whether sin(theta) p(theta, theta') is symmetric, and whether p(pi - theta, pi - theta') = p(theta, theta').
-        Both are measured on a grid of 24 probes, within 1e-9 of the largest value.
+        Both are measured at `probes` and the nodes of their rules, within 1e-9 of the largest value.
     sampling_error : float
         Largest difference, on the probes, between the cdf that `sample` inverts and the cdf by quadrature.
 
@@ -172,6 +176,12 @@ class DensityLaw(Law):
         # The user's function may be any callable.
         return f"DensityLaw({getattr(self._function, '__name__', repr(self._function))})"
 
+    @property
+    def probes(self) -> Floats:
+        """The incoming angles at which the density is examined, among them one between any two breakpoints."""
+        ends = np.concatenate(([0.0], self.outgoing_breakpoints, [np.pi]))
+        return np.unique(np.concatenate((PROBES, ends[:-1] + BETWEEN * np.diff(ends))))
+
     # ---- construction ----------------------------------------------------------------------------------------
     def _grid(self, panels: int) -> Floats:
         return np.unique(np.concatenate([np.linspace(0.0, np.pi, panels + 1), self.outgoing_breakpoints]))
@@ -188,13 +198,12 @@ class DensityLaw(Law):
         Masses and first moments of single panels are compared. The differences of masses cancel in their sum if jumps
         are mirror images, and near the middle of a panel a jump has equal masses by both rules.
         """
-        probes = _probes()
-        difference, rows = np.inf, np.zeros(PROBES)
+        probes, difference, rows = self.probes, np.inf, np.zeros(1)
         for panels in PANEL_COUNTS:
             edges, moments = self._grid(panels), []
             for order in (CHECK_NODES, GAUSS_NODES):
                 outgoing, weight = gauss_rule(edges, order)
-                masses = (self.density(probes[:, None], outgoing) * weight).reshape(PROBES, edges.size - 1, order)
+                masses = (self.density(probes[:, None], outgoing) * weight).reshape(probes.size, edges.size - 1, order)
                 local = np.polynomial.legendre.leggauss(order)[0]
                 moments.append(masses @ np.stack([np.ones(order), local], axis=1))
             rows = moments[1][..., 0].sum(axis=1)
@@ -213,17 +222,17 @@ class DensityLaw(Law):
         )
 
     def _measured_symmetries(self) -> tuple[bool, bool]:
-        probes = _probes()
-        value = self.density(probes[:, None], probes)
-        flux = SINE.density(probes)[:, None] * value
-        mirrored = self.density(np.pi - probes[:, None], np.pi - probes)
-        reversible = np.max(np.abs(flux - flux.T)) <= SYMMETRY_TOLERANCE * np.max(flux)
+        # between probes a narrow feature of both angles shows in neither
+        probes, angle = self.probes[:, None], gauss_rule(self._grid(self._panel_count), CHECK_NODES)[0]
+        value, mirrored = self.density(probes, angle), self.density(np.pi - probes, np.pi - angle)
+        flux, back = SINE.density(probes) * value, SINE.density(angle) * self.density(angle, probes)
+        reversible = np.max(np.abs(flux - back)) <= SYMMETRY_TOLERANCE * np.max(flux)
         return bool(reversible), bool(np.max(np.abs(value - mirrored)) <= SYMMETRY_TOLERANCE * np.max(value))
 
     def _measured_sampling_error(self) -> float:
-        edges, probes = self._cells(), _probes()
+        edges, probes = self._cells(), self.probes
         outgoing, weight = gauss_rule(edges, CHECK_NODES)
-        mass = (self.density(probes[:, None], outgoing) * weight).reshape(PROBES, edges.size - 1, CHECK_NODES)
+        mass = (self.density(probes[:, None], outgoing) * weight).reshape(probes.size, edges.size - 1, CHECK_NODES)
         exact = np.cumsum(mass.sum(axis=-1), axis=-1)
         table = np.cumsum(_cell_masses(edges, self.density(probes[:, None], clipped_inside(edges))), axis=-1)
         return float(np.max(np.abs(exact / exact[:, -1:] - table / table[:, -1:])))
@@ -273,11 +282,6 @@ def cut_by_edges(panels: Floats, edges: Floats) -> tuple[NDArray[np.int64], Floa
     row, column = np.nonzero(width > 0.0)
     fraction = width[row, column] / widths[row, panel[row, column]]
     return row, merged[row, column], merged[row, column + 1], fraction
-
-
-def _probes() -> Floats:
-    # No probe is a rational multiple of pi, where a density is likely to jump.
-    return np.asarray(np.pi * (np.arange(PROBES) + 0.5 * np.sqrt(5.0) - 1.0) / PROBES)
 
 
 def _cell_masses(edges: Floats, value: Floats) -> Floats:

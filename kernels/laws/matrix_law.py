@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, reduce
 
 import numpy as np
@@ -207,7 +207,7 @@ def finite_matrix(law: Law, functions: int = 0, edges: Floats | None = None) -> 
 
     rules = Rules(_inner_edges, lambda terms: joined([part for _, part in terms]), joined, lambda part: part)
     found = fold(law, rules)
-    reflects = fold(law, Rules(_reflects, lambda terms: any(part for _, part in terms), any, lambda _: True))
+    reflects = contains_reflection(law)
     found = np.sort(joined([found, np.pi - found[found > 0.0]] if reflects else [found]))
     common = np.append(found[np.diff(found, prepend=-1.0) > SAME_EDGE], np.pi)
     if edges is not None:
@@ -237,34 +237,50 @@ def _inner_edges(law: Law) -> Floats:
     return law.edges[1:-1] if isinstance(law, MatrixLaw) else np.empty(0)
 
 
-def _reflects(law: Law) -> bool:
-    return isinstance(law, IsometryLaw) and not law.retro
+def contains_reflection(law: Law) -> bool:
+    """Whether specular reflection, or a change of convention, is a part of the law."""
+
+    def of_leaf(leaf: Law) -> bool:
+        return isinstance(leaf, IsometryLaw) and not leaf.retro
+
+    return fold(law, Rules(of_leaf, lambda terms: any(part for _, part in terms), any, lambda _: True))
+
+
+def with_beyond(law: Law, reflection: Floats, leaf: Callable[[Law], Floats]) -> Floats:
+    """The matrix of a law of isometries and of laws that annihilate what is beyond a basis, with two more rows.
+
+    The last two are for even and odd functions beyond the basis; ``reflection`` is the matrix of specular reflection in
+    it, and ``leaf`` gives that of any other law.
+    """
+    size = len(reflection)
+    identity = np.eye(size + 2)
+    mirrored = np.diag([*np.zeros(size), 1.0, -1.0])
+    mirrored[:size, :size] = reflection
+
+    def of_leaf(part: Law) -> Floats:
+        if isinstance(part, IsometryLaw):
+            return identity if part.retro else mirrored
+        return np.pad(leaf(part), (0, 2))
+
+    def mixture(terms: Sequence[tuple[float, Floats]]) -> Floats:
+        return sum((weight * part for weight, part in terms), np.zeros(identity.shape))
+
+    rules = Rules(of_leaf, mixture, lambda parts: reduce(np.matmul, parts, identity), lambda part: part @ mirrored)
+    return fold(law, rules)
 
 
 def _matrix_on(law: Law, edges: Floats) -> KernelMatrix:
     """The matrix of a law on bins that refine its own, by matrices with two more rows for the functions beyond."""
     masses = SINE.mass(edges[:-1], edges[1:])
     size, middles = masses.size, 0.5 * (edges[:-1] + edges[1:])
-    identity = np.eye(size + 2)
-    reflection = identity.copy()
-    reflection[:size, :size] = identity[:size, :size][::-1]
-    reflection[-1, -1] = -1.0
 
     def leaf(part: Law) -> Floats:
-        if isinstance(part, IsometryLaw):
-            return identity if part.retro else reflection
         cell, given = np.zeros(size, dtype=np.intp), np.ones((1, 1))
         if isinstance(part, MatrixLaw):
             cell, given = cell_among(part.edges, middles), part.array
-        array = np.zeros((size + 2, size + 2))
-        array[:size, :size] = given[cell][:, cell] * (masses / np.bincount(cell, masses)[cell])
-        return array
+        return np.asarray(given[cell][:, cell] * (masses / np.bincount(cell, masses)[cell]))
 
-    def mixture(terms: Sequence[tuple[float, Floats]]) -> Floats:
-        return sum((weight * part for weight, part in terms), np.zeros((size + 2, size + 2)))
-
-    rules = Rules(leaf, mixture, lambda parts: reduce(np.matmul, parts, identity), lambda part: part @ reflection)
-    whole = fold(law, rules)
+    whole = with_beyond(law, np.eye(size)[::-1], leaf)
     # all entries on the bins are nonnegative, so their relative roundings add up
     leaves = fold(law, Rules(lambda _: 1, lambda terms: sum(number for _, number in terms), sum, lambda number: number))
     rounding = leaves * ((ENTRY_ROUNDING if size > 1 else 0.0) + size * EPS)

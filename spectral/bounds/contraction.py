@@ -9,10 +9,13 @@ from ...kernels import Law, Legendre, discretise
 from ...kernels.laws.density import not_invariant
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.structure import holds_of_all
+from ..eigenvalues.spectra import check_reversible
 
 # Polynomials whose means a law must keep to this tolerance beyond the error of their matrix; one of known error above
 # UNKNOWN decides nothing.
 POLYNOMIALS, TOLERANCE, UNKNOWN = 16, 1e-6, 0.05
+# Size and tolerance of the matrix by which a law is examined.
+EXAMINED, EXAMINED_TOLERANCE = 8, 1e-3
 
 
 def self_adjoint_elsewhere(law: Law) -> Law | None:
@@ -32,7 +35,9 @@ def self_adjoint_elsewhere(law: Law) -> Law | None:
 
 
 def refuse_unless_self_adjoint(law: Law) -> None:
-    """Raise an AccuracyError if a law is not reversible or is reversible in the other frame only.
+    """Raise an AccuracyError if a law is not reversible, or reversible in the other frame only.
+
+    A law of which this is not known is examined by its matrix in a few polynomials.
 
     Raises
     ------
@@ -52,6 +57,8 @@ def refuse_unless_self_adjoint(law: Law) -> None:
             "Use law @ law.adjoint() if that is what you mean",
             np.inf,
         )
+    if law.reversible is None:
+        check_reversible(discretise(law, Legendre(EXAMINED), tolerance=EXAMINED_TOLERANCE))
 
 
 def refuse_unless_invariant(law: Law, reason: str) -> None:

@@ -15,15 +15,13 @@ from ...core.frames import data_frame
 from ...core.rounding import EPS
 from ...kernels import Basis, CollisionLaw, DensityLaw, Law, Legendre, discretise
 from ...kernels.bases.measure import SINE
-from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, Power
 from ...kernels.laws.matrix_law import finite_matrix
-from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.walls.wall_law import made_of_isometries
 from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
 from ..eigenvalues.spectra import Spectrum, check_reversible, matrix_spectrum
 from .contraction import refuse_unless_self_adjoint
-from .images import is_traced, suits_panels
+from .images import ROUNDED, is_traced, suits_panels
 from .operator_residuals import Residuals, image_rule, residuals
 from .separation import Separation, rest_of_spectrum
 from .trial_space import adapted_trial_space
@@ -38,8 +36,6 @@ MATRIX_TOLERANCE = 1e-8
 TRIAL_FRACTION, MOST_TRACED_ANGLES, MOST_EXACT_ANGLES = 0.3, 4_000, 40_000
 # Rounding of a Rayleigh quotient, a pairwise sum of some hundred products.
 QUOTIENT_ROUNDING = 4.0 * EPS
-# Laws whose images of polynomials are computed to rounding.
-ROUNDED = (HenyeyGreensteinLaw, LambertianLaw)
 
 
 @dataclass(frozen=True, repr=False)

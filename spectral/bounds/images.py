@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.long_runs import NUMBERS_AT_ONCE, count_time
 from ...core.rounding import EPS
 from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels
 from ...kernels.bases.intervals import cell_among
@@ -15,12 +15,15 @@ from ...kernels.expectations.basis_means import Means, functions_of, height_of, 
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.matrix_law import ENTRY_ROUNDING, MatrixLaw, uniform_on_bins
+from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import holds_of_all
 from ...kernels.walls.conditionals import is_chaotic, is_few, traced_conditionals
 from ...kernels.walls.wall_law import traced_wall
 
-# Incoming angles at a time.
-ANGLES_AT_ONCE = 512
+# Laws whose images of polynomials are computed to rounding.
+ROUNDED = HenyeyGreensteinLaw, LambertianLaw
+# Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays.
+ANGLES_AT_ONCE, NODE_TIME = 512, 4e-7
 
 
 def suits_panels(law: Law) -> bool:
@@ -101,6 +104,7 @@ def _of_nodes(law: Law, basis: Basis) -> Means:
             some = theta[start : start + ANGLES_AT_ONCE]
             if shared is None:
                 found = law.conditionals(some, max(tolerance, EPS), degree, edges)
+                count_time(NODE_TIME * found.nodes.size)
             else:
                 found, _ = shared(some, tolerance)
             images.append(found.in_basis(basis))

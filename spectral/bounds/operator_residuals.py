@@ -22,7 +22,7 @@ from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_err
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
 from ...kernels.walls.conditionals import is_few
 from ...kernels.walls.wall_law import traced_wall
-from .images import expectations_of
+from .images import ROUNDED, expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
@@ -30,6 +30,9 @@ FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
 HALF_ROUNDING = 1e-12
 # Default error of conditional expectations.
 MEAN_TOLERANCE = 1e-8
+# Where a law does not know all its breakpoints a jump may lie in any panel. The differences of two rules have this
+# margin then, and panels are cut at this fraction, because adapted trial functions fit the law at the nodes of theirs.
+MARGIN, CUT = 4.0, 0.4
 # Two points just inside the ends of a panel, and the values there of the polynomial through the values at the nodes.
 ENDS = (1.0 - 1e-6) * np.array([-1.0, 1.0])
 AT_ENDS = legvander(ENDS, len(NODES) - 1) @ np.linalg.inv(legvander(NODES, len(NODES) - 1))
@@ -97,6 +100,10 @@ def residuals(
         return expansion(basis, vectors, theta), images, errors
 
     low, high = _first_panels(law, basis)
+    margin = 1.0
+    if not holds_of_all(law, _knows_breakpoints):
+        margin, cut = MARGIN, low + CUT * (high - low)
+        low, high = np.append(low, cut), np.append(cut, high)
     if mirrored:
         inside = low < 0.5 * np.pi - HALF_ROUNDING
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
@@ -106,6 +113,7 @@ def residuals(
     angles_used = 0
     while low.size:
         fresh = _integrals(here_and_images, values, low, high, 2.0 if mirrored else 1.0)
+        fresh[1][:] *= margin
         angles_used += low.size * len(POINTS)
         ends = np.concatenate([ends, [low, high]], axis=1)
         total, error, uncertainty = (
@@ -134,6 +142,12 @@ def residuals(
     return Residuals(
         values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used
     )
+
+
+def _knows_breakpoints(law: Law) -> bool:
+    """Whether a law is smooth between its breakpoints, or is a wall's, whose conditional distributions tell more."""
+    smooth = isinstance(law, ROUNDED) or traced_wall(law) is not None
+    return smooth or bool(np.isfinite(law.breakpoints(1)[1]))
 
 
 def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:

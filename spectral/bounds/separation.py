@@ -9,19 +9,19 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.estimates import ErrorKind
 from ...core.rounding import EPS
-from ...kernels import DensityLaw, Law
-from ...kernels.bases.measure import gauss_rule
+from ...kernels import Law, MatrixLaw
 from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold
+from ..eigenvalues.dense import symmetric_half
+from ..essential.compact import compact_matrix
 from ..essential.edge import essential_edge
 from .oscillations import fast_top
 
 # For a law with eigenvalues g^l the power P^p is chosen with x = g^p near this value. Then the sum of the omitted
 # squares, x^(2 m)/(1 - x^2), is below the last listed square, x^(2 m - 2), and above rounding.
 POWER_TARGET = 0.6
-# Panels of the quadrature of traces; nodes per panel of the coarser rule, for the error, and of the finer rule.
-TRACE_PANELS, TRACE_NODES = 24, (12, 16)
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
     next_value : float
         Modulus plus residual of the next eigenvalue in the basis, for laws without a better bound.
     """
-    found = _hilbert_schmidt(law, values, width)
+    found = _of_series(law, values, width) or _of_matrix(law, len(values))
     if found is not None:
         return found
     fraction = lambertian_fraction(law)
@@ -94,42 +94,34 @@ def lambertian_fraction(law: Law) -> float:
     return min(fold(law, rules), 1.0)
 
 
-def _hilbert_schmidt(law: Law, values: Floats, width: float) -> Separation | None:
-    """The bound from the sum of all lambda^(2 p), the trace of P^(2 p), minus the listed terms."""
-    if not isinstance(law, DensityLaw):
+def _of_series(law: Law, values: Floats, width: float) -> Separation | None:
+    """The bound of a law with eigenvalues g^l: the sum of all squares of those of P^p, minus the listed terms."""
+    g = law.g if isinstance(law, HenyeyGreensteinLaw) else 0.0
+    if not isinstance(law, (HenyeyGreensteinLaw, LambertianLaw)):
         return None
-    power = 1
-    if isinstance(law, HenyeyGreensteinLaw):
-        if law.g == 0.0:
-            return Separation(0.0, "bound", "the law is Lambertian: of rank 1")
-        power = max(1, round(np.log(POWER_TARGET) / np.log(abs(law.g))))
-        traces = [_trace(HenyeyGreensteinLaw(abs(law.g) ** (2 * power)), nodes) for nodes in TRACE_NODES]
-    else:
-        traces = [_squared_norm(law, nodes) for nodes in TRACE_NODES]
-    total, uncertainty = traces[-1], abs(traces[1] - traces[0])
+    if isinstance(law, HenyeyGreensteinLaw) and g == 0.0:
+        return Separation(0.0, "bound", "the law is Lambertian: of rank 1")
+    power = max(1, round(np.log(POWER_TARGET) / np.log(abs(g)))) if g else 1
+    total = 1.0 / -np.expm1(2 * power * np.log(abs(g))) if g else 1.0
     listed = float(np.sum(np.maximum(np.abs(values) - width, 0.0) ** (2 * power)))
-    rest = max(total - listed, 0.0) + uncertainty + 16.0 * EPS * total
-    radius = float(rest ** (0.5 / power))
-    kind: ErrorKind = "bound" if isinstance(law, (HenyeyGreensteinLaw, LambertianLaw)) else "estimate"
+    radius = float((max(total - listed, 0.0) + 16.0 * EPS * total) ** (0.5 / power))
     what = "P" if power == 1 else f"P^{power}"
     reason = (
         f"Hilbert-Schmidt remainder of {what}: {total:.6g} less the squares of the {len(values)} listed eigenvalues"
     )
-    return Separation(radius, kind, reason)
+    return Separation(radius, "bound", reason)
 
 
-def _trace(law: DensityLaw, nodes: int) -> float:
-    theta, weight = gauss_rule(_edges(), nodes)
-    return float(np.sum(weight * law.density(theta, theta)))
-
-
-def _squared_norm(law: DensityLaw, nodes: int) -> float:
-    """The integral of p(theta, theta') p(theta', theta), for a reversible law the squared Hilbert-Schmidt norm."""
-    edges = np.unique(np.concatenate((_edges(), law.outgoing_breakpoints)))
-    theta, weight = gauss_rule(edges, nodes)
-    density = law.density(theta[:, None], theta)
-    return float(weight @ (density * density.T) @ weight)
-
-
-def _edges() -> Floats:
-    return np.linspace(0.0, np.pi, TRACE_PANELS + 1)
+def _of_matrix(law: Law, listed: int) -> Separation | None:
+    """The next modulus of a matrix that is near the law in norm, plus its distance."""
+    exact = finite_matrix(law)
+    matrix = compact_matrix(law) if exact is None else exact if isinstance(law, MatrixLaw) else None
+    if matrix is None or matrix.beyond is None:
+        return None
+    moduli = np.sort(np.abs(np.linalg.eigvalsh(symmetric_half(matrix.symmetric))))[::-1]
+    skew = float(np.linalg.norm(matrix.symmetric - matrix.symmetric.T))
+    radius = max(*np.abs(matrix.beyond), *moduli[listed : listed + 1]) + float(matrix.error) + skew
+    reason = (
+        f"next eigenvalue of a matrix at the distance {float(matrix.error):.3g} from the law: {matrix.error.method}"
+    )
+    return Separation(float(radius), matrix.error.kind, reason)

@@ -205,6 +205,7 @@ class Spectrum(Summary):
         (True, 'estimate')
         """
         method = f"{self.basis!r}, {self.method}; algebraic + two-grid and matrix + {self.errors.quantile:.3g} sampling"
+        method += f"; {ALONE}" if ALONE in self.evidence else ""
         pairs = zip(self.values, self.errors.total(), strict=True)
         return tuple(Estimate(float(value), float(error), "estimate", method) for value, error in pairs)
 
@@ -268,7 +269,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
     residuals, algebraic = np.append(defect, rest.residuals), np.append(defect, rest.errors)
     # a matrix of a law that is known beyond the basis has the law's eigenvalues
     exact = matrix.beyond is not None
-    reason = "the matrix of a law in bins beyond which the law is known" if exact else UNREFINED
+    reason = "the matrix of a law that is known beyond its basis" if exact else UNREFINED
     changes = np.zeros(len(values)) if exact else margin * np.append(0.0, two_grid_changes(matrix, rest))
 
     algebraic = algebraic + matrix.basis.size * EPS

@@ -10,16 +10,17 @@ import numpy as np
 
 from ...core.checks import instance, positive_number
 from ...core.estimates import ErrorKind, Estimate
-from ...kernels import DensityLaw, InvolutionLaw, Law, Legendre, discretise
+from ...kernels import InvolutionLaw, Law, Legendre, discretise
 from ...kernels.laws.structure import Rules, fold
+from .compact import compact_matrix
 from .edge import essential_edge
 
-# Sizes of polynomial bases in which the norm of the matrix is taken.
-SIZES = (16, 32, 64, 128, 256, 512)
+# Size of the polynomial basis in which a lower bound of the norm is taken.
+SIZE = 16
 # Ends of the essential spectrum below this are taken as 0 for laws with a density.
 UNSEEN = 1e-3
-# Increments that fall by less than this factor from size to size do not show a limit.
-FALLING = 0.7
+# Largest error of a norm, as a fraction of it; a larger one shows that the kernel may not be square-integrable.
+LARGEST_ERROR = 0.1
 
 
 @dataclass(frozen=True, repr=False)
@@ -66,8 +67,8 @@ def hilbert_schmidt_norm(law: Law, tolerance: float = 1e-6) -> HilbertSchmidtNor
     compact: let f_n be the indicator functions of sets that shrink to a point, divided by their norms. They tend weakly
     to 0, but the norms of P f_n do not, because all parts of P f_n are non-negative. This holds for flat tops, for
     straight pieces that rays can meet alone, and for every polygonal wall. A deterministic law preserves norms. Grazing
-    rays are the second obstacle, see `essential_edge`. For a density the norms of growing Galerkin matrices increase to
-    the norm of the law. For curved walls, whose kernels can have singularities that are not square-integrable, the
+    rays are the second obstacle, see `essential_edge`. The norm of a density is that of a matrix, within the
+    distance of both. For curved walls, whose kernels can have singularities that are not square-integrable, the
     norm of the largest matrix is given as a lower bound.
 
     Source: Rudzis 2022, section 1.2.6 (R. Feres and H.-K. Zhang, Commun. Math. Phys. 313, 2012).
@@ -91,34 +92,15 @@ def hilbert_schmidt_norm(law: Law, tolerance: float = 1e-6) -> HilbertSchmidtNor
     if edge.low > 0.0:
         found = f"the law is not compact: its essential spectrum reaches {edge.low:.6g}"
         return _none(edge.kind, (found, *edge.reasons))
-    known = _contains_only_densities(law) and edge.high <= UNSEEN
-    norms: list[float] = []
-    for size in SIZES:
-        matrix = discretise(law, Legendre(size), tolerance=0.1 * wanted)
-        norms.append(float(np.linalg.norm(matrix.symmetric)))
-        rest = _rest(norms)
-        error = rest + float(matrix.error)
-        if error <= wanted or not known:
-            break
-    if not known or not math.isfinite(rest):
-        reason = f"no theorem decides; polynomials of degree below {size} give a lower bound"
-        compact = True if edge.high == 0.0 and edge.kind == "bound" else None
-        return HilbertSchmidtNorm(norms[-1], math.inf, "estimate", "Galerkin matrix", compact, (*edge.reasons, reason))
-    how = f"Galerkin matrices of up to {size} polynomials"
-    reasons = ("the law has a density, and the norms of growing matrices have a limit, so it is compact",)
-    return HilbertSchmidtNorm(norms[-1], error, "estimate", how, True, reasons)
-
-
-def _rest(norms: list[float]) -> float:
-    """An estimate of what larger matrices add; inf if the norms do not show a limit yet."""
-    if len(norms) < 3:
-        return math.inf
-    before, last = norms[-2] - norms[-3], norms[-1] - norms[-2]
-    noise = 1e-13 * norms[-1]
-    if last <= noise:
-        return noise
-    factor = last / before if before > 0.0 else math.inf
-    return last * factor / (1.0 - factor) + last if factor < FALLING else math.inf
+    matrix = compact_matrix(law) if edge.high <= UNSEEN else None
+    norm = 0.0 if matrix is None else float(np.linalg.norm(matrix.symmetric))
+    if matrix is not None and float(matrix.error) <= LARGEST_ERROR * norm:
+        reasons = ("the law has a density, and its distance from a matrix is known, so it is compact",)
+        return HilbertSchmidtNorm(norm, float(matrix.error), "estimate", matrix.error.method, True, reasons)
+    norm = float(np.linalg.norm(discretise(law, Legendre(SIZE), tolerance=0.1 * wanted).symmetric))
+    reason = f"no theorem decides; polynomials of degree below {SIZE} give a lower bound"
+    compact = True if edge.high == 0.0 and edge.kind == "bound" else None
+    return HilbertSchmidtNorm(norm, math.inf, "estimate", "Galerkin matrix", compact, (*edge.reasons, reason))
 
 
 def _none(kind: ErrorKind, reasons: tuple[str, ...]) -> HilbertSchmidtNorm:
@@ -132,12 +114,3 @@ def _contains_involution(law: Law) -> bool:
         return any(fact for _, fact in terms)
 
     return fold(law, Rules(lambda leaf: isinstance(leaf, InvolutionLaw), of_any, all, lambda fact: fact))
-
-
-def _contains_only_densities(law: Law) -> bool:
-    """Whether the law is compact by its parts: sums of densities, and products with at least one."""
-
-    def of_all(terms: Sequence[tuple[float, bool]]) -> bool:
-        return all(fact for _, fact in terms)
-
-    return fold(law, Rules(lambda leaf: isinstance(leaf, DensityLaw), of_all, any, lambda fact: fact))

@@ -18,11 +18,12 @@ from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
-from ..bounds.images import is_costly, suits_panels
+from ..bounds.images import ROUNDED, is_costly, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import adapted_trial_space
 from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, matrix_spectrum
+from ..essential.compact import compact_matrix
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .grooves import gap_of_grooves
@@ -49,25 +50,31 @@ MODULI = 3
 def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
     """The gap from an indexed enclosure; None if it would be inaccurate, or take longer than `time_limited` allows."""
     if isinstance(law, DensityLaw):
-        found = (_gap_of_enclosures(law, number, tolerance) for number in (ENCLOSED, 2 * ENCLOSED))
+        found = (_gap_of_enclosures(law, number, tolerance, edge) for number in (ENCLOSED, 2 * ENCLOSED))
         return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
     if not suits_panels(law) or is_costly(law):
         return None
-    number = _number_to_enclose(law, edge)
-    gap = None if number is None else _gap_of_enclosures(law, number, tolerance)
+    number = _number_to_enclose(law, edge) or (ENCLOSED if edge.low == 0.0 else None)
+    gap = None if number is None else _gap_of_enclosures(law, number, tolerance, edge)
     if number is not None and gap is not None and tolerance < gap.error <= tolerance / CLOSER:
-        gap = _gap_of_enclosures(law, number, CLOSER * tolerance) or gap
+        gap = _gap_of_enclosures(law, number, CLOSER * tolerance, edge) or gap
     # other bases are hardly better than adapted panels
     return gap if gap is not None and gap.error <= max(tolerance, LARGEST_MISS * gap.value) else None
 
 
-def _gap_of_enclosures(law: Law, number: int, tolerance: float) -> SpectralGap | None:
+def _gap_of_enclosures(law: Law, number: int, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
     found = enclosures(law, number, tolerance=tolerance)
     listed = [item for item in found if item.label == "indexed" and item.index]
     top = max(listed, key=lambda item: item.value, default=None)
-    # no eigenvalue that is not listed may be larger
-    if top is None or top.low <= max(found.separation.radius, 0.0) or top.high >= 1.0:
+    if top is None or top.high >= 1.0:
         return None
+    # no eigenvalue that is not listed may be larger
+    if top.low <= max(found.separation.radius, 0.0):
+        reach = max(found.separation.radius, edge.high, top.high)
+        how = f"bounds of all eigenvalues; {found.method}"
+        evidence = (f"no eigenvalue off the constants is above {reach:.3g}: {found.separation.reason}", *edge.reasons)
+        value, error = 1.0 - 0.5 * (edge.low + reach), 0.5 * (reach - edge.low)
+        return SpectralGap(value, error, "estimate", how, "essential edge", evidence, law.frame)
     gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
     return SpectralGap(
         gap, error, top.kind, f"bounds of the eigenvalue; {found.method}", "isolated", (str(top),), law.frame
@@ -201,9 +208,11 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     0.5
     """
     matrix = None if made_of_isometries(law) else finite_matrix(law)
-    if matrix is not None:
+    compact = None if matrix is not None or isinstance(law, ROUNDED) else compact_matrix(law)
+    near = compact if matrix is None else matrix
+    if near is not None and (near is matrix or float(near.error) <= tolerance):
         refuse_unless_self_adjoint(law)
-        return gap_of_exact(matrix, modulus=True)
+        return gap_of_exact(near, modulus=True)
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small
@@ -259,6 +268,18 @@ def _by_refinement(law: Law, tolerance: float, rng: np.random.Generator, seconds
     if fraction < 1.0:
         own = gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, rng, seconds)
         return _scaled(own, fraction)
+    compact = compact_matrix(law) if not isinstance(law, ROUNDED) else None
+    if compact is None:
+        return _by_edge(law, tolerance, rng, seconds)
+    found = gap_of_exact(compact)
+    if found.error > max(tolerance, LARGEST_MISS * found.value):
+        with suppress(OutOfTime), time_limited(seconds):
+            return min(found, _by_edge(law, tolerance, rng, seconds), key=lambda one: one.error)
+    return found
+
+
+def _by_edge(law: Law, tolerance: float, rng: np.random.Generator, seconds: float) -> SpectralGap:
+    """The gap from the edge of the essential spectrum and from trial functions."""
     edge = essential_edge(law)
     small = shallow_gap(law, edge)
     if small is not None and small.error <= tolerance:

@@ -14,8 +14,9 @@ from ...kernels import DensityLaw, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
-from ..bounds.images import is_costly, suits_panels
+from ..bounds.images import ROUNDED, is_costly, suits_panels
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
+from ..essential.compact import compact_matrix
 
 # Sizes of Legendre bases for laws without known errors of expectations; the first suffices for ten eigenvalues of most.
 DEGREES = (48, 96)
@@ -37,6 +38,9 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng, seconds: float
         found = law_eigenvalues(base, max(k, 2), tolerance / exponent, rng, seconds)
         return _raised(found, exponent, k)
     matrix = None if made_of_isometries(law) else finite_matrix(law, k)
+    if matrix is None and not isinstance(law, ROUNDED):
+        near = compact_matrix(law)
+        matrix = near if near is not None and float(near.error) <= tolerance else None
     if matrix is not None:
         return matrix_spectrum(matrix, k)
     if not made_of_isometries(law):

@@ -67,20 +67,26 @@ def gap_of_exact(matrix: KernelMatrix, modulus: bool = False) -> SpectralGap:
     value, kind = 1.0 - found.slem if modulus else found.gap, matrix.error.kind
     chain = matrix.symmetric @ matrix.symmetric if modulus else matrix.symmetric
     parts, _ = _separate_parts(chain)
+    inexact = not matrix.basis.is_partition
     reason = (
-        f"the law maps functions that are constant on {matrix.size} bins to such: beyond these its spectrum is "
-        f"{even:.12g} on even and {odd:.12g} on odd functions of cos(theta), each of infinite multiplicity"
-    )
-    if parts > 1 and matrix.norm_bound == 1.0:
+        f"the law maps functions that are constant on {matrix.size} bins to such" if not inexact else
+        f"the law is a matrix on {matrix.size} functions within the norm {float(matrix.error):.2g}"
+    ) + (
+        f": beyond these its spectrum is {even:.12g} on even and {odd:.12g} on odd functions of cos(theta), each of "
+        "infinite multiplicity"
+    )  # fmt: skip
+    if parts > 1 and matrix.norm_bound == 1.0 and not inexact:
         double = (
             f"{'the square of ' if modulus else ''}the law has no transitions between {parts} sets of bins: "
             f"1 is its eigenvalue of multiplicity {parts}"
         )
         return SpectralGap(0.0, 0.0, kind, "structure of the law", "no gap", (double, reason), matrix.frame, found)
-    method = made_from(found, "algebraic error and rounding; the basis is exact")
+    method = made_from(found, matrix.error.method if inexact else "algebraic error and rounding; the basis is exact")
     lowest = float(found.errors.total()[int(np.argmin(found.values))]) if modulus else 0.0
-    verdict: Verdict = "isolated" if max(even, odd, -min(even, odd) if modulus else 0.0) < 1.0 else "no gap"
-    error = max(found.gap_error, lowest)
+    error, edge = max(found.gap_error, lowest), max(even, odd, -min(even, odd) if modulus else 0.0)
+    verdict: Verdict = "no gap" if edge >= 1.0 else "isolated"
+    if inexact and 1.0 - value - error <= edge < 1.0:
+        verdict = "essential edge"
     return SpectralGap(value, error, kind, method, verdict, (reason,), matrix.frame, found).cut_at_zero()
 
 

@@ -44,12 +44,16 @@ class SpectralGap(Estimate):
     _more = ".method, .evidence, .spectrum"
 
     def cut_at_zero(self) -> SpectralGap:
-        """The gap with its interval cut at 0, because the norm of a law is 1 and no gap is negative."""
+        """The gap with its interval cut at 0, because the norm of a law is 1 and no gap is negative.
+
+        An eigenvalue whose interval contains 1 is not isolated from it.
+        """
         low, high = self.value - self.error, max(self.value + self.error, 0.0)
         if low >= 0.0 or high == np.inf:
             return self
         cut = f"a gap is never negative: the interval {with_error(self.value, self.error)} is cut at 0"
-        return replace(self, value=0.5 * high, error=0.5 * high, evidence=(*self.evidence, cut))
+        verdict: Verdict = "undecided" if self.verdict == "isolated" else self.verdict
+        return replace(self, value=0.5 * high, error=0.5 * high, verdict=verdict, evidence=(*self.evidence, cut))
 
 
 def made_from(found: Spectrum, how: str) -> str:

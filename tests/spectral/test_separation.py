@@ -52,17 +52,17 @@ def test_rounding_is_added_where_nothing_is_left():
     assert 16.0 * EPS * (1.0 - 1e-6) <= apart.radius ** (2 * power) / whole <= 24.0 * EPS
 
 
-def test_the_difference_of_two_quadratures_counts_as_error(monkeypatch):
-    sums = {12: 2.0, 16: 1.5}
-    monkeypatch.setattr(separation, "_squared_norm", lambda law, nodes: sums[nodes])
-    law = ker.DensityLaw(lambda theta, theta_out: 0.5 * np.sin(theta_out))
-    apart = rest_of_spectrum(law, CONSTANTS, 0.0, np.inf)
-    assert apart.radius == pytest.approx(1.0, rel=1e-14) and apart.kind == "estimate"
-    # the finer one is the value
-    sums[12] = 1.25
-    assert rest_of_spectrum(law, CONSTANTS, 0.0, np.inf).radius == pytest.approx(np.sqrt(0.75), rel=1e-14)
-    sums.update({12: 2.0, 16: 2.5})
-    assert rest_of_spectrum(law, CONSTANTS, 0.0, np.inf).radius == pytest.approx(np.sqrt(2.0), rel=1e-14)
+@pytest.mark.parametrize("listed", [1, 2, 3])
+def test_of_a_density_with_a_kink_on_the_diagonal_the_next_eigenvalue_and_the_norm_of_the_rest_are_left(listed):
+    """In u = sin(theta/2)^2 and v the kernel is 1 plus the sum of 10 cos(k pi u) cos(k pi v)/(k pi)^2."""
+
+    def density(theta, out):
+        u, v = np.sin(0.5 * theta) ** 2, np.sin(0.5 * out) ** 2
+        return 0.5 * np.sin(out) * (1.0 + 5.0 * (0.5 * (u * u + v * v) - np.maximum(u, v) + 1.0 / 3.0))
+
+    apart = rest_of_spectrum(ker.DensityLaw(density), np.ones(listed), 0.0, np.inf)
+    assert 5.0 / (listed * np.pi) ** 2 < apart.radius < 5.0 / (listed * np.pi) ** 2 + 1e-4
+    assert apart.kind == "estimate"
 
 
 def test_of_a_density_of_rank_two_the_second_eigenvalue_is_left():
