@@ -30,6 +30,7 @@ from .discretisation.discretisation import discretise as discretise
 from .distances.distances import distance as distance
 from .distances.retroreflectors import retroreflection_distance as retroreflection_distance
 from .distances.two_sample import difference_test as difference_test
+from .expectations.conditionals import Conditionals as Conditionals
 from .hemisphere.hemisphere_law import HemisphereLaw as HemisphereLaw
 from .inverse.cell_sequences import dichotomy as dichotomy
 from .inverse.design import design_wall as design_wall

@@ -60,9 +60,9 @@ PLAIN = (TypeError, ValueError, AttributeError, IndexError)
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz, and
 # `check_proof` its own damaged certificates.
 LEFT_OUT = {
-    "Basis", "check_proof", "Container", "DiskStatus", "double_parabola", "flat", "invisible_body", "lambertian", "Law",
-    "LeastResistanceLaw", "Proof", "retroreflection", "SpectralGap", "Spectrum", "specular", "Status",
-    "SweepTable", "verify", "WorkReport", "zero_resistance_body",
+    "Basis", "check_proof", "Conditionals", "Container", "DiskStatus", "double_parabola", "flat", "invisible_body",
+    "lambertian", "Law", "LeastResistanceLaw", "Proof", "retroreflection", "SpectralGap", "Spectrum", "specular",
+    "Status", "SweepTable", "verify", "WorkReport", "zero_resistance_body",
 }  # fmt: skip
 
 
@@ -97,7 +97,8 @@ OBJECTS: tuple[Any, ...] = (
     ker.WallLaw(geo.elliptical_arcs(1.0)), ker.WallLaw(TEETH), ker.MushroomLaw(MUSHROOMS), ker.MatrixLaw(MATRIX),
     HALVES, ker.InvolutionLaw(lambda theta: np.pi - theta), ker.DensityLaw(lambda a, b: 0.5 * np.sin(b) + 0.0 * a),
     ker.LeastResistanceLaw(), 0.5 * LAW + 0.5 * ker.specular(), TRIANGLES @ ker.specular(), TRIANGLES**2,
-    LAW.in_specular_frame(), COLLISION, 0.5 * COLLISION + 0.5 * ker.smooth(DISK), ker.no_slip(DISK),
+    LAW.in_specular_frame(), LAW.conditionals(1.0), COLLISION, 0.5 * COLLISION + 0.5 * ker.smooth(DISK),
+    ker.no_slip(DISK),
     GROOVES, 0.5 * GROOVES + 0.5 * GROOVES @ GROOVES, ker.Zernike(2),
     ker.SatelliteLaw(TEETH, DISK, 0.01), PAIR, ROUGH, ker.PolygonalBody([TRIANGLE]), ALONG, ker.SpringWall(0.5, 1.0),
     ker.CollisionAlongWall(ALONG, DISK), RECORD, GAS, geo.WALLS["koch"], ker.displacements(TEETH, 200, rng=0),
@@ -166,6 +167,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Container.sinai": {"radius": 0.2},
     "Container.stadium": {"length": 1.0},
     "Container.touch": {"wall": 0, "position": [0.3, 0.1]},
+    "Conditionals.of_atoms": {"nodes": [[0.5, 1.0]], "weights": [[0.25, 0.75]]},
+    "Conditionals.of_density": {"density": lambda a, b: 0.5 * np.sin(b) + 0.0 * a, "tolerance": 1e-8},
     "DensityLaw": {"density": lambda a, b: 0.5 * np.sin(b) + 0.0 * a},
     "Estimate": {"kind": "bound", "method": "by hand"},
     "HeightCorrelation": {"length": 0.1},
@@ -227,7 +230,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
 # They take other functions of the library, an array into which they write, or what other functions have checked.
 UNCALLED = {
     "matrix_on", "entries", "on_disc", "reflected", "add_products", "attempt", "apply_to_states", "save", "draw",
-    "plot", "plot_eigenfunctions", "features", "Spectrum.at",
+    "plot", "plot_eigenfunctions", "features", "Spectrum.at", "of_lists", "mixed", "followed_by",
 }  # fmt: skip
 # Functions of the user, what is handed on, how a matrix was made, and angles of which one gives no number, stay away.
 UNREPLACED = {
@@ -257,7 +260,8 @@ def good_call(label: str, function: Callable[..., Any]) -> tuple[Callable[..., A
 METHODS = (
     "AngularMeasure.cdf", "AngularMeasure.sample", "Arc.moved", "Arc.split", "Arc.stretched", "BilliardRecord.animate",
     "BilliardRecord.phase_portrait", "Bins.evaluate", "CollisionLaw.__matmul__", "CollisionLaw.apply",
-    "CollisionLaw.from_wall", "CollisionLaw.operator", "CollisionLaw.sample", "ConfigurationSpace.contains",
+    "CollisionLaw.from_wall", "CollisionLaw.operator",
+    "CollisionLaw.sample", "Conditionals.of_atoms", "Conditionals.of_density", "ConfigurationSpace.contains",
     "ConfigurationSpace.draw_collision", "ConfigurationSpace.draw_section", "ConfigurationSpace.good_half_width",
     "Container.draw", "Container.ellipse", "Container.from_curves", "Container.polygon", "Container.sinai",
     "Container.stadium", "Disk.from_angles", "Disk.inner", "Disk.rolling_momentum", "Disk.to_angles",

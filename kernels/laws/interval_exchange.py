@@ -102,7 +102,7 @@ class IntervalExchangeLaw(Law):
         return self.image(theta)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        return Conditionals.of_atoms(self.image(theta)[:, None], np.ones((theta.size, 1)))
+        return Conditionals.of_atoms(self.image(theta)[:, None], np.ones((theta.size, 1)), 0.0)
 
     def _checked_flux(self) -> Floats:
         matrix = self.matrix

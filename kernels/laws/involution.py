@@ -124,7 +124,7 @@ class InvolutionLaw(Law):
         return self._mapped(theta)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        return Conditionals.of_atoms(self._mapped(theta)[:, None], np.ones((theta.size, 1)))
+        return Conditionals.of_atoms(self._mapped(theta)[:, None], np.ones((theta.size, 1)), 0.0)
 
     def __repr__(self) -> str:
         # The user's function may be any callable.

@@ -339,7 +339,7 @@ class BranchLaw(Law):
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         probability, outgoing = self._branches(theta)
-        return Conditionals.of_atoms(outgoing, probability)
+        return Conditionals.of_atoms(outgoing, probability, 0.0)
 
 
 class DrivenLaw(Law):
@@ -614,7 +614,7 @@ class _Chain(Law):
             return Conditionals.of_atoms(branches[1], branches[0], self._error_of_atoms)
         if len(laws) > LONGEST_CHAIN:
             raise InputError(f"apply: expected at most {LONGEST_CHAIN} factors; use discretise(law, basis) ** n")
-        found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)))
+        found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)), 0.0)
         cuts = [*(_breakpoints_of_start(laws[k:]) for k in range(1, len(laws))), edges]
         rules = [_conditionals_of(law, tolerance, degree, cut) for law, cut in zip(laws, cuts, strict=True)]
         each = [rule(theta[:1]).nodes.size for rule in rules]

@@ -125,7 +125,7 @@ class LeastResistanceLaw(Law):
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         probability, outgoing = self.images(theta)
-        return Conditionals.of_atoms(outgoing, probability)
+        return Conditionals.of_atoms(outgoing, probability, 0.0)
 
 
 def partners(size: Floats, b: float) -> Floats:

@@ -108,7 +108,7 @@ class Known(ker.Law):
         return exchanged(theta)
 
     def _conditionals(self, theta: np.ndarray, *_: object) -> Conditionals:
-        return Conditionals.of_atoms(exchanged(theta)[:, None], np.ones((theta.size, 1)))
+        return Conditionals.of_atoms(exchanged(theta)[:, None], np.ones((theta.size, 1)), 0.0)
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
