@@ -129,7 +129,7 @@ def cells_and_atoms(terms: Terms, theta: Floats, edges: Floats, tolerance: float
             continue
         # one distribution for all angles
         incoming = theta[:1] if term.law.is_lambertian else theta
-        given = term.law._conditionals(incoming, tolerance, 0, edges[1:-1])
+        given = term.law.conditionals(incoming, tolerance, 0, edges[1:-1])
         error = np.where(np.isnan(given.error), UNKNOWN, given.error)
         table = term.law.isometry_table() if term.has_atoms and not sup else None
         # of a mean over theta, unresolved rays change no more than their fraction
