@@ -178,10 +178,10 @@ class Conditionals(NamedTuple):
             return 0, f"at least one atom for each of {number} angles, got arrays of shapes {shapes}"
         total = np.add.reduceat(weights, starts[:-1])
         for expected, values, right in (
+            ("an error of at least 0, or nan", error, ~(error < 0.0)),
             ("outgoing angles in (0, pi)", nodes, (nodes >= -ROUNDED_ANGLE) & (nodes <= np.pi + ROUNDED_ANGLE)),
             ("weights of at least 0", weights, weights >= -NEGATIVE_TOLERANCE),
             ("weights of sum 1 within the error", total, np.abs(total - 1.0) <= SUM_TOLERANCE + np.nan_to_num(error)),
-            ("an error of at least 0, or nan", error, ~(error < 0.0)),
         ):
             if not right.all():
                 at = int(np.argmin(right))

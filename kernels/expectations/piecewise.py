@@ -12,7 +12,7 @@ from ...core.checks import Floats
 from ..bases.basis import AngleFunction
 from ..bases.given import Vectorised
 from ..bases.intervals import cell_among
-from ..bases.measure import SINE
+from ..bases.measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE
 
 # Chebyshev points at which functions are examined, the size of the coefficients that count, and the highest degree.
 POINTS, SMALLEST_COEFFICIENT, MOST_DEGREE = 2048, 1e-14, 256
@@ -88,8 +88,8 @@ class Piecewise(NamedTuple):
 
         def interpolant(angle: Floats) -> Floats:
             cell = cell_among(np.append(low, np.pi), angle.ravel())
-            local = (2.0 * angle.ravel() - first[cell] - last[cell]) / (last - first)[cell]
-            powers = np.polynomial.legendre.legvander(local, DEGREE)
+            local = (2.0 * angle.ravel() - first[cell] - last[cell]) / np.maximum(last - first, SMALLEST_ANGLE)[cell]
+            powers = np.polynomial.legendre.legvander(np.clip(local, -1.0, 1.0), DEGREE)
             return np.einsum("nd,ndk->nk", powers, coefficients[cell]).reshape(angle.shape + extra)
 
         given = Vectorised(interpolant)
@@ -123,21 +123,18 @@ def halved(
         ready = rest <= np.maximum(allowed, rounding)
         ready |= halving == MOST_HALVINGS or row.size > (most + marks.size) * owner.size
         done.append((row[ready], low[ready], high[ready], rest[ready], COEFFICIENTS @ value[ready, KNOWN]))
-        middle = (low + half)[~ready]
-        row, low, high = (
-            np.repeat(row[~ready], 2),
-            *(np.stack(both, axis=1).ravel() for both in ((low[~ready], middle), (middle, high[~ready]))),
-        )
+        halves = ((row, row), (low, low + half), (low + half, high))
+        row, low, high = (np.concatenate((left[~ready], right[~ready])) for left, right in halves)
         if not row.size:
             break
-    row, low, high, rest, coefficients = (np.concatenate(parts) for parts in zip(*done, strict=True))
+    row, low, high, rest, coefficients = map(np.concatenate, zip(*done, strict=True))
     return row, low, high, rest, coefficients
 
 
 def _seen_ends(low: Floats, high: Floats) -> tuple[Floats, Floats]:
     """The first and last nodes of intervals: inside, where a function that jumps at an end has one value."""
     first = np.where(low > 0.0, np.nextafter(low, np.pi), END * high)
-    return first, np.where(high < np.pi, np.nextafter(high, 0.0), high - END * (high - low))
+    return first, np.where(high < np.pi, np.nextafter(high, 0.0), np.minimum(high - END * (high - low), LARGEST_ANGLE))
 
 
 def _pieces(

@@ -39,7 +39,7 @@ from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.basis import AngleFunction, Frame
 from ..bases.given import Vectorised, seed_by_name
 from ..bases.intervals import cell_among
-from ..expectations.conditionals import ROUNDED_ANGLE, Conditionals
+from ..expectations.conditionals import Conditionals
 from ..expectations.piecewise import INTERVALS_OF_MEANS, MOST_OF_MEANS, SEEN, Piecewise
 from .branches import MOST_BRANCHES, chained, chained_breakpoints, joined, merged
 from .isometry_table import IsometryTable
@@ -437,34 +437,24 @@ def answer_of(law: Law, method: Callable[..., T], theta: Floats, *wanted: object
 
 def outgoing_angles(found: ArrayLike, theta: Floats, law: Law) -> Floats:
     """The outgoing angles that a law has drawn: one for each incoming angle, in (0, pi) up to rounding."""
-    try:
-        outgoing = numbers("numbers", found)
-    except InputError as reason:
-        raise InputError(f"outgoing angles of {law!r}: {reason}") from reason
+    plain = type(found) is np.ndarray and found.dtype == np.float64
+    outgoing = found if plain else numbers(f"outgoing angles of {law!r}", found)
     if outgoing.shape != theta.shape:
-        raise InputError(
-            f"outgoing angles of {law!r}: expected angles of the shape {theta.shape}, got {outgoing.shape}"
-        )
+        raise InputError(f"outgoing angles of {law!r}: expected shape {theta.shape}, got {outgoing.shape}")
     if outgoing.size and not (outgoing.min() > 0.0 and outgoing.max() < np.pi):
-        bad = ~((outgoing >= -ROUNDED_ANGLE) & (outgoing <= np.pi + ROUNDED_ANGLE))
-        if bad.any():
-            raise InputError(
-                f"outgoing angles of {law!r}: expected angles in (0, pi), radians, got {outgoing[bad][0]!r} at theta = "
-                f"{theta[bad][0]:g} ({bad.sum()} such)"
-            )
-        outgoing = clipped_inside(outgoing)
+        count = np.arange(outgoing.size + 1)
+        atoms = Conditionals(outgoing.ravel(), np.ones(outgoing.size), count, np.zeros(outgoing.size))
+        outgoing = checked_conditionals(atoms, theta.ravel(), law).nodes.reshape(theta.shape)
     return outgoing
 
 
 def checked_conditionals(found: Conditionals, theta: Floats, law: Law) -> Conditionals:
     """The conditional distributions that a law has found, if they are distributions on (0, pi)."""
-    expected = f"_conditionals of {law!r}: expected"
     if not isinstance(found, Conditionals):
-        raise InputError(f"{expected} ker.Conditionals, got {shortened(found)}")
+        raise InputError(f"_conditionals of {law!r}: expected ker.Conditionals, got {shortened(found)}")
     fault = found.fault(theta.size)
     if fault is not None:
-        index, what = fault
-        raise InputError(f"{expected} {what} at theta = {theta[index]:g}")
+        raise InputError(f"law {law!r}: expected {fault[1]} at theta = {theta[fault[0]]:g}")
     return found._replace(nodes=clipped_inside(found.nodes))
 
 
@@ -728,10 +718,13 @@ class _Chain(Law):
         if first is None or self._branches(theta[:1]) is not None:
             return super()._mean(given, theta)
         for k in range(len(laws) - 1, first, -1):
-            # an interval is halved about once
-            each = 2 * WITH_POLYNOMIAL * SEEN.size * laws[k].conditionals(theta[:1], edges=given.edges).nodes.size
+            # an interval is halved about once; a Lambertian law has one distribution for all angles
+            parts = [
+                law.conditionals(theta[:1], edges=given.edges) for _, law in laws[k].parts if not law.is_lambertian
+            ]
+            each = 2 * WITH_POLYNOMIAL * SEEN.size * max(1, sum(part.nodes.size for part in parts))
             self._refuse_long(len(laws), each * INTERVALS_OF_MEANS * (len(laws) - first))
-            most = min(MOST_VALUES // (each * (len(laws) - first)), MOST_OF_MEANS)
+            most = min(MOST_VALUES // (each * (len(laws) - first)), MOST_OF_MEANS + given.edges.size)
             after = partial(_means_of, laws[k], given)
             given = Piecewise.mean_of(given, after, _breakpoints_of_start(laws[k:]), most)
         if first == 0:

@@ -71,9 +71,9 @@ def test_a_law_that_changes_its_argument_is_right_and_changes_no_array_of_the_ca
 
 # ---- angles that a law draws ---------------------------------------------------------------------------------------
 DRAWS = {
-    "beyond pi": (lambda theta: theta + 2.0, r"OwnLaw.*\(0, pi\).*got 4\.6 at theta = 2\.6"),
+    "beyond pi": (lambda theta: theta + 2.0, r"OwnLaw.*\(0, pi\), got 3\.3 at theta = 1\.3"),
     "nan": (lambda theta: np.where(theta > 1.0, np.nan, theta), r"OwnLaw.*got nan at theta = 1\.3"),
-    "one fewer": (lambda theta: theta[:-1], r"OwnLaw.*shape \(3,\), got \(2,\)"),
+    "one fewer": (lambda theta: theta[:-1], r"OwnLaw.*expected shape \(3,\), got \(2,\)"),
     "complex": (lambda theta: theta + 1j, "OwnLaw.*expected numbers"),
     "nothing": (lambda theta: None, "OwnLaw.*expected numbers"),
     "failure": (lambda theta: [][0], "_sample of OwnLaw failed.*0.4.*IndexError"),
@@ -81,7 +81,7 @@ DRAWS = {
 CALLS = {
     "sample": lambda law: law.sample(THETA, rng=0),
     "sum": lambda law: (0.5 * law + 0.5 * law).sample(np.tile(THETA, 3), rng=0),
-    "composition": lambda law: (law @ ker.lambertian()).sample(THETA, rng=0),
+    "composition": lambda law: (law @ ker.henyey_greenstein(0.5)).sample(THETA, rng=0),
     "frame": lambda law: law.in_specular_frame().sample(THETA, rng=0),
     "collision": lambda law: ker.CollisionLaw(law, geo.Disk()).sample(
         np.stack([-np.cos(THETA), -np.sin(THETA), 0.0 * THETA], axis=1), rng=0
@@ -242,7 +242,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "cos(1000 x)": (lambda x: np.cos(1000.0 * x), -1.0 / (1000.0**2 - 1.0)),
     "kink": (lambda x: np.abs(np.cos(x) - 0.3), 0.5 * (1.0 + 0.3**2)),
     "root": (lambda x: np.sqrt(np.abs(np.cos(x) - 0.3)), (1.3**1.5 + 0.7**1.5) / 3.0),
-    "1/(1 + cos)^(1/2)": (lambda x: 1.0 / np.sqrt(1.0 + np.cos(x)), np.sqrt(2.0)),
+    "1/sin(x/2)^(1/2)": (lambda x: 1.0 / np.sqrt(np.sin(0.5 * x)), 4.0 / 3.0),
     "many steps": (lambda x: np.floor(20.0 * np.cos(x)), -0.5),
 }
 LAWS: dict[str, Callable[[float, Callable[..., Any]], float]] = {
@@ -299,7 +299,8 @@ def test_the_remedy_for_a_function_that_is_not_resolved_works():
 def test_atoms_average_any_function_exactly():
     for law in (ker.specular(), ker.TriangularTeethLaw(1.1), ker.retroreflection() @ ker.specular()):
         probability, outgoing = law.branches(0.7)
-        assert float(law.apply(lambda x: np.sin(1e6 * x), 0.7)) == float(probability @ np.sin(1e6 * outgoing))
+        exact = float(probability @ np.sin(1e6 * outgoing))
+        assert float(law.apply(lambda x: np.sin(1e6 * x), 0.7)) == pytest.approx(exact, rel=1e-14)
 
 
 def test_the_campaign_draws_laws_that_are_broken_on_purpose():
