@@ -36,7 +36,7 @@ INTERVALS, MOST_INTERVALS, RESOLUTION, TOLERANCE = 64, 1024, 1e-10, 1e-8
 # The same of functions whose values take long: means of smooth functions under a law.
 INTERVALS_OF_MEANS, MOST_OF_MEANS, RESOLUTION_OF_MEANS, TOLERANCE_OF_MEANS = 4, 128, 1e-7, 1e-4
 # Intervals this narrow enclose jumps.
-JUMP = 1e-9
+JUMP = 3e-14
 
 
 class Piecewise(NamedTuple):
