@@ -90,7 +90,7 @@ class Piecewise(NamedTuple):
             cell = cell_among(np.append(low, np.pi), angle.ravel())
             local = (2.0 * angle.ravel() - first[cell] - last[cell]) / np.maximum(last - first, SMALLEST_ANGLE)[cell]
             powers = np.polynomial.legendre.legvander(np.clip(local, -1.0, 1.0), DEGREE)
-            return np.einsum("nd,ndk->nk", powers, coefficients[cell]).reshape(angle.shape + extra)
+            return np.asarray(np.einsum("nd,ndk->nk", powers, coefficients[cell])).reshape(angle.shape + extra)
 
         given = Vectorised(interpolant)
         return cls(given, DEGREE, low[1:], rest / (high - low), before.size, before.first, TOLERANCE_OF_MEANS)

@@ -430,15 +430,14 @@ def answer_of(law: Law, method: Callable[..., T], theta: Floats, *wanted: object
         raise
     except Exception as reason:
         raise InputError(
-            f"{method.__name__} of {law!r} failed for {theta.size} angles, the first {theta.flat[0]:g}: "
-            f"{type(reason).__name__}: {reason}"
+            f"{method.__name__} of {law!r} failed at theta = {shortened(theta)}: {type(reason).__name__}: {reason}"
         ) from reason
 
 
 def outgoing_angles(found: ArrayLike, theta: Floats, law: Law) -> Floats:
     """The outgoing angles that a law has drawn: one for each incoming angle, in (0, pi) up to rounding."""
-    plain = type(found) is np.ndarray and found.dtype == np.float64
-    outgoing = found if plain else numbers(f"outgoing angles of {law!r}", found)
+    plain = type(found) in (np.ndarray, np.float64) and np.asarray(found).dtype == np.float64
+    outgoing = np.asarray(found) if plain else numbers(f"outgoing angles of {law!r}", found)
     if outgoing.shape != theta.shape:
         raise InputError(f"outgoing angles of {law!r}: expected shape {theta.shape}, got {outgoing.shape}")
     if outgoing.size and not (outgoing.min() > 0.0 and outgoing.max() < np.pi):
