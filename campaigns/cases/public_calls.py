@@ -234,6 +234,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
 UNCALLED = {
     "matrix_on", "entries", "on_disc", "reflected", "add_products", "attempt", "apply_to_states", "save", "draw",
     "plot", "plot_eigenfunctions", "features", "Spectrum.at", "of_lists", "mixed", "followed_by",
+    "sums", "fault",
 }  # fmt: skip
 # Functions of the user, what is handed on, how a matrix was made, and angles of which one gives no number, stay away.
 UNREPLACED = {

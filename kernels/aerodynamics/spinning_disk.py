@@ -168,10 +168,10 @@ def _mean_directions(law: Law, theta: Floats) -> tuple[Floats, Floats]:
     means, errors = [np.empty((0, 2))], [np.empty(0)]
     for start in range(0, angle.size, AT_ONCE):
         some = angle[start : start + AT_ONCE]
-        given = law._conditionals(some, MEAN_TOLERANCE, DEGREE, np.empty(0))
+        given = law.conditionals(some, MEAN_TOLERANCE, DEGREE)
         mean, error = given.mean(_components), given.error
         if np.isnan(error).any():
-            other = law._conditionals(some, MEAN_TOLERANCE, HIGHER, np.empty(0))
+            other = law.conditionals(some, MEAN_TOLERANCE, HIGHER)
             if np.array_equal(other.nodes, given.nodes):
                 other = _every_second(given)
             error = np.abs(other.mean(_components) - mean).max(axis=1)

@@ -165,18 +165,26 @@ class VelocityLaw(TensorLaw):
         return at.copy(), self.sample(moving, rng=rng)
 
     # ---- expectations ----------------------------------------------------------------------------------------
-    def apply(self, function: VelocityFunction, theta: ArrayLike, psi: ArrayLike) -> Floats:
+    def apply(self, function: VelocityFunction, theta: ArrayLike, psi: ArrayLike, edges: ArrayLike = ()) -> Floats:
         """The expectation E[f(Theta', Psi') | theta, psi] for a vectorised function f(theta, psi) that broadcasts.
 
         ``theta`` and ``psi`` in (0, pi) are the angles of minus the incoming velocity; they broadcast. Psi' is
-        pi - psi, and psi in a term without flip.
+        pi - psi, and psi in a term without flip. ``edges`` are outgoing theta at which f is not smooth; raises an
+        AccuracyError if halving does not resolve f in theta.
         """
         pairs = broadcast(theta=angles("theta", theta), psi=angles("psi", psi))
         checked = Vectorised(function, scalar=True)
-        terms = [weight * _expectation(law, flip, checked, *pairs) for weight, law, flip in self.parts_checked()]
+        terms = [weight * _expectation(law, flip, checked, *pairs, edges) for weight, law, flip in self.parts_checked()]
         return np.asarray(sum(terms[1:], terms[0]))
 
-    def apply_to_states(self, function: StateFunction, position: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Floats:
+    def apply_to_states(
+        self,
+        function: StateFunction,
+        position: ArrayLike,
+        theta: ArrayLike,
+        psi: ArrayLike,
+        edges: ArrayLike = (),
+    ) -> Floats:
         """The expectation E[f(y', Theta', Psi') | y, theta, psi] for a function of states; y' = y.
 
         Parameters
@@ -210,7 +218,7 @@ class VelocityLaw(TensorLaw):
         points_used, index = np.unique(points, axis=0, return_inverse=True)
         for k, point in enumerate(points_used):
             here = index.ravel() == k
-            value[here] = self.apply(partial(function, point), first[here], second[here])
+            value[here] = self.apply(partial(function, point), first[here], second[here], edges)
         return value.reshape(shape)
 
     def branches(self, theta: ArrayLike) -> list[tuple[Floats, Floats]]:
@@ -484,19 +492,21 @@ def _sum_of(parts: Sequence[tuple[float, Law]]) -> Law:
     return Combination(tuple(flat))
 
 
-def _expectation(law: Law, flip: bool, function: VelocityFunction, theta_all: Floats, psi_all: Floats) -> Floats:
+def _expectation(
+    law: Law, flip: bool, function: VelocityFunction, theta_all: Floats, psi_all: Floats, edges: ArrayLike
+) -> Floats:
     """E[f(Theta', pi - psi)], or E[f(Theta', psi)] without flip, for arrays of equal shape."""
     theta_values, theta_index = np.unique(theta_all, return_inverse=True)
     psi_values, psi_index = np.unique(psi_all, return_inverse=True)
     rolled = np.pi - psi_values if flip else psi_values
     if theta_values.size * psi_values.size <= GRID_EXCESS * theta_all.size:
         # one call for the grid, with psi as an additional axis of the function's values
-        grid = law.apply(lambda outgoing: function(outgoing[..., None], rolled), theta_values)
+        grid = law.apply(lambda outgoing: function(outgoing[..., None], rolled), theta_values, edges)
         return np.asarray(grid[theta_index, psi_index].reshape(theta_all.shape))
     value = np.empty(theta_all.shape)
     for k, angle in enumerate(rolled):
         here = psi_index.reshape(psi_all.shape) == k
-        value[here] = law.apply(partial(_with_psi, function, angle), theta_all[here])
+        value[here] = law.apply(partial(_with_psi, function, angle), theta_all[here], edges)
     return value
 
 

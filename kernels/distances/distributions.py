@@ -128,7 +128,7 @@ def cells_and_atoms(terms: Terms, theta: Floats, edges: Floats, tolerance: float
             wrong += weight * (first.error + float(matrix.error) / (np.sqrt(matrix.weights.min()) if sup else 1.0))
             continue
         incoming, back = term.law._distinct(theta)
-        given = term.law._conditionals(incoming, tolerance, 0, edges[1:-1])
+        given = term.law.conditionals(incoming, tolerance, 0, edges[1:-1])
         error = np.where(np.isnan(given.error), UNKNOWN, given.error)[back]
         table = term.law.isometry_table() if term.has_atoms and not sup else None
         # of a mean over theta, unresolved rays change no more than their fraction

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,34 +18,20 @@ from ..bases.given import Vectorised
 from ..bases.intervals import cell_among, joined_lists
 from ..bases.measure import gauss_on_intervals
 from .basis_means import means_of_basis
+from .piecewise import halved
 
 # Gauss nodes on an interval on which cos(s x / 2) and sin(s x / 2), -1 < x < 1, reach rounding, for s up to the limits.
 STIFFNESS, NODES = np.array([0.2, 3.0, 16.0, 48.0, 120.0, 300.0]), np.array([4, 8, 16, 32, 64, 128, 256])
-# Chebyshev points at which functions are examined, the size of the coefficients that count, and the highest degree.
-POINTS, SMALLEST_COEFFICIENT, MOST_DEGREE = 1024, 1e-14, 256
-# Chebyshev coefficients beyond pi d / 2 that a trigonometric polynomial of degree d has, and the lowest degree.
-MORE_COEFFICIENTS, LEAST_DEGREE = 16, 8
-
-# Nodes at which a function on an interval is known, its ends among them, and those between, with weights, at which the
-# polynomial through the known values is compared with it.
-_KNOWN = np.cos(np.pi / 11.0 * np.arange(12.0))
-_BETWEEN, BETWEEN_WEIGHTS = np.polynomial.legendre.leggauss(13)
-SEEN, KNOWN, BETWEEN = np.concatenate((_KNOWN, _BETWEEN)), slice(0, 12), slice(12, None)
-INTERPOLATION = np.linalg.solve(
-    np.polynomial.legendre.legvander(_KNOWN, 11).T, np.polynomial.legendre.legvander(_BETWEEN, 11).T
-)
-# Gauss nodes that a factor of degree 11 needs beside the other factor.
+# Gauss nodes that the factor of degree 11 needs beside the other one.
 NODES_OF_FACTOR = 6
-# Halvings of an interval, to 1e-14; intervals halved at a time; error of an interval that is not halved, as a fraction
-# of the tolerance; rounding of the comparison; distance of the nodes from 0 and pi, where functions may be infinite, as
-# a fraction of the interval.
-MOST_HALVINGS, MOST_INTERVALS, SMALL_PART, NOISE, END = 44, 1024, 1e-3, 16.0 * EPS, 1e-3
 # First numbers of intervals of a density; where its integral is not 1 the next number, for peaks between the nodes.
 FIRST_INTERVALS = (16, 256, 4096)
 # Tolerance for the integral 1 of a density; it admits densities known to single precision.
 INTEGRAL_TOLERANCE = 1e-7
 # Rounding can make a zero weight or density negative by this fraction of the largest value.
 NEGATIVE_TOLERANCE = 1e-12
+# Rounding of the sum of many weights; by this it puts angles past an end of (0, pi).
+SUM_TOLERANCE, ROUNDED_ANGLE = 1e-9, 8.0 * EPS
 
 
 class Conditionals(NamedTuple):
@@ -140,7 +126,7 @@ class Conditionals(NamedTuple):
 
         for intervals in FIRST_INTERVALS:
             marks = np.unique(np.clip(np.concatenate((np.linspace(0.0, np.pi, intervals + 1), known)), 0.0, np.pi))
-            row, low, high, rest = resolved(values, np.arange(theta.size), marks, allowed)
+            row, low, high, rest, _ = halved(values, np.arange(theta.size), marks, allowed)
             owner, nodes, weights = gauss_nodes(
                 row, low, high, stiffness_between(edges, degree, low, high), NODES_OF_FACTOR
             )
@@ -184,6 +170,25 @@ class Conditionals(NamedTuple):
         """The index of the incoming angle of each node."""
         return np.repeat(np.arange(self.error.size), np.diff(self.starts))
 
+    def fault(self, number: int) -> tuple[int, str] | None:
+        """What makes these no distributions on (0, pi) at ``number`` angles, and the index of the angle; else None."""
+        nodes, weights, starts, error = self
+        shapes = [np.shape(array) for array in self]
+        if shapes[2:] != [(number + 1,), (number,)] or shapes[:2] != [(starts[-1],)] * 2 or np.any(np.diff(starts) < 1):
+            return 0, f"at least one atom for each of {number} angles, got arrays of shapes {shapes}"
+        total = np.add.reduceat(weights, starts[:-1])
+        for expected, values, right in (
+            ("an error of at least 0, or nan", error, ~(error < 0.0)),
+            ("outgoing angles in (0, pi)", nodes, (nodes >= -ROUNDED_ANGLE) & (nodes <= np.pi + ROUNDED_ANGLE)),
+            ("weights of at least 0", weights, weights >= -NEGATIVE_TOLERANCE),
+            ("weights of sum 1 within the error", total, np.abs(total - 1.0) <= SUM_TOLERANCE + np.nan_to_num(error)),
+        ):
+            if not right.all():
+                at = int(np.argmin(right))
+                owner = at if values.size == number else int(np.searchsorted(starts, at, side="right")) - 1
+                return owner, f"{expected}, got {float(values[at])!r}"
+        return None
+
     def atoms(self) -> tuple[Floats, Floats]:
         """Nodes and weights, shape (angles, nodes); unused slots have weight 0 and the first node."""
         owner, slot = joined_lists(np.diff(self.starts))
@@ -194,7 +199,10 @@ class Conditionals(NamedTuple):
 
     def mean(self, function: AngleFunction) -> Floats:
         """E[f(Theta') | theta] for every angle, shape ``(angles,) + extra`` if f has values ``theta.shape + extra``."""
-        values = Vectorised.of(function)(self.nodes)
+        return self.sums(Vectorised.of(function)(self.nodes))
+
+    def sums(self, values: Floats) -> Floats:
+        """The weighted sums of values at the nodes, shape ``(angles,) + extra``."""
         weighted = self.weights.reshape((-1,) + (1,) * (values.ndim - 1)) * values
         return np.asarray(np.add.reduceat(weighted, self.starts[:-1], axis=0))
 
@@ -226,38 +234,6 @@ class Conditionals(NamedTuple):
         return Conditionals(found.nodes, weights, found.starts[self.starts], error)
 
 
-def resolved(
-    values: Callable[[NDArray[np.intp], Floats], Floats], owner: NDArray[np.intp], marks: Floats, tolerance: float
-) -> tuple[NDArray[np.intp], Floats, Floats, Floats]:
-    """Intervals on which functions are polynomials of degree 11, halved where they are not: owner, low, high, distance.
-
-    There is one function for each owner; ``values(owner, angle)`` has the shape of ``angle``, (intervals, nodes). The
-    distance is that in L^1, seen at other nodes, at most the tolerance in all. A larger one says that halving has not
-    resolved the function there.
-    """
-    row, low, high = np.repeat(owner, marks.size - 1), *(np.tile(part, owner.size) for part in (marks[:-1], marks[1:]))
-    done = []
-    for halving in range(MOST_HALVINGS + 1):
-        half = 0.5 * (high - low)
-        least = np.where(low > 0.0, np.nextafter(low, np.pi), END * high)[:, None]
-        most = np.where(high < np.pi, np.nextafter(high, 0.0), high - END * 2.0 * half)[:, None]
-        value = values(row, np.clip(0.5 * (least + most) + 0.5 * (most - least) * SEEN, least, most))
-        rest = half * (np.abs(value[:, BETWEEN] - value[:, KNOWN] @ INTERPOLATION) @ BETWEEN_WEIGHTS)
-        allowed = np.maximum(tolerance * half / np.pi, SMALL_PART * tolerance)
-        ready = rest <= np.maximum(allowed, NOISE * half * np.abs(value).max(axis=1))
-        ready |= halving == MOST_HALVINGS or row.size > MOST_INTERVALS * owner.size
-        done.append((row[ready], low[ready], high[ready], rest[ready]))
-        middle = (low + half)[~ready]
-        row, low, high = (
-            np.repeat(row[~ready], 2),
-            *(np.stack(both, axis=1).ravel() for both in ((low[~ready], middle), (middle, high[~ready]))),
-        )
-        if not row.size:
-            break
-    row, low, high, rest = (np.concatenate(parts) for parts in zip(*done, strict=True))
-    return row, low, high, rest
-
-
 def gauss_nodes(
     owner: NDArray[np.intp], low: Floats, high: Floats, stiffness: Floats, more: int = 0
 ) -> tuple[NDArray[np.intp], Floats, Floats]:
@@ -283,21 +259,3 @@ def stiffness_between(edges: Floats, degree: int, low: Floats, high: Floats) -> 
         return degree * (high - low)
     whole = np.concatenate(([0.0], edges, [np.pi]))
     return 2.0 * degree * (high - low) / np.diff(whole)[cell_among(whole, 0.5 * (low + high))]
-
-
-def degree_of(function: Callable[[Floats], Any]) -> int:
-    """The degree of a function on (0, pi) as a trigonometric polynomial, to rounding; at most `MOST_DEGREE`.
-
-    Examples
-    --------
-    >>> degree_of(np.cos), degree_of(lambda theta: np.cos(60.0 * theta)) >= 60, degree_of(lambda theta: theta < 1.0)
-    (8, True, 256)
-    """
-    from scipy.fft import dct
-
-    points = 0.5 * np.pi * (1.0 + np.cos((np.arange(POINTS) + 0.5) * (np.pi / POINTS)))
-    values = np.asarray(function(points), dtype=np.float64).reshape(POINTS, -1)
-    coefficients = np.abs(dct(values, axis=0)).max(axis=1, initial=0.0) / POINTS
-    counted = np.flatnonzero(coefficients > SMALLEST_COEFFICIENT * max(float(np.abs(values).max(initial=0.0)), 1e-300))
-    last = int(counted[-1]) if counted.size else 0
-    return int(np.clip(np.ceil((last - MORE_COEFFICIENTS) * 2.0 / np.pi), LEAST_DEGREE, MOST_DEGREE))

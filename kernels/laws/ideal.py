@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, number_between
 from ..bases.measure import SINE
@@ -32,9 +32,6 @@ class LambertianLaw(DensityLaw):
     def panels(self, theta: Floats) -> Floats:
         """One panel."""
         return np.broadcast_to([0.0, np.pi], (*finite_array("theta", theta).shape, 2))
-
-    def _distinct(self, theta: Floats) -> tuple[Floats, NDArray[np.intp]]:
-        return theta[:1], np.zeros(theta.size, dtype=np.intp)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return SINE.sample(theta.shape, rng)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import islice
 from typing import TypeAlias, TypeVar
 
 import numpy as np
@@ -26,16 +27,20 @@ from ...core.checks import (
     number_between,
     numbers,
     sequence,
+    shaped,
     shortened,
     whole_number,
 )
-from ...core.errors import InputError
+from ...core.errors import AccuracyError, AsperityError, InputError
 from ...core.estimates import html_table
+from ...core.long_runs import OutOfTime
 from ...core.rounding import EPS
-from ..bases.angles import mirrored_angle
+from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.basis import AngleFunction, Frame
 from ..bases.given import Vectorised, seed_by_name
-from ..expectations.conditionals import Conditionals, degree_of
+from ..bases.intervals import cell_among
+from ..expectations.conditionals import Conditionals
+from ..expectations.piecewise import INTERVALS_OF_MEANS, MOST_OF_MEANS, SEEN, Piecewise
 from .branches import MOST_BRANCHES, chained, chained_breakpoints, joined, merged
 from .isometry_table import IsometryTable
 from .tables import Table, WithAtoms, tabulated
@@ -44,8 +49,9 @@ from .tables import Table, WithAtoms, tabulated
 SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 # Decimal weights such as 0.1, ..., 0.4 sum to 1 within a few roundings; a sum with a forgotten term differs by more.
 WEIGHT_TOLERANCE = 1e-12
-# Limit on the outgoing angles of a composition at all incoming angles. A density takes some 200 ns for each.
-MOST_VALUES = 10**8
+# Limit on the outgoing angles of a composition at all incoming angles. A density takes some 200 ns for each, and eight
+# times as long with the polynomial that it is multiplied by.
+MOST_VALUES, WITH_POLYNOMIAL = 10**8, 8
 # Entry points of a driven law, each an atom.
 ENTRY_POINTS = 4096
 # The tolerance of `apply`, the incoming angles with which it begins, and outgoing angles in memory at a time.
@@ -110,28 +116,68 @@ class Law(ABC):
         A whole number as ``rng``, the seed, is given by name: ``law.sample(0.7, rng=1)`` draws one angle, and
         ``law.sample(np.full(1000, 0.7))`` draws 1000 of them.
         """
-        source = generator(rng)
-        return self._sample(angles("theta", theta), source)
+        source, incoming = generator(rng), angles("theta", theta)
+        return outgoing_angles(answer_of(self, self._sample, incoming, source), incoming, self)
 
-    def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
+    def apply(self, function: AngleFunction, theta: ArrayLike, edges: ArrayLike = ()) -> Floats:
         """The expectation E[f(Theta') | theta] of a vectorised f, whose values have shape ``theta.shape + extra``.
 
-        It is computed from `conditionals`, for the degree that the function shows at some points of (0, pi).
+        It is computed from `conditionals`. Intervals are halved until f agrees with polynomials to 1e-8 of its mean
+        size; jumps and kinks are found so. Atoms average any f exactly. The law's own error is that of `conditionals`.
+        In compositions, means under the later laws are replaced by polynomials in the same way, to 1e-4.
+
+        Parameters
+        ----------
+        function : callable
+        theta : array_like
+            Incoming angles in (0, pi), radians.
+        edges : array_like, optional
+            Outgoing angles at which f is not smooth, such as those of a peak narrower than 0.005.
+
+        Raises
+        ------
+        AccuracyError
+            If halving does not resolve f; the message names the outgoing angle, ``defect`` is the error of the mean.
         """
+        wanted = shaped("edges", edges, "n")
         given, incoming = Vectorised.of(function), angles("theta", theta)
-        flat, found = incoming.ravel(), []
-        if not flat.size:
+        if not incoming.size:
             # Only the function determines the shape of its values.
             return np.empty(incoming.shape + given(np.empty(incoming.shape)).shape[incoming.ndim :])
-        flat, back = self._distinct(flat)
-        degree, start, step = degree_of(given), 0, FIRST_ANGLES
-        while start < flat.size:
-            part = self._conditionals(flat[start : start + step], TOLERANCE, degree, np.empty(0))
-            found.append(part.mean(given))
+        mean = self._mean(Piecewise.of(given, wanted), incoming.ravel())
+        return mean.reshape(incoming.shape + mean.shape[1:])
+
+    def _mean(self, given: Piecewise, theta: Floats) -> Floats:
+        """The means of a function at incoming angles, shape ``theta.shape + extra``."""
+        distinct, back = self._distinct(theta)
+        start, step, found = 0, FIRST_ANGLES, []
+        while start < distinct.size:
+            angle = distinct[start : start + step]
+            part = self.conditionals(angle, TOLERANCE, given.degree, given.edges)
+            values = given.function(part.nodes)
+            found.append(part.sums(values))
+            if given.edges.size:
+                self._refuse_unresolved(given, angle, part, values)
             start += step
             step = max(1, NODES_AT_ONCE * part.error.size // part.nodes.size)
-        mean = np.concatenate(found)[back]
-        return mean.reshape(incoming.shape + mean.shape[1:])
+        return np.concatenate(found)[back]
+
+    def _refuse_unresolved(self, given: Piecewise, theta: Floats, part: Conditionals, values: Floats) -> None:
+        """Raise an AccuracyError if the distance of a function from polynomials matters at other nodes than atoms."""
+        cell = cell_among(np.concatenate(([0.0], given.edges, [np.pi])), part.nodes)
+        distance = np.where(is_flat_top(self, theta, part), 0.0, given.distance[cell])
+        size = np.abs(values).reshape(values.shape[0], -1).max(axis=1)
+        error = part.sums(distance)
+        bad = ~(error <= given.tolerance * np.maximum(given.size, part.sums(size)))
+        if bad.any() and not is_atomic(self):
+            node = int(np.argmax(np.where(bad[part.owner], part.weights * distance, -1.0)))
+            row = part.owner[node]
+            raise AccuracyError(
+                f"function: not resolved near theta' = {part.nodes[node]:.6g}: two rules for its mean under {self!r} "
+                f"at theta = {theta[row]:.6g} differ by {error[row]:.2g}; give the angles where it is not smooth as "
+                "edges=, or bound it",
+                float(error[row]),
+            )
 
     def conditionals(
         self, theta: ArrayLike, tolerance: float = TOLERANCE, degree: int = DEGREE, edges: ArrayLike = ()
@@ -157,6 +203,9 @@ class Law(ABC):
 
         Raises
         ------
+        InputError
+            If what the law finds are no distributions: a weight is negative or not finite, weights do not sum to 1
+            within the error, or an angle is not in (0, pi).
         AccuracyError
             If more than a fraction of 1e-4 of the rays of a wall did not escape.
 
@@ -173,7 +222,8 @@ class Law(ABC):
         whole_number("degree", degree, 0)
         if given.ndim != 1 or np.any(np.diff(given) < 0.0):
             raise InputError(f"edges: expected increasing angles, got {shortened(edges)}")
-        return self._conditionals(incoming, tolerance, degree, given)
+        found = answer_of(self, self._conditionals, incoming, tolerance, degree, given.copy())
+        return checked_conditionals(found, incoming, self)
 
     def table(self, n_in: int, n_out: int, tolerance: float = TABLE_TOLERANCE) -> Table:
         """The inverse distribution functions of the outgoing angle on a grid, for other codes to draw from.
@@ -225,7 +275,7 @@ class Law(ABC):
 
     @abstractmethod
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        """`sample` for checked arguments."""
+        """`sample` for checked arguments, of which it gets a copy; called by `sample` only, which checks the angles."""
 
     def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
         """`branches` for checked angles; None if there are none, or too many."""
@@ -233,10 +283,12 @@ class Law(ABC):
 
     @abstractmethod
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        """`conditionals` for checked arguments."""
+        """`conditionals` for checked arguments, of which it gets copies; called by `conditionals` only."""
 
     def _distinct(self, theta: Floats) -> tuple[Floats, NDArray[np.intp]]:
         """Angles among those given that have all their conditional distributions, and which of them each angle has."""
+        if self.is_lambertian:
+            return theta[:1], np.zeros(theta.size, dtype=np.intp)
         return theta, np.arange(theta.size)
 
     def _repr_html_(self) -> str:
@@ -372,6 +424,41 @@ class DrivenLaw(Law):
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         outgoing = self.reflect((np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS, theta[:, None])
         return Conditionals.of_atoms(outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS), np.nan)
+
+
+def answer_of(law: Law, method: Callable[..., T], theta: Floats, *wanted: object) -> T:
+    """What a method of a law, perhaps of a user, returns for a copy of the angles; its own failures name the law."""
+    try:
+        return method(theta.copy(), *wanted)
+    except (AsperityError, OutOfTime, MemoryError):
+        raise
+    except Exception as reason:
+        raise InputError(
+            f"{method.__name__} of {law!r} failed at theta = {shortened(theta)}: {type(reason).__name__}: {reason}"
+        ) from reason
+
+
+def outgoing_angles(found: ArrayLike, theta: Floats, law: Law) -> Floats:
+    """The outgoing angles that a law has drawn: one for each incoming angle, in (0, pi) up to rounding."""
+    plain = type(found) in (np.ndarray, np.float64) and np.asarray(found).dtype == np.float64
+    outgoing = np.asarray(found) if plain else numbers(f"outgoing angles of {law!r}", found)
+    if outgoing.shape != theta.shape:
+        raise InputError(f"outgoing angles of {law!r}: expected shape {theta.shape}, got {outgoing.shape}")
+    if outgoing.size and not (outgoing.min() > 0.0 and outgoing.max() < np.pi):
+        count = np.arange(outgoing.size + 1)
+        atoms = Conditionals(outgoing.ravel(), np.ones(outgoing.size), count, np.zeros(outgoing.size))
+        outgoing = checked_conditionals(atoms, theta.ravel(), law).nodes.reshape(theta.shape)
+    return outgoing
+
+
+def checked_conditionals(found: Conditionals, theta: Floats, law: Law) -> Conditionals:
+    """The conditional distributions that a law has found, if they are distributions on (0, pi)."""
+    if not isinstance(found, Conditionals):
+        raise InputError(f"_conditionals of {law!r}: expected ker.Conditionals, got {shortened(found)}")
+    fault = found.fault(theta.size)
+    if fault is not None:
+        raise InputError(f"law {law!r}: expected {fault[1]} at theta = {theta[fault[0]]:g}")
+    return found._replace(nodes=clipped_inside(found.nodes))
 
 
 def as_weight(weight: object) -> float | None:
@@ -545,7 +632,10 @@ class Combination(Law):
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         wanted = theta, tolerance, degree, edges
-        return Conditionals.mixed([(weight, law._conditionals(*wanted)) for weight, law in self.parts])
+        return Conditionals.mixed([(weight, law.conditionals(*wanted)) for weight, law in self.parts])
+
+    def _mean(self, given: Piecewise, theta: Floats) -> Floats:
+        return np.asarray(sum(weight * law._mean(given, theta) for weight, law in self.parts))
 
     def __repr__(self) -> str:
         return " + ".join(f"{weight:.12g}*{as_factor(law)}" for weight, law in self.terms)
@@ -595,7 +685,6 @@ class _Chain(Law):
         return _breakpoints_of_chain(self.factors(), limit)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        theta = theta.copy()
         for law in self.factors():
             theta = law.sample(theta, rng)
         return theta
@@ -611,24 +700,53 @@ class _Chain(Law):
         laws = self.factors()
         return next((k for k, law in enumerate(laws) if not is_atomic(law)), len(laws))
 
+    def _refuse_long(self, factors: int, values: int = 0) -> None:
+        if factors > LONGEST_CHAIN:
+            raise InputError(f"apply: expected at most {LONGEST_CHAIN} factors; use discretise(law, basis) ** n")
+        if values > MOST_VALUES:
+            raise InputError(
+                f"apply: {self!r} needs over {MOST_VALUES:.0e} outgoing angles; use discretise() and compose the "
+                "matrices, or fewer angles at a time"
+            )
+
+    def _leaves(self) -> Iterator[Law]:
+        """The laws in their order of application, without compositions and powers among them."""
+        for law in self.factors():
+            yield from law._leaves() if isinstance(law, _Chain) else (law,)
+
+    def _mean(self, given: Piecewise, theta: Floats) -> Floats:
+        """The means; those under the later laws are replaced by polynomials, unless all earlier laws are atoms."""
+        laws = tuple(islice(self._leaves(), LONGEST_CHAIN + 1))
+        first = next((k for k, law in enumerate(laws) if not is_atomic(law)), None)
+        if first is None or self._branches(theta[:1]) is not None:
+            return super()._mean(given, theta)
+        for k in range(len(laws) - 1, first, -1):
+            # an interval is halved about once; a Lambertian law has one distribution for all angles
+            parts = [
+                law.conditionals(theta[:1], edges=given.edges) for _, law in laws[k].parts if not law.is_lambertian
+            ]
+            each = 2 * WITH_POLYNOMIAL * SEEN.size * max(1, sum(part.nodes.size for part in parts))
+            self._refuse_long(len(laws), each * INTERVALS_OF_MEANS * (len(laws) - first))
+            most = min(MOST_VALUES // (each * (len(laws) - first)), MOST_OF_MEANS + given.edges.size)
+            after = partial(_means_of, laws[k], given)
+            given = Piecewise.mean_of(given, after, _breakpoints_of_start(laws[k:]), most)
+        if first == 0:
+            return laws[0]._mean(given, theta)
+        return Composition(laws[:first]).conditionals(theta).mean(partial(_means_of, laws[first], given))
+
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """The conditional distributions; means under a law are cut at the next law's breakpoints."""
         laws = self.factors()
         branches = self._branches(theta)
         if branches is not None:
             return Conditionals.of_atoms(branches[1], branches[0], self._error_of_atoms)
-        if len(laws) > LONGEST_CHAIN:
-            raise InputError(f"apply: expected at most {LONGEST_CHAIN} factors; use discretise(law, basis) ** n")
+        self._refuse_long(len(laws))
         found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)), 0.0)
         cuts = [*(_breakpoints_of_start(laws[k:]) for k in range(1, len(laws))), edges]
         rules = [_conditionals_of(law, tolerance, degree, cut) for law, cut in zip(laws, cuts, strict=True)]
         each = [rule(theta[:1]).nodes.size for rule in rules]
         for index, rule in enumerate(rules):
-            if math.prod(each[index:], start=found.nodes.size) > MOST_VALUES:
-                raise InputError(
-                    f"apply: {self!r} needs over {MOST_VALUES:.0e} outgoing angles for {theta.size} incoming ones; use "
-                    "discretise() and compose the matrices, or fewer angles at a time"
-                )
+            self._refuse_long(0, math.prod(each[index:], start=found.nodes.size))
             found = found.followed_by(rule, index <= self._atomic_factors)
         return found
 
@@ -771,7 +889,7 @@ def is_atomic(law: Law) -> bool:
 
 def has_fixed_nodes(law: Law) -> bool:
     """Whether conditional distributions have the same nodes for all functions: they are atoms, or those of samples."""
-    whole, cut = (law._conditionals(PROBE, PROBE_TOLERANCE, degree, edges) for degree, edges in PROBE_FUNCTIONS)
+    whole, cut = (law.conditionals(PROBE, PROBE_TOLERANCE, degree, edges) for degree, edges in PROBE_FUNCTIONS)
     return np.array_equal(whole.nodes, cut.nodes)
 
 
@@ -787,7 +905,7 @@ def _with_atoms(law: Law, tolerance: float) -> WithAtoms:
     fixed = has_fixed_nodes(law)
 
     def given_and_atoms(theta: Floats, edges: Floats) -> tuple[Conditionals, NDArray[np.bool_]]:
-        given = law._conditionals(theta, tolerance, 0, edges)
+        given = law.conditionals(theta, tolerance, 0, edges)
         return given, np.ones(given.nodes.shape, dtype=bool) if fixed else is_flat_top(law, theta, given)
 
     return given_and_atoms
@@ -812,11 +930,16 @@ def knows_errors(law: Law) -> bool:
 
 
 def _probe(law: Law) -> Conditionals:
-    return law._conditionals(PROBE, PROBE_TOLERANCE, 0, np.empty(0))
+    return law.conditionals(PROBE, PROBE_TOLERANCE, 0)
+
+
+def _means_of(law: Law, given: Piecewise, theta: Floats) -> Floats:
+    mean = law._mean(given, theta.ravel())
+    return mean.reshape(theta.shape + mean.shape[1:])
 
 
 def _conditionals_of(law: Law, tolerance: float, degree: int, edges: Floats) -> Callable[[Floats], Conditionals]:
-    return lambda theta: law._conditionals(theta, tolerance, degree, edges)
+    return lambda theta: law.conditionals(theta, tolerance, degree, edges)
 
 
 @dataclass(frozen=True, repr=False)
@@ -889,7 +1012,7 @@ class SpecularFrame(Law):
         return mirrored_angle(self.law.sample(theta, rng))
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
-        return self.law._conditionals(theta, tolerance, degree, np.pi - edges[::-1]).mirrored()
+        return self.law.conditionals(theta, tolerance, degree, np.pi - edges[::-1]).mirrored()
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)}.in_specular_frame()"

@@ -106,15 +106,15 @@ class PositionLaw(Summary):
                 outgoing[here] = law.sample(incoming[here], source)
         return outgoing
 
-    def apply(self, function: PositionFunction, x: ArrayLike, theta: ArrayLike) -> Floats:
-        """The expectation E[f(x', Theta') | x, theta] of a vectorised f(x, theta), with x' = x."""
+    def apply(self, function: PositionFunction, x: ArrayLike, theta: ArrayLike, edges: ArrayLike = ()) -> Floats:
+        """The expectation E[f(x', Theta') | x, theta] of a vectorised f(x, theta), with x' = x, as `Law.apply`."""
         at, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
         flat, value = at.ravel(), np.empty(at.size)
         where, directions = self.interval(flat), incoming.ravel()
         for position in np.unique(flat):
             here = flat == position
             law = self.laws[int(where[here][0])]
-            value[here] = law.apply(Vectorised(partial(function, position), scalar=True), directions[here])
+            value[here] = law.apply(Vectorised(partial(function, position), scalar=True), directions[here], edges)
         return value.reshape(at.shape)
 
     def interval(self, x: Floats) -> NDArray[np.intp]:

@@ -22,7 +22,7 @@ from ...core.version import __version__
 from ...core.workers import BACKLOG, connected, in_order, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
-from ..laws.law import DrivenLaw, Law, entry_inside
+from ..laws.law import DrivenLaw, Law, entry_inside, outgoing_angles
 from ..walls.wall_law import WallLaw
 from .rays import RaySums
 
@@ -152,8 +152,8 @@ class IndependentRays(Job):
         reflect = self.law.random_map() if isinstance(self.law, DrivenLaw) and not closed else None
         if reflect is None:
             return theta, self.law.sample(theta, own), None
-        outgoing, escaped = reflect(entry_inside(own.random(theta.shape)), theta)
-        return theta, outgoing, escaped
+        outgoing, escaped = reflect(entry_inside(own.random(theta.shape)), theta.copy())
+        return theta, outgoing_angles(outgoing, theta, self.law), escaped
 
     def identity(self) -> dict[str, Any]:
         return {

@@ -16,7 +16,7 @@ from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..bases.mirror import is_mirror_symmetric
-from ..laws.law import Law, entry_inside
+from ..laws.law import Law, entry_inside, outgoing_angles
 from ..matrices.matrix import KernelMatrix
 from . import chunks
 from .chunks import Job, count_long
@@ -95,9 +95,9 @@ class SobolRays(Job):
             points = (digits ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS
             x, u = np.moveaxis(points + self.beyond[:, None], -1, 0)
             theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
-            outgoing, escaped = reflect(entry_inside(x), theta)
+            outgoing, escaped = reflect(entry_inside(x), theta.copy())
             sums.count_unresolved(escaped)
-            sums.add_rows(first, theta, outgoing)
+            sums.add_rows(first, theta, outgoing_angles(outgoing, theta, self.law))
 
     def identity(self) -> dict[str, Any]:
         return {

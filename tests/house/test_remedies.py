@@ -59,6 +59,14 @@ REMEDIES = {
         lambda: geo.trace(WALL, X[1:4], [0.5, 1.0]),
         lambda: geo.trace(WALL, X[1:4][:, None], [0.5, 1.0]),
     ),
+    "divide it by its integral, or give angles beside a peak": (
+        lambda: ker.Conditionals.of_density(lambda a, b: np.sin(b), [1.0], 2, ()),
+        lambda: ker.Conditionals.of_density(lambda a, b: np.sin(b) / 2.0, [1.0], 2, ()),
+    ),
+    "give the angles where it is not smooth as edges=": (
+        lambda: LAW.apply(lambda x: np.floor(2000.0 * x), 1.0),
+        lambda: LAW.apply(lambda x: np.floor(2000.0 * x), 1.0, edges=np.arange(1.0, 6284.0) / 2000.0),
+    ),
     "moves as Disk(mass=": (lambda: geo.Disk(2.0, 1.0, radius=2.0), lambda: geo.Disk(mass=2.0, inertia=0.25)),
     "pass the period or complete the path": (
         lambda: geo.Wall([geo.Segment((0, 0), (2, 0))]),

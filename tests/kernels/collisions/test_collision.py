@@ -103,7 +103,7 @@ def test_functions_are_taken_at_the_turned_angles(shape: str, monkeypatch) -> No
     calls = []
     apply = ker.TriangularTeethLaw.apply
     monkeypatch.setattr(
-        ker.TriangularTeethLaw, "apply", lambda law, f, at: calls.append(np.size(at)) or apply(law, f, at)
+        ker.TriangularTeethLaw, "apply", lambda law, f, at, edges: calls.append(np.size(at)) or apply(law, f, at, edges)
     )
     # retroreflection and specular reflection are known, so are their halves
     for law, image in (
