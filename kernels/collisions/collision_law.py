@@ -172,9 +172,9 @@ class VelocityLaw(TensorLaw):
         pi - psi, and psi in a term without flip. ``edges`` are outgoing theta at which f is not smooth; raises an
         AccuracyError if halving does not resolve f in theta.
         """
-        pairs = broadcast(theta=angles("theta", theta), psi=angles("psi", psi))
-        checked = Vectorised(function, scalar=True)
-        terms = [weight * _expectation(law, flip, checked, *pairs, edges) for weight, law, flip in self.parts_checked()]
+        first, second = broadcast(theta=angles("theta", theta), psi=angles("psi", psi))
+        given = Vectorised(function, scalar=True)
+        terms = [w * _expectation(law, flip, given, first, second, edges) for w, law, flip in self.parts_checked()]
         return np.asarray(sum(terms[1:], terms[0]))
 
     def apply_to_states(

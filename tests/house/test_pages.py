@@ -152,7 +152,8 @@ def test_the_slower_examples_agree_with_what_is_known(run, name):
             least, _, mixed, half, most = (float(passing[key][-1]) for key in (
                 "grooves across", "diffuse", "Maxwell, 80 % diffuse", "grooves at random", "grooves along",
             ))  # fmt: skip
-            assert least < clausing < mixed < half < most == pytest.approx(1.0)
+            # of an interval that ends at 1 the middle is given
+                assert least < clausing < mixed < half < most == pytest.approx(1.0, abs=3e-5)
     elif name == "two_laws_compared":
         distances = [float(found) for found in names["distances"]]
         # the distance is convex in the fraction
