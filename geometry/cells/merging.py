@@ -22,6 +22,8 @@ SAME_PIECE = 64.0 * EPS
 # Joints lie on one side within this distance, relative to the largest x and the largest y: a point of a side is
 # computed by three operations, and a wall is moved and stretched after that.
 ON_SIDE = 8.0 * EPS
+# No part is shorter than this, relative to the wall's size: the end of a plate that is thinner has no direction.
+SHORTEST = 1e-12
 # Radians between the angles at which parts of one ellipse meet; what is tested here first is only whether they may be.
 SAME_ANGLE = 1e-6
 # Parameters at which the parts are compared with the whole curve.
@@ -60,7 +62,9 @@ def _between(start: Floats, points: Floats, end: Floats, size: Floats) -> NDArra
     step, whole = points - start, end - start
     along, across = np.sum(step * whole, axis=1), step[:, 0] * whole[:, 1] - step[:, 1] * whole[:, 0]
     near = np.abs(across) <= ON_SIDE * (np.abs(whole) @ size[::-1])
-    return np.asarray(near & (along > 0.0) & (along < np.sum(whole**2, axis=1)))
+    length = np.hypot(*whole.T)
+    least = SHORTEST * size.max() * length
+    return np.asarray(near & (along > least) & (along < length**2 - least))
 
 
 def _whole(parts: tuple[Curve, ...], size: Floats) -> list[Curve]:

@@ -153,7 +153,7 @@ def test_the_slower_examples_agree_with_what_is_known(run, name):
                 "grooves across", "diffuse", "Maxwell, 80 % diffuse", "grooves at random", "grooves along",
             ))  # fmt: skip
             # of an interval that ends at 1 the middle is given
-                assert least < clausing < mixed < half < most == pytest.approx(1.0, abs=3e-5)
+            assert least < clausing < mixed < half < most == pytest.approx(1.0, abs=3e-5)
     elif name == "two_laws_compared":
         distances = [float(found) for found in names["distances"]]
         # the distance is convex in the fraction
