@@ -23,7 +23,7 @@ from ...kernels.walls.wall_law import traced_wall
 # Laws whose images of polynomials are computed to rounding.
 ROUNDED = HenyeyGreensteinLaw, LambertianLaw
 # Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays.
-ANGLES_AT_ONCE, NODE_TIME = 512, 4e-7
+ANGLES_AT_ONCE, NODE_TIME = 512, 3e-7
 
 
 def suits_panels(law: Law) -> bool:

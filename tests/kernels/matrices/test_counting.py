@@ -154,9 +154,10 @@ def test_quantiles_of_norms_are_those_of_chi_squares() -> None:
 def test_the_squared_error_has_the_moments_of_a_dirichlet_distribution(counts: list[int]) -> None:
     expected, weight = np.array([0.5, 0.25, 0.25]), np.array([2.0, 4.0, 4.0])
     drawn, number = np.array(counts), sum(counts)
-    mean, variance = counting._squared_norms([(drawn[None], weight, expected)], np.array([number]))
+    mean, variance = counting._squared_norms([(drawn[None], weight, expected)], np.array([number]), np.array([counting.PRIOR]))
     fractions = np.random.default_rng(3).dirichlet(drawn + counting.PRIOR * expected, 400_000)
     square = ((fractions - drawn / number) ** 2) @ weight
+    # the covariance is that of so many draws from the mean
     most = 1.0 + (counting.PRIOR + 1.0) / number
     assert 0.99 <= mean[0] / np.mean(square) < 1.01 * most
     assert 0.95 <= np.sqrt(variance[0]) / np.std(square) < 1.05 * most**2
@@ -192,7 +193,7 @@ def test_the_variance_of_the_squared_error_is_that_of_binomials(number: int, fra
     with np.errstate(all="raise", under="ignore"):
         counts = np.stack([first, number - first], axis=1)
         cells = counts, np.array([1.0, 2.0]), np.array([0.5, 0.5])
-        _, found = counting._squared_norms([cells], np.full(number + 1, number))
+        _, found = counting._squared_norms([cells], np.full(number + 1, number), np.full(number + 1, 1.0))
     likely = binom.pmf(first, number, fraction)
     square = 3.0 * (first / number - fraction) ** 2
     exact = likely @ square**2 - (likely @ square) ** 2

@@ -122,15 +122,16 @@ def test_an_event_that_no_ray_meets_is_within_the_errors(method) -> None:
 
 
 def test_rays_that_all_go_to_one_cell_leave_the_error_of_events_that_none_met() -> None:
-    # the cells below and above pi/2 are exchanged: counts have no variance
-    missed = 1.0 - 0.05 ** (1.0 / 4096.0)
+    # the cells below and above pi/2 are exchanged: counts have no variance, and of independent pairs each row has had
+    # one pair of the Lambertian law too
+    missed, more = 1.0 - 0.05 ** (1.0 / 4096.0), {"qmc": 1.0, "monte-carlo": 1.3}
     basis = ker.Bins([0.0, 0.5 * np.pi, np.pi])
     law = ker.InvolutionLaw(lambda theta: np.pi - np.asarray(theta))
     for method in ("qmc", "monte-carlo"):
         found = ker.discretise(law, basis, method=method, samples=4096)
         exact = np.array([[0.0, 1.0], [1.0, 0.0]])
         assert np.linalg.norm(found.symmetric - exact) < 1e-13
-        assert float(found.error) == pytest.approx(2.0 * missed, rel=1e-9)
+        assert 1.0 - 1e-9 <= float(found.error) / (2.0 * missed) <= more[method] + 1e-9
 
 
 REPEATS = 60
