@@ -306,7 +306,8 @@ def _squared_norms(
     The cells j come block by block, each as C, w and the probabilities q of the Lambertian law. Before the counts p
     has a Dirichlet distribution with the parameters m q, m the ``prior`` number of pairs, afterwards with C + m q: so
     cells that no pair met, and single pairs, have an error too. The covariance is taken as that of N draws from the
-    mean, which exceeds Dirichlet's by (m + 1) / N: with the latter 160 pairs in 16 cells are covered in 61 % instead of 93 %.
+    mean, which exceeds Dirichlet's by (m + 1) / N: with the latter 160 pairs in 16 cells are covered in 61 % instead
+    of 93 %.
     """
     number = np.asarray(number, dtype=np.float64)  # the square of a number of pairs can exceed int64
     total = number + prior

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 # Grazing angles in units of the scale of the wall. At the smallest one the outgoing angle, with an error of some 1e-15,
 # has seven digits.
 ANGLES = 10.0 ** -np.arange(3.0, 9.0)
+# Degree of the rules for means of ratios of sines.
+DEGREE = 256
 # A unit tangent with a smaller horizontal part counts as vertical: rounding of some ten operations.
 VERTICAL = 64.0 * EPS
 # The end of a hollow counts as straight until its tangent has turned by this angle; halvings to find this point.
@@ -249,8 +251,8 @@ def _extrapolated(limits: list[list[tuple[Floats, float]]]) -> GrazingLimit:
 def _aitken(first: Floats, second: Floats, third: Floats, noise: float) -> Floats:
     """The limit of geometric convergence, or the last value if the steps are noise or do not decrease."""
     before, last = second - first, third - second
-    shrinks = (np.abs(last) > noise) & (np.abs(last) < 0.9 * np.abs(before)) & (before * last > 0.0)
-    step = np.divide(last * last, before - last, out=np.zeros_like(last), where=shrinks)
+    shrinks = (np.abs(last) > noise) & (np.abs(last) < 0.9 * np.abs(before)) & ((before > 0.0) == (last > 0.0))
+    step = last * np.divide(last, before - last, out=np.zeros_like(last), where=shrinks)
     return np.maximum(third + step, 0.0)
 
 
@@ -277,7 +279,8 @@ def _at_angle(law: Law, angle: float, end: int, parts: tuple[tuple[float, float]
         value, error = sum((part[0] for part in found), np.zeros(3)), sum(part[1] for part in found)
         value, error = value[:2], error + float(value[2])
     else:
-        value, error = law.apply(ratio, np.array([theta]))[0], 0.0
+        # not by `apply`, whose nodes come so near to 0 and pi that laws round them there
+        value, error = law.conditionals([theta], degree=DEGREE).mean(ratio)[0], 0.0
         if isinstance(law, DensityLaw):
             error = float(angle)
     return value, error + ANGLE_ROUNDING / angle

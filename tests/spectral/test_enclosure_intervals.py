@@ -184,8 +184,8 @@ RANK = ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]])  # .4 beyond the constants
         (FRACTION, [1, 0.98], [0, 0.1], 0.9, (1, 0.75, "bound")),
         (FRACTION, [1, 0.9], [0.5, 0.001], 0.1, (0, 0.75, "bound")),
         (FRACTION, [1, 0.9], [0.5, 0.001], 0.8, (0, 0.75, "bound")),
-        (RANK, [1, 0.5], [0, 0.125], 0.375, (1, 0.4, "estimate")),
-        (RANK, [1, 0.125], [0, 0.125], -1.0, (1, 0.4, "estimate")),
+        (RANK, [1, 0.5], [0, 0.125], 0.375, (1, 0.4, "bound")),
+        (RANK, [1, 0.125], [0, 0.125], -1.0, (1, 0.4, "bound")),
     ],
 )
 def test_the_largest_number_that_stays_beyond_the_rest(law, quotients, norms, next_value, expected):

@@ -154,7 +154,8 @@ def test_quantiles_of_norms_are_those_of_chi_squares() -> None:
 def test_the_squared_error_has_the_moments_of_a_dirichlet_distribution(counts: list[int]) -> None:
     expected, weight = np.array([0.5, 0.25, 0.25]), np.array([2.0, 4.0, 4.0])
     drawn, number = np.array(counts), sum(counts)
-    mean, variance = counting._squared_norms([(drawn[None], weight, expected)], np.array([number]), np.array([counting.PRIOR]))
+    prior = np.array([counting.PRIOR])
+    mean, variance = counting._squared_norms([(drawn[None], weight, expected)], np.array([number]), prior)
     fractions = np.random.default_rng(3).dirichlet(drawn + counting.PRIOR * expected, 400_000)
     square = ((fractions - drawn / number) ** 2) @ weight
     # the covariance is that of so many draws from the mean
