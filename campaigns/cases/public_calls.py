@@ -214,7 +214,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "fit_order": {"size": [1, 2, 4], "error": [1.0, 0.5, 0.25], "repeats": None},
     "good_fraction": {"samples": 10},
     "limit_study": {"scales": [0.1, 0.05, 0.02], "psi": 1.2, "limit": None, "samples": (2, 2, 2)},
-    "mixing_time": {"distance": "total variation"},
+    "mixing_time": {"distance": "total variation", "start": "density"},
     "notched_angle": {"angle": 0.5},
     "play": {"laws": COLLISION, "container": STRIP, "position": [[0.0, 0.0]], "velocity": [[1.0, 1.0, 0.0]],
              "collisions": 2},

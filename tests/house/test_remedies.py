@@ -92,6 +92,10 @@ REMEDIES = {
         lambda: geo.Container.from_curves([CUSP, *ROOF]),
         lambda: geo.Container.from_curves([*CUSP.split(0.5), *ROOF]),
     ),
+    "for one of a matrix on bins pass ker.discretise(law, ker.Bins(64))": (
+        lambda: spec.mixing_time(ker.henyey_greenstein(0.5), start="worst"),
+        lambda: spec.mixing_time(ker.discretise(ker.henyey_greenstein(0.5), ker.Bins(64)), start="worst"),
+    ),
     "use P.tensor(Q)": (lambda: ker.discretise(LAW, ker.TensorBasis((ker.Bins(2), ker.Bins(2)))), lambda: P.tensor(P)),
     "use kind='pseudometric'": (
         lambda: ker.distance(*2 * (ker.discretise(LAW, ker.Legendre(4)),)),
