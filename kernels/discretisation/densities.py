@@ -42,8 +42,8 @@ MIRROR_TOLERANCE = 4.0 * EPS * np.pi
 CONDITIONAL_CHUNK = 2**17
 # Grading of intervals at the jumps of a map, where it may have square-root singularities if it maps from or to grazing.
 GRADING = 0.25 ** np.arange(1.0, 17.0)
-# Near kinks that nobody has told two levels may agree by chance, but not three; their differences fall by ORDER or more,
-# and the error has this margin.
+# Near kinks that nobody has told two levels may agree by chance, but not three: their differences fall by ORDER or
+# more, and the error has this margin.
 ORDER, MARGIN, ROUNDED = 4.0, 4.0, 1e-13
 
 
