@@ -112,6 +112,8 @@ class Conditionals(NamedTuple):
         degree, allowed = whole_number("degree", degree, 0), positive_number("tolerance", tolerance)
         known = np.append(edges, shaped("breakpoints", () if breakpoints is None else breakpoints, "n"))
         given = Vectorised(density, scalar=True)
+        if not theta.size:
+            return cls.of_atoms(np.empty((0, 1)), np.empty((0, 1)), 0.0)
 
         def values(row: NDArray[np.intp], angle: Floats) -> Floats:
             found = given(theta[row].reshape(-1, *(1,) * (angle.ndim - 1)), angle)
