@@ -36,6 +36,13 @@ def values(trial, theta, odd=True):
     return sum(float(c) * function for c, function in zip(trial, functions, strict=True))
 
 
+@pytest.fixture(autouse=True)
+def precision():
+    """That of the library of balls, which the checker alone sets for itself, and leaves."""
+    with checker.ctx.workprec(53):
+        yield
+
+
 @pytest.fixture(scope="module")
 def proof():
     """A coarse one, which takes a few seconds."""
