@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.lib import format as npy
 
-from ...core.checks import Floats, check_memory, whole_number
+from ...core.checks import SHOWN, Floats, check_memory, whole_number
 from ...core.errors import InputError
 from ...core.files import ending_in, regular_file, write_whole
 from ...core.tables import numbers_as_csv
@@ -102,7 +102,7 @@ def read(path: str | Path, restored: Callable[[Record, Stored, Basis], T]) -> T:
         if isinstance(reason, InputError) and str(source) in str(reason):
             raise
         raise InputError(
-            f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save ({reason})"
+            f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save ({str(reason)[:SHOWN]})"
         ) from reason
 
 
