@@ -99,11 +99,7 @@ def residuals(
             raise AccuracyError("rows without a known error are no ground for an enclosure", float("nan"))
         return expansion(basis, vectors, theta), images, errors
 
-    low, high = _first_panels(law, basis)
-    margin = 1.0
-    if not holds_of_all(law, _knows_breakpoints):
-        margin, cut = MARGIN, low + CUT * (high - low)
-        low, high = np.append(low, cut), np.append(cut, high)
+    low, high, margin = _first_panels(law, basis)
     if mirrored:
         inside = low < 0.5 * np.pi - HALF_ROUNDING
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
@@ -150,8 +146,11 @@ def _knows_breakpoints(law: Law) -> bool:
     return smooth or bool(np.isfinite(law.breakpoints(1)[1]))
 
 
-def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
-    """Panels between the edges of the basis and near grazing; for densities also between their breakpoints."""
+def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats, float]:
+    """Panels between the edges of the basis and near grazing, for densities also between their breakpoints; a margin.
+
+    The differences of two rules on the panels are to be multiplied by the margin.
+    """
     edges = [basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES]
     for part in {part for word in words_of(law) or () for part in word}:
         if isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw):
@@ -159,7 +158,11 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
             edges += [part.outgoing_breakpoints, part.incoming_edges(basis.edges)]
             edges += [np.pi - one for one in edges[-2:]] if law.frame == "specular" else []
     joint = np.unique(np.clip(np.concatenate(edges), 0.0, np.pi))
-    return joint[:-1], joint[1:]
+    low, high = joint[:-1], joint[1:]
+    if holds_of_all(law, _knows_breakpoints):
+        return low, high, 1.0
+    cut = low + CUT * (high - low)
+    return np.append(low, cut), np.append(cut, high), MARGIN
 
 
 def _integrals(
