@@ -29,7 +29,8 @@ import sympy as sp
 
 import asperity
 from asperity.geometry.disk import disk, rolling
-from asperity.kernels.walls import circular_arc, triangular
+from asperity.kernels.walls import circular_arc
+from asperity.kernels.walls import polygons as triangular
 from asperity.ledger import Entry
 from asperity.ledger import index as ledger
 from campaigns.cases.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY

@@ -24,7 +24,7 @@ from asperity.core.errors import AccuracyError
 from asperity.kernels.aerodynamics import drag
 from asperity.kernels.discretisation.method import Budget, MethodName
 from asperity.kernels.laws.law import DrivenLaw
-from asperity.spectral.eigenvalues.standard_errors import sampling_errors, sampling_quantile
+from asperity.spectral.eigenvalues.spectra import sampling_errors, sampling_quantile
 from asperity.study import check_tracer
 from campaigns.engine import Campaign, Judged
 

@@ -28,9 +28,9 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench.references import known_reference
 from asperity.geometry.polygons.beams import beams_of
-from asperity.kernels.discretisation.isometry_tables import table_matrix
-from asperity.kernels.walls.polygon import table_of_beams
-from asperity.spectral.work_diagrams.machine import Machine
+from asperity.kernels.discretisation.isometries import table_matrix
+from asperity.kernels.walls.polygons import table_of_beams
+from asperity.spectral.work_diagrams.problem import Machine
 from campaigns.judges import precise_triangular
 
 from ..pages import print_table

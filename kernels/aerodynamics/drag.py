@@ -15,10 +15,10 @@ from ...core.estimates import Estimate, Summary, student_95
 from ...core.long_runs import TIME_LIMIT, reported
 from ...geometry.scene.scene import SEGMENT_TIME
 from ..bases.basis import Basis
-from ..bases.directions import Directions
 from ..bases.given import Vectorised
 from ..bases.measure import SINE, gauss_rule
-from ..bases.panels import Panels
+from ..bases.partitions import Panels
+from ..bases.polynomials import Directions
 from ..discretisation.method import Budget
 from ..discretisation.methods import matrix_by
 from ..laws.law import Law

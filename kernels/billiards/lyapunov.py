@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent of a disk in a container with smooth and no-slip walls."""
+"""The largest Lyapunov exponent of a disk in a container with smooth and no-slip walls, from starts in equilibrium."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from ...core.long_runs import reported
 from ...geometry import Container
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.collision_law import CollisionLaw
-from ..collisions.velocity_matrices import no_slip_matrix, smooth_matrix
+from ..collisions.operator import no_slip_matrix, smooth_matrix
 from ..laws.law import IsometryLaw
 from .billiard import Reflector, laws_of_walls
-from .equilibrium import equilibrium_starts
 
 if TYPE_CHECKING:
+    from ...geometry import Disk
     from ...geometry.tables.boundary import Touch
 
 # The exponent is measured between the last two of these fractions of the collisions, and for comparison between the
@@ -226,3 +226,27 @@ def _times(matrices: Floats, vectors: Floats) -> Floats:
 def _quarter_turn(velocity: Floats) -> Floats:
     """Z u: the derivative of u with respect to a rotation of (v1, v2)."""
     return np.stack([-velocity[:, 1], velocity[:, 0], np.zeros(len(velocity))], axis=1)
+
+
+def equilibrium_starts(
+    container: Container, disk: Disk, count: int, spinning: bool, rng: np.random.Generator
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Draw starts on the boundary: positions (n, 2), outgoing velocities (n, 3) and walls (n,).
+
+    Positions are uniform in arc length. Velocities have the energy of speed 1 without spin; their density is the normal
+    velocity, on the half circle, or with spin on the half sphere in the kinetic metric. Every deterministic or
+    symmetric law of the walls preserves this measure (Rudzis 2022, Lemma 6.2).
+    """
+    # without an outer loop there is no perimeter
+    position, wall = container.point_at(container.perimeter * rng.random(count))
+    tangent, normal = container.frames(position, wall)
+    if spinning:
+        radius, angle = np.sqrt(rng.random(count)), rng.uniform(0.0, 2.0 * math.pi, count)
+        along, spin = radius * np.cos(angle), radius * np.sin(angle)
+        up = np.sqrt(np.maximum((1.0 - radius) * (1.0 + radius), 0.0))
+    else:
+        along, spin = rng.uniform(-1.0, 1.0, count), np.zeros(count)
+        up = np.sqrt((1.0 - along) * (1.0 + along))
+    plane = along[:, None] * tangent + up[:, None] * normal
+    omega = spin * math.sqrt(disk.mass / disk.inertia)
+    return position, np.concatenate([plane, omega[:, None]], axis=1), wall

@@ -32,11 +32,11 @@ from ...geometry import Disk, Wall
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.given import Vectorised, seed_by_name
-from ..bases.legendre import Legendre
+from ..bases.polynomials import Legendre
 from ..laws.law import Combination, Law, as_weight, retroreflection, specular
 from ..laws.tensor_law import Discretiser, TensorLaw, Term, checked_pair
-from ..walls.isometry_branches import isometries
-from .velocity_matrices import isometry_matrix
+from ..walls.wall_law import isometries
+from .operator import isometry_matrix
 
 if TYPE_CHECKING:
     from ..matrices.defects import SymmetryDefect
@@ -271,7 +271,7 @@ class VelocityLaw(TensorLaw):
     def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
         """The matrix on a basis of products e_i(theta) f_j(psi): the sum of the tensor products of its terms."""
         from ...core.estimates import Estimate
-        from ..bases.mirror import reflection_matrix
+        from ..bases.assembly import reflection_matrix
         from ..matrices.matrix import KernelMatrix
 
         theta_basis, psi_basis = checked_pair(basis).factors

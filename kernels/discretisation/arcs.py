@@ -11,12 +11,11 @@ from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside, mirrored_angle
-from ..bases.assembly import add_blocks, add_masses
+from ..bases.assembly import add_blocks, add_masses, is_mirror_symmetric, mirror_image
 from ..bases.basis import Basis
 from ..bases.intervals import between_cuts, edges_inside, joined_lists
 from ..bases.measure import gauss_on_intervals
-from ..bases.mirror import is_mirror_symmetric, mirror_image
-from ..bases.panels import Panels
+from ..bases.partitions import Panels
 from ..matrices.matrix import KernelMatrix
 from ..walls.circular_arc import CircularArcLaw
 from .method import Budget, computed, rounding

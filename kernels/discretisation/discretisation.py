@@ -13,11 +13,11 @@ from ...core.checks import DOUBLE, Rng, check_memory, choice, finite_number, gen
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.long_runs import Engine, reported
+from ..bases.assembly import reflection_matrix
 from ..bases.basis import Basis, checked_basis
-from ..bases.bins import Bins
 from ..bases.measure import SINE
-from ..bases.mirror import reflection_matrix
-from ..bases.tensor import TensorBasis
+from ..bases.partitions import Bins
+from ..bases.spaces import TensorBasis
 from ..laws.law import IsometryLaw, Law
 from ..laws.matrix_law import MatrixLaw, finite_matrix
 from ..laws.structure import Rules, fold, holds_of_all
@@ -140,7 +140,7 @@ def discretise(
 
     Examples
     --------
-    >>> from asperity.kernels.bases.bins import Bins
+    >>> from asperity.kernels.bases.partitions import Bins
     >>> from asperity.kernels import maxwell
     >>> P = discretise(maxwell(0.5), Bins(2))
     >>> P.array.round(12).tolist(), P.method

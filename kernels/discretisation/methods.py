@@ -11,17 +11,13 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import InputError
+from ..bases.assembly import is_mirror_symmetric, mirror_image, mirror_refinement
 from ..bases.basis import Basis
-from ..bases.bins import Bins
-from ..bases.directions import Directions
-from ..bases.legendre import Legendre
-from ..bases.mirror import is_mirror_symmetric, mirror_image, mirror_refinement
-from ..bases.panels import Panels
+from ..bases.partitions import Bins, Panels
+from ..bases.polynomials import Directions, Legendre
 from ..laws.density import DensityLaw
-from ..laws.interval_exchange import IntervalExchangeLaw
-from ..laws.involution import InvolutionLaw
+from ..laws.deterministic import IntervalExchangeLaw, InvolutionLaw, LeastResistanceLaw
 from ..laws.law import Combination, Composition, Law, SpecularFrame, sum_of
-from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.matrix_law import acts_on_bins
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import LONGEST_WORD, has_chain, holds_of_all, lists_branches, multiplied_out
@@ -29,15 +25,20 @@ from ..matrices.defects import SymmetryDefect
 from ..matrices.matrix import KernelMatrix
 from ..walls.circular_arc import CircularArcLaw
 from ..walls.wall_law import WallLaw, traced_wall
-from .actions import by_conditionals, has_conditionals
 from .arcs import by_arc_polygons
-from .densities import by_blocks, by_density, by_eigenvalues, by_interval_masses, by_map
-from .isometries import by_branches
-from .isometry_tables import by_isometry_table
-from .method import Budget, Method, MethodName
+from .isometries import by_branches, by_isometry_table
+from .method import Budget, Method, MethodName, by_independent_rays, by_sobol_rays
 from .products import by_panels
+from .quadrature import (
+    by_blocks,
+    by_conditionals,
+    by_density,
+    by_eigenvalues,
+    by_interval_masses,
+    by_map,
+    has_conditionals,
+)
 from .rays_or_conditionals import by_rays_or_conditionals
-from .sampled import by_independent_rays, by_sobol_rays
 from .traced import by_adaptive_angles
 
 # Methods without rays, except the first. The docstring of `discretise` states the table in this order.

@@ -12,10 +12,10 @@ from ...core.checks import Floats
 from ...core.errors import InputError
 from ..bases.assembly import one_blas_thread
 from ..bases.basis import Basis
-from ..bases.legendre import Legendre
 from ..bases.measure import SINE
-from ..bases.panels import Panels
-from ..laws.involution import InvolutionLaw, jumps_of_map
+from ..bases.partitions import Panels
+from ..bases.polynomials import Legendre
+from ..laws.deterministic import InvolutionLaw, jumps_of_map
 from ..laws.law import Combination, Law
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import lists_branches

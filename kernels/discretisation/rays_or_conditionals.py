@@ -6,13 +6,12 @@ from dataclasses import replace
 
 from ...core.errors import AccuracyError
 from ..bases.basis import Basis
-from ..bases.panels import Panels
+from ..bases.partitions import Panels
 from ..matrices.matrix import KernelMatrix
 from ..sampling.sobol import SobolSampler
 from ..walls.wall_law import FEW_PIECES, WallLaw
-from .isometry_tables import by_isometry_table
-from .method import Budget
-from .sampled import sobol_matrix
+from .isometries import by_isometry_table
+from .method import Budget, sobol_matrix
 from .traced import by_adaptive_angles, first_segments
 
 # These rays take .02 to .1 s.

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, check_memory
 from ...core.rounding import EPS
+from ..bases.assembly import is_mirror_symmetric, mirror_image
 from ..bases.basis import Basis
-from ..bases.legendre import Legendre
-from ..bases.mirror import is_mirror_symmetric, mirror_image
+from ..bases.polynomials import Legendre
 from ..expectations.angle_panels import NODES, NORMAL, NULL_RULES, AnglePanels
 from ..matrices.matrix import KernelMatrix
 from ..walls.cell_masses import CellMasses

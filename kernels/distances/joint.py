@@ -13,17 +13,16 @@ from ...core.checks import Floats
 from ...core.estimates import ErrorKind, Estimate
 from ...core.long_runs import progress_bar
 from ...core.rounding import EPS
-from ..bases.bins import Bins
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE
-from ..bases.panels import Panels
+from ..bases.partitions import Bins, Panels
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error, joint_kind
-from ..sampling.estimation import estimate
+from ..sampling.streams import estimate
 from .cell_transport import DIAGONAL, Cells, transport_bounds
-from .distributions import CellsAndAtoms, Term, Terms, cells_and_atoms, terms_of
-from .resampling import cell_middles, matrices_error, stochastic_rows
+from .conditional import CellsAndAtoms, Term, Terms, cells_and_atoms, terms_of
+from .transport import cell_middles, matrices_error, stochastic_rows
 
 # Limits on the pairs of occupied cells, at 100 bytes and some microseconds per pair, and on the cells along a side.
 MOST_PAIRS, MOST_CELLS = 2**21, 768

@@ -15,8 +15,7 @@ from ..expectations.angle_panels import GAUSS, KRONROD, SLOPES, STRETCHED
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .conditional import ConditionalDistance
-from .resampling import distance_of_rows, matrices_error, stochastic_rows
-from .transport import power_mean
+from .transport import distance_of_rows, matrices_error, power_mean, stochastic_rows
 
 # Panels of the incoming angle from 0 to pi on the coarsest level, breakpoints not counted, and breakpoints.
 PANELS, BREAKPOINTS = 32, 24

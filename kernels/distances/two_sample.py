@@ -12,7 +12,7 @@ from ...core.errors import InputError
 from ...core.estimates import Summary
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
-from .resampling import (
+from .transport import (
     all_distances,
     check_comparable,
     chunks,
@@ -21,8 +21,8 @@ from .resampling import (
     pooled_rows,
     rows_of_counts,
     stochastic_rows,
+    wasserstein_order,
 )
-from .transport import wasserstein_order
 
 
 @dataclass(frozen=True, repr=False)

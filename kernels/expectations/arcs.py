@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ..bases.intervals import cell_among, joined_lists
-from ..bases.legendre import legendre_moments
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
-from ..bases.panels import Panels
+from ..bases.partitions import Panels
+from ..bases.polynomials import legendre_moments
 
 # Each interval with a constant number of hits N <= MOST_HITS has its own Gauss rule. Rays with more hits are a fraction
 # of about 1/(4 N^2), for theta within xi/N of xi. Their outgoing angle lies within xi/N of pi - xi (or xi), and its

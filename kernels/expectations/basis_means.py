@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ..bases.basis import Basis
-from ..bases.legendre import legendre_moments
 from ..bases.measure import gauss_rule
-from ..bases.panels import Panels
+from ..bases.partitions import Panels
+from ..bases.polynomials import legendre_moments
 
 # Angles on an interval at which the largest absolute value of functions is sought.
 HEIGHT_PROBES = 5

@@ -15,7 +15,7 @@ from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate
 from ..bases.given import Vectorised
 from ..bases.measure import SINE
-from ..laws.interval_exchange import IntervalExchangeLaw
+from ..laws.deterministic import IntervalExchangeLaw
 from ..laws.law import Law, specular
 from .mirror_layout import THICKNESS, MirrorGroup, arranged, mirror_groups
 

@@ -7,9 +7,9 @@ from os.path import exists
 from types import MappingProxyType
 
 from ...core.errors import InputError
-from ..laws.ideal import lambertian, maxwell
+from ..laws.density import lambertian, maxwell
+from ..laws.deterministic import LeastResistanceLaw
 from ..laws.law import Law, retroreflection, specular
-from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.phase_function import henyey_greenstein
 from ..matrices.matrix import KernelMatrix, load_matrix
 

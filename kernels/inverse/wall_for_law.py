@@ -26,8 +26,8 @@ from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...geometry import join_walls
 from ...geometry.cells.miniature import wall_miniature
-from ..bases.legendre import Legendre
 from ..bases.measure import SINE
+from ..bases.polynomials import Legendre
 from ..collisions.collision_law import CollisionLaw
 from ..discretisation.discretisation import discretise
 from ..distances.distances import Distance, distance
@@ -35,8 +35,15 @@ from ..laws.law import Law
 from ..laws.matrix_law import MatrixLaw, not_a_law
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
-from .hollows import UnitHollow, random_polygons, retroreflector, simple_hollows
-from .hull import few_weights, nearest_weights, possible_gain
+from .hollows import (
+    UnitHollow,
+    few_weights,
+    nearest_weights,
+    possible_gain,
+    random_polygons,
+    retroreflector,
+    simple_hollows,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,15 +1,15 @@
-"""Laws with a density p(theta, theta') with respect to d theta'."""
+"""Laws with a density p(theta, theta') with respect to d theta', among them the law of Lambert and its mixtures."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, common_shape, finite_array, frozen
+from ...core.checks import Floats, angles, common_shape, finite_array, frozen, number_between
 from ...core.errors import AccuracyError, InputError
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
@@ -17,10 +17,9 @@ from ..bases.angles import clipped_inside
 from ..bases.given import Vectorised
 from ..bases.measure import SINE, gauss_rule
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
-from .law import Law, set_properties
+from .law import Combination, Law, set_properties, specular
 
 DensityFunction = Callable[[Floats, Floats], Floats]
-
 # Tolerance for the integral 1 of a conditional density; it admits densities known to single precision.
 ROW_TOLERANCE = 1e-7
 # Rounding can make a zero density negative by this fraction of its largest value.
@@ -301,3 +300,56 @@ def _inverse_cdf(edges: Floats, value: Floats, draw: Floats) -> Floats:
     step = np.divide(2.0 * rest, left + root, out=np.zeros_like(rest), where=left + root > 0.0)
     outgoing: Floats = edges[cell] + np.minimum(step, width)
     return clipped_inside(outgoing)
+
+
+@dataclass(frozen=True, init=False, repr=False)
+class LambertianLaw(DensityLaw):
+    """The law whose outgoing angle has the density sin(theta')/2 for every incoming angle."""
+
+    reversible = True
+    mirror_symmetric = True
+    is_lambertian = True
+
+    def __init__(self) -> None:
+        """Takes no arguments."""
+
+    def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
+        """sin(theta')/2, in the shape to which the two arguments broadcast."""
+        incoming, outgoing = angle_pair(theta, theta_out)
+        return np.broadcast_to(SINE.density(outgoing), np.broadcast_shapes(incoming.shape, outgoing.shape))
+
+    def panels(self, theta: Floats) -> Floats:
+        """One panel."""
+        return np.broadcast_to([0.0, np.pi], (*finite_array("theta", theta).shape, 2))
+
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        return SINE.sample(theta.shape, rng)
+
+    def __repr__(self) -> str:
+        return "lambertian()"
+
+
+def lambertian() -> LambertianLaw:
+    """Diffuse reflection: theta' has the density sin(theta')/2 for every theta (Rudzis 2022, section 1.2.5).
+
+    Examples
+    --------
+    >>> round(float(lambertian().apply(lambda theta: np.cos(theta) ** 2, 1.0)), 14)
+    0.33333333333333
+    """
+    return LambertianLaw()
+
+
+def maxwell(diffuse_fraction: float) -> Combination:
+    """The law of Maxwell and Smoluchowski: diffuse with probability ``diffuse_fraction`` in [0, 1], else specular.
+
+    Let a be the diffuse fraction. In the paper's convention the eigenvalues are 1 on constants, 1 - a on even functions
+    of cos(theta) of mean zero, and -(1 - a) on odd functions. In the specular frame both are 1 - a.
+
+    Examples
+    --------
+    >>> maxwell(0.25)
+    0.25*lambertian() + 0.75*specular()
+    """
+    diffuse = number_between("diffuse_fraction", diffuse_fraction, 0.0, 1.0, closed="low high")
+    return diffuse * lambertian() + (1.0 - diffuse) * specular()

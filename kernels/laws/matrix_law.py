@@ -13,13 +13,20 @@ from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis, Frame
-from ..bases.bins import Bins
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE
+from ..bases.partitions import Bins
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from .density import NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw, angle_pair, not_invariant, split_panels
-from .ideal import LambertianLaw
+from .density import (
+    NEGATIVE_TOLERANCE,
+    SYMMETRY_TOLERANCE,
+    DensityLaw,
+    LambertianLaw,
+    angle_pair,
+    not_invariant,
+    split_panels,
+)
 from .law import Composition, IsometryLaw, Law, set_properties
 from .phase_function import HenyeyGreensteinLaw
 from .structure import Rules, fold, holds_of_all

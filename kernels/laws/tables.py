@@ -21,8 +21,7 @@ from ...core.tables import numbers_as_csv
 from ..bases.basis import Frame
 from ..bases.given import seed_by_name
 from ..bases.measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE
-from ..expectations.conditionals import Conditionals
-from ..expectations.distribution_functions import Distributions
+from ..expectations.conditionals import Conditionals, Distributions
 
 # Cells of equal angle whose masses give a distribution function: of coarse tables, and for each probability of others.
 LEAST_CELLS, CELLS_FOR_EACH = 512, 4

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from ...core.errors import InputError
 from ..bases.basis import Basis
-from ..bases.tensor import TensorBasis
+from ..bases.spaces import TensorBasis
 from ..matrices.matrix import KernelMatrix
 from .law import Law
 

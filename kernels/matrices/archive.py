@@ -19,11 +19,9 @@ from ...core.errors import InputError
 from ...core.files import ending_in, regular_file, write_whole
 from ...core.tables import numbers_as_csv
 from ..bases.basis import Basis
-from ..bases.bins import Bins
-from ..bases.legendre import Legendre
-from ..bases.panels import Panels
-from ..bases.tensor import TensorBasis
-from ..bases.zernike import Zernike
+from ..bases.partitions import Bins, Panels
+from ..bases.polynomials import Legendre
+from ..bases.spaces import TensorBasis, Zernike
 
 FORMAT, VERSION = "asperity kernel matrix", 1
 # Of a record, in characters; and of a byte of a deflated member, in bytes that it inflates to.

@@ -33,10 +33,10 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, html_table
 from ...core.frames import data_array, data_frame
 from ...core.rounding import EPS
+from ..bases.assembly import is_mirror_symmetric, mirror_image
 from ..bases.basis import AngleFunction, Basis, BasisOfPoints, Frame, checked_basis
-from ..bases.bins import Bins
-from ..bases.mirror import is_mirror_symmetric, mirror_image
-from ..bases.tensor import TensorBasis
+from ..bases.partitions import Bins
+from ..bases.spaces import TensorBasis
 from . import archive
 from .archive import Arrays, Record, Stored
 from .defects import STOCHASTIC_NORM, STOCHASTIC_NORM_CELLS, Defect, SymmetryDefect, relative_asymmetry

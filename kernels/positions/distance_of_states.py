@@ -10,10 +10,10 @@ from ...core.checks import Floats, Rng, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
 from ...geometry import Wall
-from ..bases.legendre import Legendre
 from ..bases.measure import SINE
+from ..bases.polynomials import Legendre
 from ..discretisation.discretisation import discretise
-from ..distances.pseudometric import flux_means
+from ..distances.distances import flux_means
 from .position_law import PositionLaw
 
 # Means of products of four cosines of orders up to this one at most are compared; the rest is less than 1.3e-4.

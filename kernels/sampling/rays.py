@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, check_memory
 from ...core.errors import AccuracyError
-from ..bases.assembly import LARGE, largest_square_sum
+from ..bases.assembly import LARGE, largest_square_sum, mirror_image
 from ..bases.basis import Basis
-from ..bases.mirror import mirror_image
 from ..laws.law import Law
 from ..matrices.defects import BLOCK
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from ..walls.traced_map import UNRESOLVED_TOLERANCE
+from ..walls.conditionals import UNRESOLVED_TOLERANCE
 from .counts import matrix_from_counts, matrix_from_sums, sums_of_rows, with_missed_events
 
 # Memory of sums of real numbers: the tables, their means, and the replicates.

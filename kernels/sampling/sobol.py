@@ -13,9 +13,9 @@ from ...core.checks import Floats
 from ...core.errors import InputError
 from ...core.long_runs import Engine
 from ..bases.angles import clipped_inside
+from ..bases.assembly import is_mirror_symmetric
 from ..bases.basis import Basis
 from ..bases.measure import SINE
-from ..bases.mirror import is_mirror_symmetric
 from ..laws.law import Law, entry_inside, outgoing_angles
 from ..matrices.matrix import KernelMatrix
 from . import chunks

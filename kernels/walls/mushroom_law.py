@@ -11,7 +11,7 @@ from ...core.checks import Floats, instance
 from ...geometry import MushroomGenerations
 from ..expectations.conditionals import Conditionals
 from ..laws.law import LARGEST, DrivenLaw, entry_points
-from .traced_map import if_escaped, traced_reflection
+from .conditionals import if_escaped, traced_reflection
 from .wall_law import WallLaw
 
 

@@ -8,11 +8,11 @@ from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE, count_time
 from ...core.rounding import EPS
 from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels
+from ...kernels.bases.assembly import is_mirror_symmetric, reflection_matrix
 from ...kernels.bases.intervals import cell_among
-from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
 from ...kernels.expectations.arcs import ArcMeans
 from ...kernels.expectations.basis_means import Means, functions_of, height_of, weighted_means
-from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.density import LambertianLaw
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.matrix_law import ENTRY_ROUNDING, MatrixLaw, uniform_on_bins
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw

@@ -12,12 +12,12 @@ from ...core.checks import Floats
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ...kernels import Basis, Bins, DensityLaw, Law, Panels
+from ...kernels.bases.assembly import mirror_refinement, reflection_matrix
 from ...kernels.bases.measure import SINE
-from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
-from ...kernels.discretisation.actions import GRAZING_EDGES
+from ...kernels.discretisation.quadrature import GRAZING_EDGES
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import Means, weighted_means
-from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.density import LambertianLaw
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
 from ...kernels.walls.conditionals import is_few

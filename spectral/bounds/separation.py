@@ -10,7 +10,7 @@ from ...core.checks import Floats
 from ...core.estimates import ErrorKind
 from ...core.rounding import EPS
 from ...kernels import Law, MatrixLaw
-from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.density import LambertianLaw
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold

@@ -146,7 +146,7 @@ def exit_times(
 
     Examples
     --------
-    >>> from asperity.kernels.laws.ideal import lambertian
+    >>> from asperity.kernels.laws.density import lambertian
     >>> found = exit_times(lambertian(), [5.0, 10.0, 20.0], 500, np.random.default_rng(0))
     >>> bool(found.means[0] < found.means[1])
     True

@@ -19,8 +19,7 @@ from ...kernels import SINE, Bins, CircularArcLaw, DensityLaw, Law, WallLaw
 from ...kernels.laws.isometry_table import SAME_OFFSET, IsometryTable
 from ...kernels.laws.law import Composition, DrivenLaw, SpecularFrame, specular
 from ...kernels.laws.structure import law_of, words_of
-from ...kernels.walls.crevice_tail import FIRST_CROSSING, crevice_nodes
-from ...kernels.walls.rectangular import crevice_pieces
+from ...kernels.walls.rectangular import FIRST_CROSSING, crevice_nodes, crevice_pieces
 from .channel import in_paper_frame
 from .momentum_accommodation import incoming_angles
 

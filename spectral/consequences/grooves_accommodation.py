@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ...kernels import Law
-from ...kernels.bases.directions import SINE_NORM
+from ...kernels.bases.polynomials import SINE_NORM
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 
 # Ratios of the coefficients in space to those of the cross section. The cosine law has E|v_t|^2 = 1/2, half of it

@@ -1,4 +1,4 @@
-"""Relaxation times and mixing times of a chain of reflections."""
+"""Relaxation and mixing times of a chain of reflections, Cheeger's bounds, and the billiard Laplacian as a limit."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ...core.checks import Floats, choice, number_between, shortened
+from ...core.checks import Floats, choice, frozen, instance, number_between, shortened, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
-from ...kernels import KernelMatrix, Law
+from ...geometry import Wall
+from ...kernels import KernelMatrix, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..gap.gap import modulus_gap
 
 Distance = Literal["L2", "total variation", "chi-square"]
 Start = Literal["density", "worst"]
-
 # Number of eigenvalues computed for a matrix, and wanted error of the gap of a law.
 SOUGHT, TOLERANCE = 6, 1e-4
 # Limit on the squarings of a matrix: the numbers of steps beyond are no integers in float64.
@@ -228,3 +228,174 @@ def _steps(gap: float, target: float) -> int:
 
 def _time_scale(gap: float) -> float:
     return float(-1.0 / np.log1p(-gap)) if 0.0 < gap < 1.0 else (np.inf if gap <= 0.0 else 0.0)
+
+
+@dataclass(frozen=True, repr=False)
+class Conductance(Summary):
+    """The best cut by a level of the second eigenfunction, and its bounds for the gap.
+
+    Attributes
+    ----------
+    value : float
+        Flux from the set to its complement over the smaller of the two measures.
+    cells : array of shape (n,)
+        1 for the bins of the set, 0 for the others.
+    gap_above : float
+        Upper bound of the gap, flux / (measure times measure of the complement). It holds for the matrix and for the
+        law, whose Rayleigh quotient of the set is the same. For a sampled matrix it has a sampling error.
+    gap_below : float
+        Lower bound value^2 / 2 of the gap of the matrix. It does not hold for the law.
+    error : float
+        Error of ``gap_above``, from the Frobenius error of the matrix.
+    """
+
+    value: float
+    cells: Floats
+    gap_above: float
+    gap_below: float
+    error: float
+
+
+def conductance(matrix: KernelMatrix) -> Conductance:
+    """Cheeger's bounds for a reversible matrix on bins, from the level sets of its second eigenfunction.
+
+    Parameters
+    ----------
+    matrix : KernelMatrix
+        A reversible matrix on `Bins`.
+
+    Raises
+    ------
+    InputError
+        If the basis has no cells, or only one.
+
+    Notes
+    -----
+    Some level set of the second eigenfunction has a conductance of at most sqrt(2 gap), so gap >= value^2 / 2.
+    Source: D. A. Levin and Y. Peres, *Markov Chains and Mixing Times* (2017), theorem 13.10.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> found = conductance(ker.discretise(ker.MatrixLaw([[0.9, 0.1], [0.1, 0.9]]), ker.Bins(2)))
+    >>> round(found.value, 12), round(found.gap_above, 12), round(found.gap_below, 12)
+    (0.1, 0.2, 0.005)
+    """
+    instance("matrix", matrix, KernelMatrix, "ker.discretise(law, ker.Bins(64))")
+    if not matrix.basis.is_partition or matrix.size < 2:
+        raise InputError(f"matrix: expected one in at least two bins, got {matrix.basis!r}")
+    found = matrix_spectrum(matrix, matrix.size)
+    weights = np.asarray(matrix.weights)
+    flux = 0.5 * (matrix.flux + matrix.flux.T)
+    second = found.vectors[:, 1] / np.sqrt(weights)
+    order = np.argsort(second, kind="stable")
+    sorted_flux, mass = flux[np.ix_(order, order)], np.cumsum(weights[order])[:-1]
+    # the flux out of the first m cells: their total flux minus the flux among them
+    within = np.cumsum(np.cumsum(sorted_flux, axis=0), axis=1).diagonal()[:-1]
+    out = np.maximum(np.cumsum(sorted_flux.sum(axis=1))[:-1] - within, 0.0)
+    ratio = out / np.minimum(mass, 1.0 - mass)
+    best = int(np.argmin(ratio))
+    cells = np.zeros(matrix.size)
+    cells[order[: best + 1]] = 1.0
+    above = float(out[best] / (mass[best] * (1.0 - mass[best])))
+    value = float(ratio[best])
+    return Conductance(value, frozen(cells), above, 0.5 * value**2, float(matrix.error))
+
+
+# Chords of a wall's pieces and twice as many, whose difference tells the error of the mean squared slope.
+CHORDS = 4096
+# Ratio of the steepest slopes of the two levels that indicates a vertical tangent. There the steepest slope grows like
+# the root of the number of chords.
+STEEPENING = 1.2
+
+
+@dataclass(frozen=True, repr=False)
+class LaplacianComparison(Summary):
+    r"""Comparison of a law in Feres' convention with 1 + 2 h d/dz (1 - z^2) d/dz, z = cos(theta).
+
+    Attributes
+    ----------
+    flatness : float
+        h, computed as (1 - <e_1, P_F e_1>)/4 with e_1 = sqrt(3) cos(theta).
+    degrees : array of int, shape (n,)
+        1, ..., n.
+    deficits : array of shape (n,)
+        1 - <e_l, P_F e_l> for the normalised Legendre polynomials e_l.
+    ratios : array of shape (n,)
+        deficits / (2 h l (l + 1)), which is 1 if the Laplacian describes the law.
+    error : float
+        Frobenius error of the matrix.
+    """
+
+    flatness: float
+    degrees: Floats
+    deficits: Floats
+    ratios: Floats
+    error: float
+
+
+def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) -> LaplacianComparison:
+    """Compare the diagonal of a law in Legendre polynomials with the eigenvalues of the billiard Laplacian.
+
+    Parameters
+    ----------
+    law : Law
+        The law, in either convention; it is compared in Feres'.
+    degrees : int
+        Number of Legendre polynomials.
+    tolerance : float
+        Wanted Frobenius error of the matrix.
+
+    Notes
+    -----
+    Source: R. Feres and H.-K. Zhang, Commun. Math. Phys. 299 (2010): P_F - 1 is about 2 h times the Legendre operator
+    for walls of mean squared slope h, so 1 - lambda_l is about 2 h l (l + 1), and the gap 4 h.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> found = laplacian_comparison(ker.CircularArcLaw(0.1), 2)
+    >>> [round(float(ratio), 2) for ratio in found.ratios]
+    [1.0, 0.99]
+    """
+    whole_number("degrees", degrees, 1)
+    instance("law", law, Law, "ker.WallLaw(wall)")
+    specular = law if law.frame == "specular" else law.in_specular_frame()
+    matrix = discretise(specular, Legendre(2 * degrees + 2), tolerance=tolerance)
+    order = np.arange(1, degrees + 1)
+    diagonal = np.diagonal(matrix.symmetric)[order]
+    deficits = 1.0 - diagonal
+    flatness = float(deficits[0]) / 4.0
+    ratios = deficits / (2.0 * flatness * order * (order + 1)) if flatness > 0.0 else np.full(degrees, np.nan)
+    return LaplacianComparison(flatness, frozen(order), frozen(deficits), frozen(ratios), float(matrix.error))
+
+
+def mean_squared_slope(wall: Wall) -> float:
+    """The mean squared slope h of a wall over a period; ``inf`` if a piece is vertical or overhangs.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> round(mean_squared_slope(geo.triangular_teeth(np.pi / 2)), 12)
+    1.0
+    """
+    instance("wall", wall, Wall, "geo.koch(2)")
+    coarse, fine = (_slope_sum(wall, chords) for chords in (CHORDS, 2 * CHORDS))
+    if not np.isfinite(fine[0]) or fine[1] > STEEPENING * coarse[1]:
+        # a vertical tangent, where the integral diverges
+        return float("inf")
+    # chords have the error 1/chords^2
+    return float((fine[0] + (fine[0] - coarse[0]) / 3.0) / wall.period)
+
+
+def _slope_sum(wall: Wall, chords: int) -> tuple[float, float]:
+    """The integral of the squared slope of the chords of a wall's pieces, and the largest slope."""
+    total, steepest = 0.0, 0.0
+    for piece in wall.pieces:
+        points = piece.point(np.linspace(0.0, 1.0, chords + 1))
+        run, rise = np.diff(points, axis=0).T
+        if np.any(run <= 0.0):
+            return np.inf, np.inf
+        total += float(np.sum(rise**2 / run))
+        steepest = max(steepest, float(np.max(np.abs(rise / run))))
+    return total, steepest

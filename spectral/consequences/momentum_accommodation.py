@@ -16,11 +16,11 @@ from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...kernels import SINE, Law, Panels, PolygonLaw, WallLaw, discretise
 from ...kernels.bases.basis import Basis
-from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
 from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
+from ...kernels.bases.polynomials import MEAN_SINE, SINE_NORM, Directions
 from ...kernels.expectations.basis_means import Means
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
-from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.density import LambertianLaw
 from ...kernels.laws.law import Combination, IsometryLaw, is_atomic
 from ...kernels.laws.structure import has_chain, law_of, words_of
 from ..bounds.images import is_costly

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...kernels import Bins
-from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
+from ...kernels.bases.assembly import is_mirror_symmetric, reflection_matrix
 from .dense import ExtremalEigenvalues, Which, compressed, counted_from_above, extremal, symmetric_half, wanted
 
 if TYPE_CHECKING:

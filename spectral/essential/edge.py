@@ -11,7 +11,7 @@ import numpy as np
 from ...core.checks import Floats, instance
 from ...core.estimates import ErrorKind, Summary, with_error
 from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
-from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.density import LambertianLaw
 from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold

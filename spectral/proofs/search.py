@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...kernels import CircularArcLaw, Law, Panels, discretise
-from ...kernels.bases.mirror import reflection_matrix
+from ...kernels.bases.assembly import reflection_matrix
 from .checker import Bumps, FocusingArcs, Refused, Wall, ctx, exact
 
 # Bits of balls, and of integrals; the angle below which nothing is known but the size of the trial function.

@@ -15,10 +15,8 @@ from ...core.errors import FileExistsRefusal, InputError
 from ...core.estimates import Summary
 from ...core.files import write_whole
 from ...core.frames import data_frame, needed
-from .extremum import Extremum, refined_extremum
-from .picture import draw_curves
-from .points import Point, key_of
-from .row import COLUMNS, UNITS, SweepRow
+from .extremum import Extremum, draw_curves, refined_extremum
+from .points import COLUMNS, UNITS, Point, SweepRow, key_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

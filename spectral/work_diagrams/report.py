@@ -16,9 +16,7 @@ from ...core.errors import InputError
 from ...core.estimates import Summary
 from ...core.frames import data_frame
 from ...core.tables import table, verbatim
-from .machine import Machine
-from .order import FittedOrder, fit_order
-from .problem import ROUNDED, WorkMethod, WorkProblem
+from .problem import ROUNDED, FittedOrder, Machine, WorkMethod, WorkProblem, fit_order
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,8 +17,7 @@ from ...core.estimates import Estimate
 from ...core.files import regular_file, text_of, write_whole
 from ...kernels import KernelMatrix
 from ..sweeps.running import in_words
-from .machine import Machine, on_one_core
-from .problem import WorkMethod, WorkProblem
+from .problem import Machine, WorkMethod, WorkProblem, on_one_core
 from .report import WorkReport, WorkRow
 
 # Seed of the generators of the repeats, together with the number of the repeat.

@@ -27,9 +27,9 @@ from asperity.bench.standard_set import QUICK, Effort, TimePlan, run_problems
 from asperity.core.child import ChildCrashed, ChildProcess, OutOfTime
 from asperity.errors import InputError
 from asperity.estimates import student_95
-from asperity.kernels.bases.directions import Directions
+from asperity.kernels.bases.polynomials import Directions
 from asperity.kernels.sampling.sobol import PARTS
-from asperity.spectral.work_diagrams.machine import Machine
+from asperity.spectral.work_diagrams.problem import Machine
 from asperity.spectral.work_diagrams.report import WorkRow
 from commands import run
 

@@ -10,7 +10,7 @@ import pytest
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
 from asperity.estimates import Estimate
-from asperity.spectral.work_diagrams.machine import Machine
+from asperity.spectral.work_diagrams.problem import Machine
 from asperity.spectral.work_diagrams.report import WorkRow
 from asperity.spectral.work_diagrams.runs import measure
 

@@ -20,7 +20,7 @@ from asperity.kernels.inverse.named_laws import law_from_text
 from asperity.ledger import selected
 from asperity.spectral import SweepTable, WorkReport
 from asperity.spectral.sweeps.named_families import family_and_grid, spectrum_from_text
-from asperity.spectral.sweeps.quantities import quantities_from
+from asperity.spectral.sweeps.running import quantities_from
 from commands import run
 
 PACKAGE = Path(__file__).parents[2]

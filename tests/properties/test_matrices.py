@@ -4,7 +4,7 @@ import numpy as np
 
 from asperity import kernels as ker
 from asperity.errors import InputError
-from asperity.kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
+from asperity.kernels.bases.assembly import is_mirror_symmetric, reflection_matrix
 
 ROUNDING = 1e-11
 

@@ -12,9 +12,9 @@ from asperity import AsperityError, Estimate, InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.spectral.sweeps.quantities import name_of
-from asperity.spectral.sweeps.row import COLUMNS
-from asperity.spectral.sweeps.statistics import mean_estimate, spread_estimate
+from asperity.spectral.sweeps.ensembles import mean_estimate, spread_estimate
+from asperity.spectral.sweeps.points import COLUMNS
+from asperity.spectral.sweeps.running import name_of
 from commands import refused, run
 
 # Of 400 trials 95 % succeed, give or take four standard deviations.

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..spectral import ReferenceValue, WorkMethod, WorkProblem
-from ..spectral.work_diagrams.machine import on_one_core
+from ..spectral.work_diagrams.problem import on_one_core
 from ..spectral.work_diagrams.report import WorkRow
 from ..spectral.work_diagrams.runs import measure, parts_of, solve_once
 from .quantities.collision import COLLISION, DISK, TRUE_DISK, by_true_disks

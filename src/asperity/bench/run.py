@@ -14,7 +14,7 @@ from ..core.errors import FileExistsRefusal, InputError
 from ..core.files import moved_when_complete
 from ..core.tables import table
 from ..spectral import WorkReport
-from ..spectral.work_diagrams.order import OrderVerdict
+from ..spectral.work_diagrams.problem import OrderVerdict
 from ..spectral.work_diagrams.report import WorkRow
 
 if TYPE_CHECKING:

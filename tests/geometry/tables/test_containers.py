@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.kernels.billiards.equilibrium import equilibrium_starts
+from asperity.kernels.billiards.lyapunov import equilibrium_starts
 from disk_shapes import NAMED_TABLES
 
 DISK = geo.Disk(1.0, 0.6)

@@ -6,7 +6,7 @@ from matplotlib import pyplot
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.kernels.billiards.equilibrium import equilibrium_starts
+from asperity.kernels.billiards.lyapunov import equilibrium_starts
 from asperity.kernels.billiards.record import BilliardRecord, path_between
 
 DISK = geo.Disk(1.0, 0.5)

@@ -8,9 +8,8 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.kernels.billiards.equilibrium import equilibrium_starts
-from asperity.kernels.billiards.lyapunov import Pencil
-from asperity.kernels.collisions.velocity_matrices import no_slip_matrix, smooth_matrix
+from asperity.kernels.billiards.lyapunov import Pencil, equilibrium_starts
+from asperity.kernels.collisions.operator import no_slip_matrix, smooth_matrix
 
 DISK = geo.Disk(1.0, 0.6)
 SMOOTH, NO_SLIP = ker.smooth(DISK), ker.no_slip(DISK)

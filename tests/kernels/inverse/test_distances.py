@@ -16,14 +16,13 @@ from scipy.stats import binomtest, wasserstein_distance
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
-from asperity.kernels.distances import distributions
+from asperity.kernels.distances import conditional as distributions
 from asperity.kernels.distances import joint as joint_distance
 from asperity.kernels.distances.cell_transport import DIAGONAL, Cells, transport_bounds
-from asperity.kernels.distances.conditional import ConditionalDistance
-from asperity.kernels.distances.distributions import cells_and_atoms, terms_of
-from asperity.kernels.distances.pseudometric import flux_means
+from asperity.kernels.distances.conditional import ConditionalDistance, cells_and_atoms, terms_of
+from asperity.kernels.distances.distances import flux_means
 from asperity.kernels.distances.transport import absolute_area, grid_wasserstein, wasserstein
-from asperity.kernels.expectations.distribution_functions import Distributions
+from asperity.kernels.expectations.conditionals import Distributions
 from asperity.kernels.laws.law import DrivenLaw
 
 KINDS = ("rows", "sup", "joint", "pseudometric")

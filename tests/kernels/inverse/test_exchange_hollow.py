@@ -6,8 +6,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
-from asperity.kernels.inverse.aplanats import MirrorPair
-from asperity.kernels.inverse.mirror_layout import CLEARANCE, arranged, mirror_groups
+from asperity.kernels.inverse.mirror_layout import CLEARANCE, MirrorPair, arranged, mirror_groups
 
 
 def exchange_of(law, cells):

@@ -10,8 +10,8 @@ from scipy.special import k1, kn
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
-from asperity.kernels.aerodynamics.dual_bounds import dual_bound, hat_masses
-from asperity.kernels.bases.directions import Directions
+from asperity.kernels.aerodynamics.extremal import dual_bound, hat_masses
+from asperity.kernels.bases.polynomials import Directions
 
 # campaigns/judges/precise_least_resistance.py
 LEAST = 0.987823750351585515600495963

@@ -8,7 +8,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.kernels.inverse import wall_for_law
-from asperity.kernels.inverse.hull import few_weights, nearest_weights, possible_gain
+from asperity.kernels.inverse.hollows import few_weights, nearest_weights, possible_gain
 
 MOMENTS = 5
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from asperity import kernels as ker
-from asperity.kernels.walls.crevice_tail import sum_rule
+from asperity.kernels.walls.rectangular import sum_rule
 
 # Moments, as below, of crevices whose Fourier series is too long: period by period up to d = 2000 by antiderivatives of
 # (1, d) (1 + c^2)^(-3/2) and (1, d) c^2 (1 + c^2)^(-5/2) in 40 digits, d = 2 r c, then with the mean of q.

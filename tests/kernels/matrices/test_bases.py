@@ -14,14 +14,19 @@ from asperity import geometry as geo
 from asperity.kernels import SINE, SINE_SQUARED, Basis, Bins, Legendre, Panels, TensorBasis
 from asperity.kernels.bases import assembly as products_module
 from asperity.kernels.bases import measure as weights_module
-from asperity.kernels.bases import panels as panels_module
-from asperity.kernels.bases.assembly import add_products, largest_square_sum, one_blas_thread, overlaps
-from asperity.kernels.bases.directions import Directions
-from asperity.kernels.bases.displacement import node_rounding
+from asperity.kernels.bases import partitions as panels_module
+from asperity.kernels.bases.assembly import (
+    add_products,
+    is_mirror_symmetric,
+    largest_square_sum,
+    mirror_refinement,
+    one_blas_thread,
+    overlaps,
+    reflection_matrix,
+)
 from asperity.kernels.bases.intervals import cell_among
-from asperity.kernels.bases.legendre import legendre_moments
 from asperity.kernels.bases.measure import gauss_on_intervals, gauss_rule, measure_by_name
-from asperity.kernels.bases.mirror import is_mirror_symmetric, mirror_refinement, reflection_matrix
+from asperity.kernels.bases.polynomials import Directions, legendre_moments, node_rounding
 from asperity.kernels.discretisation.method import rounding
 
 UNEVEN = [0.0, 0.4, 1.1, 2.0, np.pi]

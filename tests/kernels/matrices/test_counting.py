@@ -10,7 +10,7 @@ from scipy.stats import binom, chi2, gamma, norm, t
 from asperity import kernels as ker
 from asperity.errors import AccuracyError
 from asperity.kernels import Basis, Bins, Legendre, Panels
-from asperity.kernels.bases.directions import Directions
+from asperity.kernels.bases.polynomials import Directions
 from asperity.kernels.matrices.matrix import KernelMatrix, frobenius_error
 from asperity.kernels.sampling import counts as counting
 from asperity.kernels.sampling.counts import (

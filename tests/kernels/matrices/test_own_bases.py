@@ -11,7 +11,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.kernels.bases import basis as promises
-from asperity.kernels.bases.directions import Directions
+from asperity.kernels.bases.polynomials import Directions
 
 OURS = [
     ker.Bins(1), ker.Bins(37), ker.Bins([0.0, 1e-6, 1.0, np.pi]), ker.Bins(8, weight="sin2"), ker.Legendre(1),

@@ -13,8 +13,8 @@ from asperity.geometry.cells.hollow_shape import distinct_hollows
 from asperity.geometry.polygons import beams as beam_module
 from asperity.geometry.polygons.beams import beams_of
 from asperity.geometry.polygons.compiled import division
-from asperity.kernels.discretisation.isometry_tables import table_matrix
-from asperity.kernels.walls.polygon import table_of_beams
+from asperity.kernels.discretisation.isometries import table_matrix
+from asperity.kernels.walls.polygons import table_of_beams
 
 
 def row(beams, theta):

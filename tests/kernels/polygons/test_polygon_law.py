@@ -9,10 +9,9 @@ from campaigns.judges.precise_triangular import ANGLE, BINS, reference
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.polygons.beams import beams_of
-from asperity.kernels.discretisation.isometries import branch_matrix
-from asperity.kernels.discretisation.isometry_tables import table_matrix
-from asperity.kernels.walls.isometry_branches import isometries
-from asperity.kernels.walls.polygon import table_of_beams
+from asperity.kernels.discretisation.isometries import branch_matrix, table_matrix
+from asperity.kernels.walls.polygons import table_of_beams
+from asperity.kernels.walls.wall_law import isometries
 
 EPS = float(np.finfo(np.float64).eps)
 SKEW = [(0, 0), (0.3, -0.5), (1, 0)]

@@ -12,7 +12,7 @@ from ...core.checks import Floats
 from ...core.estimates import Estimate
 from ...geometry import Wall
 from ...kernels import Basis, Bins, KernelMatrix, Legendre, WallLaw, discretise, distance, lambertian
-from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
+from ...kernels.bases.polynomials import MEAN_SINE, SINE_NORM, Directions
 from ...spectral import WorkMethod
 from .methods import AUTO, Methods, Quantity, matrix_methods, monte_carlo_matrix
 from .walls import standard_names

@@ -10,7 +10,7 @@ import sympy as sp
 from ...geometry import rectangular_teeth, trace
 from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import foreshortening
-from ...kernels.laws.crevice import crevice_retro
+from ...kernels.laws.isometry_table import crevice_retro
 from ...kernels.walls.rectangular import RectangularTeethLaw
 from ...verification import Verdict, agreement, verify
 from ..entry import Code, row

@@ -10,7 +10,7 @@ import sympy as sp
 from ...geometry import focusing_arcs, rectangular_teeth, trace, triangular_teeth
 from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import foreshortening
-from ...kernels.walls.triangular import TriangularTeethLaw
+from ...kernels.walls.polygons import TriangularTeethLaw
 from ...verification import Verdict, agreement, every, holds, verify
 from ..entry import Code, row
 from ..simulated import FRACTION_ERROR, fraction
