@@ -352,7 +352,9 @@ def broken_atoms(rng: Rng) -> Drawn:
         tools = ("gap", "mixing")
         return Drawn("asymmetric", lambda: Written(kernel.sample, recipe_of(kernel, True), True), tools)
     name = str(rng.choice(list(faults)))
-    return Drawn(f"atoms: {name}", lambda: Written(draw, faults[name], True), ("applied", *MATRICES, "gap"))
+    # at each single angle "one angle" is a law, whose gap 0 follows from single angles
+    tools = ("applied", *MATRICES, *(() if name == "one angle" else ("gap",)))
+    return Drawn(f"atoms: {name}", lambda: Written(draw, faults[name], True), tools)
 
 
 def broken_array(rng: Rng) -> Drawn:

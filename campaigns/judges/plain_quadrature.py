@@ -133,5 +133,5 @@ class Truth:
             return float((weight * 0.5 * np.sin(angle)) @ (away @ between))
 
         found = by_two_rules(computed)
-        # the widths of the panels differ less than their numbers of nodes
-        return Known(float(found.value), 4.0 * found.error)
+        # the absolute value has kinks that no panel knows, and both rules may miss them alike
+        return Known(float(found.value), 10.0 * found.error)

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ...core.checks import Floats
+from ...core.checks import Floats, shortened
+from ...core.errors import InputError
 from ...core.long_runs import NUMBERS_AT_ONCE, count_time
 from ...core.rounding import EPS
 from ..bases.assembly import add_products, largest_square_sum
@@ -17,7 +18,7 @@ from ..bases.intervals import bisected
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.partitions import Bins
 from ..bases.polynomials import Legendre
-from ..expectations.angle_panels import NODES, AnglePanels
+from ..expectations.angle_panels import NODES, NULL_RULES, AnglePanels
 from ..expectations.basis_means import functions_of
 from ..laws.density import VALUE_TIME, DensityLaw, cut_by_edges, split_panels
 from ..laws.deterministic import IntervalExchangeLaw, InvolutionLaw, LeastResistanceLaw
@@ -243,6 +244,8 @@ MOST_VALUES = 2**26
 FIRST_BREAKPOINTS, PANEL_FRACTION, CONVERGED = 32, 0.02, 1e-15
 # Tolerance of the conditional distributions as a fraction of that of the matrix.
 MEAN_FRACTION = 0.1
+# Asymmetry of the matrix of a law that is said to be reversible that refutes this: so many errors beyond a least one.
+UNRESOLVED, LEAST_ASYMMETRY = 100.0, 1e-3
 # First panel edges near grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 
@@ -259,9 +262,16 @@ def by_conditionals(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
     """The matrix from conditional distributions, by Kronrod's rule."""
     symmetric, error = action_matrix(law, basis, budget.tolerance)
     if law.reversible:
-        # For a reversible law an under-resolved angle causes asymmetry.
-        error = max(error, float(np.linalg.norm(symmetric - symmetric.T)))
-    how = "difference of the rules of Gauss and Kronrod, panel by panel, and errors of conditional means"
+        asymmetry = float(np.linalg.norm(symmetric - symmetric.T))
+        if asymmetry > UNRESOLVED * error + LEAST_ASYMMETRY:
+            raise InputError(
+                f"reversible: {shortened(law)} says that it is, but <e_i, P e_j> differs from <e_j, P e_i> by "
+                f"{asymmetry:.2g}, with an error of {error:.2g}: say reversible = False, or where the law has narrow "
+                "peaks, in `breakpoints`"
+            )
+        # of a reversible law an under-resolved angle causes asymmetry
+        error = max(error, asymmetry)
+    how = "null rules of Kronrod's rule, panel by panel, and errors of conditional means"
     return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
 
 
@@ -278,7 +288,7 @@ def action_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
     """<e_i, P e_j> by Kronrod's rule in theta with P e_j from conditional distributions, and an estimate of its error.
 
     Panels between edges and breakpoints are halved until each has converged or the work exceeds about a second. The
-    error is the sum over the panels of the difference from Gauss's rule, which is safe even if P e_j jumps on a panel,
+    error is the sum over the panels of the null rules, of which one alone may vanish by chance where P e_j has a kink,
     and of the errors of the conditional distributions.
     """
     breaks, (degree, inside) = law.breakpoints(FIRST_BREAKPOINTS)[0], functions_of(basis)
@@ -299,7 +309,7 @@ def action_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
             found = law.conditionals(panels.angle, max(MEAN_FRACTION * tolerance, CONVERGED), degree, inside)
             panels.image = found.in_basis(basis).reshape(panels.image.shape)
             panels.mean_error = heights * found.error.reshape(panels.angle.shape)
-            difference = panels.differences(basis)
+            difference = panels.differences(basis, NULL_RULES)
             done = last | (difference <= max(PANEL_FRACTION * tolerance, CONVERGED))
             converged[start : start + step] = done
             total += panels.selected(done).total(basis)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
-from ..expectations.angle_panels import GAUSS, KRONROD, SLOPES, STRETCHED
+from ..expectations.angle_panels import KRONROD, NULL_RULES, SLOPES, STRETCHED
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .conditional import ConditionalDistance
@@ -29,8 +29,11 @@ MOST_CORNERS, MOST_OF_LEVEL, FEW_ATOMS = 2**21, 2**22, 32
 MOST_CELLS = (256, 1024)
 # Breakpoints at which panels are divided.
 MOST_BREAKPOINTS = 1536
-# If the distance jumps at unknown incoming angles, halving a panel halves its error. The difference of Gauss's and
-# Kronrod's rule may be small by chance; a fraction of the change at the last halving guards against it.
+# Where the null rules decrease with their degree, the square of the last two below this fraction of that of the others,
+# the distance is smooth on a panel. At a kink one of them may vanish by chance, and all of them count.
+SMOOTH = 1.0 / 256.0
+# If the distance jumps at unknown incoming angles, halving a panel halves its error. All null rules may be small by
+# chance; a fraction of the change at the last halving guards against it.
 MEMORY = 0.25
 # Turning points of values on a panel that count as smooth.
 MOST_TURNS = 2
@@ -56,7 +59,7 @@ ROUNDING = 1e-13
 def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: float) -> Estimate:
     """The mean or the supremum over incoming angles of W_p; the error is estimated.
 
-    The mean is an integral by the rules of Gauss and Kronrod on panels, of which those with large errors are halved.
+    The mean is an integral by Kronrod's rule on panels, of which those with large errors are halved.
     The supremum is that over the nodes of panels that are refined until two levels agree. Two numbers of cells of the
     outgoing angle are compared.
     """
@@ -69,7 +72,7 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
         value, error, from_laws, panels = (_supremum if sup else _mean)(between, cells, left)
         if error > left or from_cells <= max(tolerance, from_laws):
             break
-    how = f"levels with up to {panels} panels" if sup else f"rules of Gauss and Kronrod on {panels} panels"
+    how = f"levels with up to {panels} panels" if sup else f"Kronrod's rule on {panels} panels"
     return Estimate(value, error + from_cells + from_laws + ROUNDING, "estimate", how)
 
 
@@ -116,10 +119,12 @@ class _Panels:
     def errors(self, order: float, unit: float, cuts: Floats) -> Floats:
         """The errors of the integrals of (distance / unit)^p over the panels.
 
-        Distances may oscillate within a panel that has cuts inside, or that reaches grazing at 0 or pi. Both rules can
+        Distances may oscillate within a panel that has cuts inside, or that reaches grazing at 0 or pi. All rules can
         then agree by chance. If such values turn more than twice, the error is at least their range times the measure.
         """
-        found = np.abs(self.parts(order, KRONROD - GAUSS, unit))
+        squares = np.array([self.parts(order, rule, unit) ** 2 for rule in NULL_RULES])
+        high, low = squares[:2].sum(axis=0), squares[2:].sum(axis=0)
+        found = np.sqrt(np.where(high < SMOOTH * low, high, 0.25 * (high + low)))
         powers = (self.rows / unit) ** order
         inside = np.searchsorted(cuts, self.high, side="left") > np.searchsorted(cuts, self.low, side="right")
         rough = inside | (self.low <= 0.0) | (self.high >= np.pi)

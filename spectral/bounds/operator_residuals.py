@@ -15,7 +15,7 @@ from ...kernels import Basis, Bins, DensityLaw, Law, Panels
 from ...kernels.bases.assembly import mirror_refinement, reflection_matrix
 from ...kernels.bases.measure import SINE
 from ...kernels.discretisation.quadrature import GRAZING_EDGES
-from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
+from ...kernels.expectations.angle_panels import KRONROD, NODES, NULL_RULES
 from ...kernels.expectations.basis_means import Means, weighted_means
 from ...kernels.laws.density import LambertianLaw
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
@@ -100,6 +100,7 @@ def residuals(
         return expansion(basis, vectors, theta), images, errors
 
     low, high, margin = _first_panels(law, basis)
+    rules = NULL_RULES if margin > 1.0 else NULL_RULES[:1]
     if mirrored:
         inside = low < 0.5 * np.pi - HALF_ROUNDING
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
@@ -108,7 +109,7 @@ def residuals(
     total, error, uncertainty = (np.zeros((0, 2, len(values))) for _ in range(3))
     angles_used = 0
     while low.size:
-        fresh = _integrals(here_and_images, values, low, high, 2.0 if mirrored else 1.0)
+        fresh = _integrals(here_and_images, values, low, high, 2.0 if mirrored else 1.0, rules)
         fresh[1][:] *= margin
         angles_used += low.size * len(POINTS)
         ends = np.concatenate([ends, [low, high]], axis=1)
@@ -171,6 +172,7 @@ def _integrals(
     low: Floats,
     high: Floats,
     copies: float,
+    rules: Floats,
 ) -> tuple[Floats, Floats, Floats]:
     """Integrals of v (P v - rho v) and (P v - rho v)^2 over each panel, their errors, and effects of those of means.
 
@@ -195,7 +197,7 @@ def _integrals(
     beyond = (1.0 - NODES.max()) * np.abs(at_ends - np.einsum("eq,pqjk->pejk", AT_ENDS, at_nodes)).sum(axis=1)
     return (
         np.einsum("q,pqjk->pjk", KRONROD, at_nodes),
-        np.abs(np.einsum("q,pqjk->pjk", KRONROD - GAUSS, at_nodes)) + beyond,
+        np.sqrt(np.mean(np.einsum("nq,pqjk->npjk", rules, at_nodes) ** 2, axis=0)) + beyond,
         np.einsum("q,pqjk->pjk", KRONROD, (weight * uncertainties)[:, : len(NODES)]),
     )
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from campaigns.errors import own_laws
+from numpy.polynomial import legendre
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -206,6 +207,86 @@ def test_the_gap_of_a_density_with_a_kink_that_nobody_mentions_has_an_error_that
     law = Kinked()
     gap = spec.spectral_gap(law, tolerance=tolerance)
     assert abs(float(gap) - (1.0 - law.factor * law.moments[1])) <= gap.error + 1e-14
+
+
+@dataclass(frozen=True)
+class Bent(Kinked):
+    """The same with h(u) = |u - kink|: integrals of polynomials and of distribution functions are elementary."""
+
+    factor: float = 0.9
+
+    def density(self, theta, out):
+        height, after = (np.abs(np.cos(angle) - self.kink) - self.mean for angle in (theta, out))
+        return 0.5 * np.sin(out) * (1.0 + self.factor * height * after)
+
+    @property
+    def mean(self):
+        return 0.5 * (1.0 + self.kink**2)
+
+    def integral(self, function, breaks=()):
+        """That of a function of u over (-1, 1), which is a polynomial between the kink and the breaks."""
+        ends = np.unique([-1.0, self.kink, *breaks, 1.0])
+        nodes, weights = np.polynomial.legendre.leggauss(8)
+        half = 0.5 * np.diff(ends)[:, None]
+        return np.sum(half * weights * function(0.5 * (ends[1:] + ends[:-1])[:, None] + half * nodes))
+
+
+# at the first two the rules of Gauss and Kronrod agree by chance
+KINKS = (0.012131502700984842, -0.09776620855528517, *np.cos(np.linspace(0.1, 3.0, 11) ** 1.1))
+POLYNOMIALS = np.eye(5) * np.sqrt(2.0 * np.arange(5) + 1.0)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
+def test_matrices_of_densities_with_a_kink_that_nobody_mentions_have_errors_that_hold(tolerance):
+    for kink in KINKS:
+        law = Bent(kink)
+        means = [
+            0.5 * law.integral(lambda u, p=p, law=law: (np.abs(u - law.kink) - law.mean) * legendre.legval(u, p))
+            for p in POLYNOMIALS
+        ]
+        exact = law.factor * np.outer(means, means)
+        exact[0, 0] += 1.0
+        P = ker.discretise(law, ker.Legendre(5), tolerance=tolerance)
+        assert np.linalg.norm(P.symmetric - exact) <= float(P.error)
+
+
+def test_distances_of_densities_with_a_kink_that_nobody_mentions_have_errors_that_hold():
+    for kink in KINKS:
+        law = Bent(kink)
+
+        def primitive(u, law=law):
+            """The integral of (h - m)/2 from -1 to u."""
+            left, right = np.minimum(u, law.kink), np.maximum(u, law.kink)
+            return 0.25 * (
+                (1.0 + law.kink) ** 2 - (law.kink - left) ** 2 + (right - law.kink) ** 2
+            ) - 0.5 * law.mean * (u + 1.0)
+
+        # the distance of the angles is the area between the distribution functions in the angle
+        angle = np.linspace(0.0, np.pi, 400_001)
+        area = np.trapezoid(np.abs(primitive(np.cos(angle))), angle)
+        turn = [law.kink - law.mean, law.kink + law.mean]
+        spread = 0.5 * law.integral(
+            lambda u, law=law: np.abs(np.abs(u - law.kink) - law.mean), np.clip(turn, -1.0, 1.0)
+        )
+        found = ker.distance(law, ker.lambertian(), kind="rows", tolerance=1e-3)
+        assert abs(float(found) - law.factor * area * spread) <= found.error + 1e-9
+
+
+def test_a_law_that_is_not_symmetric_may_not_say_that_it_is():
+    class OneWay(Bent):
+        def density(self, theta, out):
+            return (
+                0.5 * np.sin(out) * (1.0 + self.factor * np.cos(theta) * (np.abs(np.cos(out) - self.kink) - self.mean))
+            )
+
+    class Honest(OneWay):
+        reversible = False
+
+    for question in (spec.spectral_gap, spec.mixing_time, lambda law: ker.discretise(law, ker.Legendre(8))):
+        with pytest.raises(InputError, match=r"reversible: .* says that it is, .*: say reversible = False"):
+            question(OneWay())
+    P = ker.discretise(Honest(), ker.Legendre(8))
+    assert abs(P.array - P.array.T).max() > 0.01
 
 
 def test_densities_that_are_none_are_refused_with_the_angle():
