@@ -29,8 +29,7 @@ import sympy as sp
 
 import asperity
 from asperity.geometry.disk import disk, rolling
-from asperity.kernels.walls import circular_arc
-from asperity.kernels.walls import polygons as triangular
+from asperity.kernels.walls import circular_arc, polygons
 from asperity.ledger import Entry
 from asperity.ledger import index as ledger
 from campaigns.cases.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
@@ -42,7 +41,7 @@ ROOT = Path(asperity.__file__).parent
 HELPERS = str(ROOT / "ledger")
 # The library's formulas that rows use. Rectangular teeth are excluded: most of their code handles extreme numbers of
 # crossings, which the tests of that law cover. The class of disks is excluded because it has its own tests.
-LIBRARY = (disk, rolling, triangular, circular_arc)
+LIBRARY = (disk, rolling, polygons, circular_arc)
 # Limit in processor seconds: checks take at most one, and slower mutants are counted separately.
 SECONDS = 20.0
 SWAPPED_OPERATORS: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {

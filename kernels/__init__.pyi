@@ -1,10 +1,10 @@
 from .aerodynamics.drag import resistance as resistance
+from .aerodynamics.drag import spin_force as spin_force
 from .aerodynamics.extremal import extremal_resistance as extremal_resistance
 from .aerodynamics.polygonal_body import PolygonalBody as PolygonalBody
 from .aerodynamics.polygonal_body import invisible_body as invisible_body
 from .aerodynamics.polygonal_body import zero_resistance_body as zero_resistance_body
 from .aerodynamics.rough_body import RoughBody as RoughBody
-from .aerodynamics.spinning_disk import spin_force as spin_force
 from .bases.basis import Basis as Basis
 from .bases.measure import SINE as SINE
 from .bases.measure import SINE_SQUARED as SINE_SQUARED

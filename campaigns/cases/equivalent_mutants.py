@@ -18,7 +18,7 @@ EQUIVALENT = {
     ("S1.08", "formula: (u - 0.5) % 1.0"): "the same map, by the periodicity of the remainder",
     ("S1.08", "formula: (u + 1.5) % 1.0"): "the same map, by the periodicity of the remainder",
     ("S1.08", "formula: (u + -0.5) % 1.0"): "the same map, by the periodicity of the remainder",
-    ("S2.04", "triangular.outgoing_angles: even = hits % -2 == 0"): _EVEN_MODULUS,
+    ("S2.04", "teeth.outgoing_angles: even = hits % -2 == 0"): _EVEN_MODULUS,
     (
         "S2.09",
         "formula: eps / (2 * xp.tan(xi)) - xp.sqrt((eps / (-2 * xp.sin(xi))) ** 2 - (x - eps / 2) ** 2)",
@@ -43,7 +43,7 @@ EQUIVALENT = {
 _FEWER_DIGITS = "the same number with fewer digits: tests/geometry/disks/test_charts.py looks at the digits"
 _SERIES = "angle * square / 6.0 * series, angle - np.sin(angle))"
 _GUARD = "a bound that holds by itself in exact arithmetic and guards against rounding"
-_UNFOLDED, _CLIPPED = "triangular.TriangularTeethLaw._unfolded: return", "(right, base, np.clip(count, np."
+_UNFOLDED, _CLIPPED = "polygons.TriangularTeethLaw._unfolded: return", "(right, base, np.clip(count, np."
 
 # change of a function of the library -> why no row can notice it
 EQUIVALENT_IN_THE_LIBRARY = {
@@ -53,8 +53,8 @@ EQUIVALENT_IN_THE_LIBRARY = {
     f"{_UNFOLDED} {_CLIPPED}minimum(most - 1.0, 1.0), most))": _GUARD,
     f"{_UNFOLDED} {_CLIPPED}maximum(most - 2.0, 1.0), most))": _GUARD,
     f"{_UNFOLDED} {_CLIPPED}maximum(most - 1.0, -1.0), most))": _GUARD,
-    "triangular.TriangularTeethLaw._most_hits: return np.maximum(np.ceil(2.0 * theta / self.angle), -1.0)": _GUARD,
-    "triangular.TriangularTeethLaw._reflected: return np.where(np.mod(count, -2.0) == 0.0, np.pi + theta - turn, "
+    "polygons.TriangularTeethLaw._most_hits: return np.maximum(np.ceil(2.0 * theta / self.angle), -1.0)": _GUARD,
+    "polygons.TriangularTeethLaw._reflected: return np.where(np.mod(count, -2.0) == 0.0, np.pi + theta - turn, "
     "turn - theta)": _EVEN_MODULUS,
     "circular_arc.CircularArcLaw._rotation: return (right, base, chord, np.maximum(np.ceil((self.half_angle + base "
     "- chord) / (2.0 * chord)), -1.0))": _GUARD,

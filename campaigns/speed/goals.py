@@ -26,7 +26,7 @@ from threadpoolctl import threadpool_limits
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench.references import known_reference
+from asperity.bench.standard_set import known_reference
 from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.discretisation.isometries import table_matrix
 from asperity.kernels.walls.polygons import table_of_beams

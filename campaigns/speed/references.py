@@ -22,10 +22,9 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.bench.problems import problem_names
 from asperity.bench.quantities.collision import DISK, correlation_of
-from asperity.bench.quantities.matrix import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
-from asperity.bench.quantities.transmission import DIFFUSE, LENGTH
+from asperity.bench.quantities.laws import DIFFUSE, LAW_BASIS, LENGTH, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
 from asperity.bench.quantities.walls import wall_of
-from asperity.bench.references import FILE
+from asperity.bench.standard_set import FILE
 from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import traced_matrix

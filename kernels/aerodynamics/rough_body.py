@@ -33,8 +33,7 @@ from ..bases.measure import SINE
 from ..laws.density import split_panels
 from ..laws.law import Law
 from ..matrices.defects import SymmetryDefect, defect_of_pairs
-from .drag import StreamForce, resistance, scaled
-from .spinning_disk import PANELS, integral, normals_at_breakpoints, pushes
+from .drag import PANELS, StreamForce, integral, normals_at_breakpoints, pushes, resistance, scaled
 
 TURN = 2.0 * math.pi
 # Equal steps of the direction between which a change of the law is sought, and changes of a law that does not vary

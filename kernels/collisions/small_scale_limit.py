@@ -25,9 +25,9 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_errors
-from ...core.frames import data_frame
 from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...core.rounding import EPS
+from ...core.tables import data_frame
 
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall

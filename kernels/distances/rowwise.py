@@ -131,7 +131,7 @@ class _Panels:
         steps = np.diff(powers, axis=1)
         rough &= np.count_nonzero(steps[:, 1:] * steps[:, :-1] < 0.0, axis=1) > MOST_TURNS
         spread = np.where(rough, np.ptp(powers, axis=1) * SINE.mass(self.low, self.high), 0.0)
-        return np.maximum(np.maximum(found, spread), MEMORY * self.change * (self.unit / unit) ** order)
+        return np.asarray(np.maximum(np.maximum(found, spread), MEMORY * self.change * (self.unit / unit) ** order))
 
     def selected(self, chosen: NDArray[np.intp]) -> _Panels:
         """The panels with these indices."""

@@ -31,8 +31,8 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, html_table
-from ...core.frames import data_array, data_frame
 from ...core.rounding import EPS
+from ...core.tables import data_array, data_frame
 from ..bases.assembly import is_mirror_symmetric, mirror_image
 from ..bases.basis import AngleFunction, Basis, BasisOfPoints, Frame, checked_basis
 from ..bases.partitions import Bins

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, instance, positive_number, whole_number
 from ...core.estimates import ErrorKind, Summary, with_error
-from ...core.frames import data_frame
 from ...core.rounding import EPS
+from ...core.tables import data_frame
 from ...kernels import Basis, CollisionLaw, DensityLaw, Law, Legendre, discretise
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.law import Composition, Power

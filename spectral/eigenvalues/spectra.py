@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, frozen
 from ...core.errors import AccuracyError
 from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_error
-from ...core.frames import data_frame
 from ...core.rounding import EPS
+from ...core.tables import data_frame
 from ...kernels import Basis, Bins, KernelMatrix
 from ...kernels.sampling.counts import missed_fraction
 from ..plotting import draw_eigenfunctions, draw_eigenvalues

@@ -16,8 +16,8 @@ from ...core.checkpoints import Stored
 from ...core.checks import Floats, Rng, check_memory, generator, positive_number, whole_number
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import LEVEL, NORMAL_95, Estimate, Summary, student_95
-from ...core.frames import data_frame
 from ...core.long_runs import Engine, all_parts, identity_of
+from ...core.tables import data_frame
 from ...kernels import Basis, KernelMatrix, discretise
 from ...kernels.bases.basis import checked_basis
 from ...kernels.sampling.counts import half_width

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.errors import FileExistsRefusal, InputError
 from ...core.estimates import Summary
 from ...core.files import write_whole
-from ...core.frames import data_frame, needed
+from ...core.tables import data_frame, needed
 from .extremum import Extremum, draw_curves, refined_extremum
 from .points import COLUMNS, UNITS, Point, SweepRow, key_of
 

@@ -14,8 +14,7 @@ import numpy as np
 from ...core.checks import choice
 from ...core.errors import InputError
 from ...core.estimates import Summary
-from ...core.frames import data_frame
-from ...core.tables import table, verbatim
+from ...core.tables import data_frame, table, verbatim
 from .problem import ROUNDED, FittedOrder, Machine, WorkMethod, WorkProblem, fit_order
 
 if TYPE_CHECKING:

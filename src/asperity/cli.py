@@ -245,7 +245,7 @@ def _run_in_folder(
     run: Callable[..., Any], out: Path, force: bool, workers: int | None, scheduler: str | None, **asked: Any
 ) -> Any:
     """What a sweep or an ensemble finds, with its checkpoint in the folder; Ctrl-C ends the program at once."""
-    from .spectral.sweeps.folder import checkpoint_in
+    from .spectral.sweeps.named_families import checkpoint_in
 
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers are started here, a --scheduler has its own; choose one")
@@ -295,8 +295,7 @@ def sweep_walls(
       asperity sweep first.toml second.toml koch --quantity gap_specular,accommodation --out walls
     """
     from .spectral import sweep
-    from .spectral.sweeps.folder import save_all
-    from .spectral.sweeps.named_families import family_and_grid
+    from .spectral.sweeps.named_families import family_and_grid, save_all
 
     family, grid = family_and_grid(walls, over, adaptive, resolution)
     table = _run_in_folder(partial(sweep, family, grid, zipped=zipped), out, **asked)
@@ -336,8 +335,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
     from .kernels import Bins
     from .spectral import ensemble as over_random_walls
     from .spectral import mean_law
-    from .spectral.sweeps.folder import LAW_CHECKPOINT, MEAN_LAW, save_ensemble
-    from .spectral.sweeps.named_families import spectrum_from_text
+    from .spectral.sweeps.named_families import LAW_CHECKPOINT, MEAN_LAW, save_ensemble, spectrum_from_text
 
     kind = {name: given.pop(name) for name in ("points", "rms_slope", "rms_height", "period", "smooth")}
     family = partial(random_wall, spectrum_from_text(spectrum), **kind)
@@ -449,7 +447,7 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
 
     from .core.long_runs import progress_bar
     from .ledger import findings, selected
-    from .ledger.text import finding_as_dict, latex_of, table_of
+    from .ledger.index import finding_as_dict, latex_of, table_of
 
     chosen = selected(ids)
     if as_latex:

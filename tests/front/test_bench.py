@@ -17,13 +17,11 @@ from asperity import spectral as spec
 from asperity.bench.problems import OWN_QUANTITIES, QUANTITIES, methods_of, problem_names
 from asperity.bench.quantities import collision as collision_quantities
 from asperity.bench.quantities import collision as uniform_disk
-from asperity.bench.quantities.matrix import LAW_BASIS, resistance_of
+from asperity.bench.quantities.laws import LAW_BASIS, eta_at, resistance_of
 from asperity.bench.quantities.methods import matrix_methods
-from asperity.bench.quantities.spectral import eta_at
 from asperity.bench.quantities.walls import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
-from asperity.bench.references import FINEST, known_reference, made_references
 from asperity.bench.run import save
-from asperity.bench.standard_set import QUICK, Effort, TimePlan, run_problems
+from asperity.bench.standard_set import FINEST, QUICK, Effort, TimePlan, known_reference, made_references, run_problems
 from asperity.core.child import ChildCrashed, ChildProcess, OutOfTime
 from asperity.errors import InputError
 from asperity.estimates import student_95

@@ -11,7 +11,7 @@ from campaigns.cases.equivalent_mutants import EQUIVALENT
 from asperity import InputError
 from asperity.ledger import by_reading, row
 from asperity.ledger import index as ledger
-from asperity.ledger.text import latex_of, page_of, table_of
+from asperity.ledger.index import latex_of, page_of, table_of
 from asperity.verification import Verdict, agreement
 from commands import run
 

@@ -20,9 +20,9 @@ from asperity import kernels as ker
 from asperity.geometry.disk import symbolic as sym
 from asperity.verification import agreement, derivation, every, holds, identity, no_excess
 from asperity.verification.balls import Unclear, evaluate
+from asperity.verification.derivation import Search
 from asperity.verification.domain import Domain, Interval
 from asperity.verification.normal_form import product
-from asperity.verification.refutation import Search
 from asperity.verification.resolution import Part
 from commands import ended
 

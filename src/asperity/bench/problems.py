@@ -15,10 +15,18 @@ from ..spectral.work_diagrams.problem import on_one_core
 from ..spectral.work_diagrams.report import WorkRow
 from ..spectral.work_diagrams.runs import measure, parts_of, solve_once
 from .quantities.collision import COLLISION, DISK, TRUE_DISK, by_true_disks
-from .quantities.matrix import DISTANCE, LAW, MOMENT, RESISTANCE
+from .quantities.laws import (
+    DIFFUSE,
+    DIFFUSIVITY,
+    DISTANCE,
+    EIGENVALUE,
+    LAW,
+    MOMENT,
+    RESISTANCE,
+    TRANSMISSION,
+    diffuse_methods,
+)
 from .quantities.methods import Methods
-from .quantities.spectral import DIFFUSIVITY, EIGENVALUE
-from .quantities.transmission import DIFFUSE, TRANSMISSION, diffuse_methods
 from .quantities.walls import scenes, standard_names, wall_of
 
 QUANTITIES = {

@@ -1,8 +1,12 @@
-"""Tables in Markdown and CSV, and text that pictures show as it is."""
+"""Tables in Markdown, CSV and as data frames, arrays with coordinates, and text that pictures show as it is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib import import_module
+from typing import Any
+
+from .errors import InputError
 
 
 def table_lines(heads: str, rows: Iterable[str | Iterable[object]]) -> Iterator[str]:
@@ -49,3 +53,27 @@ def verbatim(text: str) -> str:
     """
     # fonts have no letters for halves of surrogate pairs
     return text.encode("utf-8", "replace").decode().replace("$", r"\$")
+
+
+def needed(library: str, method: str, extra: str = "studies") -> Any:
+    """The module of an extra that a method needs.
+
+    Raises
+    ------
+    InputError
+        If it is not installed.
+    """
+    try:
+        return import_module(library)
+    except ImportError as reason:
+        raise InputError(f"{method}: needs {library}; install it with: pip install 'asperity[{extra}]'") from reason
+
+
+def data_frame(columns: Mapping[str, Any]) -> Any:
+    """A pandas.DataFrame of named columns; an InputError if pandas is not installed."""
+    return needed("pandas", "to_frame").DataFrame(dict(columns))
+
+
+def data_array(values: Any, **described: Any) -> Any:
+    """An xarray.DataArray, with its dimensions, coordinates, name and attributes; an InputError without xarray."""
+    return needed("xarray", "to_xarray").DataArray(values, **described)

@@ -16,8 +16,7 @@ from ..spectral import SpectralGap
 from ..spectral.bounds.enclosure import Enclosures
 from ..spectral.consequences.momentum_accommodation import Accommodation
 from ..spectral.plotting import CONVENTIONS
-from .consequences import Consequences
-from .result import StudyResult, TracerCheck
+from .result import Consequences, StudyResult, TracerCheck
 
 AVERAGES = ("tangential", "normal", "maxwell_fraction", "misfit")
 # Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.

@@ -29,10 +29,9 @@ from ..spectral.bounds.enclosure import Enclosures
 from ..spectral.consequences.momentum_accommodation import from_degrees
 from ..spectral.gap.law_spectrum import with_gap
 from ..spectral.gap.methods import law_eigenvalues
-from .consequences import consequences_of
 from .pictures import RESOLUTION, save_pictures
 from .report import report_of, study_as_dict
-from .result import StudyResult, TracerCheck
+from .result import StudyResult, TracerCheck, consequences_of
 
 BINS = 128
 TOLERANCE = 1e-3

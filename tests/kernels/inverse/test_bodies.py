@@ -6,7 +6,7 @@ from scipy.special import ellipe
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.kernels.aerodynamics.spinning_disk import integral
+from asperity.kernels.aerodynamics.drag import integral
 
 RNG = 20_260_401
 TRIANGLE = ker.PolygonalBody([[(0.0, 0.0), (2.0, 0.0), (0.3, 1.1)]])

@@ -12,8 +12,7 @@ from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import foreshortening
 from ...verification import Verdict, agreement, every, verify
 from ..entry import Code, row
-from ..samples import generator
-from ..simulated import outgoing_velocity
+from ..simulated import generator, outgoing_velocity
 
 # Rounding error of a dozen reflections.
 TRACED = 1e-10

@@ -13,7 +13,7 @@ from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import contact_normal
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator
+from ..simulated import generator
 
 
 @row(

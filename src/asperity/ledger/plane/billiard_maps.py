@@ -9,7 +9,7 @@ from ...core.checks import Floats
 from ...geometry import focusing_arcs, trace
 from ...verification import Verdict, agreement, every, holds, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator
+from ..simulated import generator
 
 # Semi-axes of the elliptical table.
 AXES = np.array([[1.6], [1.0]])

@@ -11,7 +11,7 @@ from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, no_excess, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator, random_disks, unit_velocities
+from ..simulated import generator, random_disks, unit_velocities
 
 
 @row(

@@ -12,7 +12,7 @@ from ...geometry.disk import symbolic as sym
 from ...geometry.disk.disk import frame_rows
 from ...verification import Verdict, every, holds, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator, random_disks
+from ..simulated import generator, random_disks
 
 
 def _orthonormal(s1: Any, s2: Any) -> Any:

@@ -9,7 +9,7 @@ from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator, kinetic_norm, random_disks, residual, unit_velocities
+from ..simulated import generator, kinetic_norm, random_disks, residual, unit_velocities
 
 good_states = by_reading(
     id="S5.31",

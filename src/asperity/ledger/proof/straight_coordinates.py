@@ -9,8 +9,7 @@ from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, by_reading, row
-from ..samples import generator, kinetic_norm, random_disks
-from ..simulated import is_free, tooth
+from ..simulated import generator, is_free, kinetic_norm, random_disks, tooth
 
 
 @row(

@@ -11,7 +11,7 @@ from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, holds, no_excess, verify
 from ..entry import Code, row
-from ..samples import generator, kinetic_norm, random_disks, unit_velocities
+from ..simulated import generator, kinetic_norm, random_disks, unit_velocities
 
 VELOCITY = sym.v1, sym.v2, sym.omega
 

@@ -11,7 +11,7 @@ from ...geometry.disk import rolling
 from ...geometry.disk import symbolic as sym
 from ...verification import Verdict, agreement, every, no_excess, verify
 from ..entry import Code, row
-from ..samples import generator, kinetic_norm, random_disks, residual, unit_velocities
+from ..simulated import generator, kinetic_norm, random_disks, residual, unit_velocities
 
 # A zoomed configuration and the scale.
 ZOOMED = (*sp.symbols("x1 x2 bar", real=True), sym.epsilon)

@@ -1,0 +1,181 @@
+"""Quantities of a law: matrix, first moment, resistance, distance from Lambert's law, largest spectral value, diffusion
+and transmission.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...core.checks import Floats
+from ...core.estimates import Estimate
+from ...geometry import Wall
+from ...kernels import (
+    Basis,
+    Bins,
+    HemisphereLaw,
+    KernelMatrix,
+    Law,
+    Legendre,
+    Panels,
+    WallLaw,
+    discretise,
+    distance,
+    lambertian,
+)
+from ...kernels.bases.polynomials import MEAN_SINE, SINE_NORM, Directions
+from ...spectral import WorkMethod, diffusivity, spectral_gap, spectrum, transmission
+from ...spectral.consequences.clausing import Section
+from .methods import AUTO, FLIGHTS, Methods, Quantity, matrix_methods, monte_carlo_matrix
+from .walls import standard_names
+
+LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS = Bins(32), Legendre(2), Directions()
+# Scenes whose conditional distributions have a closed form.
+DISTANCE_SCENES = ("triangular-teeth", "rectangular-teeth", "focusing-arc")
+SAMPLED_BINS = 64
+
+
+def _read_from(basis: Basis, read: Callable[[KernelMatrix], Any]) -> Callable[[Wall], Methods]:
+    """Methods for a quantity that ``read`` computes from a matrix."""
+
+    def reading(method: WorkMethod) -> WorkMethod:
+        return replace(method, solve=lambda *how: read(method.solve(*how)))
+
+    return lambda wall: [(reading(method), quick, full) for method, quick, full in matrix_methods(wall, basis)]
+
+
+def moment_of(matrix: KernelMatrix) -> Estimate:
+    """<u, P u>/<u, u>, from the matrix in Legendre polynomials."""
+    return Estimate(float(matrix.symmetric[1, 1]), matrix.error.value, matrix.error.kind, matrix.method)
+
+
+def resistance_of(symmetric: Floats) -> float:
+    """(3/4) E[1 + cos(theta' - theta)] from the matrix in orthonormalised 1, cos and sin."""
+    sine = np.array([MEAN_SINE, 0.0, SINE_NORM])
+    return float(0.75 * (1.0 + symmetric[1, 1] / 3.0 + sine @ symmetric @ sine))
+
+
+def _resistance(matrix: KernelMatrix) -> Estimate:
+    # the norm of the coefficients of the matrix
+    size = 0.75 * float(np.hypot(1.0 / 3.0, MEAN_SINE**2 + SINE_NORM**2))
+    return Estimate(resistance_of(matrix.symmetric), size * matrix.error.value, matrix.error.kind, matrix.method)
+
+
+def _distance_methods(wall: Wall) -> Methods:
+    law = WallLaw(wall)
+
+    def of_laws(budget: float) -> Estimate:
+        return distance(law, lambertian(), tolerance=1.0 / budget)
+
+    def of_bins(number: int) -> Estimate:
+        return _to_lambert(discretise(law, Bins(number)))
+
+    def of_samples(rays: float, rng: np.random.Generator) -> Estimate:
+        return _to_lambert(monte_carlo_matrix(wall, Bins(SAMPLED_BINS), rays, rng))
+
+    sizes = (16.0, 32.0, 64.0)
+    # samples have a noise floor from their bins, and bins an error from their width, so neither has one order
+    return [
+        (WorkMethod(AUTO, of_laws), (1e2, 1e4), (1e2, 1e3, 1e4, 1e5, 1e6)),
+        (WorkMethod("bins", of_bins), sizes, (*sizes, 128.0, 256.0, 512.0)),
+        (WorkMethod("Monte Carlo", of_samples, True), (4.0**7, 4.0**8), tuple(4.0**k for k in (7, 8, 9, 10))),
+    ]
+
+
+def _to_lambert(matrix: KernelMatrix) -> Estimate:
+    return distance(matrix, discretise(lambertian(), matrix.basis))
+
+
+# The matrix of the law in bins, <u, P u>/<u, u>, and the mean resistance of a body with this wall.
+LAW = Quantity("law", lambda wall: matrix_methods(wall, LAW_BASIS), standard_names())
+MOMENT = Quantity("moment", _read_from(MOMENT_BASIS, moment_of), standard_names())
+RESISTANCE = Quantity(
+    "resistance", _read_from(RESISTANCE_BASIS, _resistance), ("triangular-teeth", "focusing-arc", "mixed")
+)
+DISTANCE = Quantity("distance", _distance_methods, DISTANCE_SCENES)
+# Entry points at one grazing angle; the error of their midpoint rule is below the error of the finite angle.
+ENTRY_POINTS = 2**16
+ETA_SCENES = ("focusing-arc", "koch", "mixed")
+
+
+def _second(wall: Wall, basis: Basis) -> Estimate:
+    # the spectrum of the matrix, because for the law theorems and essential edges would be used
+    found = spectrum(discretise(WallLaw(wall), basis), k=2)
+    return Estimate(1.0 - found.gap, found.gap_error, "estimate", f"{found.basis!r}, {found.method}")
+
+
+def _auto_second(wall: Wall, budget: float, rng: np.random.Generator) -> Estimate:
+    gap = spectral_gap(WallLaw(wall), tolerance=1.0 / budget, rng=rng)
+    return Estimate(1.0 - gap.value, gap.error, gap.kind, f"{gap.verdict}: {gap.method}")
+
+
+def _eigenvalue_methods(wall: Wall) -> Methods:
+    def panels(degree: int) -> Estimate:
+        return _second(wall, Panels.for_wall(wall, degree=degree, smallest=1e-3))
+
+    sizes = (4.0, 8.0, 16.0)
+    return [
+        (WorkMethod(AUTO, lambda n, rng: _auto_second(wall, n, rng), True), (1e2,), (1e2, 1e4, 1e6)),
+        (WorkMethod("Legendre", lambda n: _second(wall, Legendre(n))), sizes, (*sizes, 32.0, 64.0)),
+        (WorkMethod("bins", lambda n: _second(wall, Bins(n))), sizes, (*sizes, 32.0, 64.0, 128.0)),
+        (WorkMethod("panels", panels), (1.0, 2.0), (1.0, 2.0, 3.0, 4.0)),
+    ]
+
+
+def _diffusivity_methods(wall: Wall) -> Methods:
+    angles = (1e1, 1e2, 1e3)
+    return [
+        (WorkMethod(AUTO, lambda budget: _auto_eta(wall)), (1.0,), (1.0,)),
+        (WorkMethod("rays at the angle 1/budget", lambda n: eta_at(wall, 1.0 / n)), angles, (*angles, 1e4, 1e5, 1e6)),
+    ]
+
+
+def _auto_eta(wall: Wall) -> Estimate:
+    found = diffusivity(WallLaw(wall))
+    return Estimate(found.eta, found.eta_error, found.kind, found.method)
+
+
+def eta_at(wall: Wall, angle: float) -> float:
+    """(1 + zeta)/(1 - zeta) with zeta = E[cot(Theta)/cot(theta)] at a small angle and its mirror image."""
+    entry = (np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS
+    law, total = WallLaw(wall), 0.0
+    for theta in (angle, np.pi - angle):
+        # the sign of cot(Theta) is opposite in the specular convention
+        total -= float(np.mean(np.tan(theta) / np.tan(law.reflect(entry, theta))))
+    return (1.0 + 0.5 * total) / (1.0 - 0.5 * total)
+
+
+# The largest spectral value off the constants.
+EIGENVALUE = Quantity("lambda2", _eigenvalue_methods, standard_names())
+# The slope of L^2/tau against ln L in a long channel, over that between diffuse walls.
+DIFFUSIVITY = Quantity("eta", _diffusivity_methods, ETA_SCENES)
+LENGTH = 10.0
+# Scenes that have no wall: their channel or tube reflects diffusely.
+DIFFUSE: dict[str, Section] = {"diffuse-channel": "channel", "diffuse-tube": "tube"}
+
+
+def diffuse_methods(scene: str) -> Methods:
+    """The methods for diffuse reflection."""
+    return _methods(lambertian(), DIFFUSE[scene])
+
+
+def _methods(law: Law, section: Section) -> Methods:
+    def chosen(budget: float, rng: np.random.Generator) -> Estimate:
+        return transmission(law, LENGTH, section, 1.0 / budget, rng)
+
+    def flights(budget: float, rng: np.random.Generator) -> Estimate:
+        # in space, where no polynomials are tried
+        return transmission(HemisphereLaw(law, 0.5 * np.pi), LENGTH, section, 1.0 / budget, rng)
+
+    found: Methods = [(WorkMethod(AUTO, chosen, True), (1e2, 1e3), (1e2, 1e3, 1e4, 1e5))]
+    # laws of grooves contain no diffuse reflection in a tube
+    if section == "channel":
+        found.append((WorkMethod(FLIGHTS, flights, True), (4e2, 1e3), (4e2, 1e3, 2e3)))
+    return found
+
+
+# The probability that a particle passes.
+TRANSMISSION = Quantity("transmission", lambda wall: _methods(WallLaw(wall), "channel"), ("focusing-arc", *DIFFUSE))
