@@ -487,8 +487,7 @@ def _sum_of(parts: Sequence[tuple[float, Law]]) -> Law:
     """The weighted sum, with nested sums flattened."""
     flat: list[tuple[float, Law]] = []
     for weight, law in parts:
-        inner = law.terms if isinstance(law, Combination) else ((1.0, law),)
-        flat += [(weight * own, part) for own, part in inner]
+        flat += [(weight * own, part) for own, part in Combination.of(law).terms]
     return Combination(tuple(flat))
 
 

@@ -18,7 +18,7 @@ from ..bases.basis import Basis, checked_basis
 from ..bases.measure import SINE
 from ..bases.partitions import Bins
 from ..bases.spaces import TensorBasis
-from ..laws.law import IsometryLaw, Law
+from ..laws.law import Law
 from ..laws.matrix_law import MatrixLaw, finite_matrix
 from ..laws.structure import Rules, fold, holds_of_all
 from ..laws.tensor_law import SpatialLaw
@@ -222,7 +222,7 @@ def _on_roll_angles(law: Law, basis: Basis) -> KernelMatrix:
 
 def _on_odd_functions(law: Law) -> float:
     """The eigenvalue -1 of specular reflection, 1 of retroreflection; raises InputError for other laws."""
-    if isinstance(law, IsometryLaw):
+    if law.retro is not None:
         return 1.0 if law.retro else -1.0
     raise InputError(
         f"basis: {law!r} preserves sin(theta) d theta, not sin(psi)^2 d psi; give a basis with weight 'sin', or "

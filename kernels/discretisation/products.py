@@ -177,7 +177,7 @@ def _probed(law: Law, matrix: Floats, functions: Floats, panels: Panels) -> Floa
 
 
 def _terms(law: Law) -> Sequence[tuple[float, Law]]:
-    return law.terms if isinstance(law, Combination) else ((1.0, law),)
+    return Combination.of(law).terms
 
 
 def _on_panels(law: Law, panels: Panels, matrix_of: Callable[[Law, Basis], KernelMatrix]) -> tuple[Floats, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import islice
 from typing import TypeAlias, TypeVar
@@ -89,6 +89,8 @@ class Law(ABC):
         ``"specular"`` after `in_specular_frame`, where specular reflection is the identity (Feres' convention).
     is_lambertian : bool
         Whether the outgoing angle has the density sin(theta')/2 for every incoming angle.
+    retro : bool or None
+        True for theta' = theta, False for theta' = pi - theta, None for other laws.
     outgoing_breakpoints : ndarray
         The known outgoing angles at which densities jump or have a kink for every incoming angle.
 
@@ -104,6 +106,7 @@ class Law(ABC):
     mirror_symmetric: bool | None = None
     frame: Frame = "paper"
     is_lambertian: bool = False
+    retro: bool | None = None
     outgoing_breakpoints: Floats = frozen(())
     # A law is an operator, not an array: with None, numpy leaves ``np.float64(0.3) * law`` to this class.
     __array_ufunc__ = None
@@ -1031,7 +1034,7 @@ def _flip(frame: Frame) -> Law:
 class IsometryLaw(BranchLaw):
     """The deterministic law theta' = theta (``retro``) or theta' = pi - theta."""
 
-    retro: bool
+    retro: bool = field()
 
     mirror_symmetric = True
 

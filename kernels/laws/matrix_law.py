@@ -22,13 +22,11 @@ from .density import (
     NEGATIVE_TOLERANCE,
     SYMMETRY_TOLERANCE,
     DensityLaw,
-    LambertianLaw,
     angle_pair,
     not_invariant,
     split_panels,
 )
-from .law import Composition, IsometryLaw, Law, set_properties
-from .phase_function import HenyeyGreensteinLaw
+from .law import Composition, Law, set_properties
 from .structure import Rules, fold, holds_of_all
 
 # Rows divided by their sums add up to 1 within a few roundings. Rows of a matrix with symmetrised flux may not; such a
@@ -236,8 +234,7 @@ def acts_on_bins(law: Law) -> bool:
 def _is_finite(law: Law) -> bool:
     if isinstance(law, MatrixLaw):
         return bool(np.diff(law.edges).min() > SAME_EDGE)
-    isotropic = isinstance(law, HenyeyGreensteinLaw) and law.g == 0.0
-    return isotropic or isinstance(law, (IsometryLaw, LambertianLaw))
+    return law.is_lambertian or law.retro is not None
 
 
 def _inner_edges(law: Law) -> Floats:
@@ -246,11 +243,8 @@ def _inner_edges(law: Law) -> Floats:
 
 def contains_reflection(law: Law) -> bool:
     """Whether specular reflection, or a change of convention, is a part of the law."""
-
-    def of_leaf(leaf: Law) -> bool:
-        return isinstance(leaf, IsometryLaw) and not leaf.retro
-
-    return fold(law, Rules(of_leaf, lambda terms: any(part for _, part in terms), any, lambda _: True))
+    rules = Rules(lambda leaf: leaf.retro is False, lambda terms: any(part for _, part in terms), any, lambda _: True)
+    return fold(law, rules)
 
 
 def with_beyond(law: Law, reflection: Floats, leaf: Callable[[Law], Floats]) -> Floats:
@@ -265,7 +259,7 @@ def with_beyond(law: Law, reflection: Floats, leaf: Callable[[Law], Floats]) -> 
     mirrored[:size, :size] = reflection
 
     def of_leaf(part: Law) -> Floats:
-        if isinstance(part, IsometryLaw):
+        if part.retro is not None:
             return identity if part.retro else mirrored
         return np.pad(leaf(part), (0, 2))
 

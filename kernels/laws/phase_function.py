@@ -53,6 +53,7 @@ class HenyeyGreensteinLaw(DensityLaw):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "g", number_between("g", self.g, -1.0, 1.0))
+        object.__setattr__(self, "is_lambertian", self.g == 0.0)
 
     def eigenvalue(self, degree: int) -> float:
         """The eigenvalue g^l of the Legendre polynomial of degree l in cos(theta)."""

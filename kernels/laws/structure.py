@@ -150,8 +150,7 @@ def sum_of_words(terms: Iterable[tuple[float, Word]]) -> Law:
     laws: list[tuple[float, Law]] = []
     for weight, word in terms:
         law = law_of(word)
-        inner = law.terms if isinstance(law, Combination) else ((1.0, law),)
-        laws += [(weight * fraction, term) for fraction, term in inner]
+        laws += [(weight * fraction, term) for fraction, term in Combination.of(law).terms]
     if len(laws) == 1:
         return laws[0][1]
     whole = object.__new__(Combination)

@@ -28,7 +28,6 @@ from ...core.estimates import NORMAL_95, Estimate, Summary, with_errors
 from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
 from ...kernels.bases.measure import SINE
-from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.structure import holds_of_all
 
 Arrangement = Literal["mirror", "half-turn"]
@@ -210,7 +209,7 @@ def _keeps_sines(law: Law) -> bool:
         wall = law.wall
         steps = [np.subtract(piece.end, piece.start) for loop in (wall.pieces, *wall.islands) for piece in loop]
         return wall.is_polygonal and all(np.count_nonzero(step) == 1 for step in steps)
-    return isinstance(law, (IsometryLaw, RectangularTeethLaw))
+    return law.retro is not None or isinstance(law, RectangularTeethLaw)
 
 
 def reflected(law: Law, incoming: Floats, rng: np.random.Generator) -> Floats:

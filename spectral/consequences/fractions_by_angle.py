@@ -17,7 +17,7 @@ from ...geometry.cells.hollow_shape import distinct_hollows
 from ...geometry.polygons.beams import Beams, beams_of
 from ...kernels import SINE, Bins, CircularArcLaw, DensityLaw, Law, WallLaw
 from ...kernels.laws.isometry_table import SAME_OFFSET, IsometryTable
-from ...kernels.laws.law import Composition, DrivenLaw, SpecularFrame, specular
+from ...kernels.laws.law import Composition, DrivenLaw, specular
 from ...kernels.laws.structure import law_of, words_of
 from ...kernels.walls.rectangular import FIRST_CROSSING, crevice_nodes, crevice_pieces
 from .channel import in_paper_frame
@@ -216,7 +216,7 @@ def _specular_part(law: Law, theta: Floats | None, rng: np.random.Generator) -> 
         missed = table.unresolved if theta is None else np.sqrt(table.unresolved)
         kind: ErrorKind = "bound" if theta is None or not missed else "estimate"
         return value, error + missed, kind, "isometries of the law"
-    inner = law.law if isinstance(law, SpecularFrame) else law
+    inner = in_paper_frame(law)
     factors = inner.laws if isinstance(inner, Composition) else (inner,)
     if any(isinstance(one, (DensityLaw, CircularArcLaw)) for one in factors):
         return zero, zero, "bound", "densities have none"

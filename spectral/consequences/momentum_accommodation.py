@@ -20,8 +20,7 @@ from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
 from ...kernels.bases.polynomials import MEAN_SINE, SINE_NORM, Directions
 from ...kernels.expectations.basis_means import Means
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
-from ...kernels.laws.density import LambertianLaw
-from ...kernels.laws.law import Combination, IsometryLaw, is_atomic
+from ...kernels.laws.law import Combination, is_atomic
 from ...kernels.laws.structure import has_chain, law_of, words_of
 from ..bounds.images import is_costly
 from ..bounds.operator_residuals import image_rule
@@ -331,8 +330,8 @@ class _Changes:
     def __init__(self, law: Law, slopes: Slopes | None, tolerance: float, rng: np.random.Generator) -> None:
         self.law, self.slopes, self.tolerance, self.rng = law, slopes, tolerance, rng
         # of specular reflection, retroreflection and the Lambertian law: factors of the complete change
-        self.ideal = np.array([1.0, 1.0]) if isinstance(law, LambertianLaw) else None
-        if isinstance(law, IsometryLaw):
+        self.ideal = np.array([1.0, 1.0]) if law.is_lambertian else None
+        if law.retro is not None:
             self.ideal = np.array([2.0 if law.retro else 0.0, 0.0])
         exact = self.ideal is not None or (slopes is None and is_atomic(law))
         self.kind: ErrorKind = "bound" if exact else "estimate"

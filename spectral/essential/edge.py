@@ -11,8 +11,6 @@ import numpy as np
 from ...core.checks import Floats, instance
 from ...core.estimates import ErrorKind, Summary, with_error
 from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
-from ...kernels.laws.density import LambertianLaw
-from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold
 from ...kernels.walls.wall_law import made_of_isometries
@@ -114,10 +112,10 @@ def _taken_apart(law: Law) -> _Part:
 
 
 def _leaf(law: Law) -> _Part:
-    if isinstance(law, (LambertianLaw, HenyeyGreensteinLaw, MatrixLaw)):
+    if law.is_lambertian or isinstance(law, (HenyeyGreensteinLaw, MatrixLaw)):
         return _Part((0.0, 0.0), np.zeros((2, 2)), 0.0, 0.0, True, (f"{law!r} is compact",))
     if made_of_isometries(law):
-        if isinstance(law, IsometryLaw):
+        if law.retro is not None:
             return replace(_isometric(law), grazing=np.eye(2) if law.retro else SWAP)
         limit = grazing_limit(law)
         # the grazing limit of an isometric law matters in sums with other laws only

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...kernels import Law
-from ...kernels.laws.law import IsometryLaw, SpecularFrame, sum_of
+from ...kernels.laws.law import sum_of
 
 
 def without_identity(law: Law) -> tuple[float, Law]:
@@ -19,9 +19,9 @@ def without_identity(law: Law) -> tuple[float, Law]:
     >>> without_identity(0.75 * ker.retroreflection() + 0.25 * ker.henyey_greenstein(0.5))
     (0.25, henyey_greenstein(0.5))
     """
-    in_frame = isinstance(law, SpecularFrame)
-    inner = law.law if isinstance(law, SpecularFrame) else law
-    terms = [(weight, SpecularFrame.of(term) if in_frame else term) for weight, term in inner.parts]
+    in_frame = law.frame == "specular"
+    inner = law.in_specular_frame() if in_frame else law
+    terms = [(weight, term.in_specular_frame() if in_frame else term) for weight, term in inner.parts]
     rest = [(weight, term) for weight, term in terms if not _keeps_angles(term)]
     if len(rest) in (0, len(terms)):
         return 1.0, law
@@ -30,5 +30,5 @@ def without_identity(law: Law) -> tuple[float, Law]:
 
 
 def _keeps_angles(law: Law) -> bool:
-    inner = law.law if isinstance(law, SpecularFrame) else law
-    return isinstance(inner, IsometryLaw) and inner.retro == (law.frame == "paper")
+    inner = law.in_specular_frame() if law.frame == "specular" else law
+    return inner.retro is (law.frame == "paper")
