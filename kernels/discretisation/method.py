@@ -33,6 +33,8 @@ DEFAULT_SAMPLES = 2**20
 # Rounding error of a matrix with n functions, divided by n. Each edge of n cells has a rounding error that moves a
 # fraction of about n eps of a cell's measure; an error of 1.2e-13 was measured for n eps = 1.1e-13.
 ROUNDING = 8.0 * EPS
+# Least factor by which the differences of levels fall near kinks, margin of the error there, and agreement to rounding.
+ORDER, MARGIN, ROUNDED = 4.0, 4.0, 1e-13
 
 
 @dataclass(frozen=True)
@@ -99,16 +101,22 @@ def rounding(basis: Basis) -> float:
     return ROUNDING * basis.size + node_rounding(basis)
 
 
-def until_converged(levels: Iterator[Floats], tolerance: float) -> tuple[Floats, float]:
-    """The first level that differs from the previous one by at most the tolerance, or the last; and the difference."""
-    current = next(levels)
-    difference = np.inf
+def until_converged(levels: Iterator[Floats], tolerance: float, smooth: bool = True) -> tuple[Floats, float]:
+    """The first level that is known to the tolerance, or the last, and its error: the difference from the previous one.
+
+    Where kinks are not known, two levels may agree by chance, but not three: their differences fall by `ORDER` or more.
+    The error is the last difference, or that before over `ORDER`, with a margin. Two levels decide if they agree to
+    rounding.
+    """
+    current, before, error = next(levels), np.inf, np.inf
     for finer in levels:
         difference = float(np.linalg.norm(finer - current))
-        current = finer
-        if difference <= tolerance:
+        three = np.isfinite(before)
+        error = difference if smooth else MARGIN * max(difference, before / ORDER if three else 0.0)
+        current, before = finer, difference
+        if error <= tolerance if smooth or three else difference <= ROUNDED:
             break
-    return current, difference
+    return current, error
 
 
 def by_sobol_rays(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:

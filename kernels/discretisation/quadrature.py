@@ -46,9 +46,6 @@ MIRROR_TOLERANCE = 4.0 * EPS * np.pi
 CONDITIONAL_CHUNK = 2**17
 # Grading of intervals at the jumps of a map, where it may have square-root singularities if it maps from or to grazing.
 GRADING = 0.25 ** np.arange(1.0, 17.0)
-# Near kinks that nobody has told two levels may agree by chance, but not three: their differences fall by ORDER or
-# more, and the error has this margin.
-ORDER, MARGIN, ROUNDED = 4.0, 4.0, 1e-13
 
 
 def by_eigenvalues(law: HenyeyGreensteinLaw, basis: Legendre, budget: Budget) -> KernelMatrix:
@@ -113,18 +110,8 @@ def density_matrix(law: DensityLaw, basis: Basis, tolerance: float) -> tuple[Flo
             # the rules over theta' are of one order
             return found, error + law._row_error * float(basis.normalisation.max())
     levels = _density_levels(law, basis, edges)
-    if type(law) is not DensityLaw:
-        return until_converged(levels, tolerance)
-    current, before, error = next(levels), np.inf, np.inf
-    for finer in levels:
-        difference = float(np.linalg.norm(finer - current))
-        error = MARGIN * (difference if np.isinf(before) else max(difference, before / ORDER))
-        # two levels decide if they agree to rounding
-        done = error <= tolerance if np.isfinite(before) else difference <= ROUNDED
-        current, before = finer, difference
-        if done:
-            break
-    return current, error
+    # the kinks of a function of a user's are not known
+    return until_converged(levels, tolerance, smooth=type(law) is not DensityLaw)
 
 
 def _with_mirror_image(half: Floats) -> Floats:

@@ -236,7 +236,7 @@ KINKS = (0.012131502700984842, -0.09776620855528517, *np.cos(np.linspace(0.1, 3.
 POLYNOMIALS = np.eye(5) * np.sqrt(2.0 * np.arange(5) + 1.0)
 
 
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
 def test_matrices_of_densities_with_a_kink_that_nobody_mentions_have_errors_that_hold(tolerance):
     for kink in KINKS:
         law = Bent(kink)
@@ -246,8 +246,9 @@ def test_matrices_of_densities_with_a_kink_that_nobody_mentions_have_errors_that
         ]
         exact = law.factor * np.outer(means, means)
         exact[0, 0] += 1.0
-        P = ker.discretise(law, ker.Legendre(5), tolerance=tolerance)
-        assert np.linalg.norm(P.symmetric - exact) <= float(P.error)
+        for one in (law, ker.DensityLaw(law.density)):
+            P = ker.discretise(one, ker.Legendre(5), tolerance=tolerance)
+            assert np.linalg.norm(P.symmetric - exact) <= float(P.error)
 
 
 def test_distances_of_densities_with_a_kink_that_nobody_mentions_have_errors_that_hold():
