@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, instance, positive_number, whole_number
+from ...core.checks import Floats, Value, finite_array, finite_number, frozen, instance, positive_number, whole_number
 from ...core.errors import InputError
 from .disk import Disk
 
@@ -33,7 +33,7 @@ class Features(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SatelliteDisk:
+class SatelliteDisk(Value):
     """A disk that touches other bodies with its satellites only, round bumps on its rim, or with teeth.
 
     Parameters

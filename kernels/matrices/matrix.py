@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ...core.checks import (
     Floats,
+    Value,
     choice,
     finite_array,
     finite_number,
@@ -127,7 +128,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class KernelMatrix:
+class KernelMatrix(Value):
     r"""The matrix of a Markov kernel P in a basis of L^2 of the invariant measure.
 
     Made by `discretise`, `estimate` or `load_matrix`, and by the algebra: ``P @ Q`` (first P, then Q),
@@ -275,12 +276,8 @@ class KernelMatrix:
         return np.array(self.array, dtype=dtype, copy=copy)
 
     def __getstate__(self) -> dict[str, Any]:
-        # ``array`` stays behind: unpickled it would be writable
+        # without ``array``, which is as large again
         return {field.name: getattr(self, field.name) for field in fields(self)} | {"replicates": (*self.replicates,)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self.__post_init__()
 
     @property
     def weights(self) -> Floats:

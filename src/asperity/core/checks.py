@@ -5,10 +5,11 @@ from __future__ import annotations
 import numbers as kinds_of_numbers
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from types import MappingProxyType
+from typing import Any, SupportsIndex, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -365,6 +366,56 @@ def frozen(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
     """Return a read-only copy, or the array itself if it owns its numbers and nobody can write to it."""
     if isinstance(array, np.ndarray) and array.dtype == dtype and array.flags.owndata and not array.flags.writeable:
         return array
-    copy: NDArray[Any] = np.array(array, dtype=dtype)
-    copy.setflags(write=False)
-    return copy
+    return read_only(np.array(array, dtype=dtype))
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """An array of the caller's own, to which nobody can write from now on."""
+    array.setflags(write=False)
+    return array
+
+
+class Value:
+    """An object with arrays, of which those that are read-only are so in its copies and pickles too.
+
+    Those in its attributes and in tuples in them; numpy copies and pickles all arrays as writable ones.
+    """
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
+        made = super().__reduce_ex__(protocol)
+        return (*made[:2], *map(_state, made[2:3]), *made[3:]) if isinstance(made, tuple) else made
+
+
+class State(dict[str, Any]):
+    """The attributes of a value: a shallow copy takes them as they are, others what `_Fixed` makes of them."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return dict, ({name: _fixed(value) for name, value in self.items()},)
+
+
+def _state(value: Any) -> Any:
+    # a pair if there are slots
+    return State(value) if type(value) is dict else tuple(map(_state, value)) if type(value) is tuple else value
+
+
+class _Fixed:
+    """What a function makes of the copy of a value."""
+
+    def __init__(self, function: Callable[[Any], Any], value: object) -> None:
+        self.made = function, (value,)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.made
+
+
+def _fixed(value: Any) -> Any:
+    if isinstance(value, np.ndarray) and not value.flags.writeable:
+        return _Fixed(read_only, value)
+    if isinstance(value, MappingProxyType):
+        return _Fixed(_mapping, {name: _fixed(one) for name, one in value.items()})
+    return tuple(map(_fixed, value)) if type(value) is tuple else value
+
+
+def _mapping(items: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    # pickles find no name of the class
+    return MappingProxyType(items)
