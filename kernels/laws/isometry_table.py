@@ -15,7 +15,7 @@ from ...core.errors import InputError
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
-from ..bases.intervals import joined_lists, without_extremal
+from ..bases.intervals import MOST_BREAKPOINTS, joined_lists, without_extremal
 from ..bases.measure import SINE
 
 Whole = NDArray[np.int64]
@@ -362,7 +362,7 @@ def crevice_retro(height_to_width: float, theta: Floats) -> Floats:
 
 def crevice_breakpoints(height_to_width: float, limit: int) -> tuple[Floats, float]:
     """The angles where d is a whole number, about ``limit`` at most, and the measure of the angles beyond them."""
-    last = max((whole_number("limit", limit, 0) - 1) // 2, 0)
+    last = max((whole_number("limit", limit, 0, most=MOST_BREAKPOINTS) - 1) // 2, 0)
     if last == 0:
         return np.empty(0), 1.0
     steep = np.arctan(2.0 * height_to_width / np.arange(last, 0, -1))
