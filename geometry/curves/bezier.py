@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, number_between, sequence
+from ...core.checks import Floats, number_between, sequence, whole_number
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, parameters, stretch_factors, uniform_parameters
@@ -124,7 +124,7 @@ class Bezier(Curve):
 
     def turning_points(self, axis: int) -> list[float]:
         """Return the parameters in (0, 1) where coordinate ``axis`` has zero derivative, ascending."""
-        v = self._derivative()[:, axis]
+        v = self._derivative()[:, whole_number("axis", axis, 0, most=1)]
         if self.degree == 2:
             return _roots_inside([v[1] - v[0], v[0]])
         return _roots_inside([v[0] - 2.0 * v[1] + v[2], 2.0 * (v[1] - v[0]), v[0]])

@@ -16,6 +16,7 @@ from ...core.checks import Floats, finite_array, frozen, indices, number_between
 from ...core.errors import InputError
 from ...core.estimates import Summary
 from ...core.rounding import EPS
+from ...core.tables import axes_or_new
 from ..curves.arc import Arc
 from ..curves.curve import Curve
 from ..curves.segment import Segment
@@ -417,9 +418,7 @@ class Container(Summary):
 
     def draw(self, ax: Axes | None = None) -> Axes:
         """Draw the boundary into matplotlib Axes, new ones by default, and return them."""
-        from matplotlib import pyplot
-
-        axes = pyplot.subplots()[1] if ax is None else ax
+        axes = axes_or_new(ax)
         for curve in self.curves:
             axes.plot(*curve.flattened(1e-4 * boundary.size_of(self.curves)).T, color="black", linewidth=1.2)
         for point, tangent in zip(self.points, self.tangents, strict=True):

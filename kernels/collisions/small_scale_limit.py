@@ -21,6 +21,7 @@ from ...core.checks import (
     finite_array,
     frozen,
     generator,
+    instance,
     shaped,
     whole_number,
 )
@@ -29,9 +30,10 @@ from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_err
 from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...core.rounding import EPS
 from ...core.tables import data_frame
+from ...geometry import Wall
 
 if TYPE_CHECKING:
-    from ...geometry import Disk, Wall
+    from ...geometry import Disk
 
 # A slope with an error needs three points.
 FEWEST_SCALES = 3
@@ -218,7 +220,9 @@ def limit_study(
     # a part takes a thousand bytes, packed
     check_memory("repetitions", "all repetitions", 128 * len(eps) * repetitions)
     spaces = [ConfigurationSpace(wall, disk, float(e), None if spacing is None else spacing(float(e))) for e in eps]
-    target = (wall if limit is None else limit).foreshorten(disk)
+    if limit is not None:
+        instance("limit", limit, Wall, "geo.triangular_teeth(0.7)")
+    target = (limit or wall).foreshorten(disk)
     sizes = tuple((space.scale, space.spacing) for space in spaces)
     job = _Repetitions(disk, wall, target, sizes, tuple(map(float, rolls)), samples, repetitions, root)
     parts = all_parts(

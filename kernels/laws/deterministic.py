@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, angles, finite_array, frozen
+from ...core.checks import Floats, angles, finite_array, frozen, instance
 from ...core.errors import InputError
 from ..bases.angles import clipped_inside
 from ..bases.intervals import bisected
@@ -340,6 +340,7 @@ class LeastResistanceLaw(Law):
 
     def flux(self, cells: Bins) -> Floats:
         """The mass of sin(theta)/2 d theta that goes from each cell to each cell, shape (n, n), to rounding."""
+        instance("cells", cells, Bins, "ker.Bins(64)")
         b = self.split_ends
         edges = cells.edges - 0.5 * np.pi
         edges = np.concatenate((edges, -edges))

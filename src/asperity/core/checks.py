@@ -24,6 +24,8 @@ Rng: TypeAlias = np.random.Generator | np.random.BitGenerator | np.random.SeedSe
 SHOWN, LINE_ENDS = 80, re.compile(r"\s*\n\s*")
 # Bytes of a double, and the number of doubles for which no machine is asked.
 DOUBLE, ALWAYS_THERE = 8, 2**24
+# Positive numbers below count as 0: their reciprocals overflow.
+SMALLEST = 1e-300
 # Whole numbers beyond do not fit into arrays.
 LARGEST = 2**63 - 1
 # By the wanted class and that of what was given instead: what makes the one from the other.
@@ -210,7 +212,7 @@ def choice(name: str, value: object, options: Iterable[object]) -> None:
 def positive_number(name: str, value: Any) -> float:
     """Return ``value`` as a finite float greater than zero."""
     number = finite_number(name, value)
-    if number <= 0.0:
+    if number < SMALLEST:
         raise InputError(f"{name}: expected a number greater than 0, got {number!r}")
     return number
 
@@ -218,7 +220,7 @@ def positive_number(name: str, value: Any) -> float:
 def number_between(name: str, value: Any, low: float, high: float, *, closed: str = "") -> float:
     """Return ``value`` in (low, high); ``closed`` holds ``"low"`` and/or ``"high"`` for ends that are allowed."""
     number = finite_number(name, value)
-    inside_low = number >= low if "low" in closed else number > low
+    inside_low = number >= low if "low" in closed else number > (low or SMALLEST)
     inside_high = number <= high if "high" in closed else number < high
     if not (inside_low and inside_high):
         left, right = "[" if "low" in closed else "(", "]" if "high" in closed else ")"
