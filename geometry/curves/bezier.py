@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, number_between, sequence, whole_number
+from ...core.checks import Floats, number_between, positive_number, sequence, whole_number
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, parameters, stretch_factors, uniform_parameters
@@ -163,7 +163,7 @@ class Bezier(Curve):
         bend = np.diff(np.array(self.control_points), n=2, axis=0)
         most = self.degree * (self.degree - 1) * float(np.hypot(bend[:, 0], bend[:, 1]).max())
         # a step h has an error of at most h^2 max|B''| / 8
-        return self.point(uniform_parameters(tolerance, math.sqrt(most / (8.0 * max(tolerance, 1e-300)))))
+        return self.point(uniform_parameters(math.sqrt(most / 8.0 / positive_number("tolerance", tolerance))))
 
 
 def _bernstein(control: Floats, s: Floats) -> Floats:

@@ -85,7 +85,7 @@ class SatelliteDisk(Value):
         for name, least in (("size", 0.0), ("radius", np.finfo(float).tiny)):
             value: ArrayLike = getattr(self, name)
             if not np.iterable(value):
-                if value != 0.0 or least > 0.0:
+                if finite_number(name, value) != 0.0 or least > 0.0:
                     object.__setattr__(self, name, positive_number(name, value))
                 continue
             array = finite_array(name, value)
