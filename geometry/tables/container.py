@@ -305,6 +305,8 @@ class Container(Summary):
         """
         last = indices("last", shaped("last", last, "n"), self.wall_count, -1)
         position, velocity = shaped("position", position, last.size, 2), shaped("velocity", velocity, last.size, "k")
+        if velocity.shape[1] not in (2, 3):
+            raise InputError(f"velocity: expected shape (n, 2) or (n, 3), got {velocity.shape}")
         times = np.full((len(position), self.wall_count), np.inf)
         straight = len(self.points)
         if straight:
