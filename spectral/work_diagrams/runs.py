@@ -130,7 +130,7 @@ def work_precision(
     >>> round(report.order("midpoint").order, 6)
     2.0
     """
-    instance("problem", problem, WorkProblem, "spec.WorkProblem(name, reference)")
+    instance("problem", problem, WorkProblem, "spec.WorkProblem('a', spec.ReferenceValue(0.5, 0.0, 'by hand'))")
     whole_number("repeats", repeats, 1)
     positive_number("seconds", seconds)
     ladders = _ladders(methods, budgets)
