@@ -90,6 +90,8 @@ def collide_rim(
         )
     whole_number("max_contacts", max_contacts, 1)
     at, moving = checked_states(position, velocity)
+    periods = np.abs(at[:, 0]).max(initial=0.0) / (eps * wall.period)
+    number_between("position in periods", periods, 0.0, 1e15, closed="low")
     around = _AboveWall(body, wall, eps)
 
     def collided(at: Floats, moving: Floats) -> DiskResults:

@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, angles, finite_array, frozen, instance
+from ...core.checks import Floats, angles, finite_array, frozen, instance, read_only
 from ...core.errors import InputError
 from ..bases.angles import clipped_inside
 from ..bases.intervals import bisected
@@ -212,8 +212,7 @@ class IntervalExchangeLaw(Law):
         starts = SINE.cdf(edges[:-1])[row] + before - before[first][row]
         number = np.full(flux.shape, -1, dtype=np.int64)
         number[row, column] = np.arange(row.size)
-        partner = number[column, row]
-        partner.setflags(write=False)
+        partner = read_only(number[column, row])
         for name, value in (("starts", frozen(starts)), ("widths", frozen(widths)), ("partner", partner)):
             object.__setattr__(self, name, value)
 

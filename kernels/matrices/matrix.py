@@ -28,6 +28,7 @@ from ...core.checks import (
     frozen,
     instance,
     number_between,
+    read_only,
     whole_number,
 )
 from ...core.errors import InputError
@@ -267,9 +268,7 @@ class KernelMatrix(Value):
     def array(self) -> Floats:
         """P[i, j] = P(bin i -> bin j) for partitions, <e_i, P e_j> for other bases; shape (n, n), read-only."""
         normalisation = self.basis.normalisation
-        array = np.asarray(normalisation[:, None] * self.symmetric / normalisation)
-        array.setflags(write=False)
-        return array
+        return read_only(np.asarray(normalisation[:, None] * self.symmetric / normalisation))
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """``np.asarray(P)`` is ``P.array``."""

@@ -179,6 +179,7 @@ def test_objects_of_another_kind_are_refused_in_words_before_any_work():
     teeth, bins, conditionals = geo.triangular_teeth(1.0), ker.Bins(4), ker.lambertian().conditionals([1.0])
     along = ker.CollisionAlongWall(ker.PositionLaw([0.0, 1.0], [ker.lambertian()]), geo.Disk())
     curve, found = geo.Bezier([(0, 0), (0.5, -1), (1, 0)]), spec.spectrum(ker.henyey_greenstein(0.5), 2)
+    body = geo.SatelliteDisk(geo.Disk(), 24, 0.1)
     for name, call in {
         "container": lambda: ker.play(3, law, [0.5, 0.0], [0.0, 1.0, 0.0], 3),
         "container: ": lambda: along.check_wall(None, 0),
@@ -198,7 +199,8 @@ def test_objects_of_another_kind_are_refused_in_words_before_any_work():
         "ax: ": lambda: found.plot("axes"),
         "spacing": lambda: geo.ConfigurationSpace(teeth, geo.Disk(), 0.01, 5e-324),
         "angle": lambda: geo.triangular_teeth(5e-324),
-        "scale": lambda: geo.collide_rim(geo.SatelliteDisk(geo.Disk(), 24, 0.1), teeth, 1e300, [[0, 0]], [[0, -1, 0]]),
+        "scale": lambda: geo.collide_rim(body, teeth, 1e300, [[0, 0]], [[0, -1, 0]]),
+        "position in periods": lambda: geo.collide_rim(body, teeth, 0.01, [[1e300, 0]], [[0, -1, 0]]),
         "size": lambda: geo.SatelliteDisk(geo.Disk(), 24, np.zeros((), dtype=[("a", float)])),
     }.items():  # fmt: skip
         with pytest.raises(InputError, match=rf"^{name.removesuffix(': ')}: expected"):

@@ -371,10 +371,10 @@ def frozen(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
     return read_only(np.array(array, dtype=dtype))
 
 
-def read_only(array: NDArray[Any]) -> NDArray[Any]:
+def read_only(array: Any) -> NDArray[Any]:
     """An array of the caller's own, to which nobody can write from now on."""
     array.setflags(write=False)
-    return array
+    return np.asarray(array)
 
 
 class Value:
