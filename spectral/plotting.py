@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.checks import Floats
+from ..core.tables import axes_or_new
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,10 +35,7 @@ def draw_eigenvalues(
     ax : matplotlib Axes, optional
         By default axes of a new figure.
     """
-    if ax is None:
-        from matplotlib import pyplot
-
-        ax = pyplot.figure(layout="constrained").subplots()
+    ax = axes_or_new(ax)
     rank = np.arange(len(values))
     known = np.isfinite(width)
     ax.axhline(0.0, color="0.6", linewidth=0.8, zorder=1)
@@ -69,10 +67,7 @@ def draw_eigenfunctions(
     theta: Floats, functions: Floats, labels: Sequence[str], convention: str, ax: Axes | None = None
 ) -> Axes:
     """Draw functions on angles, shape (functions, angles), each with its label."""
-    if ax is None:
-        from matplotlib import pyplot
-
-        ax = pyplot.figure(layout="constrained").subplots()
+    ax = axes_or_new(ax)
     for values, label in zip(functions, labels, strict=True):
         # the sign is chosen positive at small angles
         ax.plot(theta, np.sign(values[0] or 1.0) * values, label=label)

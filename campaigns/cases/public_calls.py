@@ -54,9 +54,8 @@ FIRST = {
     "rectangular_teeth", "resistance", "smooth", "spectral_gap", "spectrum", "trace", "trajectory",
     "triangular_teeth", "Wall.foreshorten", "wall_for", "wall_from_text",
 }  # fmt: skip
-# How Python and numpy refuse what has no such method, no length, no truth, or is no path; its message and the lines
-# of the call say the rest.
-PLAIN = (TypeError, ValueError, AttributeError, IndexError)
+# How Python and numpy refuse what is no number, no length, no truth, or no path; the lines of the call say the rest.
+PLAIN = (TypeError, ValueError)
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz, and
 # `check_proof` its own damaged certificates.
 LEFT_OUT = {
@@ -307,3 +306,30 @@ def method_calls() -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
             call = good_call(label, getattr(thing, name))
             found[label if label not in found else f"{label} of {thing!r}"] = call
     return found
+
+
+# What is of a wrong kind for most arguments.
+CIRCULAR: list[Any] = []
+CIRCULAR.append(CIRCULAR)
+WRONG: dict[str, Any] = {
+    "None": None, "text": "text", "number as text": "0.5", "bytes": b"bytes", "list": [], "dict": {"a": 1},
+    "array": np.array([1.0, 2.0, 3.0]), "matrix": np.zeros((2, 2)), "ragged": [[1, 2], [3]],
+    "texts": np.array(["a", "b"]), "objects": np.array([None, {}], dtype=object), "nan": np.nan, "inf": np.inf,
+    "negative": -1, "zero": 0, "fraction": 2.5, "beyond double": 10**400, "complex": 1j,
+    "function": lambda: 0, "class": int, "law": LAW, "disk": DISK, "kernel": MATRIX, "wall": TEETH, "nul": "a\0b",
+    "surrogate": "\ud800", "object": object(), "set": {1, 2}, "tuple": (1, 2), "list of None": [None], "large": 1e300,
+    "tiny": 5e-324, "true": True, "seven": 7, "list in itself": CIRCULAR,
+    "span of time": np.timedelta64(3, "s"),
+}  # fmt: skip
+# A function of the user that fails, or returns nonsense, fails in its own way; a bound may be met after hours.
+FUNCTIONS = ("density", "map", "function", "spacing", "family", "objective", "cost", "solve", "spectrum", "quantities")
+ENDLESS_KINDS = ("zero", "beyond double", "tiny", "large")
+ENDLESS = {"tolerance", "lengths", "smallest_opening", "permutations", "max_contacts", "max_collisions", "iterations"}
+
+
+def wrong_kinds(label: str, parameter: str) -> dict[str, Any]:
+    """What replaces an argument of a call, without functions where the user's are called and endless work."""
+    label = label.partition(" of ")[0]
+    of_user = parameter in FUNCTIONS or (label == "RoughBody" and parameter in ("law", "radius"))
+    left_out = ENDLESS_KINDS if parameter in ENDLESS else ()
+    return {kind: wrong for kind, wrong in WRONG.items() if kind not in left_out and not (callable(wrong) and of_user)}

@@ -2,8 +2,9 @@
 
 Each call is a good one with one argument replaced: by the same numbers in another kind of array (the answer must be the
 same one, or an error), by what has no meaning as numbers (an error), or by other numbers (an answer without NaN, or an
-error). An error is an InputError, elsewhere than in constructors and the functions of the first pages also a TypeError,
-ValueError, AttributeError or IndexError. A call that ends the process, or does not come back, fails.
+error), or by an object of another kind (an answer or an error). An error is an InputError, elsewhere than in
+constructors and the functions of the first pages also a TypeError or ValueError. A call that ends the process, or does
+not come back, fails.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from campaigns.cases import public_calls
 from campaigns.engine import Campaign, Judged
 
 SECONDS = 60.0
-SAME, REFUSED, OTHER = "same numbers", "no numbers", "other numbers"
+SAME, REFUSED, OTHER, ODD = "same numbers", "no numbers", "other numbers", "odd objects"
 # Arguments that the object at hand does not need, a text, and heights, of which masked ones count as undefined.
 UNUSED = re.compile(
     r"breakpoints\(limit|turning_(points|values)\(axis|Segment.flattened|made_by|\.__\w+__\(|check_wall|\(height"
@@ -168,15 +169,15 @@ def _of_call(name: str, function: Callable[..., Any], good: dict[str, Any], rng:
         for one, value in good.items()
     }
     for one, value in arrays.items():
+        kinds: list[tuple[str, dict[str, Any]]] = [(ODD, public_calls.wrong_kinds(name, one))]
         if UNUSED.search(f"{name}({one}"):
-            continue
-        kinds: list[tuple[str, dict[str, Any]]] = []
-        if one == "rng" and "Rng" in kinds_of.get(one, ""):
-            kinds = [(REFUSED, sources(value))]
+            pass
+        elif one == "rng" and "Rng" in kinds_of.get(one, ""):
+            kinds += [(REFUSED, sources(value))]
         elif one == "function":
-            kinds = [(REFUSED, functions(value)), (OTHER, scalars(value))]
+            kinds += [(REFUSED, functions(value)), (OTHER, scalars(value))]
         elif _is_number(value):
-            kinds = [(SAME, same_numbers(value)), (REFUSED, no_numbers(value)), (OTHER, other_numbers(value, rng))]
+            kinds += [(SAME, same_numbers(value)), (REFUSED, no_numbers(value)), (OTHER, other_numbers(value, rng))]
         usual, strict = partial(function, **arrays), public_calls.is_strict(name, function)
         for rule, odd in kinds:
             for kind, other in odd.items():
@@ -272,6 +273,8 @@ def _ended(case: Case) -> tuple[str, str]:
     except Exception as reason:
         plain = isinstance(reason, public_calls.PLAIN) and not case.strict
         return ("plain error", "") if plain else ("exception", f"{type(reason).__name__}: {reason}")
+    if case.rule == ODD:
+        return "answer", ""
     if case.rule == REFUSED:
         return "answer", f"accepted, {answer}"
     wrong = f"NaN, {answer}" if has_nan(answer) else ""

@@ -16,7 +16,7 @@ from ...core.errors import InputError
 from ...core.long_runs import counted
 from .measured import is_slope, metres
 
-BRACKETED = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
+BRACKETED = re.compile(r"[\[({<]\s*([^\])}>]*?)\s*[\])}>]")
 # A sign # of a comment, but not that of an undefined number as in 1.#QNAN and #N/A.
 COMMENT = re.compile(r"(?:^|(?<=[\s,;]))#(?!N/?A\b|\w+!|#+\s*$)(.*)")
 # Words of instruments and tables for a height that is not known.
@@ -33,7 +33,7 @@ GROUPED_BY_BLANK = re.compile(r"(?<=\d)['’\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 # Lines that name the unit of one column each.
 UNIT_OF_ONE = re.compile(r"^\W*[xyz]\w*[ _]units?\s*[:=]\s*(\S+)", re.IGNORECASE)
 # Characters between the names of columns, from the surest to the least sure.
-BETWEEN = (r"[;\t]+", r",", r"\s{2,}", r"(?<=[\])])\s+", r"\s+")
+BETWEEN = (r"[;\t|]+", r",", r"\s{2,}", r"(?<=[\])}>])\s+", r"\s+")
 # A header may have this fraction of rows that look like data.
 STRAY = 0.1
 

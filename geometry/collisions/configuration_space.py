@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, instance, number_between, positive_number, shaped
 from ...core.errors import InputError
+from ...core.tables import axes_or_new
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk, contact_normal
 from ..disk.inner_disk import InnerDisk
 from ..disk.satellites import Satellites
-from ..plotting.walls import LEVEL, RAY_COLOURS, SOLID, axes_or_new, draw_solid
+from ..plotting.walls import LEVEL, RAY_COLOURS, SOLID, draw_solid
 from ..walls.interior import in_solid
 from ..walls.wall import Wall
 from .paths import collision_path

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, instance, whole_number
+from ...core.checks import Floats, finite_array, instance, read_only, whole_number
 from ...core.errors import InputError
 from ..disk.rim import Features, SatelliteDisk
 from .amplification import DiskCounts, DiskStatus, fewest_contacts, mark_amplified
@@ -120,9 +120,7 @@ def collide_pair(
     ratio = max(body.disk.mass / body.disk.inertia for body in (first, second))
     uncertain = contacts >= fewest_contacts(spacing * (1.0 + largest_bend_of(first, second)), ratio)
     mark_amplified(again, states, ends, arrays[-1], uncertain, (spacing, masses))
-    for array in arrays:
-        array.setflags(write=False)
-    return PairCollision(*arrays)
+    return PairCollision(*map(read_only, arrays))
 
 
 class _TwoRims:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, instance, positive_number, whole_number
+from ...core.checks import Floats, instance, number_between, whole_number
 from ...core.errors import InputError
 from ..disk.rim import Features, SatelliteDisk
 from ..tracing.tracing import Status
@@ -20,6 +20,8 @@ from .rigid import RigidCollision, checked_states, marked
 STRIDE = 0.5
 # Sine of the angle between neighbouring edges that are one.
 STRAIGHT = 1e-12
+# A period that is longer has positions rounded to more than 1e-7 of the disk.
+LARGEST_SCALE = 1e9
 
 
 def collide_rim(
@@ -80,7 +82,7 @@ def collide_rim(
     """
     instance("body", body, SatelliteDisk, "geo.SatelliteDisk(geo.Disk(), 100, 0.05)")
     instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
-    eps = positive_number("scale", scale)
+    eps = number_between("scale", scale, 0.0, LARGEST_SCALE)
     if not wall.is_polygonal or wall.islands or wall.origin[1] != 0.0:
         raise InputError(
             "wall: expected straight pieces without islands and highest points at height 0; a curved wall can be "
@@ -88,6 +90,8 @@ def collide_rim(
         )
     whole_number("max_contacts", max_contacts, 1)
     at, moving = checked_states(position, velocity)
+    periods = np.abs(at[:, 0]).max(initial=0.0) / (eps * wall.period)
+    number_between("position in periods", periods, 0.0, 1e15, closed="low")
     around = _AboveWall(body, wall, eps)
 
     def collided(at: Floats, moving: Floats) -> DiskResults:

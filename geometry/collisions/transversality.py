@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, instance, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, Summary, fraction_estimate
+from ...core.tables import axes_or_new
 from ..curves.curvature import largest_curvature
 from ..curves.segment import Segment
 from ..disk import rolling
 from ..disk.disk import Disk
-from ..plotting.walls import LEVEL, RAY_COLOURS, axes_or_new, draw_solid
+from ..plotting.walls import LEVEL, RAY_COLOURS, draw_solid
 from ..tracing.tracing import trace, trajectory
 from ..walls.wall import Wall
 from .configuration_space import FLIGHT_POINTS, ConfigurationSpace

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, number_between
+from ...core.checks import Floats, number_between, positive_number
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from .curve import LARGEST_COORDINATE, Curve, Point, as_point, parameters, stretch_factors, uniform_parameters
@@ -260,6 +260,6 @@ class Arc(Curve):
     def flattened(self, tolerance: float) -> Floats:
         """Return points on the arc, uniform in t, whose polyline is within ``tolerance``."""
         # A step of d radians has an error of at most max(a, b) (1 - cos(d/2)) = 2 max(a, b) sin^2(d/4).
-        sine = math.sqrt(max(tolerance, 0.0) / (2.0 * max(self.semi_axes)))
+        sine = math.sqrt(positive_number("tolerance", tolerance) / (2.0 * max(self.semi_axes)))
         step = 4.0 * math.asin(min(sine, 0.5)) or math.inf
-        return self.point(uniform_parameters(tolerance, 2.0 * self.half_span / step))
+        return self.point(uniform_parameters(2.0 * self.half_span / step))

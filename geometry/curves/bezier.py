@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, number_between, sequence
+from ...core.checks import Floats, number_between, positive_number, sequence, whole_number
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, parameters, stretch_factors, uniform_parameters
@@ -124,7 +124,7 @@ class Bezier(Curve):
 
     def turning_points(self, axis: int) -> list[float]:
         """Return the parameters in (0, 1) where coordinate ``axis`` has zero derivative, ascending."""
-        v = self._derivative()[:, axis]
+        v = self._derivative()[:, whole_number("axis", axis, 0, most=1)]
         if self.degree == 2:
             return _roots_inside([v[1] - v[0], v[0]])
         return _roots_inside([v[0] - 2.0 * v[1] + v[2], 2.0 * (v[1] - v[0]), v[0]])
@@ -163,7 +163,7 @@ class Bezier(Curve):
         bend = np.diff(np.array(self.control_points), n=2, axis=0)
         most = self.degree * (self.degree - 1) * float(np.hypot(bend[:, 0], bend[:, 1]).max())
         # a step h has an error of at most h^2 max|B''| / 8
-        return self.point(uniform_parameters(tolerance, math.sqrt(most / (8.0 * max(tolerance, 1e-300)))))
+        return self.point(uniform_parameters(math.sqrt(most / 8.0 / positive_number("tolerance", tolerance))))
 
 
 def _bernstein(control: Floats, s: Floats) -> Floats:

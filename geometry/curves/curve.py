@@ -137,10 +137,8 @@ def parameters(s: ArrayLike) -> Floats:
     return array
 
 
-def uniform_parameters(tolerance: float, steps: float) -> Floats:
-    """Return parameters from 0 to 1 in at least ``steps`` equal steps; ``tolerance`` must be positive."""
-    if not finite_number("tolerance", tolerance) > 0.0:
-        raise WallError(f"flattened: expected a tolerance greater than 0, got {tolerance!r}")
+def uniform_parameters(steps: float) -> Floats:
+    """Return parameters from 0 to 1 in at least ``steps`` equal steps."""
     if not steps <= MOST_STEPS:
         raise WallError(f"flattened: expected a tolerance for at most {MOST_STEPS:g} points, got {steps:.3g}")
     return np.linspace(0.0, 1.0, max(1, math.ceil(steps)) + 1)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, instance, positive_number, whole_number
+from ...core.checks import Floats, Value, finite_array, finite_number, frozen, instance, positive_number, whole_number
 from ...core.errors import InputError
 from .disk import Disk
 
@@ -33,7 +33,7 @@ class Features(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SatelliteDisk:
+class SatelliteDisk(Value):
     """A disk that touches other bodies with its satellites only, round bumps on its rim, or with teeth.
 
     Parameters
@@ -85,7 +85,7 @@ class SatelliteDisk:
         for name, least in (("size", 0.0), ("radius", np.finfo(float).tiny)):
             value: ArrayLike = getattr(self, name)
             if not np.iterable(value):
-                if value != 0.0 or least > 0.0:
+                if finite_number(name, value) != 0.0 or least > 0.0:
                     object.__setattr__(self, name, positive_number(name, value))
                 continue
             array = finite_array(name, value)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, broadcast, finite_array
-from ...core.tables import verbatim
+from ...core.checks import Floats, angles, broadcast, finite_array, instance
+from ...core.tables import axes_or_new, verbatim
+from ..walls.wall import Wall
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..curves.curve import Curve
-    from ..walls.wall import Wall
 
 # Okabe and Ito's colours, which colour-blind readers can distinguish.
 RAY_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -65,6 +65,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     >>> draw_wall(geo.triangular_teeth(3.1)).get_ylabel()
     'y, stretched 29.1 times'
     """
+    instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
     entries, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
     ax = axes_or_new(ax)
     free, floor = heights(wall)
@@ -88,13 +89,6 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     ax.set_aspect(vertical_stretch(wall))
     ax.locator_params(axis="both", nbins=6)
     return ax
-
-
-def axes_or_new(ax: Axes | None) -> Axes:
-    """Return the axes, or those of a new figure."""
-    from matplotlib import pyplot
-
-    return pyplot.figure(layout="constrained").subplots() if ax is None else ax
 
 
 def vertical_stretch(wall: Wall) -> float:

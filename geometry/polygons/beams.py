@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, number_between, whole_number
+from ...core.checks import Floats, number_between, read_only, whole_number
 from ...core.rounding import EPS
 from ..tracing.threads import in_blocks, interruptibly
 from .compiled import columns as c
@@ -404,6 +404,4 @@ def _mirrored(pieces: _Pieces) -> _Pieces:
 
 
 def _fixed(array: NDArray[Any]) -> NDArray[Any]:
-    array = np.ascontiguousarray(array)
-    array.setflags(write=False)
-    return array
+    return read_only(np.ascontiguousarray(array))

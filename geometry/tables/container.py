@@ -16,6 +16,7 @@ from ...core.checks import Floats, finite_array, frozen, indices, number_between
 from ...core.errors import InputError
 from ...core.estimates import Summary
 from ...core.rounding import EPS
+from ...core.tables import axes_or_new
 from ..curves.arc import Arc
 from ..curves.curve import Curve
 from ..curves.segment import Segment
@@ -304,6 +305,8 @@ class Container(Summary):
         """
         last = indices("last", shaped("last", last, "n"), self.wall_count, -1)
         position, velocity = shaped("position", position, last.size, 2), shaped("velocity", velocity, last.size, "k")
+        if velocity.shape[1] not in (2, 3):
+            raise InputError(f"velocity: expected shape (n, 2) or (n, 3), got {velocity.shape}")
         times = np.full((len(position), self.wall_count), np.inf)
         straight = len(self.points)
         if straight:
@@ -417,9 +420,7 @@ class Container(Summary):
 
     def draw(self, ax: Axes | None = None) -> Axes:
         """Draw the boundary into matplotlib Axes, new ones by default, and return them."""
-        from matplotlib import pyplot
-
-        axes = pyplot.subplots()[1] if ax is None else ax
+        axes = axes_or_new(ax)
         for curve in self.curves:
             axes.plot(*curve.flattened(1e-4 * boundary.size_of(self.curves)).T, color="black", linewidth=1.2)
         for point, tangent in zip(self.points, self.tangents, strict=True):

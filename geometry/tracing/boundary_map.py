@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, finite_array, instance, whole_number
+from ...core.checks import Floats, angles, finite_array, instance, read_only, whole_number
 from ...core.errors import InputError
 from ..tables.boundary import TINIEST, FlightStatus
 from ..tables.container import Container
@@ -214,6 +214,4 @@ class _Flight:
     def states(self) -> BoundaryStates:
         length = self.container.length_at(self.position, self.wall)
         arrays = (length, self.theta, self.wall, self.time, self.made, self.status)
-        for array in arrays:
-            array.setflags(write=False)
-        return BoundaryStates(*arrays)
+        return BoundaryStates(*map(read_only, arrays))

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, broadcast, finite_array, whole_number
+from ...core.checks import Floats, angles, broadcast, finite_array, read_only, whole_number
 from ..walls.mushroom import checked_mushrooms, fewest_per_top, mushrooms
 from ..walls.wall import Wall
 from .tracing import MAX_COLLISIONS, Status, Trace, trace
@@ -171,6 +171,4 @@ class MushroomGenerations:
         out_theta[entering], collisions[entering], status[entering] = rays.theta, rays.collisions, rays.status
         shape = x_all.shape
         results = (out_x.reshape(shape), out_theta.reshape(shape), collisions.reshape(shape), status.reshape(shape))
-        for array in results:
-            array.setflags(write=False)
-        return Trace(*results)
+        return Trace(*map(read_only, results))

@@ -22,6 +22,7 @@ from ...core.checks import (
     instance,
     number_between,
     numbers,
+    read_only,
     whole_number,
 )
 from ...core.estimates import Summary
@@ -243,9 +244,7 @@ def trace(
     if starts is not given:
         in_blocks(move_back, len(starts), threads)
     results = (out_x.reshape(shape), out_theta.reshape(shape), collisions.reshape(shape), status.reshape(shape))
-    for array in results:
-        array.setflags(write=False)
-    return Trace(*results)
+    return Trace(*map(read_only, results))
 
 
 class InvalidRays(Exception):

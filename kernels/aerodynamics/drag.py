@@ -133,7 +133,7 @@ def resistance(
     else:
         basis, coefficients, missed = _represented(cost, finite_array("breakpoints", breakpoints), 0.1 * wanted)
     size = float(np.linalg.norm(coefficients))
-    budget = Budget(MATRIX_FRACTION * wanted / max(size, 1.0), segments=int(seconds / SEGMENT_TIME))
+    budget = Budget(MATRIX_FRACTION * wanted / max(size, 1.0), segments=int(min(seconds / SEGMENT_TIME, 1e18)))
     matrix = matrix_by(law, "auto", basis, budget)
     value = float(np.sum(coefficients * matrix.symmetric))
     error = _error(matrix, coefficients) + missed

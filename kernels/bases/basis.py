@@ -9,7 +9,7 @@ from typing import Any, Literal, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, frozen, instance, shaped, whole_number
+from ...core.checks import Floats, Value, finite_array, frozen, instance, shaped, whole_number
 from ...core.errors import AsperityError, InputError
 from .given import Vectorised
 from .intervals import cell_among
@@ -26,7 +26,7 @@ DENSER, BETWEEN = 3, 1.02
 ORTHONORMAL, CHECKED = 1e-12, "_is_checked"
 
 
-class Basis(ABC):
+class Basis(Value, ABC):
     """An orthonormal family e_0, ..., e_{n-1} in L^2 of a probability measure on (0, pi).
 
     In every basis the matrix S with entries <e_i, P e_j> represents a kernel P. Two bases are equal if they are of the

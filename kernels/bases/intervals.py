@@ -12,6 +12,8 @@ from .measure import SINE
 
 # Number of halvings that shrink an interval of angles to the spacing of float64.
 BISECTIONS = 60
+# Limit on the breakpoints that a law lists, less than a second of work.
+MOST_BREAKPOINTS = 2**20
 
 
 def joined_lists(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

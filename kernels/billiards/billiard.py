@@ -14,7 +14,7 @@ from ...core.checks import Floats, Rng, check_memory, finite_array, generator, i
 from ...core.errors import InputError
 from ...core.estimates import Summary
 from ...core.long_runs import Engine, all_parts, identity_of, reported
-from ...geometry import Disk
+from ...geometry import Container, Disk
 from ...geometry.tables.boundary import FlightStatus
 from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
@@ -24,7 +24,6 @@ from ..positions.position_law import PositionLaw
 from .record import BilliardRecord
 
 if TYPE_CHECKING:
-    from ...geometry import Container
     from ...geometry.tables.boundary import Touch
 
 # Relative change of the energy of a disk at a wall that is rounding.
@@ -196,6 +195,7 @@ def laws_of_walls(container: Container, laws: Any, *others: type) -> list[Any]:
 
     Raises an InputError if they do not match the walls or belong to two disks.
     """
+    instance("container", container, Container, "geo.Container.circle()")
     walls = container.wall_count
     each = list(laws) if isinstance(laws, Sequence) else [laws] * walls
     for law in each:
@@ -313,7 +313,7 @@ class CollisionAlongWall(Summary):
 
     def check_wall(self, container: Container, wall: int) -> None:
         """Raise an InputError if the wall is a curve and the edges do not run from 0 to its length."""
-        curve = wall - len(container.points)
+        curve = _number_of(container, wall) - len(container.points)
         if curve < 0:
             return
         length = container.curves[curve].length
@@ -326,7 +326,12 @@ class CollisionAlongWall(Summary):
     def coordinate(self, container: Container, wall: int, position: Floats) -> Floats:
         """The coordinates x (n,) of points (n, 2) on a wall, within the edges of the law."""
         (first, last), position = self.law.edges[[0, -1]], finite_array("position", position)
-        if wall < len(container.points):
+        if _number_of(container, wall) < len(container.points):
             along = (position - container.points[wall]) @ container.tangents[wall]
             return np.asarray(first + np.mod(along - first, last - first))
         return np.clip(container.length_on(wall, position), first, last)
+
+
+def _number_of(container: Container, wall: int) -> int:
+    instance("container", container, Container, "geo.Container.circle()")
+    return whole_number("wall", wall, 0, most=container.wall_count - 1)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, choice, number_between, shaped, whole_number
 from ...core.estimates import Summary
+from ...core.tables import axes_or_new
 from ...geometry.tables.boundary import FlightStatus
 from ...geometry.tracing.tracing import numbers_of
 
@@ -191,9 +192,7 @@ class BilliardRecord(Summary):
         'arc length $s$'
         """
         first, second = self.phase_portrait(coordinates)
-        from matplotlib import pyplot
-
-        axes = pyplot.subplots()[1] if ax is None else ax
+        axes = axes_or_new(ax)
         # a few points are to be seen too
         size = float(np.clip(300.0 / len(first), 1.2, 5.0))
         for k in range(first.shape[1]):

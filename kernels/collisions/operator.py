@@ -12,7 +12,7 @@ from ...core.checks import Floats, instance
 from ...core.errors import InputError
 from ...geometry.disk.disk import Disk, branch_block
 from ..bases.assembly import reflection_matrix
-from ..bases.basis import Basis
+from ..bases.basis import Basis, checked_basis
 from ..matrices.defects import SymmetryDefect, relative_asymmetry
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ class CollisionOperator(LinearOperator):
             raise InputError("theta_matrix: expected one matrix or two in the same basis")
         if parts[0].basis.measure.name != "sin":
             raise InputError("theta_basis: expected a basis for sin(theta), got one with weight 'sin2'")
+        checked_basis(psi_basis)
         if psi_basis.measure.name != "sin2":
             raise InputError("psi_basis: expected a basis for sin(psi)^2, such as Legendre(n, weight='sin2')")
         self.flipped, self.unflipped = theta_matrix, unflipped

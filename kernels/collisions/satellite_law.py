@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, finite_array, generator, whole_number
+from ...core.checks import Floats, Rng, finite_array, generator, shaped, whole_number
 from ...core.errors import AccuracyError, InputError
+from ...core.tables import axes_or_new
 from ..bases.given import seed_by_name
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ class SatelliteLaw:
         AccuracyError
             If a disk does not come back from the wall in 20 draws of its position.
         """
-        moving = finite_array("velocity", velocity)
+        moving = shaped("velocity", velocity, "n", 3)
         out = self.attempt(moving, generator(rng))
         lost = np.flatnonzero(np.isnan(out[:, 0]))
         if lost.size:
@@ -148,10 +149,7 @@ class SatelliteLaw:
             raise InputError(f"scales: expected at most {len(COLOURS)} numbers, got shape {eps.shape}")
         laws = [self] if scales is None else [SatelliteLaw(self.wall, self.disk, float(scale)) for scale in eps]
         theta, psi = angles
-        if ax is None:
-            from matplotlib import pyplot
-
-            ax = pyplot.figure(layout="constrained").subplots()
+        ax = axes_or_new(ax)
         right = ax.twinx()
         velocity = np.tile(-self.disk.from_angles(theta, psi), (samples, 1))
         fractions = (np.arange(samples) + 0.5) / samples

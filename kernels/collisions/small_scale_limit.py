@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -20,6 +21,7 @@ from ...core.checks import (
     finite_array,
     frozen,
     generator,
+    instance,
     shaped,
     whole_number,
 )
@@ -28,9 +30,10 @@ from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_err
 from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...core.rounding import EPS
 from ...core.tables import data_frame
+from ...geometry import Wall
 
 if TYPE_CHECKING:
-    from ...geometry import Disk, Wall
+    from ...geometry import Disk
 
 # A slope with an error needs three points.
 FEWEST_SCALES = 3
@@ -65,13 +68,13 @@ class LimitStudy(Summary):
     shift : array
         E[u u']/E[u^2] with u = -cos theta, minus the same ratio for the limit at the same incoming angles. The true
         disk's correlation is <u, P~ u>/<u, u> plus ``shift``.
-    errors : dict of arrays
+    errors : mapping to arrays
         Standard errors of the eight columns above, from independent repetitions.
     collisions : int
         Number of collisions at each scale.
     psi : array, shape (k,)
         The incoming psi, radians. With several, every column above is the mean over them.
-    by_psi : dict of arrays
+    by_psi : mapping to arrays
         The eight columns for every psi, each of shape (scales, k).
     """
 
@@ -86,10 +89,10 @@ class LimitStudy(Summary):
     outliers: Floats
     drift: Floats
     shift: Floats
-    errors: dict[str, Floats]
+    errors: Mapping[str, Floats]
     collisions: int
     psi: Floats
-    by_psi: dict[str, Floats]
+    by_psi: Mapping[str, Floats]
     _more = ".errors, .order(column), .by_psi, .to_frame()"
 
     def _facts(self) -> dict[str, object]:
@@ -217,7 +220,9 @@ def limit_study(
     # a part takes a thousand bytes, packed
     check_memory("repetitions", "all repetitions", 128 * len(eps) * repetitions)
     spaces = [ConfigurationSpace(wall, disk, float(e), None if spacing is None else spacing(float(e))) for e in eps]
-    target = (wall if limit is None else limit).foreshorten(disk)
+    if limit is not None:
+        instance("limit", limit, Wall, "geo.triangular_teeth(0.7)")
+    target = (limit or wall).foreshorten(disk)
     sizes = tuple((space.scale, space.spacing) for space in spaces)
     job = _Repetitions(disk, wall, target, sizes, tuple(map(float, rolls)), samples, repetitions, root)
     parts = all_parts(
@@ -231,10 +236,10 @@ def limit_study(
         scales=frozen(eps),
         spacings=frozen([space.spacing for space in spaces]),
         gap_fraction=frozen([2.0 * space.gap_radius / space.spacing for space in spaces]),
-        errors={name: frozen(errors[:, j]) for j, name in enumerate(COLUMNS)},
+        errors=MappingProxyType({name: frozen(errors[:, j]) for j, name in enumerate(COLUMNS)}),
         collisions=repetitions * len(rolls) * math.prod(samples),
         psi=frozen(rolls),
-        by_psi={name: frozen(each.mean(axis=1)[:, :, j]) for j, name in enumerate(COLUMNS)},
+        by_psi=MappingProxyType({name: frozen(each.mean(axis=1)[:, :, j]) for j, name in enumerate(COLUMNS)}),
         **columns,
     )
 

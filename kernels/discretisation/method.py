@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ...core.checks import Floats
+from ...core.checks import Floats, read_only
 from ...core.estimates import ErrorKind
 from ...core.long_runs import Engine
 from ...core.rounding import EPS
@@ -92,8 +92,7 @@ def computed(
 
     The array is the caller's no more: it becomes read-only, and is not copied.
     """
-    symmetric.setflags(write=False)
-    return KernelMatrix(symmetric, basis, frobenius_error(error, kind, how), method=name)
+    return KernelMatrix(read_only(symmetric), basis, frobenius_error(error, kind, how), method=name)
 
 
 def rounding(basis: Basis) -> float:

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.estimates import shown, text_of
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
-from ..bases.basis import AngleFunction, Basis
+from ..bases.basis import AngleFunction, Basis, checked_basis
 from ..bases.given import Vectorised
 from ..bases.intervals import cell_among, joined_lists
 from ..bases.measure import gauss_on_intervals
@@ -211,6 +211,7 @@ class Conditionals(NamedTuple):
 
     def masses(self, edges: Floats) -> Floats:
         """The probabilities between neighbouring edges, which go from 0 to pi, shape (angles, cells)."""
+        edges = shaped("edges", edges, "n")
         shape = self.error.size, edges.size - 1
         cell = self.owner * shape[1] + cell_among(edges, self.nodes)
         masses = np.bincount(cell, weights=self.weights, minlength=shape[0] * shape[1])
@@ -218,6 +219,7 @@ class Conditionals(NamedTuple):
 
     def in_basis(self, basis: Basis) -> Floats:
         """The means of the functions of a basis, shape (angles, size)."""
+        checked_basis(basis)
         return means_of_basis(basis, self.nodes, self.weights, self.starts)
 
     def mirrored(self) -> Conditionals:

@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, angles, finite_array, frozen
+from ...core.checks import Floats, angles, finite_array, frozen, instance, read_only
 from ...core.errors import InputError
 from ..bases.angles import clipped_inside
 from ..bases.intervals import bisected
@@ -212,8 +212,7 @@ class IntervalExchangeLaw(Law):
         starts = SINE.cdf(edges[:-1])[row] + before - before[first][row]
         number = np.full(flux.shape, -1, dtype=np.int64)
         number[row, column] = np.arange(row.size)
-        partner = number[column, row]
-        partner.setflags(write=False)
+        partner = read_only(number[column, row])
         for name, value in (("starts", frozen(starts)), ("widths", frozen(widths)), ("partner", partner)):
             object.__setattr__(self, name, value)
 
@@ -340,6 +339,7 @@ class LeastResistanceLaw(Law):
 
     def flux(self, cells: Bins) -> Floats:
         """The mass of sin(theta)/2 d theta that goes from each cell to each cell, shape (n, n), to rounding."""
+        instance("cells", cells, Bins, "ker.Bins(64)")
         b = self.split_ends
         edges = cells.edges - 0.5 * np.pi
         edges = np.concatenate((edges, -edges))

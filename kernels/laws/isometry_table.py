@@ -10,12 +10,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, whole_number
+from ...core.checks import Floats, Value, angles, read_only, whole_number
 from ...core.errors import InputError
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
-from ..bases.intervals import joined_lists, without_extremal
+from ..bases.intervals import MOST_BREAKPOINTS, joined_lists, without_extremal
 from ..bases.measure import SINE
 
 Whole = NDArray[np.int64]
@@ -49,7 +49,7 @@ class Crevice:
 
 
 @dataclass(frozen=True, eq=False)
-class IsometryTable:
+class IsometryTable(Value):
     r"""Pieces theta' = sign theta + offset for low < theta < high, and rectangular crevices.
 
     On a piece the probability is p(theta) = a + b cot(theta). The sinusoid p(theta) sin(theta) is given by its values
@@ -91,14 +91,14 @@ class IsometryTable:
 
     def __post_init__(self) -> None:
         columns = [np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64)) for name in COLUMNS]
-        columns[4:] = (_fixed(np.maximum(column, 0.0)) for column in columns[4:])
+        columns[4:] = (read_only(np.maximum(column, 0.0)) for column in columns[4:])
         used = (columns[3] > columns[2]) & ((columns[4] > 0.0) | (columns[5] > 0.0))
         if np.any(columns[3] - columns[2] > 0.5 * np.pi * (1.0 + 1e-15)):
             raise InputError("table: expected pieces not longer than pi/2; cut the others at pi/2")
         everything = bool(used.all())
         for name, column in zip(COLUMNS, columns, strict=True):
             shared = everything and not column.flags.writeable
-            object.__setattr__(self, name, column if shared else _fixed(column[used]))
+            object.__setattr__(self, name, column if shared else read_only(column[used]))
 
     # ---- constructors ------------------------------------------------------------------------------------------
     @classmethod
@@ -115,7 +115,7 @@ class IsometryTable:
     ) -> IsometryTable:
         """The table of pieces of any length with probability ``sine + cosine cot(theta)``; pieces are cut at pi/2."""
         columns = np.broadcast_arrays(*np.atleast_1d(sign, offset, low, high, sine, cosine))
-        sign, offset, low, high, sine, cosine = (_fixed(np.array(column, dtype=np.float64)) for column in columns)
+        sign, offset, low, high, sine, cosine = (read_only(np.array(column, dtype=np.float64)) for column in columns)
         right = 0.5 * np.pi
         cut = (low < right) & (high > right)
         if cut.any():
@@ -313,12 +313,6 @@ class IsometryTable:
         return found, min(left_out + beyond, 1.0)
 
 
-def _fixed(array: Floats) -> Floats:
-    """Make an array of one's own read-only."""
-    array.setflags(write=False)
-    return array
-
-
 # d = 2 r |cot theta|, with r depth over width, has a relative error of about 2 eps in float64. Above the first limit
 # d mod 2 needs double-double arithmetic, above the second multiple precision. Theta and r count as exact numbers.
 LARGEST_PLAIN, LARGEST_DOUBLE_DOUBLE = 2.0**6, 2.0**48
@@ -368,7 +362,7 @@ def crevice_retro(height_to_width: float, theta: Floats) -> Floats:
 
 def crevice_breakpoints(height_to_width: float, limit: int) -> tuple[Floats, float]:
     """The angles where d is a whole number, about ``limit`` at most, and the measure of the angles beyond them."""
-    last = max((whole_number("limit", limit, 0) - 1) // 2, 0)
+    last = max((whole_number("limit", limit, 0, most=MOST_BREAKPOINTS) - 1) // 2, 0)
     if last == 0:
         return np.empty(0), 1.0
     steep = np.arctan(2.0 * height_to_width / np.arange(last, 0, -1))

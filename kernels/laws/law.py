@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import (
     Floats,
     Rng,
+    Value,
     angles,
     common_shape,
     finite_array,
@@ -74,7 +75,7 @@ T = TypeVar("T")
 RandomMap: TypeAlias = Callable[[Floats, Floats], tuple[Floats, "NDArray[np.bool_] | None"]]
 
 
-class Law(ABC):
+class Law(Value, ABC):
     """A Markov kernel P~(theta, d theta') on the half circle (0, pi).
 
     In the paper's convention theta' = theta is retroreflection and theta' = pi - theta is specular reflection.

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TypeAlias
 
+from ...core.checks import Value
 from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.spaces import TensorBasis
@@ -18,7 +19,7 @@ Term: TypeAlias = tuple[float, Law, bool]
 Discretiser: TypeAlias = Callable[[Law, Basis], KernelMatrix]
 
 
-class SpatialLaw(ABC):
+class SpatialLaw(Value, ABC):
     """A law of several angles or of velocities in space, whose matrix is computed from those of laws of one angle."""
 
     @abstractmethod

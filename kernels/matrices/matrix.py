@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ...core.checks import (
     Floats,
+    Value,
     choice,
     finite_array,
     finite_number,
@@ -27,6 +28,7 @@ from ...core.checks import (
     frozen,
     instance,
     number_between,
+    read_only,
     whole_number,
 )
 from ...core.errors import InputError
@@ -127,7 +129,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class KernelMatrix:
+class KernelMatrix(Value):
     r"""The matrix of a Markov kernel P in a basis of L^2 of the invariant measure.
 
     Made by `discretise`, `estimate` or `load_matrix`, and by the algebra: ``P @ Q`` (first P, then Q),
@@ -266,21 +268,15 @@ class KernelMatrix:
     def array(self) -> Floats:
         """P[i, j] = P(bin i -> bin j) for partitions, <e_i, P e_j> for other bases; shape (n, n), read-only."""
         normalisation = self.basis.normalisation
-        array = np.asarray(normalisation[:, None] * self.symmetric / normalisation)
-        array.setflags(write=False)
-        return array
+        return read_only(np.asarray(normalisation[:, None] * self.symmetric / normalisation))
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """``np.asarray(P)`` is ``P.array``."""
         return np.array(self.array, dtype=dtype, copy=copy)
 
     def __getstate__(self) -> dict[str, Any]:
-        # ``array`` stays behind: unpickled it would be writable
+        # without ``array``, which is as large again
         return {field.name: getattr(self, field.name) for field in fields(self)} | {"replicates": (*self.replicates,)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self.__post_init__()
 
     @property
     def weights(self) -> Floats:

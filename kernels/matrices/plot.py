@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.checks import Floats
+from ...core.tables import axes_or_new
 from ..bases.basis import Frame
 
 if TYPE_CHECKING:
@@ -26,10 +27,7 @@ def draw_kernel(edges: Floats, density: Floats, frame: Frame, ax: Axes | None = 
     """
     from matplotlib.colors import PowerNorm
 
-    if ax is None:
-        from matplotlib import pyplot
-
-        ax = pyplot.subplots(figsize=(5.6, 4.4), layout="constrained")[1]
+    ax = axes_or_new(ax, figsize=(5.6, 4.4))
     highest = float(density.max())
     norm = PowerNorm(COLOUR_POWER, vmin=0.0, vmax=highest if highest > 0.0 else 1.0)
     mesh = ax.pcolormesh(edges, edges, np.maximum(density, 0.0).T, cmap="viridis", norm=norm, rasterized=True)

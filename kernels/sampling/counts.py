@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats
+from ...core.checks import Floats, read_only
 from ...core.errors import AccuracyError
 from ...core.estimates import LEVEL
 from ...core.rounding import EPS
@@ -151,14 +151,14 @@ def matrix_from_counts(parts: Sequence[Any], basis: Basis, *, symmetrise: bool, 
             for pairs in occupied_pairs(counts)
         )
         if _may_be_stored(symmetric, len(parts)):  # as counts, which take less memory
-            replicates = Mapped(parts, lambda part: _read_only(symmetric + influence(part, slice(None))))
+            replicates = Mapped(parts, lambda part: read_only(symmetric + influence(part, slice(None))))
     raw = relative_asymmetry(counts, basis.normalisation)
     how = "variance of multinomial counts" if independent else f"spread of {len(parts)} parts"
     return KernelMatrix(
-        _read_only(symmetric),
+        read_only(symmetric),
         basis,
         frobenius_error(error, "estimate", how),
-        counts=cast(Counts, _read_only(counts)) if counts.dtype == np.int64 else None,
+        counts=cast(Counts, read_only(counts)) if counts.dtype == np.int64 else None,
         replicates=replicates,
         symmetrised=symmetrise,
         raw_defect=SymmetryDefect(raw, z_score=z_score),
@@ -186,7 +186,7 @@ def matrix_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool,
         symmetric,
         basis,
         frobenius_error(error, "estimate", f"spread of {len(fixed)} parts"),
-        replicates=tuple(map(_read_only, fixed)) if _may_be_stored(symmetric, len(fixed)) else (),
+        replicates=tuple(map(read_only, fixed)) if _may_be_stored(symmetric, len(fixed)) else (),
         symmetrised=symmetrise,
         raw_defect=SymmetryDefect(relative_asymmetry(raw), z_score=z_score),
     )
@@ -200,11 +200,6 @@ def half_width(symmetric: Floats, replicates: Sequence[Floats]) -> float:
 
 def _may_be_stored(symmetric: Floats, number: int) -> bool:
     return symmetric.nbytes * number <= LARGEST_REPLICATES
-
-
-def _read_only(array: Any) -> Any:
-    array.setflags(write=False)
-    return array
 
 
 def _half_width(differences: Callable[[slice], Floats], symmetric: Floats, number: int) -> float:

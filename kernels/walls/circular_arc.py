@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, number_between, whole_number
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
-from ..bases.intervals import between_cuts, edges_inside
+from ..bases.intervals import MOST_BREAKPOINTS, between_cuts, edges_inside
 from ..bases.measure import SINE
 from ..expectations.arcs import arc_lines, followed_hits
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
@@ -78,7 +78,7 @@ class CircularArcLaw(DrivenLaw):
 
         They are xi (1 + 1/k), xi k/(k + 1), xi, pi/2 -+ xi and their mirror images, and accumulate at xi and pi - xi.
         """
-        count = max((whole_number("limit", limit, 0) - 4) // 4, 1)
+        count = max((whole_number("limit", limit, 0, most=MOST_BREAKPOINTS) - 4) // 4, 1)
         k = np.arange(1.0, count + 1.0)
         left = self.half_angle * np.concatenate([[1.0], 1.0 + 1.0 / k, k / (k + 1.0)])
         left = np.concatenate([left, [0.5 * np.pi - self.half_angle]])

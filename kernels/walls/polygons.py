@@ -16,7 +16,7 @@ from ...core.estimates import Estimate
 from ...core.rounding import EPS
 from ...geometry import Wall
 from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
-from ..bases.intervals import without_extremal
+from ..bases.intervals import MOST_BREAKPOINTS, without_extremal
 from ..expectations.conditionals import Conditionals
 from ..laws.branches import merged
 from ..laws.isometry_table import IsometryTable
@@ -280,7 +280,7 @@ class TriangularTeethLaw(BranchLaw):
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The angles where N or an active bound on X changes; if there are too many, the ones nearest to pi/2."""
-        psi, limit = self.angle, whole_number("limit", limit, 0)
+        psi, limit = self.angle, whole_number("limit", limit, 0, most=MOST_BREAKPOINTS)
         # No ray with theta >= (pi + psi)/2 passes on the left, so larger multiples of psi/2 are no breakpoints.
         last = int(np.ceil((np.pi + psi) / psi))
         first = max(1, last - limit)

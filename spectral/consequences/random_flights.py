@@ -13,6 +13,7 @@ from ...core.checks import Floats, Rng, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, student_95
 from ...core.long_runs import reported
+from ...core.tables import axes_or_new
 from ...kernels import Law
 from .channel import MOST_FLIGHTS, Arrangement, Channel, checked
 
@@ -109,9 +110,7 @@ class ChannelPaths(Summary):
 
         The scale is t^(1/2) in a bent channel and (t ln t)^(1/2) in a straight one, with t in units of radius/speed.
         """
-        from matplotlib import pyplot
-
-        axes = pyplot.subplots()[1] if ax is None else ax
+        axes = axes_or_new(ax)
         time = float(self.times[-1])
         is_straight = math.isinf(self.bend)
         growth = math.log(time * self.speed / self.radius) if is_straight else 1.0

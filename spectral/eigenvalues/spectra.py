@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, frozen
+from ...core.checks import Floats, frozen, whole_number
 from ...core.errors import AccuracyError
 from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_error
 from ...core.rounding import EPS
@@ -211,7 +211,8 @@ class Spectrum(Summary):
 
     def eigenfunction(self, index: int, theta: Any) -> Floats:
         """Values at the angles theta of the eigenfunction of ``values[index]``, normalised to the mean square 1."""
-        return np.asarray(self.basis.evaluate(theta) @ self.vectors[:, index])
+        number = whole_number("index", index, -len(self.values), most=len(self.values) - 1)
+        return np.asarray(self.basis.evaluate(theta) @ self.vectors[:, number])
 
     def plot_eigenfunctions(self, ax: Axes | None = None) -> Axes:
         """Draw up to five eigenfunctions, without the constants, against the incoming angle."""

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.estimates import Estimate, Summary
 from ...core.long_runs import reported
 from ...core.rounding import EPS
-from ...core.tables import verbatim
+from ...core.tables import axes_or_new, verbatim
 from ...geometry import WALLS
 from .points import UNITS
 
@@ -212,10 +212,7 @@ def draw_curves(
     numeric = [name for name in parameters if all(isinstance(row.point[name], (int, float)) for row in rows)]
     if not numeric:
         raise InputError(f"plot: expected a parameter that is a number, got {', '.join(parameters)}")
-    if ax is None:
-        from matplotlib import pyplot
-
-        ax = pyplot.figure(layout="constrained").subplots()
+    ax = axes_or_new(ax)
     name = numeric[0]
     curves: dict[str, list[SweepRow]] = {}
     for row in sorted(rows, key=lambda row: float(row.point[name])):

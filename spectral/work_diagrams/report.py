@@ -14,7 +14,7 @@ import numpy as np
 from ...core.checks import choice
 from ...core.errors import InputError
 from ...core.estimates import Summary
-from ...core.tables import data_frame, table, verbatim
+from ...core.tables import axes_or_new, data_frame, table, verbatim
 from .problem import ROUNDED, FittedOrder, Machine, WorkMethod, WorkProblem, fit_order
 
 if TYPE_CHECKING:
@@ -307,10 +307,7 @@ class WorkReport(Summary):
 
 def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
     """Draw the errors (see `WorkReport.level`) over the least times, the front in grey and ``auto`` in black."""
-    if ax is None:
-        from matplotlib.figure import Figure
-
-        ax = Figure(figsize=(6.0, 4.5), layout="constrained").add_subplot()
+    ax = axes_or_new(ax, figsize=(6.0, 4.5))
     front = [(row.least, report.level(row)) for row in report.front()]
     if len(front) > 1:
         ax.plot(*zip(*front, strict=True), color="0.8", linewidth=6.0, solid_capstyle="round", zorder=0)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.checks import positive_number, sequence, shortened, whole_number
+from ...core.checks import instance, positive_number, sequence, shortened, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.files import regular_file, text_of, write_whole
@@ -130,6 +130,7 @@ def work_precision(
     >>> round(report.order("midpoint").order, 6)
     2.0
     """
+    instance("problem", problem, WorkProblem, "spec.WorkProblem('a', spec.ReferenceValue(0.5, 0.0, 'by hand'))")
     whole_number("repeats", repeats, 1)
     positive_number("seconds", seconds)
     ladders = _ladders(methods, budgets)

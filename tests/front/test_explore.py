@@ -313,6 +313,34 @@ def test_a_file_of_60_megabytes_is_read_in_a_process_that_is_ended_and_its_copy_
     assert not Path(folder).exists()
 
 
+def waited(page, condition):
+    for _ in range(600):
+        if condition():
+            return
+        time.sleep(0.05)
+        page.collect()
+    pytest.fail(f"still {page.message!r}")
+
+
+def test_a_refused_file_is_read_again_when_its_options_change_or_it_is_sent_again(page, monkeypatch):
+    cleared = []
+    monkeypatch.setattr(page.file, "_send_event", cleared.append)
+    page.options.value = "seam=nonsense"
+    page.file.filename, page.file.value = "profile.txt", b"0 0\n1 -0.5\n2 -0.1\n3 -0.4\n"
+    waited(page, lambda: "nonsense" in page.message)
+    # a browser answers so, and sends the same file again only then
+    assert [event.event_name for event in cleared] == ["clear_input"]
+    page.file.value = None
+    page.options.value = "seam=void"
+    waited(page, lambda: "void" in page.message)
+    page.options.value = "seam=step"
+    waited(page, lambda: page.question.name == "profile" and not page.message)
+    # another wall is chosen: options wait for the next file
+    page.choice.value = "koch"
+    page.options.value = "seam=mirror"
+    waited(page, lambda: page.question.name == "koch" and not page._awaited)
+
+
 def test_vertices_and_numbers_beyond_the_limits_are_refused_before_any_work(page):
     x = np.linspace(0.0, 1.0, 100_000)
     vertices = {"x": x.tolist(), "y": (-x * (1.0 - x)).tolist()}

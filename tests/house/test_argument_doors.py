@@ -172,3 +172,36 @@ def test_operators_refuse_what_is_no_operand_in_words():
     for law in (ker.lambertian(), collision):
         with pytest.raises(InputError, match="weight"):
             10**400 * law
+
+
+def test_objects_of_another_kind_are_refused_in_words_before_any_work():
+    container, law = geo.Container.circle(), ker.CollisionLaw(ker.lambertian(), geo.Disk())
+    teeth, bins, conditionals = geo.triangular_teeth(1.0), ker.Bins(4), ker.lambertian().conditionals([1.0])
+    along = ker.CollisionAlongWall(ker.PositionLaw([0.0, 1.0], [ker.lambertian()]), geo.Disk())
+    curve, found = geo.Bezier([(0, 0), (0.5, -1), (1, 0)]), spec.spectrum(ker.henyey_greenstein(0.5), 2)
+    body = geo.SatelliteDisk(geo.Disk(), 24, 0.1)
+    for name, call in {
+        "container": lambda: ker.play(3, law, [0.5, 0.0], [0.0, 1.0, 0.0], 3),
+        "container: ": lambda: along.check_wall(None, 0),
+        "wall": lambda: along.coordinate(container, 5, [[0.0, 0.0]]),
+        "limit": lambda: ker.limit_study(geo.Disk(), teeth, [0.1, 0.05, 0.02], limit="teeth"),
+        "problem": lambda: spec.work_precision("integral", [], [1.0]),
+        "basis": lambda: law.operator(bins, 3),
+        "basis: ": lambda: conditionals.in_basis("bins"),
+        "edges": lambda: conditionals.masses("edges"),
+        "cells": lambda: ker.LeastResistanceLaw().flux([0.0, np.pi]),
+        "axis": lambda: curve.turning_points(5),
+        "tolerance": lambda: curve.flattened(10**400),
+        "index": lambda: found.eigenfunction(9, 1.0),
+        "velocity": lambda: container.next_wall([[0.0, 0.0]], [[1.0]], [-1]),
+        "wall: ": lambda: geo.draw_wall("koch"),
+        "ax": lambda: container.draw(3),
+        "ax: ": lambda: found.plot("axes"),
+        "spacing": lambda: geo.ConfigurationSpace(teeth, geo.Disk(), 0.01, 5e-324),
+        "angle": lambda: geo.triangular_teeth(5e-324),
+        "scale": lambda: geo.collide_rim(body, teeth, 1e300, [[0, 0]], [[0, -1, 0]]),
+        "position in periods": lambda: geo.collide_rim(body, teeth, 0.01, [[1e300, 0]], [[0, -1, 0]]),
+        "size": lambda: geo.SatelliteDisk(geo.Disk(), 24, np.zeros((), dtype=[("a", float)])),
+    }.items():  # fmt: skip
+        with pytest.raises(InputError, match=rf"^{name.removesuffix(': ')}: expected"):
+            call()

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from campaigns.cases.public_calls import CALLS, DISK, EDGES, FIRST, LAW, LEFT_OUT, MATRIX, PLAIN, TEETH, is_strict
+from campaigns.cases.public_calls import CALLS, EDGES, FIRST, LEFT_OUT, PLAIN, is_strict, wrong_kinds
 from campaigns.faults.odd_arguments import has_nan, leaves
 
 from asperity import geometry as geo
@@ -19,18 +19,6 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AsperityError, InputError
 
-WRONG: dict[str, Any] = {
-    "None": None, "text": "text", "number as text": "0.5", "bytes": b"bytes", "list": [], "dict": {"a": 1},
-    "array": np.array([1.0, 2.0, 3.0]), "matrix": np.zeros((2, 2)), "ragged": [[1, 2], [3]],
-    "texts": np.array(["a", "b"]), "objects": np.array([None, {}], dtype=object), "nan": np.nan, "inf": np.inf,
-    "negative": -1, "zero": 0, "fraction": 2.5, "beyond double": 10**400, "complex": 1j,
-    "function": lambda: 0, "class": int, "law": LAW, "disk": DISK, "kernel": MATRIX, "wall": TEETH, "nul": "a\0b",
-    "surrogate": "\ud800", "span of time": np.timedelta64(3, "s"),
-}  # fmt: skip
-# A function of the user that fails, or returns nonsense, fails in its own way; a bound may be met after hours.
-FUNCTIONS = ("density", "map", "function", "spacing", "family", "objective", "cost", "solve", "spectrum", "quantities")
-ENDLESS_KINDS = ("zero", "beyond double")
-ENDLESS = {"tolerance", "smallest_opening", "permutations", "max_contacts", "max_collisions", "iterations"}
 # Seconds of the processor that a call may take: one that takes its argument may work.
 LONGEST = 10.0
 
@@ -96,11 +84,8 @@ def test_a_wrong_kind_of_argument_is_refused(name, tmp_path, monkeypatch):
     with contextlib.suppress(AsperityError):
         usual = function(**arguments)
     for changed in arguments:
-        for kind, wrong in WRONG.items():
-            right = any(wrong is good for good in (arguments[changed], defaults.get(changed, inspect.Parameter.empty)))
-            endless = changed in ENDLESS and kind in ENDLESS_KINDS
-            of_user = changed in FUNCTIONS or (name == "RoughBody" and changed in ("law", "radius"))
-            if right or endless or (callable(wrong) and of_user):
+        for kind, wrong in wrong_kinds(name, changed).items():
+            if any(wrong is good for good in (arguments[changed], defaults.get(changed, inspect.Parameter.empty))):
                 continue
             try:
                 answer = call(function, {**arguments, changed: wrong})

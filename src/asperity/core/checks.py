@@ -5,10 +5,11 @@ from __future__ import annotations
 import numbers as kinds_of_numbers
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from types import MappingProxyType
+from typing import Any, SupportsIndex, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +24,8 @@ Rng: TypeAlias = np.random.Generator | np.random.BitGenerator | np.random.SeedSe
 SHOWN, LINE_ENDS = 80, re.compile(r"\s*\n\s*")
 # Bytes of a double, and the number of doubles for which no machine is asked.
 DOUBLE, ALWAYS_THERE = 8, 2**24
+# Positive numbers below count as 0: their reciprocals overflow.
+SMALLEST = 1e-300
 # Whole numbers beyond do not fit into arrays.
 LARGEST = 2**63 - 1
 # By the wanted class and that of what was given instead: what makes the one from the other.
@@ -209,7 +212,7 @@ def choice(name: str, value: object, options: Iterable[object]) -> None:
 def positive_number(name: str, value: Any) -> float:
     """Return ``value`` as a finite float greater than zero."""
     number = finite_number(name, value)
-    if number <= 0.0:
+    if number < SMALLEST:
         raise InputError(f"{name}: expected a number greater than 0, got {number!r}")
     return number
 
@@ -217,7 +220,7 @@ def positive_number(name: str, value: Any) -> float:
 def number_between(name: str, value: Any, low: float, high: float, *, closed: str = "") -> float:
     """Return ``value`` in (low, high); ``closed`` holds ``"low"`` and/or ``"high"`` for ends that are allowed."""
     number = finite_number(name, value)
-    inside_low = number >= low if "low" in closed else number > low
+    inside_low = number >= low if "low" in closed else number > (low or SMALLEST)
     inside_high = number <= high if "high" in closed else number < high
     if not (inside_low and inside_high):
         left, right = "[" if "low" in closed else "(", "]" if "high" in closed else ")"
@@ -365,6 +368,56 @@ def frozen(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
     """Return a read-only copy, or the array itself if it owns its numbers and nobody can write to it."""
     if isinstance(array, np.ndarray) and array.dtype == dtype and array.flags.owndata and not array.flags.writeable:
         return array
-    copy: NDArray[Any] = np.array(array, dtype=dtype)
-    copy.setflags(write=False)
-    return copy
+    return read_only(np.array(array, dtype=dtype))
+
+
+def read_only(array: Any) -> NDArray[Any]:
+    """An array of the caller's own, to which nobody can write from now on."""
+    array.setflags(write=False)
+    return np.asarray(array)
+
+
+class Value:
+    """An object with arrays, of which those that are read-only are so in its copies and pickles too.
+
+    Those in its attributes and in tuples in them; numpy copies and pickles all arrays as writable ones.
+    """
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
+        made = super().__reduce_ex__(protocol)
+        return (*made[:2], *map(_state, made[2:3]), *made[3:]) if isinstance(made, tuple) else made
+
+
+class State(dict[str, Any]):
+    """The attributes of a value: a shallow copy takes them as they are, others what `_Fixed` makes of them."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return dict, ({name: _fixed(value) for name, value in self.items()},)
+
+
+def _state(value: Any) -> Any:
+    # a pair if there are slots
+    return State(value) if type(value) is dict else tuple(map(_state, value)) if type(value) is tuple else value
+
+
+class _Fixed:
+    """What a function makes of the copy of a value."""
+
+    def __init__(self, function: Callable[[Any], Any], value: object) -> None:
+        self.made = function, (value,)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.made
+
+
+def _fixed(value: Any) -> Any:
+    if isinstance(value, np.ndarray) and not value.flags.writeable:
+        return _Fixed(read_only, value)
+    if isinstance(value, MappingProxyType):
+        return _Fixed(_mapping, {name: _fixed(one) for name, one in value.items()})
+    return tuple(map(_fixed, value)) if type(value) is tuple else value
+
+
+def _mapping(items: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    # pickles find no name of the class
+    return MappingProxyType(items)

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from .checks import shortened
+from .checks import State, shortened
 from .errors import InputError
 
 
@@ -192,7 +192,7 @@ class _Contents:
             return [kind.__name__, *map(self.of, value)]
         if kind in (set, frozenset):
             return [kind.__name__, *self._sorted(value)]
-        if kind in (dict, types.MappingProxyType):
+        if kind in (dict, State, types.MappingProxyType):
             return ["dict", *(self.of(one) for item in value.items() for one in item)]
         if isinstance(value, np.generic) or kind in (np.ndarray, np.memmap):
             words = f"{'array' if isinstance(value, np.ndarray) else 'scalar'} {value.dtype.descr} {value.shape}"
@@ -263,7 +263,7 @@ class _Contents:
         if not isinstance(made, tuple):
             raise _NoContent(shortened(value))
         function, arguments, state, entries, items, setter = (*made, None, None, None, None)[:6]
-        if type(state) is dict:
+        if isinstance(state, dict):
             # with nothing but cached properties it is as without any
             state = _without_cached(value, state) or None
         listed = [None if one is None else list(one) for one in (entries, items)]

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import choice, numbers, one_number
+from .checks import Value, choice, numbers, one_number
 from .errors import InputError
 
 ErrorKind = Literal["bound", "estimate"]
@@ -38,7 +38,7 @@ ON_REQUEST = {
 }  # fmt: skip
 
 
-class Summary:
+class Summary(Value):
     """A result that is shown as its class, its value with its error, and one fact a line, as text and as HTML.
 
     Facts are the fields of a dataclass, which has ``repr=False``, but those that say why, and those at their defaults.

@@ -1,12 +1,16 @@
-"""Tables in Markdown, CSV and as data frames, arrays with coordinates, and text that pictures show as it is."""
+"""Tables in Markdown, CSV and as data frames, arrays with coordinates, axes of pictures and text shown as it is."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from .checks import instance
 from .errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def table_lines(heads: str, rows: Iterable[str | Iterable[object]]) -> Iterator[str]:
@@ -41,6 +45,16 @@ def numbers_as_csv(comments: Iterable[str], rows: Iterable[Sequence[float]]) -> 
     """
     lines = [f"# {' '.join(comment.split())}" for comment in comments]
     return "\n".join([*lines, *(",".join(map(repr, row)) for row in rows), ""])
+
+
+def axes_or_new(ax: Axes | None, **figure: Any) -> Axes:
+    """The axes of matplotlib that a user gives, or those of a new figure."""
+    from matplotlib import axes, pyplot
+
+    if ax is None:
+        return pyplot.figure(layout="constrained", **figure).subplots()
+    instance("ax", ax, axes.Axes, "matplotlib.pyplot.subplots()[1]")
+    return ax
 
 
 def verbatim(text: str) -> str:

@@ -74,6 +74,7 @@ class Page:
         self._picture: drawing.Picture | None = None
         # when the answer that is shown goes, if no other has come
         self._due: float | None = None
+        self._sent: tuple[str, bytes] | None = None
         self._archive: bytes | None = None
         self._was_busy = False
         self._make_figures()
@@ -108,6 +109,7 @@ class Page:
         self._make_sliders(parameters)
         self.choice.param.watch(lambda _: self._wall_chosen(), "value")
         self.file.param.watch(lambda _: self._file_sent(), "value")
+        self.options.param.watch(lambda _: self._open_file(), "value")
         for widget in (self.mass, self.inertia, self.convention, self.foreshortened):
             widget.param.watch(lambda _: self._ask_again(), "value")
 
@@ -157,6 +159,7 @@ class Page:
     def _wall_chosen(self) -> None:
         if self._filling:
             return
+        self._sent = None
         self._make_sliders({})
         if self.choice.value in WALLS:
             self._parameters_moved()
@@ -166,6 +169,7 @@ class Page:
             self._ask_polygon(points or [(0, 0), (0.3, -0.5), (0.6, -0.2), (1, 0)])
 
     def _ask_polygon(self, points: Any) -> None:
+        self._sent = None
         self.ask(partial(Wall.from_vertices, points, self.question.wall.unit), "polygon")
 
     def _parameters_moved(self) -> None:
@@ -181,10 +185,15 @@ class Page:
         self.ask(partial(wall_from_text, f"{name}:{values}"), name, of_catalogue=True)
 
     def _file_sent(self) -> None:
-        if not self.file.value:
-            return
-        name, content, options = str(self.file.filename), self.file.value, str(self.options.value or "")
-        self.ask(partial(opened, name, content, options), Path(name).stem)
+        if self.file.value:
+            self._sent = str(self.file.filename), self.file.value
+            self._open_file()
+
+    def _open_file(self) -> None:
+        """Ask for the file that came last with the options as they are now, unless another wall was chosen since."""
+        if self._sent is not None:
+            name, content = self._sent
+            self.ask(partial(opened, name, content, str(self.options.value or "")), Path(name).stem)
 
     def _choose(self, choice: str) -> None:
         """Set the choice without asking for its wall."""
@@ -296,6 +305,8 @@ class Page:
             return
         refused, self._awaited = self._awaited, False
         if refused:
+            # else a browser does not send the same file again
+            self.file.clear()
             self._show(self.answer)
             if self._picture is not None and not (self.answer and self.answer.finished):
                 # go on with the last valid wall

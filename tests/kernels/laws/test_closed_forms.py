@@ -9,6 +9,7 @@ from campaigns.judges.plain_tracer import trace_plainly
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.errors import InputError
 from asperity.kernels.laws.law import BranchLaw
 
 EPS = float(np.finfo(np.float64).eps)
@@ -168,6 +169,15 @@ def test_rectangular_kinks_say_how_much_they_leave_out() -> None:
     # cot(theta) = k/2, k = 1..50: beyond lies cot(theta) > 25, of probability 1 - 25/sqrt(1 + 625)
     assert abs(left_out - (1.0 - 25.0 / math.sqrt(626.0))) < 1e-15
     assert ker.RectangularTeethLaw(1e8).breakpoints(100)[1] > 0.99
+
+
+@pytest.mark.parametrize("make", [ker.CircularArcLaw, ker.TriangularTeethLaw, ker.RectangularTeethLaw])
+def test_no_law_lists_more_breakpoints_than_there_is_memory_for(make) -> None:
+    for law in (make(1.2), make(1.2).in_specular_frame(), 0.5 * make(1.2) + 0.5 * ker.specular()):
+        assert law.breakpoints(2**20)[0].size <= 2**20
+        for limit in (2**20 + 1, 2**31, 10**400):
+            with pytest.raises(InputError, match="limit: expected a whole number from 0 to 1048576"):
+                law.breakpoints(limit)
 
 
 def test_triangular_kinks_are_cut_to_the_limit_around_normal_incidence() -> None:
