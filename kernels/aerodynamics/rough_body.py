@@ -223,6 +223,7 @@ class RoughBody(Summary):
         >>> round(3 * float(body.resistance(directions=lambda u: 0 * u + 0.5 / np.pi)), 9)
         8.0
         """
+        positive_number("tolerance", tolerance)
         known: dict[Hashable, Estimate] = {}
 
         def mean(law: Law, normals: Floats) -> Floats:
