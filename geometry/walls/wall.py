@@ -243,7 +243,8 @@ class Wall(Cell):
 
     def outline(self, tolerance: float) -> Floats:
         """Return the path of one period, without islands, as a polyline within ``tolerance``, shape (n, 2)."""
-        chunks = [p.flattened(tolerance)[:-1] for p in self.pieces]
+        wanted = positive_number("tolerance", tolerance)
+        chunks = [p.flattened(wanted)[:-1] for p in self.pieces]
         return np.concatenate([*chunks, self.vertices[-1:]])
 
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:

@@ -141,10 +141,10 @@ class Panels(Basis):
         return panel, values.reshape(*angle.shape, self.degree + 1)
 
     def positions(self, angle: Floats) -> tuple[NDArray[np.int64], Floats]:
-        """The panel of each angle and the angle's position in it, from -1 to 1."""
+        """The panel of each angle and the angle's position in it, from -1 to 1; angles beyond the ends count as these."""
         panel = self._cells.index(angle)
         low, high = self.edges[panel], self.edges[panel + 1]
-        return panel, np.asarray((2.0 * angle - low - high) / (high - low))
+        return panel, np.asarray((2.0 * np.clip(angle, low, high) - low - high) / (high - low))
 
     def of_legendre(self, moments: Floats) -> Floats:
         """Integrals of the functions, shape (..., size), from the integrals of the panels' Legendre polynomials.
