@@ -32,9 +32,10 @@ from campaigns.engine import Campaign, Judged
 
 SECONDS = 60.0
 SAME, REFUSED, OTHER, ODD = "same numbers", "no numbers", "other numbers", "odd objects"
-# Arguments that the object at hand does not need, a text, and heights, of which masked ones count as undefined.
+# Arguments that the object at hand does not need, a text, heights, of which masked ones count as undefined, and numbers
+# that may be NaN, for unknown ones.
 UNUSED = re.compile(
-    r"breakpoints\(limit|turning_(points|values)\(axis|Segment.flattened|made_by|\.__\w+__\(|check_wall|\(height"
+    r"breakpoints\(limit|turning_(points|values)\(axis|Segment.flattened|made_by|\.__\w+__\(|check_wall|\(height|of_atoms\(error|^Estimate\(value"
 )
 
 

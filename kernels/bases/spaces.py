@@ -119,6 +119,10 @@ class TensorBasis(BasisOfPoints):
         return "TensorBasis(" + ", ".join(map(repr, self.factors)) + ")"
 
 
+# Points of the disc may lie beyond its rim by rounding.
+ROUNDED = 1e-12
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Zernike(BasisOfPoints):
     r"""The Zernike functions of degree 0, ..., ``degree`` on the unit disc, orthonormal for its uniform measure.
@@ -178,7 +182,10 @@ class Zernike(BasisOfPoints):
 
     def evaluate(self, angle: ArrayLike) -> Floats:
         """Values of all functions, shape ``(..., n)``, at points of the disc, whose last axis holds (v_x, v_y)."""
-        return zernike_functions(shaped("angle", angle, "...", 2), self.degrees, self.orders)
+        points = shaped("angle", angle, "...", 2)
+        if (farthest := float(np.hypot(points[..., 0], points[..., 1]).max(initial=0.0))) > 1.0 + ROUNDED:
+            raise InputError(f"angle: expected points of the unit disc, got one at the distance {farthest:g} from 0")
+        return zernike_functions(points, self.degrees, self.orders)
 
     def project(self, function: Callable[[Floats], Floats]) -> Floats:
         """Coefficients <f_i, g>, shape (n,), of a function of points of the disc, whose last axis holds (v_x, v_y)."""
