@@ -141,7 +141,7 @@ class Panels(Basis):
         return panel, values.reshape(*angle.shape, self.degree + 1)
 
     def positions(self, angle: Floats) -> tuple[NDArray[np.int64], Floats]:
-        """The panel of each angle and the angle's position in it, from -1 to 1; angles beyond the ends count as these."""
+        """The panel of each angle, and its position there from -1 to 1; angles beyond the ends count as these."""
         panel = self._cells.index(angle)
         low, high = self.edges[panel], self.edges[panel + 1]
         return panel, np.asarray((2.0 * np.clip(angle, low, high) - low - high) / (high - low))
