@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Unpack, get_args
@@ -32,9 +33,10 @@ from .method import (
     SEED_WITHOUT_RNG,
     SEGMENTS_A_RAY,
     Budget,
+    Method,
     MethodName,
 )
-from .methods import matrix_by
+from .methods import METHODS, SAMPLED, matrix_by
 
 # Memory in which a matrix is computed, in matrices, and least time of an entry.
 MATRICES, SECONDS = 6, 4e-7
@@ -43,7 +45,7 @@ MATRICES, SECONDS = 6, 4e-7
 def discretise(
     law: Law | SpatialLaw,
     basis: Basis,
-    method: MethodName = "auto",
+    method: MethodName | str = "auto",
     tolerance: float = 1e-8,
     samples: int | None = None,
     rng: Rng = None,
@@ -63,7 +65,9 @@ def discretise(
         Any law; for a combination each term is computed by its best method.
     basis : Basis
         Bins, Legendre or Panels for theta; Zernike for tangential velocities.
-    method : {"auto", "exact", "quadrature", "qmc", "monte-carlo"}
+    method : {"auto", "exact", "quadrature", "qmc", "monte-carlo"} or str
+        A kind of methods, or the name of one of the notes, as ``"by_sobol_rays"``.
+
         ``"exact"``: laws of isometries, to rounding; the error includes a bound for unresolved beams of a polygonal
         wall, or for breakpoints of a composition left out near grazing. ``"quadrature"``: Gauss rules, refined until
         their error meets the tolerance or the work exceeds some seconds; ``error.method`` tells how the error is
@@ -108,25 +112,13 @@ def discretise(
 
     Notes
     -----
-    ``"auto"`` tries the methods in this order; every other value of ``method`` tries the methods of its kind.
+    ``"auto"`` tries the methods in this order; a kind tries the methods of its kind, and a name this method alone.
 
-    1. ``by_rays_or_conditionals`` (auto): a wall without further parts, by the first of these that meets the tolerance,
-       or by the most exact: isometries, if the beams of a polygonal wall resolve; 2^17 rays; conditional
-       distributions, of walls that close and have at most 16 pieces; all rays. The error does not grow if the tolerance
-       falls. The same for a wall in the other frame.
-    2. ``by_isometry_table`` (exact): isometries on intervals of angles, with probabilities, such as polygonal walls.
-    3. ``by_branches`` (exact): any other law that lists its isometries and is not a composition.
-    4. ``by_eigenvalues`` (exact): Henyey-Greenstein scattering, in `Legendre`.
-    5. ``by_blocks`` (exact): matrices on bins, and chains of them with Lambertian reflection and ideal isometries.
-    6. ``by_arc_polygons`` (quadrature): circular arcs.
-    7. ``by_density`` (quadrature): laws with a density.
-    8. ``by_interval_masses`` (quadrature): `LeastResistanceLaw`, in `Bins`.
-    9. ``by_map`` (quadrature): deterministic laws.
-    10. ``by_conditionals`` (quadrature): any other law whose conditional distributions have errors; laws that average
-        over entry points only in `Legendre`.
-    11. ``by_sobol_rays`` (qmc): laws driven by one uniform number.
-    12. ``by_adaptive_angles`` (quadrature): any wall without further parts or isometries.
-    13. ``by_independent_rays`` (monte-carlo): any law.
+    {methods}
+
+    A wall without further parts takes the first of these that meets the tolerance, or the most exact: isometries, if
+    the beams of a polygonal wall resolve; 2^17 rays; conditional distributions, of walls that close and have at most 16
+    pieces; all rays. The error does not grow if the tolerance falls. The same for a wall in the other frame.
 
     Methods 1 to 10 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the
     other frame from its inner law, a composition from its factors if none of them needs rays. Methods 11 to 13 come
@@ -178,7 +170,7 @@ def discretise(
     if basis.measure != SINE:
         return _on_roll_angles(law, basis)
     check_memory("basis", f"computing the matrix in {basis!r}", MATRICES * basis.size**2)
-    choice("method", method, get_args(MethodName))
+    choice("method", method, (*get_args(MethodName), *(each.matrix.__name__ for each in (*METHODS, *SAMPLED))))
     choice("symmetrise", symmetrise, (True, False))
     if finite_number("tolerance", tolerance) < 0.0:
         raise InputError(f"tolerance: expected a number of at least 0, got {tolerance!r}")
@@ -205,6 +197,17 @@ def discretise(
         requested_tolerance=float(tolerance),
         metadata={"numpy": np.__version__},
     )
+
+
+def _rows_of(methods: Iterable[Method]) -> str:
+    """The table of the docstring: number, name, kind, and the first line of each method."""
+    return "\n    ".join(
+        f"{number}. ``{each.matrix.__name__}`` ({each.name}): {(each.matrix.__doc__ or '').partition(chr(10))[0]}"
+        for number, each in enumerate(methods, start=1)
+    )
+
+
+discretise.__doc__ = (discretise.__doc__ or "").replace("{methods}", _rows_of((*METHODS, *SAMPLED)))
 
 
 def _on_roll_angles(law: Law, basis: Basis) -> KernelMatrix:

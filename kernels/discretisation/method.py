@@ -23,7 +23,7 @@ from ..sampling.sobol import PARTS, SobolSampler
 
 MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
 # The methods whose rays can be stored on the way and traced by workers.
-SAMPLING: tuple[MethodName, ...] = ("qmc", "monte-carlo")
+SAMPLING = ("qmc", "monte-carlo", "by_sobol_rays", "by_independent_rays")
 # Limits on the ray segments of traced conditional distributions of one matrix: ten to twenty seconds of work; without
 # an explicit request for quadrature, the time of two million rays, or of the largest number of rays.
 MOST_SEGMENTS, QUICK_SEGMENTS, SEGMENTS_A_RAY = 140_000_000, 4_000_000, 4

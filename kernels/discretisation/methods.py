@@ -41,7 +41,7 @@ from .quadrature import (
 from .rays_or_conditionals import by_rays_or_conditionals
 from .traced import by_adaptive_angles
 
-# Methods without rays, except the first. The docstring of `discretise` states the table in this order.
+# Methods without rays, except the first. The docstring of `discretise` states the table.
 METHODS: tuple[Method, ...] = (
     Method("auto", lambda law, _: isinstance(law, WallLaw) and sum_of(law.parts) is law, by_rays_or_conditionals),
     Method("exact", lambda law, _: law.isometry_table() is not None, by_isometry_table),
@@ -77,12 +77,13 @@ ANY_PANELS = Panels(np.array([0.0, np.pi]), 0)
 Computation: TypeAlias = Callable[[Budget], KernelMatrix]
 
 
-def matrix_by(law: Law, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
+def matrix_by(law: Law, wanted: str, basis: Basis, budget: Budget) -> KernelMatrix:
     """The matrix of a law by the first method of the wanted kind that accepts it, or from its parts.
 
     Raises InputError if the law does not have this kind of method.
     """
     # Independent rays use the law without simplification.
+    wanted = "monte-carlo" if wanted == by_independent_rays.__name__ else wanted
     given = law if wanted == "monte-carlo" else multiplied_out(law)
     found = computation(given, wanted, basis)
     if found is None:
@@ -96,7 +97,7 @@ def matrix_by(law: Law, wanted: MethodName, basis: Basis, budget: Budget) -> Ker
     return found(budget)
 
 
-def computation(law: Law, wanted: MethodName, basis: Basis) -> Computation | None:
+def computation(law: Law, wanted: str, basis: Basis) -> Computation | None:
     """The computation by the first method of the wanted kind that accepts a law, or from its parts, if there is one."""
     from_rays = _method(SAMPLED, law, wanted, basis)
     if wanted == "auto":
@@ -108,12 +109,12 @@ def _without_rays(law: Law, basis: Basis) -> Computation | None:
     return _method(METHODS, law, "auto", basis) or _from_parts(law, "auto", basis)
 
 
-def _method(methods: Sequence[Method], law: Law, wanted: MethodName, basis: Basis) -> Computation | None:
-    named = (method for method in methods if wanted in ("auto", method.name))
+def _method(methods: Sequence[Method], law: Law, wanted: str, basis: Basis) -> Computation | None:
+    named = (method for method in methods if wanted in ("auto", method.name, method.matrix.__name__))
     return next((partial(method.matrix, law, basis) for method in named if method.accepts(law, basis)), None)
 
 
-def _from_parts(law: Law, wanted: MethodName, basis: Basis) -> Computation | None:
+def _from_parts(law: Law, wanted: str, basis: Basis) -> Computation | None:
     if isinstance(law, Combination):
         return _of_sum(law, wanted, basis)
     if isinstance(law, Composition):
@@ -121,7 +122,7 @@ def _from_parts(law: Law, wanted: MethodName, basis: Basis) -> Computation | Non
     return _of_mirrored(law, wanted, basis) if isinstance(law, SpecularFrame) else None
 
 
-def _of_sum(law: Combination, wanted: MethodName, basis: Basis) -> Computation | None:
+def _of_sum(law: Combination, wanted: str, basis: Basis) -> Computation | None:
     """Each term by its own method."""
     # If the whole sum has too many chains to be multiplied out, single terms can still be.
     terms = [(weight, multiplied_out(term)) for weight, term in law.terms]
@@ -173,7 +174,7 @@ def _matrices(
     return [(weight, found[k]) for k, (weight, _) in enumerate(parts)]
 
 
-def _of_chain(law: Composition, wanted: MethodName, basis: Basis) -> Computation | None:
+def _of_chain(law: Composition, wanted: str, basis: Basis) -> Computation | None:
     """By isometries, else through panels, which requires that no part of the chain needs rays.
 
     The first of these matrices that meets the tolerance is returned, or else the most exact one.
@@ -216,7 +217,7 @@ def _most_exact(computations: Sequence[Computation], budget: Budget) -> KernelMa
     return best
 
 
-def _of_mirrored(law: SpecularFrame, wanted: MethodName, basis: Basis) -> Computation | None:
+def _of_mirrored(law: SpecularFrame, wanted: str, basis: Basis) -> Computation | None:
     """A law in the other frame, from the law's matrix in a mirror-symmetric basis."""
 
     def inner_on(chosen: Basis) -> Computation | None:

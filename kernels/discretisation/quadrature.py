@@ -56,7 +56,7 @@ def by_eigenvalues(law: HenyeyGreensteinLaw, basis: Legendre, budget: Budget) ->
 
 
 def by_blocks(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-    """The matrix of transitions between bins, from the means of the functions over each bin."""
+    """The matrix of transitions between bins, also in chains with ideal laws, from means of functions on each bin."""
     inner = finite_matrix(law)
     assert inner is not None  # as `acts_on_bins` asks
     means = uniform_on_bins(inner.basis.edges, *functions_of(basis)).in_basis(basis)
@@ -246,7 +246,7 @@ def has_conditionals(law: Law, basis: Basis) -> bool:
 
 
 def by_conditionals(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-    """The matrix from conditional distributions, by Kronrod's rule."""
+    """The matrix of a law whose conditional distributions have errors, by Kronrod's rule in the incoming angle."""
     symmetric, error = action_matrix(law, basis, budget.tolerance)
     if law.reversible:
         asymmetry = float(np.linalg.norm(symmetric - symmetric.T))

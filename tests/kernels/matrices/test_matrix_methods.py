@@ -7,6 +7,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.errors import InputError
 from asperity.kernels.discretisation import methods
 from asperity.kernels.discretisation.method import Method, computed
 
@@ -18,6 +19,27 @@ def test_the_docstring_of_discretise_is_the_table_of_methods():
     stated = re.findall(r"^ *(\d+)\. ``(\w+)`` \((.+?)\):", ker.discretise.__doc__, re.MULTILINE)
     asked = [(method.matrix.__name__, method.name) for method in methods.METHODS + methods.SAMPLED]
     assert stated == [(str(number), *names) for number, names in enumerate(asked, start=1)]
+
+
+@pytest.mark.parametrize(
+    ("law", "name", "method"),
+    [
+        (TEETH, "by_isometry_table", "exact"), (TEETH, "by_branches", "exact"), (TEETH, "by_sobol_rays", "qmc"),
+        (HG(0.5), "by_density", "quadrature"), (HG(0.5), "by_independent_rays", "monte-carlo"),
+        (0.5 * HG(0.5) + 0.5 * ker.lambertian(), "by_conditionals", "quadrature"),
+        (ker.InvolutionLaw(lambda theta: np.pi - theta), "by_map", "quadrature"),
+    ],
+)  # fmt: skip
+def test_a_method_is_called_by_its_name(law, name, method):
+    P, usual = (ker.discretise(law, BASIS, one, samples=2**14) for one in (name, "auto"))
+    assert P.method == method and np.linalg.norm(P.symmetric - usual.symmetric) <= 2.0 * (
+        float(P.error) + float(usual.error)
+    )
+
+
+def test_a_method_that_does_not_take_the_law_is_refused():
+    with pytest.raises(InputError, match=r"has no method 'by_arc_polygons'; it has exact, qmc, monte-carlo"):
+        ker.discretise(TEETH, BASIS, "by_arc_polygons")
 
 
 def one_product(law, basis, budget):
