@@ -231,8 +231,9 @@ MOST_VALUES = 2**26
 FIRST_BREAKPOINTS, PANEL_FRACTION, CONVERGED = 32, 0.02, 1e-15
 # Tolerance of the conditional distributions as a fraction of that of the matrix.
 MEAN_FRACTION = 0.1
-# Asymmetry of the matrix of a law that is said to be reversible that refutes this: so many errors beyond a least one.
-UNRESOLVED, LEAST_ASYMMETRY = 100.0, 1e-3
+# Asymmetry of the matrix of a law that is said to be reversible that refutes this, if it is there at a finer tolerance
+# too: so many errors beyond a least one.
+UNRESOLVED, LEAST_ASYMMETRY, FINER = 100.0, 1e-3, 1e-3
 # First panel edges near grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 
@@ -248,18 +249,22 @@ def has_conditionals(law: Law, basis: Basis) -> bool:
 def by_conditionals(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
     """The matrix of a law whose conditional distributions have errors, by Kronrod's rule in the incoming angle."""
     symmetric, error = action_matrix(law, basis, budget.tolerance)
-    if law.reversible:
-        asymmetry = float(np.linalg.norm(symmetric - symmetric.T))
-        if asymmetry > UNRESOLVED * error + LEAST_ASYMMETRY:
+    if law.reversible and _asymmetry(symmetric) > UNRESOLVED * error + LEAST_ASYMMETRY:
+        symmetric, error = action_matrix(law, basis, FINER * budget.tolerance)
+        if _asymmetry(symmetric) > UNRESOLVED * error + LEAST_ASYMMETRY:
             raise InputError(
                 f"reversible: {shortened(law)} says that it is, but <e_i, P e_j> differs from <e_j, P e_i> by "
-                f"{asymmetry:.2g}, with an error of {error:.2g}: say reversible = False, or where the law has narrow "
-                "peaks, in `breakpoints`"
+                f"{_asymmetry(symmetric):.2g}, with an error of {error:.2g}: say reversible = False, or where the law "
+                "has narrow peaks, in `breakpoints`"
             )
-        # of a reversible law an under-resolved angle causes asymmetry
-        error = max(error, asymmetry)
+    # of a reversible law an under-resolved angle causes asymmetry
+    error = max(error, _asymmetry(symmetric)) if law.reversible else error
     how = "null rules of Kronrod's rule, panel by panel, and errors of conditional means"
     return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
+
+
+def _asymmetry(symmetric: Floats) -> float:
+    return float(np.linalg.norm(symmetric - symmetric.T))
 
 
 def _has_too_many_breakpoints(law: Law) -> bool:

@@ -227,7 +227,7 @@ class IntervalExchangeLaw(Law):
 
     def map(self, theta: Floats) -> Floats:
         """`image` also at 0 and pi, which rounding can give."""
-        return self.image(clipped_inside(theta))
+        return self.image(clipped_inside(finite_array("theta", theta)))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """All angles between two pieces; none are left out."""
@@ -317,7 +317,7 @@ class LeastResistanceLaw(Law):
 
     def potential(self, theta: Floats) -> Floats:
         """The potential phi: phi(theta) + phi(theta') <= cos(theta' - theta), with equality on the law's support."""
-        size = np.abs(finite_array("theta", theta) - 0.5 * np.pi)
+        size = np.minimum(np.abs(finite_array("theta", theta) - 0.5 * np.pi), 0.5 * np.pi)
         b = self.split_ends
         last = np.pi - 3.0 * b
         # Cumulative integral of sin(x - x') over the sorted x from b to pi - 3 b; beyond, the integral is elementary.
