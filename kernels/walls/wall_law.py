@@ -169,7 +169,8 @@ def made_of_isometries(law: Law) -> bool:
 
 
 def _is_isometric(law: Law) -> bool:
-    return law.wall.is_polygonal if isinstance(law, WallLaw) else isinstance(law, BranchLaw)
+    isometric = law.retro is not None or isinstance(law, BranchLaw)
+    return law.wall.is_polygonal if isinstance(law, WallLaw) else isometric
 
 
 def traced_wall(law: Law) -> Wall | None:

@@ -218,7 +218,7 @@ def _specular_part(law: Law, theta: Floats | None, rng: np.random.Generator) -> 
         return value, error + missed, kind, "isometries of the law"
     inner = in_paper_frame(law)
     factors = inner.laws if isinstance(inner, Composition) else (inner,)
-    if any(isinstance(one, (DensityLaw, CircularArcLaw)) for one in factors):
+    if any(one.is_lambertian or isinstance(one, (DensityLaw, CircularArcLaw)) for one in factors):
         return zero, zero, "bound", "densities have none"
     if all(one == specular() for one in factors):
         return zero + (len(factors) % 2 == 1), zero, "bound", "specular factors"
