@@ -21,7 +21,7 @@ import mpmath as mp
 import numpy as np
 
 from asperity import geometry as geo
-from asperity.geometry.scene.columns import (
+from asperity.geometry.curves.columns import (
     CURVATURE,
     END_X,
     END_Y,

@@ -11,7 +11,6 @@ from typing import Any, Self
 from ...core.checks import Floats, frozen, positive_number
 from ...core.estimates import Estimate
 from ..curves.curve import Curve, Point, point_array
-from ..curves.segment import Segment
 from .hollow import Hollow, flat_tops, hollows_between
 from .merging import merged
 from .origin import HighestPoint, highest_point_of
@@ -66,7 +65,7 @@ class Cell:
     def depth(self) -> float:
         """The depth of the wall below y = 0."""
         lowest = [float(self.vertices[:, 1].min())]
-        lowest += [p.box[1] for path in (self.pieces, *self.islands) for p in path if not isinstance(p, Segment)]
+        lowest += [p.box[1] for path in (self.pieces, *self.islands) for p in path if not p.is_straight]
         return max(0.0, -min(lowest + [float(v[:, 1].min()) for v in self.island_vertices]))
 
     @cached_property
@@ -106,7 +105,7 @@ class Cell:
     @cached_property
     def is_polygonal(self) -> bool:
         """Whether every piece is a Segment."""
-        return all(isinstance(p, Segment) for path in (self.pieces, *self.islands) for p in path)
+        return all(p.is_straight for path in (self.pieces, *self.islands) for p in path)
 
     @cached_property
     def _highest(self) -> HighestPoint | None:

@@ -8,7 +8,6 @@ from itertools import pairwise
 
 from ...core.checks import Floats
 from ..curves.curve import Curve
-from ..curves.segment import Segment
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Hollow:
 def flat_tops(pieces: Sequence[Curve], vertices: Floats) -> list[int]:
     """Return the indices of the pieces that run rightward along y = 0."""
     level = (vertices[:-1, 1] == 0.0) & (vertices[1:, 1] == 0.0) & (vertices[1:, 0] > vertices[:-1, 0])
-    return [i for i in level.nonzero()[0].tolist() if isinstance(pieces[i], Segment)]
+    return [i for i in level.nonzero()[0].tolist() if pieces[i].is_straight]
 
 
 def hollows_between(tops: Sequence[int], vertices: Floats) -> tuple[Hollow, ...]:

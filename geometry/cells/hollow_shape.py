@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.checks import Floats, frozen
 from ...core.rounding import EPS
-from ..curves.curve import Curve
+from ..curves.curve import INNER, Curve
 from ..curves.segment import Segment
 from .cell import Cell
 from .hollow import Hollow
@@ -21,7 +21,6 @@ from .hollow import Hollow
 # compute it by about ten operations.
 SHAPE_TOLERANCE = 64.0 * EPS
 # The ends and these three inner points determine a piece: circles need three points, ellipses and cubics five.
-INNER = np.array([0.25, 0.5, 0.75])
 # Flat top beside a hollow that is wider than its opening, as a fraction of what exceeds the opening.
 BESIDE = 1.02
 AnyCell = TypeVar("AnyCell", bound=Cell)
@@ -55,7 +54,7 @@ class HollowShape:
         corner = np.array([hollow.left, 0.0])
         vertices = (wall.vertices[hollow.first : hollow.last + 1] - corner) / hollow.width
         vertices[-1, 0] = 1.0
-        curved = [piece.point(INNER) for piece in pieces if not isinstance(piece, Segment)]
+        curved = [piece.point(INNER) for piece in pieces if not piece.is_straight]
         inner = (np.reshape(curved, (-1, len(INNER), 2)) - corner) / hollow.width
         size = max(wall.period / hollow.width, float(np.abs(vertices).max()))
         kinds = tuple(type(piece).__name__ for piece in pieces)

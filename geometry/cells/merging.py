@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 
 import numpy as np
@@ -10,8 +9,6 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..curves.arc import Arc
-from ..curves.bezier import Bezier
 from ..curves.crossings import straight_in
 from ..curves.curve import Curve, point_array
 from ..curves.segment import Segment
@@ -24,10 +21,6 @@ SAME_PIECE = 64.0 * EPS
 ON_SIDE = 8.0 * EPS
 # No part is shorter than this, relative to the wall's size: the end of a plate that is thinner has no direction.
 SHORTEST = 1e-12
-# Radians between the angles at which parts of one ellipse meet; what is tested here first is only whether they may be.
-SAME_ANGLE = 1e-6
-# Parameters at which the parts are compared with the whole curve.
-INNER = np.array([0.25, 0.5, 0.75])
 
 
 def merged(path: tuple[Curve, ...], is_loop: bool = False) -> tuple[Curve, ...]:
@@ -70,7 +63,7 @@ def _between(start: Floats, points: Floats, end: Floats, size: Floats) -> NDArra
 def _whole(parts: tuple[Curve, ...], size: Floats) -> list[Curve]:
     """Return the curve whose consecutive parts are the given pieces of one kind; an empty list if there is none."""
     start, end = parts[0].start, parts[-1].end
-    if isinstance(parts[0], Segment):
+    if parts[0].is_straight:
         joints = point_array(piece.start for piece in parts[1:])
         return [Segment(start, end)] if _between(np.array([start]), joints, np.array([end]), size).all() else []
     if end < start:
@@ -78,53 +71,5 @@ def _whole(parts: tuple[Curve, ...], size: Floats) -> list[Curve]:
         return [p.reversed() for p in _whole(tuple(part.reversed() for part in reversed(parts)), size)]
     whole: Curve | None = parts[0]
     for part in parts[1:]:
-        whole = whole and joined(whole, part, SAME_PIECE * float(size.max()))
+        whole = whole and whole.joined(part, SAME_PIECE * float(size.max()))
     return [whole] if whole else []
-
-
-def joined(before: Curve, after: Curve, tolerance: float) -> Curve | None:
-    """Return the arc or Bezier curve of two consecutive parts within ``tolerance``; None if there is none.
-
-    Examples
-    --------
-    >>> joined(Arc((0, 0), 1.0, 3.5, 4.0), Arc((0, 0), 1.0, 4.0, 5.5), 1e-15)
-    Arc(center=(0.0, 0.0), semi_axes=1.0, start=3.5, end=5.5)
-    """
-    if isinstance(before, Arc) and isinstance(after, Arc):
-        return _joined_arcs(before, after, tolerance)
-    if isinstance(before, Bezier) and isinstance(after, Bezier):
-        return _joined_beziers(before, after, tolerance)
-    return None
-
-
-def _joined_arcs(before: Arc, after: Arc, tolerance: float) -> Arc | None:
-    span = 2.0 * (before.half_span + after.half_span)
-    turn = math.remainder(after.start_angle - before.end_angle, 2.0 * math.pi)
-    if before.direction != after.direction or span > 2.0 * math.pi + SAME_ANGLE or abs(turn) > SAME_ANGLE:
-        return None
-    end = before.start_angle + before.direction * min(span, 2.0 * math.pi)
-    whole = Arc(before.center, before.semi_axes, before.start_angle, end).pinned(before.start, after.end)
-    return whole if _are_parts(whole, before, after, before.half_span / (0.5 * span), tolerance) else None
-
-
-def _joined_beziers(before: Bezier, after: Bezier, tolerance: float) -> Bezier | None:
-    if before.degree != after.degree:
-        return None
-    first, second = (np.array(part.control_points) for part in (before, after))
-    # each distance is proportional to the derivative at the joint times the part's fraction of the parameter
-    left, right = math.dist(first[-1], first[-2]), math.dist(second[1], second[0])
-    if left == 0.0 or right == 0.0:
-        return None
-    fraction = left / (left + right)
-    inner = [first[0] + (first[1] - first[0]) / fraction]
-    if before.degree == 3:
-        inner.append(second[-1] + (second[-2] - second[-1]) / (1.0 - fraction))
-    whole = Bezier([before.start, *(tuple(p) for p in inner), after.end])
-    return whole if _are_parts(whole, before, after, fraction, tolerance) else None
-
-
-def _are_parts(whole: Curve, before: Curve, after: Curve, fraction: float, tolerance: float) -> bool:
-    """Whether the joint and points of both parts lie on the whole curve at the corresponding parameters."""
-    given = np.concatenate([before.point(INNER), [before.end], after.point(INNER)])
-    found = whole.point(np.concatenate([fraction * INNER, [fraction], fraction + (1.0 - fraction) * INNER]))
-    return bool(np.abs(given - found).max() <= tolerance)

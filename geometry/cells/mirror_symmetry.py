@@ -86,7 +86,7 @@ def _steps(path: Sequence[Curve]) -> Floats:
     # the points of a segment follow from its ends
     steps = PARAMETERS[:, None] * (end - start)[:, None, :]
     for i, piece in enumerate(path):
-        if not isinstance(piece, Segment):
+        if not piece.is_straight:
             steps[i, :-1] = piece.point(PARAMETERS[:-1]) - start[i]
     return np.asarray(steps)
 

@@ -55,7 +55,7 @@ def highest_point_of(path: tuple[Curve, ...], joints: Floats, period: float) -> 
         return None
     points = [(px, py) for px, py in vertices.tolist()]
     pieces = tuple(
-        Segment(start, end) if isinstance(path[k], Segment) else path[k].moved(float(shift), -y).pinned(start, end)
+        Segment(start, end) if path[k].is_straight else path[k].moved(float(shift), -y).pinned(start, end)
         for k, shift, (start, end) in zip(order, shifts, pairwise(points), strict=True)
     )
     return HighestPoint(pieces, (x, y), tuple(order))

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...core.checks import Floats, frozen
 from ...core.estimates import Estimate
-from ..curves.curvature import curvature_at, largest_curvature
 from ..curves.curve import Curve
 
 # Largest angle between tangents, radians, and relative jump of the curvature, at a joint that counts as smooth. They
@@ -31,7 +30,7 @@ def _is_smooth(before: Curve, after: Curve) -> bool:
     (tx, ty), (ux, uy) = before.tangent(1.0), after.tangent(0.0)
     if abs(tx * uy - ty * ux) > SMOOTH_ANGLE or tx * ux + ty * uy < 0.0:
         return False
-    left, right = curvature_at(before, 1.0), curvature_at(after, 0.0)
+    left, right = before.curvature(1.0), after.curvature(0.0)
     if not (math.isfinite(left) and math.isfinite(right)):
         return False
     return abs(left - right) <= SMOOTH_JUMP * max(abs(left), abs(right))
@@ -39,7 +38,7 @@ def _is_smooth(before: Curve, after: Curve) -> bool:
 
 def largest_curvature_of(paths: Sequence[Sequence[Curve]]) -> Estimate:
     """Return the largest curvature of all pieces with a bound on its error."""
-    found = [largest_curvature(piece) for path in paths for piece in path]
+    found = [piece.largest_curvature() for path in paths for piece in path]
     value = max(v for v, _ in found)
     error = 0.0 if value == math.inf else max(v + e for v, e in found) - value
     method = "critical points of the pieces, checked in floating point by Bernstein coefficients"

@@ -18,7 +18,6 @@ from ...core.long_runs import counted
 from ...core.rounding import EPS
 from ..curves.crossings import find_crossing
 from ..curves.curve import Curve, Point, point_array
-from ..curves.segment import Segment
 from .cell import Cell
 
 # Distance, relative to the wall's size, up to which the ends of two pieces join; enough for input of ten digits.
@@ -210,7 +209,7 @@ def _pinned(pieces: Pieces, vertices: Floats, size: Floats, label: str) -> Piece
 def _check_heights(pieces: Pieces, vertices: Floats, size: Floats, label: str) -> None:
     excess = np.maximum(vertices[1:, 1], vertices[:-1, 1])
     for i, piece in enumerate(pieces):
-        if not isinstance(piece, Segment):
+        if not piece.is_straight:
             _, bottom, _, top = piece.box
             if bottom == top == 0.0:
                 raise WallError(f"piece {i}{label}: expected a Segment where the wall runs along y = 0, got {piece}")
@@ -228,7 +227,7 @@ def _check_heights(pieces: Pieces, vertices: Floats, size: Floats, label: str) -
 
 def _level(pieces: Pieces, vertices: Floats, slack: Floats) -> tuple[float, NDArray[np.bool_]]:
     """Return the greatest height of the path, at most 0, and a mask of the vertices at that height within slack."""
-    tops = [y for piece in pieces if not isinstance(piece, Segment) for y in piece.turning_values(1)]
+    tops = [y for piece in pieces if not piece.is_straight for y in piece.turning_values(1)]
     highest = min(max([float(vertices[:, 1].max()), *tops]), 0.0)
     near = vertices[:, 1] >= highest - slack
     # the height of a vertex, which was given, is preferred to that of a curve's top, which was computed
@@ -240,7 +239,7 @@ def _cut_at_touching(piece: Curve, level: float, limit: float) -> list[Curve]:
     if piece.end < piece.start:
         # in one direction of the two, so that coincident faces stay coincident
         return [part.reversed() for part in reversed(_cut_at_touching(piece.reversed(), level, limit))]
-    if not isinstance(piece, Segment):
+    if not piece.is_straight:
         for top in piece.turning_points(1):
             x, y = (float(v) for v in piece.point(top))
             if TOUCH_MARGIN < top < 1.0 - TOUCH_MARGIN and y >= level - limit:

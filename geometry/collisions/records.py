@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.errors import InputError
 from ...core.rounding import EPS
+from ..curves import columns as c
+from ..curves.curve import Curve
 from ..disk.satellites import Satellites
-from ..scene import columns as c
 from ..tracing.threads import new_flag
 from .compiled.graph_table import LEAST_BEND, MOST_BEND, graphs_of
 
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 # Relative allowance for rounding in bounds on the reach of satellites and on the depth of the disk.
 ROOM = 1e-9
-# Relative error of positions, a few rounding errors of their size, as for rays (`scene/tolerances`).
+# Relative error of positions, a few rounding errors of their size, as for rays (`curves/tolerances`).
 SLACK = 16.0 * EPS
 
 
@@ -92,6 +94,9 @@ def ground_of(scene: Scene) -> Ground:
     """Return the tables of a wall."""
     from ..tracing.compiled.pieces.arcs import refined_arcs
 
+    for cls, rows in zip(Curve.traced(), scene.curves, strict=True):
+        if len(rows) and not cls.meets_disks:
+            raise InputError(f"wall: expected pieces that disks meet, got a {cls.__name__}; write it as Bezier curves")
     hollows = scene.hollows.copy()
     graphs = graphs_of(scene.beziers, hollows)
     return Ground(

@@ -14,8 +14,6 @@ from ...core.checks import Floats, Rng, finite_array, frozen, generator, instanc
 from ...core.errors import InputError
 from ...core.estimates import Estimate, Summary, fraction_estimate
 from ...core.tables import axes_or_new
-from ..curves.curvature import largest_curvature
-from ..curves.segment import Segment
 from ..disk import rolling
 from ..disk.disk import Disk
 from ..plotting.walls import LEVEL, RAY_COLOURS, draw_solid
@@ -551,8 +549,8 @@ def _polylines(wall: Wall) -> list[tuple[Floats, float]]:
     tolerance = FLATTENING * wall.period
     found = []
     for piece in wall.pieces:
-        value, error = largest_curvature(piece)
-        line = np.array([piece.start, piece.end]) if isinstance(piece, Segment) else piece.flattened(tolerance)
+        value, error = piece.largest_curvature()
+        line = np.array([piece.start, piece.end]) if piece.is_straight else piece.flattened(tolerance)
         found.append((line, value + error))
     shifts = [k * wall.period for k in (-1, 0, 1)]
     beyond = [(shifts[0] - FAR * wall.period, shifts[0]), (shifts[2] + wall.period, shifts[2] + FAR * wall.period)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +13,10 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, number_between, positive_number
 from ...core.errors import WallError
 from ...core.rounding import EPS
-from .curve import LARGEST_COORDINATE, Curve, Point, as_point, parameters, stretch_factors, uniform_parameters
+from . import columns as c
+from .columns import row_of
+from .curve import LARGEST_COORDINATE, ROUNDED, Bools, Curve, Point, as_point, inverted, parameters, stretch_factors
+from .reading import Table, check_keys, pair_of
 
 # Up to this span (radians) the points of an arc are computed from its chord and semi-axes. The difference of two
 # angles near pi/2 has an error of eps, so the angles give a span of 1e-8 with 8 digits only, the chord with 16.
@@ -27,6 +31,17 @@ SMALLEST_AXIS = 1.0 / LARGEST_COORDINATE
 
 # Error of a computed end point, relative to |c| + a: c + a cos t rounds three times.
 END_ROUNDING = 4.0 * EPS
+# Half angle below which it is computed from the chord and the radius, more exactly than from two parameters.
+SHALLOW_ARC = 0.5
+# Largest span of an arc; longer arcs are cut in two, so that the side of the chord decides which points are on the arc.
+LONGEST_ARC = 1.5 * math.pi
+# Radians between the angles at which parts of one ellipse meet; what is tested here first is only whether they may be.
+SAME_ANGLE = 1e-6
+FULL_CIRCLE, WHOLE = 2.0 * math.pi, 4e-12
+# How far ahead, in semi-axes, it is decided whether a path that is tangent to an arc from inside runs along the arc.
+AHEAD = 1e-7
+# Rounding of the distance of a path from the centre of an arc, relative to the distance of its start.
+TANGENT = 8.0 * EPS
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -72,6 +87,9 @@ class Arc(Curve):
     >>> Arc((0, 0), (2, 1), 0.0, pi / 2).is_circular
     False
     """
+
+    kind = "arc"
+    table, columns, meets_disks = 0, c.ARC_COLUMNS, True
 
     center: Point
     semi_axes: Point
@@ -262,4 +280,197 @@ class Arc(Curve):
         # A step of d radians has an error of at most max(a, b) (1 - cos(d/2)) = 2 max(a, b) sin^2(d/4).
         sine = math.sqrt(positive_number("tolerance", tolerance) / (2.0 * max(self.semi_axes)))
         step = 4.0 * math.asin(min(sine, 0.5)) or math.inf
-        return self.point(uniform_parameters(2.0 * self.half_span / step))
+        return self.point(self.steps(2.0 * self.half_span / step))
+
+    def curvature(self, s: float) -> float:
+        """The curvature of a circle or an ellipse."""
+        a, b = self.semi_axes
+        t = self.start_angle + s * (self.end_angle - self.start_angle)
+        turn = 1.0 if self.end_angle > self.start_angle else -1.0
+        return turn / a if a == b else turn * a * b / math.hypot(a * math.sin(t), b * math.cos(t)) ** 3
+
+    def largest_curvature(self) -> tuple[float, float]:
+        """At an end or on an axis."""
+        # monotone between multiples of pi/2
+        a, b = self.semi_axes
+        if a == b:
+            return 1.0 / a, EPS / a
+        low, high = sorted((self.start_angle, self.end_angle))
+        quarters = range(math.ceil(low / (0.5 * math.pi)), math.floor(high / (0.5 * math.pi)) + 1)
+        at_axes = [b / a**2 if k % 2 else a / b**2 for k in quarters]
+        value = max(abs(self.curvature(0.0)), abs(self.curvature(1.0)), *at_axes, 0.0)
+        # an angle is rounded, and the formula changes by at most this factor with it
+        return value, ROUNDED * max(a / b, b / a) ** 2 * value
+
+    def joined(self, after: Curve, tolerance: float) -> Arc | None:
+        """Return the arc of which both are parts; None if there is none."""
+        if not isinstance(after, Arc):
+            return None
+        span = 2.0 * (self.half_span + after.half_span)
+        turn = math.remainder(after.start_angle - self.end_angle, 2.0 * math.pi)
+        if self.direction != after.direction or span > 2.0 * math.pi + SAME_ANGLE or abs(turn) > SAME_ANGLE:
+            return None
+        end = self.start_angle + self.direction * min(span, 2.0 * math.pi)
+        whole = Arc(self.center, self.semi_axes, self.start_angle, end).pinned(self.start, after.end)
+        return whole if whole.has_parts(self, after, self.half_span / (0.5 * span), tolerance) else None
+
+    def to_table(self) -> Table:
+        """Centre, semi-axes, angles, and the ends, which may be pinned."""
+        form = {"center": list(self.center), "semi_axes": list(self.semi_axes)}
+        angles = [self.start_angle, self.end_angle]
+        return {"kind": self.kind, **form, "angles": angles, "start": list(self.start), "end": list(self.end)}
+
+    @classmethod
+    def from_table(cls, table: Table) -> Arc:
+        """From centre, semi-axes and angles, pinned if the ends are given."""
+        check_keys(table, {"kind", "center", "semi_axes", "angles"}, {"start", "end"})
+        axes = table["semi_axes"]
+        start, end = pair_of("angles", table["angles"])
+        semi_axes = pair_of("semi_axes", axes if isinstance(axes, list) else [axes, axes])
+        arc = cls(pair_of("center", table["center"]), semi_axes, start, end)
+        if "start" not in table and "end" not in table:
+            return arc
+        check_keys(table, {"kind", "center", "semi_axes", "angles", "start", "end"}, set())
+        return arc.pinned(pair_of("start", table["start"]), pair_of("end", table["end"]))
+
+    def row(self, ends: Mapping[int, float]) -> Floats:
+        """The row of ``arcs``; RUN_SINE is set later."""
+        a, b = self.semi_axes
+        stretch = a / b
+        turn = self.end_angle - self.start_angle
+        # counterclockwise arcs have their centre on the left, the free side: they are focusing
+        sign = 1.0 if turn > 0.0 else -1.0
+        chord = (ends[c.END_X] - ends[c.START_X], stretch * (ends[c.END_Y] - ends[c.START_Y]))
+        length = math.hypot(*chord)
+        direction = (chord[0] / length, chord[1] / length)
+        half = 0.5 * abs(turn)
+        # sin(half) = kappa length / 2 puts both joints on the circle: the more accurate of the two gives the other
+        if half < SHALLOW_ARC:
+            half = math.asin(min(1.0, 0.5 * length / a))
+            curvature = sign / a
+        else:
+            curvature = sign * 2.0 * math.sin(half) / length
+        normal = (
+            sign * math.sin(half) * direction[0] - math.cos(half) * direction[1],
+            sign * math.sin(half) * direction[1] + math.cos(half) * direction[0],
+        )
+        short = length if half <= 0.25 * math.pi else 0.0
+        columns = {
+            c.NORMAL_X: normal[0], c.NORMAL_Y: normal[1], c.CURVATURE: curvature,
+            c.CHORD_X: direction[0], c.CHORD_Y: direction[1], c.SHORT_CHORD: short, c.SPAN: 2.0 * half,
+            c.STRETCH: stretch,
+        }  # fmt: skip
+        return row_of(c.ARC_COLUMNS, {**ends, **columns})
+
+    @staticmethod
+    def heights(rows: Floats) -> Floats:
+        """Every point is within half of the arc length of an end."""
+        half = 0.5 * rows[:, [c.SPAN]] / np.abs(rows[:, [c.CURVATURE]]) / rows[:, [c.STRETCH]]
+        ends = rows[:, [c.START_Y, c.END_Y]]
+        return np.hstack([ends.min(axis=1, keepdims=True) - half, ends.max(axis=1, keepdims=True) + half])
+
+    @staticmethod
+    def goes_in_waves(rows: Floats) -> bool:
+        """If all are circular."""
+        return bool(np.all(rows[:, c.STRETCH] == 1.0))
+
+    def cut(self) -> tuple[Curve, ...]:
+        """In two if it is longer than LONGEST_ARC, with a smooth joint."""
+        if abs(self.end_angle - self.start_angle) <= LONGEST_ARC:
+            return (self,)
+        middle = 0.5 * (self.start_angle + self.end_angle)
+        return (
+            Arc(self.center, self.semi_axes, self.start_angle, middle),
+            Arc(self.center, self.semi_axes, middle, self.end_angle),
+        )
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the curve is a whole ellipse, which has no ends."""
+        return abs(self.end_angle - self.start_angle) + WHOLE >= FULL_CIRCLE
+
+    @property
+    def signed_area(self) -> float:
+        (cx, cy), (a, b), (t0, t1) = self.center, self.semi_axes, (self.start_angle, self.end_angle)
+        rise, run = math.sin(t1) - math.sin(t0), math.cos(t1) - math.cos(t0)
+        return 0.5 * (a * b * (t1 - t0) + cx * b * rise - cy * a * run)
+
+    def arrival(self, position: Floats, velocity: Floats, own: Bools, slack: float, front: bool = True) -> Floats:
+        turn = 1.0 if front else -1.0
+        axes = np.array(self.semi_axes)
+        start, direction = (position - np.array(self.center)) / axes, velocity[:, :2] / axes
+        square = np.sum(direction**2, axis=1)
+        along = np.sum(start * direction, axis=1)
+        across = np.abs(start[:, 0] * direction[:, 1] - start[:, 1] * direction[:, 0])
+        excess = np.where(own, 0.0, np.sum(start**2, axis=1) - 1.0)
+        speed = np.sqrt(square)
+        root = np.sqrt(np.maximum((speed - across) * (speed + across), 0.0))
+        behind = slack / float(axes.min())
+        tangent = np.zeros(len(position), dtype=bool)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            if self.direction * turn > 0:
+                # the way out of the circle; from the circle itself C = 0
+                time = np.where(along > 0.0, -excess / (along + root), (root - along) / square)
+                time = np.where(own, -2.0 * along / square, time)
+                # within rounding the path is tangent: it is reached unless it leaves the arc there
+                tangent = ~own & (
+                    np.abs(across - speed) <= TANGENT * speed * (1.0 + np.hypot(start[:, 0], start[:, 1]))
+                )
+                hit = own | ((tangent | (across < speed)) & (time * speed >= -behind))
+            else:
+                time = excess / (root - along)
+                hit = ~own & (along < 0.0) & (across < speed) & (excess >= -behind)
+            time = np.maximum(time, 0.0)
+            met = start + direction * (time + np.where(tangent, AHEAD / speed, 0.0))[:, None]
+        return np.where(hit & np.isfinite(time) & self._within_span(met, behind), time, np.inf)
+
+    def _within_span(self, unit: Floats, slack: float) -> Bools:
+        """Return whether points (n, 2) of the unit circle belong to the arc."""
+        span = abs(self.end_angle - self.start_angle)
+        if span + slack >= FULL_CIRCLE:
+            return np.ones(len(unit), dtype=bool)
+        with np.errstate(invalid="ignore"):
+            swept = self.direction * (np.arctan2(unit[:, 1], unit[:, 0]) - self.start_angle) % FULL_CIRCLE
+        return np.asarray((swept <= span + slack) | (swept >= FULL_CIRCLE - slack))
+
+    def touch(self, position: Floats) -> tuple[Floats, Floats, Floats]:
+        a, b = self.semi_axes
+        axes, center = np.array([a, b]), np.array(self.center)
+        unit = (position - center) / axes
+        unit /= np.hypot(unit[:, 0], unit[:, 1])[:, None]
+        tangent = self.direction * np.stack([-a * unit[:, 1], b * unit[:, 0]], axis=1)
+        speed = np.hypot(tangent[:, 0], tangent[:, 1])
+        return (center + axes * unit, tangent / speed[:, None], self.direction * a * b / speed**3)
+
+    def length_to(self, position: Floats) -> Floats:
+        unit = (position - np.array(self.center)) / np.array(self.semi_axes)
+        span = abs(self.end_angle - self.start_angle)
+        swept = self.direction * (np.arctan2(unit[:, 1], unit[:, 0]) - self.start_angle) % FULL_CIRCLE
+        # rounding may put a point just before the start or behind the end: it belongs to the nearer one
+        swept = np.where(swept > 0.5 * (span + FULL_CIRCLE), 0.0, np.minimum(swept, span))
+        return self._length_swept(swept)
+
+    def point_at_length(self, length: Floats) -> Floats:
+        if self.is_circular:
+            return self.point(length / self.length)
+        span = abs(self.end_angle - self.start_angle)
+        return self.point(inverted(lambda swept: self._length_swept(swept), length, span) / span)
+
+    def _length_swept(self, swept: Floats) -> Floats:
+        """Arc lengths from the start to where the parametric angle has grown or fallen by ``swept``."""
+        a, b = self.semi_axes
+        if self.is_circular:
+            return a * swept
+        from scipy.special import ellipeinc
+
+        # the longer semi-axis in front, so that the parameter m is in (0, 1)
+        shift, long, short = (0.0, b, a) if b > a else (0.5 * math.pi, a, b)
+        m = (1.0 - short / long) * (1.0 + short / long)
+        start = self.start_angle - shift
+        return np.asarray(long * np.abs(ellipeinc(start + self.direction * swept, m) - ellipeinc(start, m)))
+
+    def is_on(self, position: Floats, slack: float) -> Bools:
+        axes = np.array(self.semi_axes)
+        unit = (position - np.array(self.center)) / axes
+        near = np.abs(np.hypot(unit[:, 0], unit[:, 1]) - 1.0) * float(axes.min()) <= slack
+        return np.asarray(near & self._within_span(unit, slack / float(axes.min())))

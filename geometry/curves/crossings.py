@@ -23,7 +23,6 @@ from ...core.checks import Floats
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from .curve import Curve, point_array
-from .segment import Segment
 
 # Tolerance of the polylines that replace curves, in coordinates where the wall is 1 wide and 1 deep. Polylines of
 # curves that only touch overlap by at most twice the tolerance; a face of thickness d has 2 area / perimeter <= d.
@@ -168,12 +167,12 @@ def directions_of(path: Sequence[Curve]) -> tuple[Floats, Floats]:
 
 def straight_in(path: Sequence[Curve]) -> NDArray[np.bool_]:
     """Return whether each piece is a segment."""
-    return np.array([isinstance(piece, Segment) for piece in path])
+    return np.array([piece.is_straight for piece in path])
 
 
 def _coincidence(before: Curve, after: Curve, across: float, size: tuple[float, float]) -> float:
     """Return the tolerance within which two pieces coincide from their joint on; 0 if they do not coincide."""
-    if isinstance(before, Segment) and isinstance(after, Segment):
+    if before.is_straight and after.is_straight:
         apart = across * min(before.length, after.length)
         return STRAIGHT_THICKNESS if apart <= SAME_POINT * max(size) else 0.0
     import shapely
@@ -197,7 +196,7 @@ def _flatten(pieces: Sequence[Curve], size: tuple[float, float], first_label: in
         return _Loop(points, np.arange(first_label, first_label + len(pieces)))
     chunks, labels = [], []
     for i, piece in enumerate(pieces):
-        if isinstance(piece, Segment):
+        if piece.is_straight:
             points = np.array([piece.start, piece.end]) / size
         else:
             points = piece.stretched(1.0 / size[0], 1.0 / size[1]).flattened(FLATTENING)

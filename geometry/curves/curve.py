@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from itertools import chain
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, finite_number, numbers, shortened
 from ...core.errors import InputError, WallError
+from ...core.rounding import EPS
+from .reading import Table, check_keys
 
 # Of a coordinate; products of three lengths stay far below the largest double.
 LARGEST_COORDINATE = 1e100
@@ -20,7 +23,12 @@ LARGEST_COORDINATE = 1e100
 MOST_STEPS = 1e7
 # Rounding takes parameters at most this far beyond the ends.
 BEYOND_ENDS = 1e-9
+# Halvings after which an interval of parameters has the width of rounding.
+HALVINGS = 56
+# Parameters at which two curves are compared, and rounding of a closed formula.
+INNER, ROUNDED = np.array([0.25, 0.5, 0.75]), 64.0 * EPS
 
+Bools = NDArray[np.bool_]
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
@@ -41,6 +49,33 @@ class Curve(ABC):
     start: Point
     end: Point
     rounding: float
+    # the name in wall files, and the classes by their names
+    kind: ClassVar[str] = ""
+    kinds: ClassVar[dict[str, type[Curve]]] = {}
+    is_straight: ClassVar[bool] = False
+    # of the compiled table: its place among those of all curves that rays meet, and its columns; see `columns`
+    table: ClassVar[int] = -1
+    columns: ClassVar[int] = 0
+    # whether disks meet it
+    meets_disks: ClassVar[bool] = False
+
+    def __init_subclass__(cls) -> None:
+        if "kind" in vars(cls):
+            Curve.kinds[cls.kind] = cls
+
+    @staticmethod
+    @cache
+    def traced() -> tuple[type[Curve], ...]:
+        """Return the classes of the curves that rays meet, in the order of their tables; classes made later are not."""
+        found = sorted((cls for cls in Curve.kinds.values() if cls.columns), key=lambda cls: cls.table)
+        if [cls.table for cls in found] != list(range(len(found))):
+            raise TypeError(f"expected tables 0, 1, ... of curves, got {[(cls.kind, cls.table) for cls in found]}")
+        return tuple(found)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is a closed curve without ends."""
+        return False
 
     @abstractmethod
     def point(self, s: ArrayLike) -> Floats:
@@ -87,6 +122,116 @@ class Curve(ABC):
     @abstractmethod
     def flattened(self, tolerance: float) -> Floats:
         """Return points on the curve, shape (n, 2), both ends included, whose polyline is within ``tolerance``."""
+
+    @staticmethod
+    def steps(count: float) -> Floats:
+        """Return parameters from 0 to 1 in at least ``count`` equal steps."""
+        if not count <= MOST_STEPS:
+            raise WallError(f"flattened: expected a tolerance for at most {MOST_STEPS:g} points, got {count:.3g}")
+        return np.linspace(0.0, 1.0, max(1, math.ceil(count)) + 1)
+
+    @abstractmethod
+    def curvature(self, s: float) -> float:
+        """Return the signed curvature at the parameter s, positive if the piece is focusing; inf where b' = 0."""
+
+    @abstractmethod
+    def largest_curvature(self) -> tuple[float, float]:
+        """Return the largest absolute curvature and a bound on its error; (inf, 0) if b' vanishes somewhere."""
+
+    def joined(self, after: Curve, tolerance: float) -> Curve | None:
+        """Return the curve whose parts are this one and the next within ``tolerance``; None if none exists."""
+        return None
+
+    def cusp(self) -> float | None:
+        """Return a parameter between the ends at which b' = 0; None if there is none."""
+        return None
+
+    def has_parts(self, before: Curve, after: Curve, fraction: float, tolerance: float) -> bool:
+        """Whether two parts and their joint lie on the curve; the first one has this ``fraction`` of the parameters."""
+        given = np.concatenate([before.point(INNER), [before.end], after.point(INNER)])
+        found = self.point(np.concatenate([fraction * INNER, [fraction], fraction + (1.0 - fraction) * INNER]))
+        return bool(np.abs(given - found).max() <= tolerance)
+
+    @abstractmethod
+    def to_table(self) -> Table:
+        """Return the table of a wall file."""
+
+    @classmethod
+    @abstractmethod
+    def from_table(cls, table: Table) -> Curve:
+        """Return the piece of a table of a wall file."""
+
+    @staticmethod
+    def of_table(table: Table) -> Curve:
+        """Return the piece of a table of any kind."""
+        kind = table.get("kind")
+        if isinstance(kind, str) and kind in Curve.kinds:
+            return Curve.kinds[kind].from_table(table)
+        check_keys(table, {"kind"}, set(table))
+        *first, last = map(repr, sorted(Curve.kinds))
+        raise InputError(f"key 'kind': expected {', '.join(first)} or {last}, got {kind!r}")
+
+    # ---- for the tracer -----------------------------------------------------------------------------------------
+    def row(self, ends: Mapping[int, float]) -> Floats:
+        """Return the row of the compiled table of this kind from its first columns ``ends``; see `columns`."""
+        raise NotImplementedError
+
+    @staticmethod
+    def heights(rows: Floats) -> Floats:
+        """Return heights (n, k) of which the least and the largest bound each piece of these rows."""
+        raise NotImplementedError
+
+    @staticmethod
+    def goes_in_waves(rows: Floats) -> bool:
+        """Return whether `waves` has a loop for these rows."""
+        return False
+
+    def hull(self, start: Point, end: Point) -> list[Point]:
+        """Return four points whose convex hull contains the piece between the joints ``start`` and ``end``."""
+        x0, y0, x1, y1 = self.box
+        return [(x0, y0), (x0, y1), (x1, y0), (x1, y1)]
+
+    def cut(self) -> tuple[Curve, ...]:
+        """Return the parts of which each has a row of its own."""
+        return (self,)
+
+    # ---- for containers: a disk whose centre moves freely -------------------------------------------------------
+    @property
+    @abstractmethod
+    def signed_area(self) -> float:
+        """Half of the integral of x dy - y dx along the curve."""
+
+    @abstractmethod
+    def arrival(self, position: Floats, velocity: Floats, own: Bools, slack: float, front: bool = True) -> Floats:
+        """Return the times (n,) at which moving points reach the curve from its left, inf where they do not.
+
+        A point that is tangent to a curve flies on, except where the curve bends towards it: there it is reached.
+
+        Parameters
+        ----------
+        own : array of bool, shape (n,)
+            Whether the point begins on this curve.
+        slack : float
+            The length by which the curve is longer at both ends, and the depth up to which a point may be behind it.
+        front : bool
+            If False, arrivals from the right.
+        """
+
+    @abstractmethod
+    def touch(self, position: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return points (n, 2) that are on the curve up to rounding, moved onto it, with tangents and curvatures."""
+
+    @abstractmethod
+    def length_to(self, position: Floats) -> Floats:
+        """Return the arc lengths (n,) from the start to points (n, 2) on the curve."""
+
+    def point_at_length(self, length: Floats) -> Floats:
+        """Return the points (n, 2) at these arc lengths (n,) from the start."""
+        return self.point(length / self.length)
+
+    def is_on(self, position: Floats, slack: float) -> Bools:
+        """Return whether points (n, 2) are on the curve, up to ``slack``."""
+        return np.asarray(np.hypot(*(self.touch(position)[0] - position).T) <= slack)
 
     @property
     def box(self) -> Box:
@@ -137,8 +282,11 @@ def parameters(s: ArrayLike) -> Floats:
     return array
 
 
-def uniform_parameters(steps: float) -> Floats:
-    """Return parameters from 0 to 1 in at least ``steps`` equal steps."""
-    if not steps <= MOST_STEPS:
-        raise WallError(f"flattened: expected a tolerance for at most {MOST_STEPS:g} points, got {steps:.3g}")
-    return np.linspace(0.0, 1.0, max(1, math.ceil(steps)) + 1)
+def inverted(length_to: Callable[[Floats], Floats], length: Floats, most: float) -> Floats:
+    """Return where in [0, ``most``] an increasing function takes these values (n,), to rounding."""
+    low, high = np.zeros_like(length), np.full_like(length, most)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        short = length_to(middle) < length
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return np.asarray(0.5 * (low + high))

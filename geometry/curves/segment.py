@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, shaped
 from ...core.errors import WallError
-from .curve import Box, Curve, Point, as_point, parameters, stretch_factors
+from .curve import Bools, Box, Curve, Point, as_point, parameters, stretch_factors
+from .reading import Table, check_keys, pair_of
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,9 @@ class Segment(Curve):
     >>> side.point([0.0, 0.5]).tolist()
     [[0.0, 0.0], [1.5, -2.0]]
     """
+
+    kind = "segment"
+    is_straight = True
 
     start: Point
     end: Point
@@ -122,3 +126,53 @@ class Segment(Curve):
     def flattened(self, tolerance: float) -> Floats:
         """Return the two end points, for any tolerance."""
         return np.array([self.start, self.end])
+
+    def curvature(self, s: float) -> float:
+        """0."""
+        return 0.0
+
+    def largest_curvature(self) -> tuple[float, float]:
+        """0, exactly."""
+        return 0.0, 0.0
+
+    def to_table(self) -> Table:
+        """The two ends."""
+        return {"kind": self.kind, "start": list(self.start), "end": list(self.end)}
+
+    @classmethod
+    def from_table(cls, table: Table) -> Segment:
+        """From the two ends."""
+        check_keys(table, {"kind", "start", "end"}, set())
+        return cls(pair_of("start", table["start"]), pair_of("end", table["end"]))
+
+    @property
+    def signed_area(self) -> float:
+        (x0, y0), (x1, y1) = self.start, self.end
+        return 0.5 * (x0 * y1 - x1 * y0)
+
+    def arrival(self, position: Floats, velocity: Floats, own: Bools, slack: float, front: bool = True) -> Floats:
+        turn = 1.0 if front else -1.0
+        along = self.tangent(0.0)
+        normal = turn * np.array([-along[1], along[0]])
+        relative = position - np.array(self.start)
+        distance, approach = np.sum(relative * normal, axis=1), -np.sum(velocity[:, :2] * normal, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            time = np.maximum(distance, 0.0) / approach
+            at = np.sum((relative + velocity[:, :2] * time[:, None]) * along, axis=1)
+        hit = (approach > 0.0) & (distance >= -slack) & (at >= -slack) & (at <= self.length + slack) & ~own
+        return np.where(hit & np.isfinite(time), time, np.inf)
+
+    def touch(self, position: Floats) -> tuple[Floats, Floats, Floats]:
+        tangent = np.broadcast_to(self.tangent(0.0), position.shape)
+        return position, tangent, np.zeros(len(position))
+
+    def length_to(self, position: Floats) -> Floats:
+        along = (position - np.array(self.start)) @ self.tangent(0.0)
+        return np.asarray(np.clip(along, 0.0, self.length))
+
+    def is_on(self, position: Floats, slack: float) -> Bools:
+        along = self.tangent(0.0)
+        relative = position - np.array(self.start)
+        at = relative @ along
+        near = np.abs(relative @ np.array([-along[1], along[0]])) <= slack
+        return np.asarray(near & (at >= -slack) & (at <= self.length + slack))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.long_runs import count_time
-from ..scene.columns import LEFT, RIGHT, RUN_SINE
+from ..curves.columns import LEFT, RIGHT, RUN_SINE
 from .pieces import Pieces, samples_between
 
 if TYPE_CHECKING:

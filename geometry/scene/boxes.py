@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.checks import Floats
-from .tolerances import BOX_MARGIN
+from ..curves.tolerances import BOX_MARGIN
 
 # Most boxes, or lines, in a row; of four levels of nodes the masks are in one number, see `tracing/compiled/tree`.
 BOXES = 16

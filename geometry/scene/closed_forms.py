@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.checks import Floats
+from ..curves import columns as c
 from ..curves.arc import Arc
-from ..curves.segment import Segment
-from . import columns as c
-from .columns import row_of
+from ..curves.columns import row_of
 from .facing import WIDEST_WEDGE
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ def closed_form_of(pieces: Sequence[Curve], points: Sequence[Point], size: float
     """Return the kind and the numbers of the form of one hollow; ``points`` are its joints from left to right."""
     (left, top), (right, other) = points[0], points[-1]
     if top == other == 0.0 and left < right:
-        if len(pieces) == 2 and all(isinstance(piece, Segment) for piece in pieces):
+        if len(pieces) == 2 and all(piece.is_straight for piece in pieces):
             return _wedge_form(left, right, points[1], size)
         if len(pieces) == 1 and isinstance(pieces[0], Arc) and pieces[0].is_circular:
             return _arc_form(left, right, pieces[0])

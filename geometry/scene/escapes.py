@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from .tolerances import JOINT_ULPS, NEARBY
+from ..curves.tolerances import JOINT_ULPS, NEARBY
 
 # Number of lines in a hollow up to which all pairs of them are compared, a few milliseconds.
 MOST_LINES = 1024

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from . import columns as c
+from ..curves import columns as c
 
 # Widest wedge with runs, radians. In a wider wedge a ray has at most about ten hits, and a run does not pay.
 WIDEST_WEDGE = 0.3

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...core.estimates import Summary
 from ..cells.cell import Cell
 from ..cells.hollow_shape import distinct_hollows
-from . import columns as c
+from ..curves import columns as c
 from .scene import Scene
 
 

@@ -6,34 +6,31 @@ columns.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import asin, cos, frexp, hypot, ldexp, pi, sin
+from math import frexp, hypot, ldexp, pi, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.errors import InputError
 from ..cells.cell import Cell
+from ..curves import columns as c
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
+from ..curves.columns import row_of, table_of
 from ..curves.crossings import directions_of, straight_in
 from ..curves.curve import Curve, Point
-from . import columns as c
+from ..curves.tolerances import SMOOTH_JOINT
 from .boxes import TREE_COLUMNS, tree_of
 from .closed_forms import MOST_PIECES, closed_form_of
-from .columns import row_of, table_of
 from .escapes import escape_sectors
 from .facing import facing_pairs
 from .structs import Struct
-from .tolerances import NEARBY_MARGIN, SMOOTH_JOINT
 
-# Half angle below which it is computed from the chord and the radius, more exactly than from two parameters.
-SHALLOW_ARC = 0.5
-# Largest span of an arc; longer arcs are cut in two, so that the side of the chord decides which points are on the arc.
-LONGEST_ARC = 1.5 * pi
 # Number of chords from which on a run along an arc pays for its two arctangents and one sincos.
 RUN_CHORDS = 8.0
 OUTLINE_POINTS = 64
@@ -43,18 +40,6 @@ TREE_LINES = 48
 GRID_DIGITS = 50
 # Nominal time of a segment in seconds, and how many times as long it takes on Bezier curves.
 SEGMENT_TIME, BEZIER_FACTOR = 2e-7, 4.0
-# Numbers of columns of the tables in `Tables` after the hollows.
-TABLE_COLUMNS = (
-    c.JOINT_COLUMNS, c.LINE_COLUMNS, c.ARC_COLUMNS, c.BEZIER_COLUMNS, c.PAIR_COLUMNS, TREE_COLUMNS, 1,
-)  # fmt: skip
-
-
-def hull_of(piece: Curve, start: Point, end: Point) -> list[Point]:
-    """Return four points whose convex hull contains a curved piece."""
-    if isinstance(piece, Bezier):
-        return [start, *list(piece.control_points[1:-1])[:2], *[end] * (5 - len(piece.control_points))]
-    x0, y0, x1, y1 = piece.box
-    return [(x0, y0), (x0, y1), (x1, y0), (x1, y1)]
 
 
 def corners_of(pieces: Sequence[Curve]) -> NDArray[np.bool_]:
@@ -66,56 +51,16 @@ def corners_of(pieces: Sequence[Curve]) -> NDArray[np.bool_]:
     return np.append(corner, corner[0])
 
 
-def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
-    """Return a row of ``arcs`` from its first columns ``ends``; RUN_SINE is set later."""
-    a, b = arc.semi_axes
-    stretch = a / b
-    turn = arc.end_angle - arc.start_angle
-    # counterclockwise arcs have their centre on the left, the free side: they are focusing
-    sign = 1.0 if turn > 0.0 else -1.0
-    chord = (ends[c.END_X] - ends[c.START_X], stretch * (ends[c.END_Y] - ends[c.START_Y]))
-    length = hypot(*chord)
-    direction = (chord[0] / length, chord[1] / length)
-    half = 0.5 * abs(turn)
-    # sin(half) = kappa length / 2 puts both joints on the circle: the more accurate of half and kappa gives the other
-    if half < SHALLOW_ARC:
-        half = asin(min(1.0, 0.5 * length / a))
-        curvature = sign / a
-    else:
-        curvature = sign * 2.0 * sin(half) / length
-    normal = (
-        sign * sin(half) * direction[0] - cos(half) * direction[1],
-        sign * sin(half) * direction[1] + cos(half) * direction[0],
-    )
-    short = length if half <= 0.25 * pi else 0.0
-    columns = {
-        c.NORMAL_X: normal[0], c.NORMAL_Y: normal[1], c.CURVATURE: curvature,
-        c.CHORD_X: direction[0], c.CHORD_Y: direction[1], c.SHORT_CHORD: short, c.SPAN: 2.0 * half, c.STRETCH: stretch,
-    }  # fmt: skip
-    return row_of(c.ARC_COLUMNS, {**ends, **columns})
-
-
-def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
-    """Return a row of ``beziers`` from its first columns ``ends``."""
-    curve = curve.pinned((ends[c.START_X], ends[c.START_Y]), (ends[c.END_X], ends[c.END_Y]))
-    points, powers = np.array(curve.control_points), curve.powers[1:]
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    reach = float(np.hypot(*(points - middle).T).max()) + NEARBY_MARGIN * float(np.abs(powers).sum())
-    columns = {c.MIDDLE_X: middle[0], c.MIDDLE_Y: middle[1], c.REACH: reach}
-    return row_of(c.BEZIER_COLUMNS, {**ends, **dict(enumerate(powers.ravel(), c.X1)), **columns})
-
-
 class Tables(NamedTuple):
     """The tables of a wall as arguments of compiled functions; tables of absent primitives are empty.
 
-    ``closed`` has one column.
+    ``curves`` has a table for each of `Curve.traced`, and ``closed`` has one column.
     """
 
     hollows: Floats
     joints: Floats
     lines: Floats
-    arcs: Floats
-    beziers: Floats
+    curves: tuple[Floats, ...]
     pairs: Floats
     boxes: Floats
     closed: Floats
@@ -133,6 +78,16 @@ class Scene(Tables):
         return Struct(Tables(*self))
 
     @property
+    def arcs(self) -> Floats:
+        """The table of arcs."""
+        return self.curves[Arc.table]
+
+    @property
+    def beziers(self) -> Floats:
+        """The table of Bezier pieces."""
+        return self.curves[Bezier.table]
+
+    @property
     def segment_time(self) -> float:
         """Nominal time of a segment of a ray in adaptive quadrature, in seconds; measured as .2 and .8 microseconds."""
         return BEZIER_FACTOR * SEGMENT_TIME if len(self.beziers) else SEGMENT_TIME
@@ -143,8 +98,9 @@ class Scene(Tables):
         is_circular = self.arcs[:, c.STRETCH] == 1.0
         present = {
             "lines": self.joints[:, c.STARTS_LINE].any(), "circles": is_circular.any(),
-            "ellipses": not is_circular.all(), "beziers": len(self.beziers) > 0,
+            "ellipses": not is_circular.all(),
         }  # fmt: skip
+        present |= {f"{cls.kind}s": len(self.curves[cls.table]) > 0 for cls in Curve.traced() if cls is not Arc}
         return tuple(name for name, is_present in present.items() if is_present)
 
 
@@ -195,11 +151,9 @@ class _Chain:
         """Return the chain with every arc of more than LONGEST_ARC cut in two at a smooth joint."""
         chain = self
         for k in reversed(self.curves()):
-            arc = self.pieces[k]
-            if isinstance(arc, Arc) and abs(arc.end_angle - arc.start_angle) > LONGEST_ARC:
-                middle = 0.5 * (arc.start_angle + arc.end_angle)
-                first = Arc(arc.center, arc.semi_axes, arc.start_angle, middle)
-                second = Arc(arc.center, arc.semi_axes, middle, arc.end_angle)
+            parts = self.pieces[k].cut()
+            if len(parts) == 2:
+                first, second = parts
                 chain = _Chain(
                     (*chain.pieces[:k], first, second, *chain.pieces[k + 1 :]),
                     np.insert(chain.vertices, k + 1, first.end, axis=0),
@@ -241,8 +195,9 @@ class _Tables:
     def __init__(self, cell: float, is_open: bool) -> None:
         self.cell, self.is_open = float(cell), bool(is_open)
         self.hollows: list[Floats] = []
-        self._blocks = tuple(map(_Blocks, TABLE_COLUMNS))
-        self.joints, self.lines, self.arcs, self.beziers, self.pairs, self.boxes, self.closed = self._blocks
+        self.joints, self.lines = _Blocks(c.JOINT_COLUMNS), _Blocks(c.LINE_COLUMNS)
+        self.curves = tuple(_Blocks(cls.columns) for cls in Curve.traced())
+        self.pairs, self.boxes, self.closed = _Blocks(c.PAIR_COLUMNS), _Blocks(TREE_COLUMNS), _Blocks(1)
 
     def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[float, float]) -> None:
         """Append one hollow, or the whole cell of an open wall."""
@@ -251,11 +206,11 @@ class _Tables:
         vertices = np.concatenate([chain.vertices for chain in chains])
         size = max(float(np.max(np.ptp(vertices, axis=0))), right - left)
         row = {c.LEFT: left, c.RIGHT: right, c.SIZE: size, c.LEFT_EDGE: edges[0], c.RIGHT_EDGE: edges[1]}
-        row |= dict(zip((c.FIRST_JOINT, c.FIRST_ARC, c.FIRST_BEZIER), self._sizes(), strict=True))
+        row |= dict(zip((c.FIRST_JOINT, *self._curve_columns()), self._sizes(), strict=True))
         joints = np.concatenate([_joint_rows(chain) for chain in chains])
         lines = np.concatenate([_line_rows(chain) for chain in chains])
         self._add_curves(chains, size)
-        self.hollows.append(row_of(c.HOLLOW_COLUMNS, row))
+        self.hollows.append(row_of(self._width, row))
         inside = bool(np.all((left <= vertices[:, 0]) & (vertices[:, 0] <= right)))
         if inside or edges != (c.NO_EDGE, c.NO_EDGE):
             self._mark_pairs(joints, lines, chains, size)
@@ -265,20 +220,26 @@ class _Tables:
                 lines[:-1, [c.ESCAPE_RIGHT, c.ESCAPE_LEFT]] = escape_sectors(chains[0].vertices, size)
         self.joints.append(joints)
         self.lines.append(lines)
-        self.hollows[-1][[c.JOINTS_END, c.ARCS_END, c.BEZIERS_END]] = self._sizes()
+        self.hollows[-1][[c.JOINTS_END, *self._curve_columns(1)]] = self._sizes()
         if is_closed and len(chains[0].pieces) <= MOST_PIECES:
             points = list(map(chains[0].joint, range(len(chains[0].vertices))))
             kind, form = closed_form_of(chains[0].pieces, points, size)
             self.hollows[-1][[c.FORM, c.FORM_START]] = kind, self.closed.count
             self.closed.append(form[:, np.newaxis])
 
-    def _sizes(self) -> tuple[int, int, int]:
-        return self.joints.count, self.arcs.count, self.beziers.count
+    @property
+    def _width(self) -> int:
+        return c.FIRST_CURVE + 2 * len(self.curves)
+
+    def _curve_columns(self, end: int = 0) -> range:
+        return range(c.FIRST_CURVE + end, self._width, 2)
+
+    def _sizes(self) -> list[int]:
+        return [block.count for block in (self.joints, *self.curves)]
 
     def _add_curves(self, chains: list[_Chain], size: float) -> None:
         """Append arcs and Bezier pieces."""
-        arcs: list[Floats] = []
-        beziers: list[Floats] = []
+        rows: list[list[Floats]] = [[] for _ in self.curves]
         for chain in chains:
             for i in chain.curves():
                 piece, start, end = chain.pieces[i], chain.joint(i), chain.joint(i + 1)
@@ -286,12 +247,12 @@ class _Tables:
                     c.START_X: start[0], c.START_Y: start[1], c.END_X: end[0], c.END_Y: end[1],
                     c.START_CORNER: chain.corners[i], c.END_CORNER: chain.corners[i + 1],
                 }  # fmt: skip
-                if isinstance(piece, Arc):
-                    arcs.append(arc_row(piece, ends))
-                elif isinstance(piece, Bezier):
-                    beziers.append(bezier_row(piece, ends))
-        self.arcs.append(_with_runs(table_of(arcs, c.ARC_COLUMNS), chains, size))
-        self.beziers.append(table_of(beziers, c.BEZIER_COLUMNS))
+                if not isinstance(piece, Curve.traced()):
+                    raise InputError(f"wall: expected pieces that rays meet, got {piece!r}; write it as Bezier curves")
+                rows[piece.table].append(piece.row(ends))
+        for cls, block, some in zip(Curve.traced(), self.curves, rows, strict=True):
+            table = table_of(some, cls.columns)
+            block.append(_with_runs(table, chains, size) if cls is Arc else table)
 
     def _add_tree(self, joints: Floats, size: float) -> None:
         """Add a tree over the lines of the last hollow."""
@@ -317,8 +278,9 @@ class _Tables:
         self.pairs.append(table_of(table, c.PAIR_COLUMNS))
 
     def scene(self) -> Scene:
-        hollows, tables = table_of(self.hollows, c.HOLLOW_COLUMNS), (block.whole() for block in self._blocks)
-        return Scene._make((hollows, *tables, len(hollows), self.cell, self.is_open))
+        hollows, curves = table_of(self.hollows, self._width), tuple(block.whole() for block in self.curves)
+        joints, lines, *rest = (b.whole() for b in (self.joints, self.lines, self.pairs, self.boxes, self.closed))
+        return Scene._make((hollows, joints, lines, curves, *rest, len(hollows), self.cell, self.is_open))
 
 
 class _Blocks:
@@ -356,7 +318,7 @@ def _hulls(chain: _Chain) -> Floats:
     """Return `hull_of` of every piece."""
     hulls = np.stack([chain.vertices[:-1], chain.vertices[1:]] * 2, axis=1)
     for k in chain.curves():
-        hulls[k] = hull_of(chain.pieces[k], chain.joint(k), chain.joint(k + 1))
+        hulls[k] = chain.pieces[k].hull(chain.joint(k), chain.joint(k + 1))
     return hulls
 
 
@@ -386,5 +348,6 @@ def _with_runs(arcs: Floats, chains: list[_Chain], size: float) -> Floats:
     return arcs
 
 
-# Empty tables, with the types of all tables.
-NO_TABLES = _Tables(1.0, True).scene().tables
+def no_tables() -> Struct:
+    """Return empty tables, with the types of all tables."""
+    return _Tables(1.0, True).scene().tables

@@ -18,11 +18,11 @@ from ...core.estimates import Summary
 from ...core.rounding import EPS
 from ...core.tables import axes_or_new
 from ..curves.arc import Arc
+from ..curves.bezier import GRAZE
 from ..curves.curve import Curve
 from ..curves.segment import Segment
 from . import boundary
 from .boundary import FlightStatus
-from .splines import GRAZE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,7 +75,7 @@ class Container(Summary):
 
     points: Floats
     normals: Floats
-    curves: tuple[boundary.Piece, ...] = ()
+    curves: tuple[Curve, ...] = ()
 
     def __post_init__(self) -> None:
         points, normals = finite_array("points", self.points), finite_array("normals", self.normals)
@@ -256,14 +256,14 @@ class Container(Summary):
         InputError
             If the container is not bounded by curves or the sides of a polygon.
         """
-        return math.fsum(boundary.signed_area(curve) for curve in self._closed_curves())
+        return math.fsum(curve.signed_area for curve in self._closed_curves())
 
     @property
     def perimeter(self) -> float:
         """The length of the boundary; a disk with specular reflection flies pi area/perimeter on average (Santalo)."""
         return math.fsum(curve.length for curve in self._closed_curves())
 
-    def _closed_curves(self) -> tuple[boundary.Piece, ...]:
+    def _closed_curves(self) -> tuple[Curve, ...]:
         table = self.closed()
         if len(table.points) or not table._has_outer_loop:
             raise InputError("container: expected a polygon, or curves with an outer loop, such as Container.circle()")
@@ -271,7 +271,7 @@ class Container(Summary):
 
     @property
     def _has_outer_loop(self) -> bool:
-        areas = (sum(boundary.signed_area(self.curves[k]) for k in loop) for loop in boundary.loops_of(self.curves))
+        areas = (sum(self.curves[k].signed_area for k in loop) for loop in boundary.loops_of(self.curves))
         return bool(self.curves) and any(area > 0.0 for area in areas)
 
     def contains(self, position: ArrayLike) -> NDArray[np.bool_]:
@@ -321,7 +321,7 @@ class Container(Summary):
             begins = last == k
             if new.size:
                 begins[new] = boundary.begins_along(curve, position[new])
-            times[:, k] = boundary.arrival(curve, position, velocity, begins, slack)
+            times[:, k] = curve.arrival(position, velocity, begins, slack)
         wall = np.argmin(times, axis=1)
         first = times[np.arange(len(position)), wall]
         wall = np.where(np.isfinite(first), wall, -1)
@@ -364,7 +364,7 @@ class Container(Summary):
         """
         position, (wall,) = shaped("position", position, "n", 2), indices("wall", [wall], self.wall_count).tolist()
         if wall >= len(self.points):
-            return boundary.touch(self.curves[wall - len(self.points)], position)
+            return boundary.Touch(*self.curves[wall - len(self.points)].touch(position))
         return boundary.Touch(position, np.broadcast_to(self.tangents[wall], position.shape), np.zeros(len(position)))
 
     def frames(self, position: Floats, wall: NDArray[np.int64]) -> tuple[Floats, Floats]:
@@ -394,7 +394,7 @@ class Container(Summary):
         points = np.empty((len(along), 2))
         for k, curve in enumerate(self.curves):
             here = wall == k
-            points[here] = boundary.point_at_length(curve, along[here] - ends[k])
+            points[here] = curve.point_at_length(along[here] - ends[k])
         return points, wall.astype(np.int64)
 
     def length_at(self, position: ArrayLike, wall: NDArray[np.int64]) -> Floats:
@@ -404,13 +404,13 @@ class Container(Summary):
         length = np.empty(len(points))
         for k, curve in enumerate(self.curves):
             here = wall == k
-            length[here] = ends[k] + boundary.length_at(curve, points[here])
+            length[here] = ends[k] + curve.length_to(points[here])
         return length
 
     def length_on(self, wall: int, position: Floats) -> Floats:
         """Return the arc lengths (n,) of points (n, 2) from the start of a curve, whose number is ``wall``."""
         (curve,) = indices("wall", [wall - len(self.points)], len(self.curves)).tolist()
-        return boundary.length_at(self.curves[curve], shaped("position", position, "n", 2))
+        return self.curves[int(curve)].length_to(shaped("position", position, "n", 2))
 
     def _ends(self) -> Floats:
         """The arc lengths at the ends of the curves, 0 before the first."""

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..scene import columns as c
+from ..curves import columns as c
+from ..curves.curve import Curve
+from ..curves.tolerances import JOINT_ULPS
 from ..scene.scene import Tables
-from ..scene.tolerances import JOINT_ULPS
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -62,12 +63,11 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
 
 
 def tables_of(scene: Scene) -> Tables:
-    """Return the tables of a wall for double-double arithmetic, with arcs as by `refined_arcs`."""
-    from .compiled.pieces.arcs import refined_arcs
+    """Return the tables of a wall for double-double arithmetic, with curves as by `refined_table` of their kinds."""
+    from .compiled.pieces.kinds import CURVES
 
-    # at least one row, as of arcs, because `refined_face` passes a row also for a wall without Bezier pieces
-    beziers = scene.beziers if len(scene.beziers) else np.zeros((1, c.BEZIER_COLUMNS))
-    return Tables(*scene._replace(arcs=refined_arcs(scene.arcs), beziers=beziers))
+    tables = (piece.refined_table(rows) for piece, rows in zip(CURVES, scene.curves, strict=True))
+    return Tables(*scene._replace(curves=tuple(tables)))
 
 
 def retrace(
@@ -116,12 +116,7 @@ def _free_bands(scene: Scene) -> Floats:
         return np.empty((0, 2))
     lines = np.flatnonzero(scene.joints[:, c.STARTS_LINE] > 0.0)
     heights = [np.column_stack([scene.joints[lines, c.JOINT_Y], scene.joints[lines + 1, c.JOINT_Y]])]
-    # every point of an arc is within half of the arc length of one of its ends
-    half = 0.5 * scene.arcs[:, c.SPAN] / np.abs(scene.arcs[:, c.CURVATURE]) / scene.arcs[:, c.STRETCH]
-    ends = scene.arcs[:, (c.START_Y, c.END_Y)]
-    heights.append(np.column_stack([ends.min(axis=1) - half, ends.max(axis=1) + half]))
-    c0, c1, c2, c3 = scene.beziers[:, (c.START_Y, c.Y1, c.Y2, c.Y3)].T
-    heights.append(np.column_stack([c0, c0 + c1 / 3, c0 + (2 * c1 + c2) / 3, c0 + c1 + c2 + c3]))
+    heights += [cls.heights(rows) for cls, rows in zip(Curve.traced(), scene.curves, strict=True)]
     slack = JOINT_ULPS * EPS * float(scene.hollows[0, c.SIZE])
     extents = sorted((float(row.min()) - slack, float(row.max()) + slack) for part in heights for row in part)
     bands, top = [], extents[0][1]

@@ -27,7 +27,8 @@ from ...core.checks import (
 )
 from ...core.estimates import Summary
 from ...core.long_runs import reported
-from ..scene import columns as c
+from ..curves import columns as c
+from ..curves.curve import Curve
 from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
 
@@ -276,7 +277,9 @@ def _work(scene: Scene) -> int:
 
 def _goes_in_waves(scene: Scene, rays: int) -> bool:
     """Whether rays are traced in waves, which needs a function that takes a second to compile once on a machine."""
-    if rays < MANY_RAYS or scene.is_open or np.any(scene.arcs[:, c.STRETCH] != 1.0) or len(scene.boxes):
+    if rays < MANY_RAYS or scene.is_open or len(scene.boxes):
+        return False
+    if not all(cls.goes_in_waves(rows) for cls, rows in zip(Curve.traced(), scene.curves, strict=True) if len(rows)):
         return False
     if np.all(scene.hollows[:, c.FORM] != c.NO_FORM):
         return False

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ..curves.curve import Curve
-from ..curves.segment import Segment
 from .wall import Wall
 
 # Number of bisections of the parameter interval [0, 1] that leave two neighbouring floats near 1.
@@ -53,7 +52,7 @@ def _cross(piece: Curve, x: Floats, y: Floats, odd: NDArray[np.bool_]) -> None:
 
 def _height(piece: Curve, start: float, end: float, x: Floats) -> Floats:
     """Return the heights at ``x`` of the part from ``start`` to ``end``, which is monotone in x."""
-    if isinstance(piece, Segment):
+    if piece.is_straight:
         (x0, y0), (x1, y1) = piece.start, piece.end
         return np.asarray(y0 + (x - x0) * ((y1 - y0) / (x1 - x0)))
     first, last = np.full_like(x, start), np.full_like(x, end)

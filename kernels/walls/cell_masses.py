@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...geometry.curves.columns import LEFT, RIGHT
 from ...geometry.itineraries.hollow import HollowConditionals, compiled_result
 from ...geometry.itineraries.patches import Strips, common_pieces, ends_of, positions, sample, together, weight_at
-from ...geometry.scene.columns import LEFT, RIGHT
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..expectations.angle_panels import NODES

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, angles, instance
 from ...core.errors import AccuracyError
 from ...core.rounding import EPS
-from ...geometry import Arc, Segment, Wall
+from ...geometry import Arc, Wall
 from ...geometry.cells.hollow import Hollow
 from ...geometry.cells.hollow_shape import HollowShape, side_by_side
 from ..expectations.conditionals import Conditionals
@@ -197,7 +197,7 @@ def parts_of_wall(wall: Wall) -> tuple[tuple[float, Law], ...] | None:
             widths[law] = widths.get(law, 0.0) + width
         elif cell.is_polygonal:
             return None
-        elif all(isinstance(piece, Segment) for piece in cell.pieces[hollow.first : hollow.last]):
+        elif all(piece.is_straight for piece in cell.pieces[hollow.first : hollow.last]):
             straight.append(hollow)
         else:
             shape = HollowShape.of(cell, hollow)

@@ -12,7 +12,7 @@ from ...core.checks import Floats, Rng, generator, instance, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, fraction_estimate, mean_of_strata
 from ...core.rounding import EPS
-from ...geometry import Segment, Wall, trace
+from ...geometry import Wall, trace
 from ...geometry.cells.hollow_shape import distinct_hollows
 from ...geometry.polygons.beams import Beams, beams_of
 from ...kernels import SINE, Bins, CircularArcLaw, DensityLaw, Law, WallLaw
@@ -248,7 +248,7 @@ def _near_specular(law: Law, inner: DrivenLaw, x: Floats, theta: Floats) -> tupl
 
 def _has_curved_hollows(cell: Wall) -> bool:
     """Whether no hollow of a wall that is its own cell has a straight piece."""
-    straight = {index for index, piece in enumerate(cell.pieces) if isinstance(piece, Segment)}
+    straight = {index for index, piece in enumerate(cell.pieces) if piece.is_straight}
     return cell.closes and not any(straight & set(range(one.first, one.last)) for one in cell.hollows)
 
 

@@ -202,9 +202,8 @@ def _straight(law: WallLaw, x: Floats, theta: Floats) -> Floats:
 
 
 def _has_straight_pieces_below(wall: Wall) -> bool:
-    from ...geometry import Segment
 
     loops = [wall.pieces, *wall.islands]
     if wall.closes:
         loops = [wall.cell.pieces[hollow.first : hollow.last] for hollow in wall.hollows]
-    return any(isinstance(piece, Segment) for loop in loops for piece in loop)
+    return any(piece.is_straight for loop in loops for piece in loop)

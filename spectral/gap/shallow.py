@@ -261,13 +261,11 @@ def slopes_of(law: Law) -> Slopes | None:
 
 def _slopes_of_wall(wall: Wall) -> Slopes | None:
     """The slopes of a wall, or None unless it is a graph with small slopes."""
-    from ...geometry import Segment
-
-    if not wall.closes or sum(not isinstance(piece, Segment) for piece in wall.cell.pieces) > MOST_CURVED:
+    if not wall.closes or sum(not piece.is_straight for piece in wall.cell.pieces) > MOST_CURVED:
         return None
     angles, weights, turns = [], [], [np.inf]
     for piece in wall.cell.pieces:
-        if isinstance(piece, Segment):
+        if piece.is_straight:
             angle, weight = _angles(piece, np.zeros(1)), np.array([piece.end[0] - piece.start[0]])
         else:
             angle, weight = _slopes_of_curve(piece)

@@ -13,7 +13,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core import checkpoints
-from asperity.geometry.scene.columns import START_X, START_Y, STRETCH, TREE_LEVELS, X1, X2, X3, Y1, Y2, Y3
+from asperity.geometry.curves.columns import START_X, START_Y, STRETCH, TREE_LEVELS, X1, X2, X3, Y1, Y2, Y3
 from asperity.geometry.tracing import tracing
 from asperity.geometry.tracing.compiled.waves import MOST_HITS
 from asperity.kernels.billiards import billiard

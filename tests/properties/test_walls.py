@@ -9,7 +9,7 @@ from campaigns.judges.plain_tracer import trace_plainly
 from campaigns.rays.aimed_rays import AimedRays, aimed_rays, grazing_rays, judge
 
 from asperity import geometry as geo
-from asperity.geometry.scene.columns import FIRST_PAIR, FORM, NO_FORM, PAIRS_END, RUN_SINE
+from asperity.geometry.curves.columns import FIRST_PAIR, FORM, NO_FORM, PAIRS_END, RUN_SINE
 
 EPS = np.finfo(float).eps
 # Rays on a wall; between an island of a curve and the floor some are nearly caught.

@@ -32,7 +32,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scene import columns as c
+from ...curves import columns as c
+from ...curves.arc import Arc
+from ...curves.bezier import Bezier
+from ...curves.columns import range_of
 from ...tracing.compiled.pieces.arcs import arc_form, arc_normal, end_excess
 from ...tracing.compiled.pieces.formulas import near_end
 from ...tracing.compiled.pieces.kinds import Face
@@ -60,6 +63,8 @@ WIDEST_SLACK = 1e6
 # Limit on steps. Near a tangency a step at worst halves the distance, which takes about 100 steps from the wall's size
 # to its rounding. Disks that sink slowly and rotate fast need more: a step is a few sizes of the wall along the rim.
 ROOT_STEPS = 100_000
+# Of each kind of piece the columns of a hollow for its first row and the row after the last.
+RANGES = (LINE, c.FIRST_JOINT, c.JOINTS_END), (ARC, *range_of(Arc.table)), (BEZIER, *range_of(Bezier.table))
 
 
 class Motion(NamedTuple):
@@ -300,10 +305,10 @@ def face_at(kind, number, x, y, ground):
     arc = ground.exact_arcs[number if kind == ARC else 0]
     graph = ground.graphs[number if kind == BEZIER else 0]
     if kind != BEZIER:
-        return Face(kind, number, arc, arc, extended(0.0))
+        return Face(kind, number, arc, extended(0.0))
     along, _ = in_frame(graph, x - graph[c.START_X], y - graph[c.START_Y])
     curve = ground.beziers[int(graph[g.PIECE])]
-    return Face(BEZIER, number, arc, curve, extended(graph[g.FIRST_S] + parameter_at(graph, along)))
+    return Face(BEZIER, number, curve, extended(graph[g.FIRST_S] + parameter_at(graph, along)))
 
 
 @inner
@@ -465,10 +470,7 @@ def first_in_hollow(h, own, came_from, base, path, span, ground):
     t, end, rotation = span
     none = satellite_after(t, rotation, path.turn, motion)
     touch = Touch(np.inf, Touching(ZERO, NOTHING, h), base, none, CLEAR)
-    ranges = (
-        (LINE, c.FIRST_JOINT, c.JOINTS_END), (ARC, c.FIRST_ARC, c.ARCS_END), (BEZIER, c.FIRST_BEZIER, c.BEZIERS_END),
-    )  # fmt: skip
-    for tried, first, end_of_range in ranges:
+    for tried, first, end_of_range in RANGES:
         for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
             if tried != LINE or joints[k, c.STARTS_LINE] > 0.0:
                 rest = Span(t, end, rotation)

@@ -14,8 +14,9 @@ import numpy as np
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
-from ...scene import columns as c
-from ...scene.columns import row_of, table_of
+from ...curves import columns as c
+from ...curves.bezier import Bezier
+from ...curves.columns import range_of, row_of, table_of
 
 # graphs: the first columns are those of every curve; sigma = s - FIRST_S is the parameter of the part.
 ALONG_X = c.END_CORNER + 1  # unit vector along the chord
@@ -55,7 +56,8 @@ def graphs_of(beziers: Floats, hollows: Floats) -> Floats:
         rows += _graphs_of_piece(curve, number)
         first.append(len(rows))
     for hollow in hollows:
-        hollow[[c.FIRST_BEZIER, c.BEZIERS_END]] = [first[int(k)] for k in hollow[[c.FIRST_BEZIER, c.BEZIERS_END]]]
+        columns = list(range_of(Bezier.table))
+        hollow[columns] = [first[int(k)] for k in hollow[columns]]
     return table_of(rows, GRAPH_COLUMNS)
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scene import columns as c
+from ...curves import columns as c
 from ...tracing.compiled.pieces.arcs import arc_form, arc_point
 from ...tracing.compiled.pieces.formulas import opening_at
 from ...tracing.compiled.pieces.lines import LEAST_FRACTION, line_at, line_point

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from ....core.rounding import EPS
-from ...scene import columns as c
+from ...curves import columns as c
 from ...tracing.compiled.pieces.options import inlined
 from . import graph_table as g
 

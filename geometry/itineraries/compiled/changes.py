@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
-from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
+from ...curves.columns import LEFT, POINT_X, POINT_Y, RIGHT
 from ...scene.compiled.tables import ROW, named, reader_of
 from ...scene.scene import Scene
 from ...scene.structs import Struct

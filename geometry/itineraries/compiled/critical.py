@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....core.rounding import EPS
-from ...scene.columns import LEFT, RIGHT
+from ...curves.columns import LEFT, RIGHT
 from ...tracing.compiled.pieces.options import compiled, linked
 from .changes import probe, set_angle, setting_at
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
-from ...scene.columns import LEFT, RIGHT, SIZE
+from ...curves.columns import LEFT, RIGHT, SIZE
 from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.structs import Struct
 from ...tracing.compiled.pieces.options import compiled, linked

@@ -82,7 +82,8 @@ def named(form: Any, *kinds: Any) -> Any:
 def kind_of(value: Any) -> Any:
     """Return the type of a value of a `Struct` in compiled functions."""
     if isinstance(value, tuple):
-        return named(type(value), *map(kind_of, value))
+        kinds = tuple(map(kind_of, value))
+        return named(type(value), *kinds) if hasattr(value, "_fields") else types.BaseTuple.from_types(kinds)
     if isinstance(value, np.ndarray):
         return Table(value.shape[1]) if value.ndim == 2 else types.CPointer(typeof(value).dtype)
     return typeof(value)

@@ -13,7 +13,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
-from ...scene import columns as c
+from ...curves import columns as c
 from ...scene.compiled.tables import ROW
 from .closed_forms import cross_arc, cross_wedge
 from .pieces.formulas import TOP_CORNER, last_hollow, opening_at

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from ...scene import columns as c
+from ...curves import columns as c
 from .pieces.options import inner
 from .trigonometry import PI, PI_REST, arcsine, sine_cosine
 

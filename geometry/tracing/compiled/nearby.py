@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...curves.tolerances import NEARBY_SLACKS
 from ...scene.boxes import BOXES, CONTENT
-from ...scene.tolerances import NEARBY_SLACKS
 from ..double_double.numbers import extended
 from .pieces.kinds import face_of, piece_nearby
 from .pieces.options import allocating, inner, linked
 from .pieces.pointers import call_late
-from .pieces.records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit
+from .pieces.records import FIRST_CURVE, LINE, NO_PIECE, OPENING, SIDE, Hit
 from .pieces.sides import Arrival, in_front_at, line_in_front_of_line
 from .tree import first_boxes, next_leaf, tree_of
 
@@ -47,7 +47,8 @@ def nearer(scope, found, piece, own, px, py, vx, vy):
     """-> Hit: the earlier of a hit and of that on a nearby piece, given by kind and row, if the ray starts in front."""
     tables, slack = scope.tables, scope.slack
     kind, number = piece
-    t, s, tangent, is_clear = piece_nearby(scope, piece, own, px, py, vx, vy)
+    is_own = own.kind == kind and own.number == number
+    t, s, tangent, is_clear = piece_nearby(kind, (scope, number, own, is_own, px, py, vx, vy))
     if not t < found.time:
         return found
     from_piece = own.kind != OPENING and own.kind != SIDE
@@ -86,7 +87,7 @@ def hit_nearby(scope, own, px, py, vx, vy):
     else:
         for number in range(first, end - 1):
             found = nearer(scope, found, (A_LINE, number), own, px, py, vx, vy)
-    for kind, (first, end) in ((ARC, scope.arcs), (BEZIER, scope.beziers)):
+    for index, (first, end) in enumerate(scope.curves):
         for number in range(first, end):
-            found = nearer(scope, found, (kind, number), own, px, py, vx, vy)
+            found = nearer(scope, found, (FIRST_CURVE + index, number), own, px, py, vx, vy)
     return found

@@ -16,18 +16,18 @@ import math
 import numpy as np
 from numba import types
 
-from ...scene import columns as c
+from ...curves import columns as c
+from ...curves.tolerances import NEARBY_SLACKS
 from ...scene.boxes import TREE_COLUMNS
 from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
-from ...scene.scene import NO_TABLES
+from ...scene.scene import no_tables
 from ...scene.structs import Struct
-from ...scene.tolerances import NEARBY_SLACKS
 from .nearby import UNCERTAIN, hit_nearby, line_starts_in_front, starts_in_front
-from .pieces import records
+from .pieces import arcs, beziers, records
 from .pieces.arcs import arc_form, arc_normal, on_smooth_end
 from .pieces.beziers import bend_number, nearest_bezier
 from .pieces.formulas import FLAT_TOP, TOP_CORNER, bounds_of, exit_time, opening_at, with_length_one
-from .pieces.kinds import incidence, nearest_curve, reflect
+from .pieces.kinds import CURVES, incidence, nearest_curve, reflect
 from .pieces.lines import is_ahead, joint_side, line_at, line_hit
 from .pieces.options import compiled, inlined, inner
 from .pieces.pointers import Late, call_late, checked, is_raised
@@ -51,9 +51,9 @@ BEND_SHIFT = 40
 def scope_of(tables, h, slots):
     """-> Scope: hollow number h."""
     hollow = tables.hollows[h]
-    left, right, slack, joints, arcs, beziers = bounds_of(hollow)
+    left, right, slack, joints, curves = bounds_of(hollow)
     has_tree = hollow[c.TREE_LEVELS] > 0.0
-    return records.Scope(tables, hollow, left, right, slack, joints, arcs, beziers, has_tree, slots)
+    return records.Scope(tables, hollow, left, right, slack, joints, curves, has_tree, slots)
 
 
 @inlined
@@ -137,7 +137,7 @@ def meets_corner(scope, hit, corner, px, py, vx, vy):
 def may_run(tables, hit, own, px, py, vx, vy):
     """-> bool: whether a run of hits may follow a hit, so that `skip_run` is worth a call."""
     if hit.kind == ARC:
-        arc = tables.arcs[hit.number]
+        arc = tables.curves[arcs.TABLE][hit.number]
         qx, qy = px - arc[c.START_X], py - arc[c.START_Y]
         nx, ny = arc_normal(arc_form(arc), 1.0, qx, qy)
         return (arc[c.RUN_SINE] > 0.0) & (vx * nx + vy * ny <= arc[c.RUN_SINE])
@@ -150,8 +150,8 @@ def may_run(tables, hit, own, px, py, vx, vy):
 def skip_run(scope, hit, own, px, py, vx, vy, most):
     """-> (px, py, vx, vy, hits): the ray after the run of hits that follows a hit; no hits if a run does not pay."""
     tables, number = scope.tables, hit.number
-    if hit.kind == ARC and tables.arcs[number, c.RUN_SINE] > 0.0:
-        return skip_chords(tables.arcs[number], px, py, vx, vy, most)
+    if hit.kind == ARC and tables.curves[arcs.TABLE][number, c.RUN_SINE] > 0.0:
+        return skip_chords(tables.curves[arcs.TABLE][number], px, py, vx, vy, most)
     if hit.kind == LINE:
         lines, pairs = tables.lines, tables.pairs
         normal = lines[number, c.LINE_NORMAL_X], lines[number, c.LINE_NORMAL_Y]
@@ -167,7 +167,7 @@ def piece_label(tables, hit, vx):
     side = 1 if hit.kind == SIDE and vx > 0.0 else 0
     number = 8 * (hit.number + 1 + side) + hit.kind
     if hit.kind == BEZIER:
-        number += bend_number(tables.beziers[hit.number], hit.s) << BEND_SHIFT
+        number += bend_number(tables.curves[beziers.TABLE][hit.number], hit.s) << BEND_SHIFT
     return np.uint64(number)
 
 
@@ -277,7 +277,7 @@ def _late_functions() -> tuple[Late, ...]:
     number, integer, truth = types.float64, types.int64, types.boolean
     own = named(Own, integer, integer, number, number, integer, integer)
     hit = named(Hit, number, integer, integer, number, integer)
-    ranges = [types.UniTuple(integer, 2)] * 3
+    ranges = types.UniTuple(integer, 2), types.UniTuple(types.UniTuple(integer, 2), len(CURVES))
     scope = named(records.Scope, TABLES, ROW, *[number] * 3, *ranges, truth, kind_of(NO_SLOTS))
     table = Table(TREE_COLUMNS), Table(c.JOINT_COLUMNS), Table(c.LINE_COLUMNS)
     tree = named(records.Tree, *table, integer, integer, number)
@@ -295,7 +295,7 @@ def _late_functions() -> tuple[Late, ...]:
     )
 
 
-TABLES, NO_SLOTS = kind_of(NO_TABLES.values), records.Slots(*[0] * len(records.Slots._fields))
+TABLES, NO_SLOTS = kind_of(no_tables().values), records.Slots(*[0] * len(records.Slots._fields))
 LATE = _late_functions()
 # For functions that are compiled apart from `trace_rays`.
 TRACE = Late(trace_rays, *[types.int64] * 6)

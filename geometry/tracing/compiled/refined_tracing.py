@@ -26,7 +26,7 @@ import math
 
 import numpy as np
 
-from ...scene import columns as c
+from ...curves import columns as c
 from ..double_double.numbers import (
     LOCAL_ERROR,
     cross,
@@ -38,13 +38,12 @@ from ..double_double.numbers import (
     two_sum,
     where,
 )
-from .pieces.arcs import refined_arc_hit
-from .pieces.beziers import refined_bezier_hit
+from .pieces import arcs
 from .pieces.formulas import TOP_CORNER, bounds_of, exit_time, mirror, opening_at, with_length_one
-from .pieces.kinds import refined_face, refined_surface
+from .pieces.kinds import refined_face, refined_hit, refined_surface
 from .pieces.lines import line_ends, orientation
 from .pieces.options import compiled, linked
-from .pieces.records import ARC, BEZIER, LINE, NO_PIECE, OPENING, SIDE, Hit, RefinedScope, Sizes
+from .pieces.records import ARC, BEZIER, FIRST_CURVE, LINE, NO_PIECE, OPENING, SIDE, Hit, RefinedScope, Sizes
 from .pieces.sides import Arrival, in_front_at, line_in_front_of_line
 from .runs import LAST_REFINED_HITS, refined_crossings, skip_refined_chords
 
@@ -197,25 +196,19 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
 @linked
 def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
     """-> (Hit, graze): the first hit on a curve before ``nearest``, or ``nearest``; time of undecided contact."""
-    tables, slack = scope.tables, scope.slack
     graze = np.inf
-    for k in range(scope.arcs[0], scope.arcs[1]):
-        widest = max(1.0, tables.arcs[k, c.STRETCH])
-        is_own = own.kind == ARC and own.number == k
-        t, undecided, height = refined_arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
-        graze = min(graze, undecided)
-        hit, clearance = Hit(t, ARC, k, own.s, 0), (height, slack * widest, error * widest)
-        if t < nearest.time and meets(tables, hit, own, px, py, vx, vy, clearance):
-            nearest = hit
-    for k in range(scope.beziers[0], scope.beziers[1]):
-        own_s = own.s if own.kind == BEZIER and own.number == k else extended(-1.0)
-        t, s, undecided, near_s = refined_bezier_hit(tables.beziers[k], own_s, px, py, vx, vy, slack, error)
-        graze = min(graze, undecided)
-        if t < nearest.time:
-            nearest = Hit(t, BEZIER, k, s, 0)
-        if near_s >= 0.0:
-            hit = Hit(extended(0.0), BEZIER, k, near_s, 0)
-            if meets(tables, hit, own, px, py, vx, vy, (0.0, slack, error)):
+    for table, (first, end) in enumerate(scope.curves):
+        for k in range(first, end):
+            kind = np.int64(FIRST_CURVE + table)
+            is_own = own.kind == kind and own.number == k
+            arguments = scope, k, own, is_own, px, py, vx, vy, error
+            t, s, undecided, clearance, near_s = refined_hit(kind, arguments)
+            graze = min(graze, undecided)
+            hit = Hit(t, kind, k, s, 0)
+            if t < nearest.time and meets(scope.tables, hit, own, px, py, vx, vy, clearance):
+                nearest = hit
+            hit = Hit(extended(0.0), kind, k, near_s, 0)
+            if near_s >= 0.0 and meets(scope.tables, hit, own, px, py, vx, vy, (0.0, scope.slack, error)):
                 nearest = hit
     return nearest, graze
 
@@ -299,7 +292,7 @@ def refined_ray(scope, entry, theta, limit, most_segments):
             return px, nowhere, bounces, GRAZING, norm, local
         if hit.kind == NO_PIECE:
             return px, nowhere, bounces, CORNER if corner < np.inf else UNRESOLVED, norm, local
-        qx, qy, nx, ny, bent = refined_surface(tables, hit, px, py, vx, vy)
+        qx, qy, nx, ny, bent = refined_surface(hit.kind, (tables, hit, px, py, vx, vy))
         incidence = abs(dot(vx, vy, nx, ny).high)
         if corner < np.inf and meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
             return px, nowhere, bounces, CORNER, norm, local
@@ -329,7 +322,8 @@ def refined_ray(scope, entry, theta, limit, most_segments):
                 py = py + travel
                 sizes = after_flight(sizes, flight / scale)
             if hit.kind == ARC:
-                hits, px, py, vx, vy = skip_refined_chords(tables.arcs[hit.number], px, py, vx, vy, limit - bounces)
+                arc = tables.curves[arcs.TABLE][hit.number]
+                hits, px, py, vx, vy = skip_refined_chords(arc, px, py, vx, vy, limit - bounces)
                 if hits > 0:
                     bounces += hits
                     sizes = after_chords(with_new_error(sizes), float(hits), 2.0 * incidence / (bent * scale))
@@ -342,8 +336,8 @@ def refined_ray(scope, entry, theta, limit, most_segments):
 def scope_of(tables, bands, h):
     """-> RefinedScope: hollow number h."""
     hollow = tables.hollows[h]
-    left, right, slack, joints, arcs, beziers = bounds_of(hollow)
-    return RefinedScope(tables, bands, tables.cell + hollow[c.SIZE], left, right, slack, joints, arcs, beziers)
+    left, right, slack, joints, curves = bounds_of(hollow)
+    return RefinedScope(tables, bands, tables.cell + hollow[c.SIZE], left, right, slack, joints, curves)
 
 
 @compiled

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ...scene import columns as c
+from ...curves import columns as c
 from ..double_double.numbers import cross, direction_angle, dot, extended, rounded, scaled, sine_cosine, two_sum
 from .pieces.arcs import arc_form, arc_normal, refined_form
 from .pieces.options import inlined, linked

@@ -14,10 +14,10 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ...scene import columns as c
+from ...curves import columns as c
+from ...curves.tolerances import NEARBY_SLACKS
 from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, OTHER_X, OTHER_Y, PARENT
 from ...scene.escapes import ESCAPE_ROOM
-from ...scene.tolerances import NEARBY_SLACKS
 from .pieces.formulas import side
 from .pieces.lines import is_ahead, joint_side, line_at, line_hit, line_sides
 from .pieces.options import inlined, inner

@@ -16,8 +16,8 @@ import math
 import numpy as np
 
 from ....core.rounding import EPS
-from ...scene import columns as c
-from ...scene.tolerances import NEARBY, NEARBY_SLACKS, TANGENT_ULPS
+from ...curves import columns as c
+from ...curves.tolerances import NEARBY, NEARBY_SLACKS, TANGENT_ULPS
 from ..double_double.numbers import where
 from . import work as w
 from .pieces import arcs, beziers, formulas, lines
@@ -318,10 +318,10 @@ def meet_lines(scope, work, count):
 def meet_pieces(scope, work, places, count):
     """Find the nearest hits of all rays on the pieces of a hollow."""
     tables, close = scope.tables, NEARBY_SLACKS * scope.slack
-    for k in range(scope.arcs[0], scope.arcs[1]):
-        meet_arc(work, count, numbers_of(tables.arcs[k]), w.ARCS + k, close)
-    for k in range(scope.beziers[0], scope.beziers[1]):
-        curve, number = numbers_of(tables.beziers[k]), w.BEZIERS + k
+    for k in range(scope.curves[arcs.TABLE][0], scope.curves[arcs.TABLE][1]):
+        meet_arc(work, count, numbers_of(tables.curves[arcs.TABLE][k]), w.ARCS + k, close)
+    for k in range(scope.curves[beziers.TABLE][0], scope.curves[beziers.TABLE][1]):
+        curve, number = numbers_of(tables.curves[beziers.TABLE][k]), w.BEZIERS + k
         if curve[c.X3] == 0.0 and curve[c.Y3] == 0.0:
             meet_parabola(work, count, curve, number)
         else:
@@ -353,10 +353,10 @@ def place_on_arc(some, count, arc, slack):
 def place_on_arcs(scope, work, places, count):
     """Compute the points at which rays meet arcs, for the rays of each arc in vectors."""
     some = work[w.WORK :]
-    for k in range(scope.arcs[0], scope.arcs[1]):
+    for k in range(scope.curves[arcs.TABLE][0], scope.curves[arcs.TABLE][1]):
         hits = list_rays(work, places, count, w.PIECE, w.ARCS + k, w.ARCS + k, 0)
         gather(work, places, hits, some, w.BEFORE_HIT)
-        place_on_arc(some, hits, numbers_of(scope.tables.arcs[k]), scope.slack)
+        place_on_arc(some, hits, numbers_of(scope.tables.curves[arcs.TABLE][k]), scope.slack)
         for j in range(hits):
             i = places[j] & NATURAL
             for column in w.AT_HIT:
@@ -379,10 +379,10 @@ def place_hits(scope, work, places, count):
         may_run = (work[w.BEFORE + i] == w.LINES + j) & (tables.lines[j, c.PAIRS_END] > 0.0)
         at_corner = is_corner & (abs(fraction) * line.length <= slack)
         keep_point(work, i, x, y, line.normal_x, line.normal_y, at_corner, may_run)
-    if scope.beziers[0] < scope.beziers[1]:
+    if scope.curves[beziers.TABLE][0] < scope.curves[beziers.TABLE][1]:
         for k in range(list_rays(work, places, count, w.PIECE, w.BEZIERS, w.LINES - 1.0, 0)):
             i = places[k] & NATURAL
-            curve, s = tables.beziers[int(work[w.PIECE + i] - w.BEZIERS) & NATURAL], work[w.HIT_S + i]
+            curve, s = tables.curves[beziers.TABLE][int(work[w.PIECE + i] - w.BEZIERS) & NATURAL], work[w.HIT_S + i]
             coefficients = beziers.bezier_coefficients(curve)
             (x, y), (nx, ny) = beziers.bezier_point(coefficients, s), beziers.bezier_normal(coefficients, s)
             keep_point(work, i, x, y, nx, ny, formulas.near_end(curve, x, y, slack), False)

@@ -98,7 +98,7 @@ def digest() -> int:
     """Return a number for the sources of all compiled functions and of the constants in them."""
     package = Path(__file__).parents[1]
     sources = [Path(__file__), package / "core" / "rounding.py"]
-    for folder in ("compiled", "double_double", "scene"):
+    for folder in ("compiled", "double_double", "scene", "curves"):
         sources += sorted(package.glob(f"geometry/**/{folder}/**/*.py"))
     return int.from_bytes(hashlib.sha256(b"".join(source.read_bytes() for source in sources)).digest()[:8], "big")
 

@@ -9,7 +9,7 @@ from campaigns.judges.precise_polynomials import POLYNOMIALS, coefficients
 from numba import njit
 
 from asperity import geometry as geo
-from asperity.geometry.scene.columns import FORM, NO_FORM
+from asperity.geometry.curves.columns import FORM, NO_FORM
 from asperity.geometry.tracing.compiled import trigonometry as angle_engine
 
 EPS = 2.0**-52

@@ -69,7 +69,7 @@ def trace_in_double_doubles(tables, bands, rays, found):
             hit, _ = twin.nearest_curve(scope, own, hit, px, py, vx, vy, twin.error_of(scope, sizes))
             if hit.kind == records.NO_PIECE:
                 break
-            px, py, nx, ny, _ = refined_surface(tables, hit, px, py, vx, vy)
+            px, py, nx, ny, _ = refined_surface(hit.kind, (tables, hit, px, py, vx, vy))
             vx, vy = mirror(vx, vy, nx, ny)
             vx, vy = with_length_one(vx, vy)
             found[i, k] = hit.time.high, float(hit.number), hit.s.high, px.high, py.high, vx.high, vy.high

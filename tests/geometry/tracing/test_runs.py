@@ -10,7 +10,7 @@ from campaigns.judges.precise_rays import unfold
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry.scene.columns import PARTNER
+from asperity.geometry.curves.columns import PARTNER
 from asperity.geometry.tracing.compiled.pieces.lines import is_ahead
 from asperity.geometry.tracing.refinement import REFINED_SEGMENTS, refined_trace
 

@@ -8,7 +8,6 @@ from scipy.interpolate import BPoly
 from scipy.optimize import minimize_scalar
 
 from asperity import geometry as geo
-from asperity.geometry.curves.curvature import largest_curvature
 from disk_shapes import PARABOLAS, STILL, WAVES
 
 
@@ -59,7 +58,7 @@ def test_the_largest_curvature_of_cubic_pieces_agrees_with_a_search(number):
     best = grid[np.argmin(negative(grid))]
     found = minimize_scalar(negative, bounds=(max(best - 1e-3, 0.0), min(best + 1e-3, 1.0)), options={"xatol": 1e-12})
     searched = -min(found.fun, negative(best))
-    value, error = largest_curvature(piece)
+    value, error = piece.largest_curvature()
     assert value - error - 1e-9 * value <= searched <= value + error + 1e-12 * value
 
 

@@ -11,7 +11,7 @@ from asperity import kernels as ker
 from asperity.errors import WallError
 from asperity.geometry import Arc, Bezier, Segment
 from asperity.geometry.cells.hollow import Hollow
-from asperity.geometry.cells.merging import joined, merged
+from asperity.geometry.cells.merging import merged
 from asperity.geometry.cells.origin import first_top
 from asperity.geometry.tracing.tracing import entries
 
@@ -106,13 +106,13 @@ def test_pieces_that_the_period_cuts_are_one():
     curve = Bezier([(0, 0), (0.2, -1), (0.9, -0.7), (1, -0.1)])
     for whole in (Arc((0, 0), (1, 2), 3.0, 0.5), Arc((0, 0), 1e7, -1.6, -1.5999), curve):
         before, after = whole.split(0.3)
-        back = joined(before, after, 1e-14 * max(1.0, abs(whole.end[1])))
+        back = before.joined(after, 1e-14 * max(1.0, abs(whole.end[1])))
         assert back is not None
         np.testing.assert_allclose(back.point([0.2, 0.6]), whole.point([0.2, 0.6]), atol=1e-8, rtol=1e-14)
     for far in ((2, -2 - 1e-9), (0.5, -0.5)):
         path = (Segment((0, 0), (1, -1)), Segment((1, -1), far))
         assert merged(path) is path
-    assert joined(Arc((0, 0), 1.0, 3.0, 4.0), Arc((0, 0), 1.0, 4.0, 3.0), 1e-14) is None
+    assert Arc((0, 0), 1.0, 3.0, 4.0).joined(Arc((0, 0), 1.0, 4.0, 3.0), 1e-14) is None
 
 
 def test_a_flat_top_cut_by_the_period_hides_no_mirror_axis():

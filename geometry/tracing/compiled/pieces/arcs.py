@@ -14,11 +14,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import carray  # type: ignore[attr-defined]
 
 from .....core.compilation import jit
 from .....core.rounding import EPS
-from ....scene import columns as c
-from ....scene.tolerances import SMOOTH_JOINT, TANGENT_ULPS
+from ....curves import columns as c
+from ....curves.arc import Arc
+from ....curves.tolerances import NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
 from ...double_double.numbers import (
     LOCAL_ERROR,
     cross,
@@ -32,7 +34,13 @@ from ...double_double.numbers import (
     two_sum,
     where,
 )
-from .options import inlined, inner, linked
+from .formulas import curve_ends, near_end
+from .options import inlined, inner, linked, linked_allocating
+from .pointers import call_late
+from .records import ARC
+
+# Of this type, because numba compiles a function again for a literal argument.
+NOT_OWN = np.bool_(False)
 
 # Bound, times B^2 + |v|^2, on the error of D that `tangent_error` gives for a ray near a tangency: there kappa |r| is
 # at most |B| and the chord over the radius.
@@ -57,7 +65,7 @@ def refined_arcs(arcs):
 
     It has the columns of arcs, then the low parts of the numbers from NORMAL_X to SHORT_CHORD.
     """
-    # at least one row, because `face_of` passes a row also for a wall without arcs
+    # at least one row, because `refined_face` passes a row of the first table also for lines
     table = np.zeros((max(1, arcs.shape[0]), c.REFINED_ARC_COLUMNS))
     for k in range(arcs.shape[0]):
         arc, row = arcs[k], table[k]
@@ -253,36 +261,112 @@ def arc_incidence(arc, t, px, py, vx, vy):
     return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)
 
 
-@linked
-def refined_arc_hit(arc, own, px, py, vx, vy, error):
-    """-> (t, undecided, height): `front_hit` on the arc in double-doubles; time of an undecided contact, or inf.
+# ---- the names that every kind of piece has, see `kinds` --------------------------------------------------------
+KIND, TABLE = ARC, Arc.table
 
-    ``error`` bounds the transversal error of the ray at the arc.
-    """
+
+@inlined
+def nearest(state, scope, own, px, py, vx, vy):
+    """-> (time, kind, number, s, contact, nearby): the nearest of these hits and of those on arcs."""
+    time, kind, number, hit_s, contact, nearby = state
+    slack = scope.slack
+    close = NEARBY_SLACKS * slack
+    for k in range(scope.curves[TABLE][0], scope.curves[TABLE][1]):
+        arc = scope.tables.curves[TABLE][k]
+        is_own = own.kind == ARC and own.number == k
+        t, tangent, _ = arc_time(arc, is_own, px, py, vx, vy)
+        if abs(t) <= close and not is_own:
+            nearby = True
+        elif tangent != 0:
+            if may_touch_arc(arc, t, px, py, vx, vy, slack):
+                contact = min(contact, t)
+        elif 0.0 <= t < time:
+            excess, room = excess_after(arc, t, px, py, vx, vy), slack * max(1.0, arc[c.STRETCH])
+            is_met = excess <= room
+            if room < excess <= NEARBY_SLACKS * room:
+                is_met = call_late(scope.slots.smooth_end, is_met, (arc, t, px, py, vx, vy, slack))
+            if is_met:
+                time, kind, number = t, ARC, k
+    return time, kind, number, hit_s, contact, nearby
+
+
+@inlined
+def nearby(scope, number, own, is_own, px, py, vx, vy):
+    """-> (t, s, tangent, is_clear): time to a hit close by, or inf; see `kinds.piece_nearby`."""
+    if is_own:
+        return np.inf, 0.0, 0, False
+    arc, slack = scope.tables.curves[TABLE][number], scope.slack
+    stretch = arc[c.STRETCH]
+    wide = slack * max(1.0, stretch)
+    t, tangent, height = arc_time(arc, NOT_OWN, px, py, vx, vy)
+    if abs(t) > NEARBY_SLACKS * slack or height < -wide:
+        return np.inf, 0.0, 0, False
+    t = max(t, 0.0)
+    if end_excess(arc, px + t * vx - arc[c.START_X], stretch * (py + t * vy - arc[c.START_Y])) > wide:
+        return np.inf, 0.0, 0, False
+    return t, 0.0, tangent, height > wide
+
+
+@inlined
+def incidence(tables, hit, px, py, vx, vy):
+    """-> float: sine of the angle between the velocity and the arc."""
+    return arc_incidence(tables.curves[TABLE][hit.number], hit.time, px, py, vx, vy)
+
+
+@inlined
+def surface(scope, hit, own, px, py, vx, vy):
+    """-> (px, py, nx, ny, at_corner): the end of a ray segment, the unit normal, and whether it is at a corner."""
+    curve = scope.tables.curves[TABLE][hit.number]
+    px, py, nx, ny = arc_point(arc_form(curve), curve, curve[c.STRETCH], hit.time, px, py, vx, vy)
+    return px, py, nx, ny, near_end(curve, px, py, scope.slack)
+
+
+@linked
+def refined_surface(tables, hit, px, py, vx, vy):
+    """-> (qx, qy, nx, ny, bent): see `kinds.refined_surface`."""
+    arc = tables.curves[TABLE][hit.number]
+    stretch = arc[c.STRETCH]
+    qx, qy, nx, ny = arc_point(refined_form(arc), arc, stretch, hit.time, px, py, vx, vy)
+    x, y = nx.high, ny.high
+    return qx, qy, nx, ny, arc[c.CURVATURE] * (y * y + (stretch * x) ** 2) * math.sqrt(x * x + (y / stretch) ** 2)
+
+
+@linked
+def refined_hit(scope, number, own, is_own, px, py, vx, vy, error):
+    """-> (t, s, undecided, clearance, near_s): see `kinds.refined_hit`."""
+    arc = scope.tables.curves[TABLE][number]
     form, chord, stretch, undecided = refined_form(arc), refined_chord(arc), arc[c.STRETCH], np.inf
     widest = max(1.0, stretch)
     rx, ry, wy = px - arc[c.START_X], stretch * (py - arc[c.START_Y]), stretch * vy
     b, f, d, speed2 = arc_terms(form, rx, ry, vx, wy)
     _, _, curvature = form
-    if not own and curvature < 0.0 and b < 0.0:
+    if not is_own and curvature < 0.0 and b < 0.0:
         # d = w^2 - kappa^2 (distance of the line from the centre)^2 w^2; kappa times distance is about 1 at d = 0
         noise = 8.0 * LOCAL_ERROR * (b.high * b.high + 2.0 * abs((curvature * speed2 * f).high))
         if abs(d.high) <= noise + 4.0 * abs(curvature.high) * widest**4 * error:
-            t = arc_root(form, own, b, f, extended(0.0), speed2)
+            t = arc_root(form, is_own, b, f, extended(0.0), speed2)
             if t > 0.0 and beyond_end(form, chord, rx + t * vx, ry + t * wy) <= error:
                 undecided = t.high
-    t, height = front_hit(form, own, b, f, d, speed2)
+    t, height = front_hit(form, is_own, b, f, d, speed2)
     if t < np.inf and beyond_end(form, chord, rx + t * vx, ry + t * wy) > error * widest:
         t, height = extended(np.inf), extended(np.inf)
-    return t, undecided, height.high
+    clearance = height.high, scope.slack * widest, error * widest
+    return t, own.s, undecided, clearance, extended(-1.0)
+
+
+refined_table = refined_arcs
+
+
+@linked_allocating
+def refined_row(tables, number):
+    """-> array: the row of `refined_table` of a row of the table of doubles."""
+    return refined_arcs(carray(tables.curves[TABLE][number], (1, c.ARC_COLUMNS)))[0]
 
 
 @linked
-def arc_height(arc, px, py):
-    """-> (height, nx, ny): distance of a position close to an arc, positive on the free side; unit normal.
-
-    Position and results are double-doubles.
-    """
+def height(joints, face, px, py):
+    """-> (height, nx, ny): see `kinds.height_over`."""
+    arc = face.row
     form, stretch = refined_form(arc), arc[c.STRETCH]
     qx, qy = px - arc[c.START_X], stretch * (py - arc[c.START_Y])
     nx, ny = arc_normal(form, stretch, qx, qy)
@@ -290,8 +374,4 @@ def arc_height(arc, px, py):
     return form_value(form, qx, qy) / size, nx / size, ny / size
 
 
-@inlined
-def arc_bend(arc, nx, ny):
-    """-> float: the curvature of an arc, positive if it is focusing, where (nx, ny) is the unit normal."""
-    stretch = arc[c.STRETCH]
-    return arc[c.CURVATURE] * (ny * ny + (stretch * nx) ** 2) * math.sqrt(nx * nx + (ny / stretch) ** 2)
+ends = curve_ends

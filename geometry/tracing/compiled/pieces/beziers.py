@@ -13,11 +13,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import carray  # type: ignore[attr-defined]
 from numba.extending import overload
 
 from .....core.rounding import EPS
-from ....scene import columns as c
-from ....scene.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, SMOOTH_JOINT, TANGENT_ULPS
+from ....curves import columns as c
+from ....curves.bezier import Bezier
+from ....curves.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, SMOOTH_JOINT, TANGENT_ULPS
 from ...double_double.numbers import (
     DOUBLE_DOUBLE,
     LOCAL_ERROR,
@@ -31,8 +33,10 @@ from ...double_double.numbers import (
     scaled,
     where,
 )
-from .formulas import side
-from .options import inlined, inner, linked
+from .formulas import curve_ends, near_end, side
+from .options import inlined, inner, linked, linked_allocating
+from .pointers import call_late
+from .records import BEZIER
 
 ROOT_STEPS = 80
 # Limit on bisections in double-doubles, more than the search for neighbouring doubles needs.
@@ -448,23 +452,6 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
     return hit_from_afar(curve, coefficients, g, px, py, vx, vy, TANGENT_ULPS * EPS * spread, slack, slack)
 
 
-@linked
-def refined_bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
-    """-> (t, s, undecided, near_s): the same in double-doubles; ``undecided`` is the time of a contact, or inf.
-
-    ``error`` bounds the transversal error of the ray.
-    """
-    coefficients = refined_coefficients(curve)
-    g = bezier_sides(coefficients, px, py, vx, vy)
-    if own_s >= 0.0:
-        t, s = nearest_own_hit(coefficients, g, own_s, px, py, vx, vy, LOCAL_ERROR)
-        return t, s, np.inf, extended(-1.0)
-    t, s, tangent, near_s = hit_from_afar(curve, coefficients, g, px, py, vx, vy, error, 0.0, slack)
-    if tangent != 0:
-        return extended(np.inf), s, t.high, near_s
-    return t, s, np.inf, near_s
-
-
 @inner
 def nearest_bezier(beziers, first, end, own_number, own_s, px, py, vx, vy, slack, time):
     """-> (t, number, s, contact, near_s): the first hit before ``time`` on the pieces from ``first`` to ``end``.
@@ -489,20 +476,6 @@ def nearest_bezier(beziers, first, end, own_number, own_s, px, py, vx, vy, slack
     return time, number, hit_s, contact, near
 
 
-@linked
-def bezier_height(curve, s, px, py):
-    """-> (height, nx, ny): distance of a position from a piece near its parameter s, and the unit normal.
-
-    All are double-doubles; the distance is positive on the free side.
-    """
-    coefficients = refined_coefficients(curve)
-    for _ in range(STEPS):
-        (x, y), (tx, ty) = bezier_point(coefficients, s), bezier_tangent(coefficients, s)
-        s = s + dot(px - x, py - y, tx, ty) / dot(tx, ty, tx, ty)
-    (x, y), (nx, ny) = bezier_point(coefficients, s), bezier_normal(coefficients, s)
-    return dot(px - x, py - y, nx, ny), nx, ny
-
-
 @inlined
 def bend_number(curve, s):
     """-> int: the number, 0, 1 or 2, of the part between inflections that contains the point s of a Bezier piece.
@@ -524,3 +497,99 @@ def bend_number(curve, s):
     if c2 != 0.0 and 0.0 < q / c2 < s:
         number += 1
     return number
+
+
+# ---- the names that every kind of piece has, see `kinds` --------------------------------------------------------
+KIND, TABLE = BEZIER, Bezier.table
+
+
+@inlined
+def nearest(state, scope, own, px, py, vx, vy):
+    """-> (time, kind, number, s, contact, nearby): the nearest of these hits and of those on Bezier pieces."""
+    time, kind, number, hit_s, contact, nearby = state
+    first, end = scope.curves[TABLE]
+    if first < end:
+        own_number = own.number if own.kind == BEZIER else -1
+        arguments = scope.tables.curves[TABLE], first, end, own_number, own.s, px, py, vx, vy, scope.slack, time
+        t, k, s, touch, near_s = call_late(scope.slots.bezier, NO_BEZIER_HIT, arguments)
+        contact = min(contact, touch)
+        if k >= 0:
+            time, kind, number, hit_s = t, BEZIER, k, s
+        nearby = nearby or near_s >= 0.0
+    return time, kind, number, hit_s, contact, nearby
+
+
+@inlined
+def nearby(scope, number, own, is_own, px, py, vx, vy):
+    """-> (t, s, tangent, is_clear): time to a hit close by, or inf; see `kinds.piece_nearby`."""
+    own_number = number if is_own else -1
+    arguments = scope.tables.curves[TABLE], number, number + 1, own_number, own.s, px, py, vx, vy, scope.slack, np.inf
+    _, _, _, _, near_s = call_late(scope.slots.bezier, NO_BEZIER_HIT, arguments)
+    if near_s >= 0.0:
+        return 0.0, near_s, 0, False
+    return np.inf, 0.0, 0, False
+
+
+@inlined
+def incidence(tables, hit, px, py, vx, vy):
+    """-> float: sine of the angle between the velocity and the curve."""
+    tx, ty = bezier_tangent(bezier_coefficients(tables.curves[TABLE][hit.number]), hit.s)
+    return abs(tx * vy - ty * vx) / math.sqrt(tx * tx + ty * ty)
+
+
+@inlined
+def surface(scope, hit, own, px, py, vx, vy):
+    """-> (px, py, nx, ny, at_corner): the end of a ray segment, the unit normal, and whether it is at a corner."""
+    curve = scope.tables.curves[TABLE][hit.number]
+    coefficients = bezier_coefficients(curve)
+    (px, py), (nx, ny) = bezier_point(coefficients, hit.s), bezier_normal(coefficients, hit.s)
+    return px, py, nx, ny, near_end(curve, px, py, scope.slack)
+
+
+@linked
+def refined_surface(tables, hit, px, py, vx, vy):
+    """-> (qx, qy, nx, ny, bent): see `kinds.refined_surface`."""
+    curve = tables.curves[TABLE][hit.number]
+    coefficients = refined_coefficients(curve)
+    (qx, qy), (nx, ny) = bezier_point(coefficients, hit.s), bezier_normal(coefficients, hit.s)
+    return qx, qy, nx, ny, bezier_bend(curve, hit.s.high)
+
+
+@linked
+def refined_hit(scope, number, own, is_own, px, py, vx, vy, error):
+    """-> (t, s, undecided, clearance, near_s): see `kinds.refined_hit`."""
+    curve, slack = scope.tables.curves[TABLE][number], scope.slack
+    coefficients, undecided, near_s = refined_coefficients(curve), np.inf, extended(-1.0)
+    g = bezier_sides(coefficients, px, py, vx, vy)
+    if is_own:
+        t, s = nearest_own_hit(coefficients, g, own.s, px, py, vx, vy, LOCAL_ERROR)
+    else:
+        t, s, tangent, near_s = hit_from_afar(curve, coefficients, g, px, py, vx, vy, error, 0.0, slack)
+        if tangent != 0:
+            t, undecided = extended(np.inf), t.high
+    return t, s, undecided, (np.inf, slack, error), near_s
+
+
+def refined_table(rows):
+    """Return the table itself: a row with its ends defines the piece, see `refined_coefficients`."""
+    return rows
+
+
+@linked_allocating
+def refined_row(tables, number):
+    """-> array: the row of `refined_table` of a row of the table of doubles."""
+    return carray(tables.curves[TABLE][number], c.BEZIER_COLUMNS)
+
+
+@linked
+def height(joints, face, px, py):
+    """-> (height, nx, ny): see `kinds.height_over`."""
+    coefficients, s = refined_coefficients(face.row), face.s
+    for _ in range(STEPS):
+        (x, y), (tx, ty) = bezier_point(coefficients, s), bezier_tangent(coefficients, s)
+        s = s + dot(px - x, py - y, tx, ty) / dot(tx, ty, tx, ty)
+    (x, y), (nx, ny) = bezier_point(coefficients, s), bezier_normal(coefficients, s)
+    return dot(px - x, py - y, nx, ny), nx, ny
+
+
+ends = curve_ends

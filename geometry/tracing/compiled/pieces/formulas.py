@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from .....core.rounding import EPS
-from ....scene import columns as c
-from ....scene.tolerances import JOINT_ULPS
+from ....curves import columns as c
+from ....curves.curve import Curve
+from ....curves.tolerances import JOINT_ULPS
 from ...double_double.numbers import dot, rounded, scaled, where
-from .options import inlined
+from .options import inlined, linked
 from .records import NO_PIECE, OPENING, SIDE
 
 # In place of a hollow's number: a flat top, and a corner at an end of an opening.
@@ -21,13 +22,23 @@ def side(x, y, px, py, vx, vy):
     return (x - px) * vy - (y - py) * vx
 
 
+def _ranges_up_to(table):
+    """Return a function of a hollow: the ranges of its curves in the tables up to this one."""
+    first, end = c.range_of(table)
+    if table == 0:
+        return inlined(lambda hollow: ((np.int64(hollow[first]), np.int64(hollow[end])),))
+    earlier = _ranges_up_to(table - 1)
+    return inlined(lambda hollow: earlier(hollow) + ((np.int64(hollow[first]), np.int64(hollow[end])),))  # noqa: RUF005
+
+
+_ranges = _ranges_up_to(len(Curve.traced()) - 1)
+
+
 @inlined
 def bounds_of(hollow):
-    """-> (left, right, slack, joints, arcs, beziers): the ends of the opening, the slack, and ranges in the tables."""
+    """-> (left, right, slack, joints, curves): the ends of the opening, the slack, and ranges in the tables."""
     joints = np.int64(hollow[c.FIRST_JOINT]), np.int64(hollow[c.JOINTS_END])
-    arcs = np.int64(hollow[c.FIRST_ARC]), np.int64(hollow[c.ARCS_END])
-    beziers = np.int64(hollow[c.FIRST_BEZIER]), np.int64(hollow[c.BEZIERS_END])
-    return hollow[c.LEFT], hollow[c.RIGHT], JOINT_ULPS * EPS * hollow[c.SIZE], joints, arcs, beziers
+    return hollow[c.LEFT], hollow[c.RIGHT], JOINT_ULPS * EPS * hollow[c.SIZE], joints, _ranges(hollow)
 
 
 @inlined
@@ -94,6 +105,12 @@ def opening_at(entry, hollows, count):
         at_right = h >= 0 and entry == hollows[h, c.RIGHT] and hollows[h, c.RIGHT_EDGE] == c.CORNER_EDGE
         return TOP_CORNER if at_left or at_right else FLAT_TOP
     return h
+
+
+@linked
+def curve_ends(joints, face):
+    """-> (x0, y0, x1, y1): the ends of a curve."""
+    return face.row[c.START_X], face.row[c.START_Y], face.row[c.END_X], face.row[c.END_Y]
 
 
 @inlined

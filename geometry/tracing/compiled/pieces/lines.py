@@ -13,10 +13,12 @@ import numpy as np
 
 from .....core.compilation import jit
 from .....core.rounding import EPS, UNIT_ROUNDOFF
-from ....scene import columns as c
+from ....curves import columns as c
+from ....curves.tolerances import NEARBY_SLACKS
 from ...double_double.numbers import dot, root, two_product, two_sum, where
 from .formulas import side
-from .options import inlined, linked
+from .options import inlined, linked, linked_allocating
+from .records import LINE
 
 # Least absolute value of a fraction from a line's end, so that it is negative even if the ray meets that end.
 LEAST_FRACTION = 5e-324
@@ -174,3 +176,69 @@ def orientation(ax, ay, bx, by, cx, cy):
     for k in range(count):
         value += total[k]
     return value
+
+
+# ---- the names that every kind of piece has, see `kinds` --------------------------------------------------------
+KIND = LINE
+
+
+@inlined
+def nearby(scope, number, own, is_own, px, py, vx, vy):
+    """-> (t, s, tangent, is_clear): time to a hit close by, or inf; see `kinds.piece_nearby`."""
+    if is_own:
+        return np.inf, 0.0, 0, False
+    tables, slack = scope.tables, scope.slack
+    line = line_at(tables, number)
+    before, after = line_sides(line, px, py, vx, vy)
+    if tables.joints[number, c.STARTS_LINE] > 0.0 and before >= 0.0 >= after and before > after:
+        t, fraction, _, _ = line_hit(line, before, after, px, py, vx, vy)
+        height, reach = t * (before - after), slack * line.length
+        if abs(t) <= NEARBY_SLACKS * slack and height >= -reach:
+            return t, fraction, 0, height > reach
+    return np.inf, 0.0, 0, False
+
+
+@inlined
+def incidence(tables, hit, px, py, vx, vy):
+    """-> float: sine of the angle between the velocity and the line."""
+    table = tables.lines
+    return abs(vx * table[hit.number, c.LINE_NORMAL_X] + vy * table[hit.number, c.LINE_NORMAL_Y])
+
+
+@inlined
+def surface(scope, hit, own, px, py, vx, vy):
+    """-> (px, py, nx, ny, at_corner): the end of a ray segment, the unit normal, and whether it is at a corner."""
+    tables = scope.tables
+    line = line_at(tables, hit.number)
+    px, py = line_point(line, hit.s)
+    # a first hit near an end of the opening is as accurate as the ray, at any distance from that corner
+    at_opening = own.bounces == 0 and (line.y0 if hit.s >= 0.0 else line.y1) == 0.0
+    room = LEAST_FRACTION * line.length if at_opening else scope.slack
+    near = hit.number if hit.s >= 0.0 else hit.number + 1
+    at_corner = abs(hit.s) * line.length <= room and tables.joints[near, c.IS_CORNER] > 0.0
+    return px, py, line.normal_x, line.normal_y, at_corner
+
+
+@linked
+def refined_surface(tables, hit, px, py, vx, vy):
+    """-> (qx, qy, nx, ny, bent): see `kinds.refined_surface`."""
+    x0, y0, ex, ey, nx, ny = line_frame(tables.joints, hit.number)
+    return x0 + hit.s * ex, y0 + hit.s * ey, nx, ny, 0.0
+
+
+@linked_allocating
+def refined_row(tables, number):
+    """-> array: empty, for the joints define a line."""
+    return np.empty(0)
+
+
+@linked
+def height(joints, face, px, py):
+    """-> (height, nx, ny): see `kinds.height_over`."""
+    return line_height(joints, face.number, px, py)
+
+
+@linked
+def ends(joints, face):
+    """-> (x0, y0, x1, y1): the ends of a piece."""
+    return line_ends(joints, face.number)

@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....core.checks import Floats
+from ....curves.arc import Arc
+from ....curves.bezier import Bezier
 from ....scene.structs import Struct
 
-# Kinds of obstacles; OPENING is the opening of the hollow, SIDE a side of an open wall.
-NO_PIECE, OPENING, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
+# Kinds of obstacles; OPENING is the opening of the hollow, SIDE a side of an open wall. That of a curve is FIRST_CURVE
+# plus its table.
+NO_PIECE, OPENING, SIDE, LINE, FIRST_CURVE = 0, 1, 2, 3, 4
+ARC, BEZIER = FIRST_CURVE + Arc.table, FIRST_CURVE + Bezier.table
 
 
 class Slots(NamedTuple):
@@ -46,8 +50,8 @@ class Scope(NamedTuple):
     right: float
     slack: float
     joints: tuple[int, int]
-    arcs: tuple[int, int]
-    beziers: tuple[int, int]
+    # of each table of curves
+    curves: tuple[tuple[int, int], ...]
     has_tree: bool
     slots: Any
 
@@ -76,8 +80,8 @@ class RefinedScope(NamedTuple):
     right: float
     slack: float
     joints: tuple[int, int]
-    arcs: tuple[int, int]
-    beziers: tuple[int, int]
+    # of each table of curves
+    curves: tuple[tuple[int, int], ...]
 
 
 class Own(NamedTuple):

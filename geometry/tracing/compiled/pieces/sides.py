@@ -78,11 +78,12 @@ def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
     """
     nx, ny = px, py
     for _ in range(STEPS):
-        height, nx, ny = height_over(joints, own, px, py)
+        height, nx, ny = height_over(own.kind, (joints, own, px, py))
         px, py = px - height * nx, py - height * ny
-    height, mx, my = height_over(joints, piece, px, py)
+    height, mx, my = height_over(piece.kind, (joints, piece, px, py))
     if height.high + arrival.blur * abs(mx.high * ny.high - my.high * nx.high) <= CURVE_NOISE * arrival.slack:
         return False
     w = 2.0 * (vx * nx.high + vy * ny.high)
     vx, vy = vx - w * nx.high, vy - w * ny.high
-    return not came_through(ends_of(joints, piece), mx.high, my.high, px.high, py.high, vx, vy, arrival)
+    ends = ends_of(piece.kind, (joints, piece))
+    return not came_through(ends, mx.high, my.high, px.high, py.high, vx, vy, arrival)

@@ -28,17 +28,13 @@ RIGHT = 1  # x of the right end
 SIZE = 2  # maximum of the width of the opening and the extents of the joints in x and y
 FIRST_JOINT = 3  # row of the first joint in `joints`
 JOINTS_END = 4  # row after the last joint
-FIRST_ARC = 5  # row of the first piece in `arcs`
-ARCS_END = 6  # row after the last piece
-FIRST_BEZIER = 7  # the same in `beziers`
-BEZIERS_END = 8
-LEFT_EDGE = 9  # the left end of the opening: NO_EDGE, SMOOTH_EDGE or CORNER_EDGE
-RIGHT_EDGE = 10  # the right end
-TREE_ROOT = 11  # row of the root in `boxes`, of the tree over the lines of a hollow that has many
-TREE_LEVELS = 12  # number of levels of the tree, 0 without a tree
-FORM = 13  # kind of the closed form of the reflection
-FORM_START = 14  # place of its first number in `closed`
-HOLLOW_COLUMNS = 15
+LEFT_EDGE = 5  # the left end of the opening: NO_EDGE, SMOOTH_EDGE or CORNER_EDGE
+RIGHT_EDGE = 6  # the right end
+TREE_ROOT = 7  # row of the root in `boxes`, of the tree over the lines of a hollow that has many
+TREE_LEVELS = 8  # number of levels of the tree, 0 without a tree
+FORM = 9  # kind of the closed form of the reflection
+FORM_START = 10  # place of its first number in `closed`
+FIRST_CURVE = 11  # from here on for each table of curves its first row, and the row after the last; see `range_of`
 # Kinds of ends of an opening; NO_EDGE for an open wall.
 NO_EDGE, SMOOTH_EDGE, CORNER_EDGE = 0.0, 1.0, 2.0
 # Kinds of closed forms.
@@ -76,7 +72,7 @@ PAIR_SINE = 8  # sine of the angle between the lines
 PAIR_ANGLE = 9  # angle between the lines, 0 if parallel
 PAIR_COLUMNS = 10
 
-# The first columns of every curve.
+# The first columns of every curve; each kind has a table of its own.
 START_X = 0
 START_Y = 1
 END_X = 2
@@ -132,6 +128,11 @@ LINK_X = 0
 LINK_Y = 1
 LINK_CONSTANT = 2
 LINK_COLUMNS = 3
+
+
+def range_of(table: int) -> tuple[int, int]:
+    """Return the columns of a hollow for the first row of a table of curves and for the row after the last."""
+    return FIRST_CURVE + 2 * table, FIRST_CURVE + 2 * table + 1
 
 
 def row_of(columns: int, values: Mapping[int, float]) -> Floats:
