@@ -1,4 +1,9 @@
-"""The cell of a periodic wall: its pieces over one period, its islands, and its geometric properties."""
+"""The cell of a periodic wall: its pieces over one period, its islands, its origin, and its geometric properties.
+
+The origin is one of the wall's highest points (condition B5'; Rudzis 2022, section 1.3.1). A wall without islands
+closes if its period begins at any of them. So the law of the wall is that of the cell that begins there, for any given
+start of the period and any height of the wall below y = 0. Nor do rays depend on where a curve was cut in pieces.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +11,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checks import Floats, frozen, positive_number
 from ...core.estimates import Estimate
+from ...core.rounding import EPS
+from ..curves.crossings import directions_of, straight_in
 from ..curves.curve import Curve, Point, point_array
+from ..curves.segment import Segment
 from .hollow import Hollow, flat_tops, hollows_between
-from .merging import merged
-from .origin import HighestPoint, highest_point_of
-from .regularity import largest_curvature_of, singular_points_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -213,3 +222,177 @@ class Cell:
 
 def _vertices(path: Sequence[Curve]) -> Floats:
     return frozen(point_array([*(p.start for p in path), path[-1].end]))
+
+
+@dataclass(frozen=True)
+class HighestPoint:
+    """The pieces of a wall over one period, starting from one of its highest points as the origin.
+
+    Parameters
+    ----------
+    pieces : tuple of Curve
+        From (0, 0) to (period, 0).
+    origin : (float, float)
+        The position of (0, 0) in the coordinates of the wall.
+    numbers : tuple of int
+        For every piece its index in the wall.
+    """
+
+    pieces: tuple[Curve, ...]
+    origin: Point
+    numbers: tuple[int, ...]
+
+
+def highest_point_of(path: tuple[Curve, ...], joints: Floats, period: float) -> HighestPoint | None:
+    """Return the cell of a wall without islands; None without a first top or if rounding would remove a piece."""
+    first = first_top(joints, period)
+    if first is None:
+        return None
+    first = _above_a_plate(path, joints, first)
+    x, y = (float(c) for c in joints[first])
+    count = len(path)
+    if first == 0 and y == 0.0:
+        return HighestPoint(path, (0.0, 0.0), tuple(range(count)))
+    order = [*range(first, count), *range(first)]
+    shifts = np.where(np.array(order) >= first, -x, period - x)
+    starts = joints[order] + np.column_stack([shifts, np.full(count, -y)])
+    vertices = np.concatenate([starts, [(period, 0.0)]])
+    given = joints[1:][order] - joints[:-1][order]
+    if np.any(np.all(vertices[1:] == vertices[:-1], axis=1) & np.any(given != 0.0, axis=1)):
+        return None
+    points = [(px, py) for px, py in vertices.tolist()]
+    pieces = tuple(
+        Segment(start, end) if path[k].is_straight else path[k].moved(float(shift), -y).pinned(start, end)
+        for k, shift, (start, end) in zip(order, shifts, pairwise(points), strict=True)
+    )
+    return HighestPoint(pieces, (x, y), tuple(order))
+
+
+def _above_a_plate(path: tuple[Curve, ...], joints: Floats, top: int) -> int:
+    """Return the first joint at the point of a top with the sky on its left: on a plate there is one below it, too."""
+    same = np.flatnonzero(np.all(joints[:-1] == joints[top], axis=1))
+    if len(same) > 1:
+        into, out = directions_of(path)
+        # angles from straight down, from -pi/2 on the left to pi/2 on the right
+        back, on = (np.arctan2(x, -y) for x, y in (-into[same - 1].T, out[same].T))
+        above = same[on >= back]
+        top = int(above[0]) if len(above) else top
+    return top
+
+
+def first_top(vertices: Floats, period: float) -> int | None:
+    """Return the first joint of greatest height with all others of that height at most one period to its right.
+
+    Only joints on plates of zero thickness, which run back below a flat top, lack this property.
+
+    Examples
+    --------
+    >>> first_top(np.array([(0, -1), (0.2, 0), (0.5, 0), (0.3, 0), (1, -1)]), 1.0)
+    1
+    """
+    height = vertices[:-1, 1]
+    tops = np.flatnonzero(height == height.max())
+    x = vertices[tops, 0]
+    # extremal x of this joint and the later ones, and of the earlier ones shifted by one period
+    least = np.minimum.accumulate(x[::-1])[::-1]
+    most = np.maximum.accumulate(x[::-1])[::-1]
+    least[1:] = np.minimum(least[1:], np.minimum.accumulate(x)[:-1] + period)
+    most[1:] = np.maximum(most[1:], np.maximum.accumulate(x)[:-1] + period)
+    found = tops[(least >= x) & (most <= x + period)]
+    return int(found[0]) if len(found) else None
+
+
+# Two pieces are parts of one curve if it passes within this distance, relative to the wall's size, of their joint and
+# of points of both. The joint is computed by a few dozen operations, and shifting the cell rounds once more.
+SAME_PIECE = 64.0 * EPS
+# Joints lie on one side within this distance, relative to the largest x and the largest y: a point of a side is
+# computed by three operations, and a wall is moved and stretched after that.
+ON_SIDE = 8.0 * EPS
+# No part is shorter than this, relative to the wall's size: the end of a plate that is thinner has no direction.
+SHORTEST = 1e-12
+
+
+def merged(path: tuple[Curve, ...], is_loop: bool = False) -> tuple[Curve, ...]:
+    """Return the path without the joints at which nothing changes; the path itself if there are none.
+
+    Joints at height 0 stay, because hollows end there, except between level segments.
+
+    Examples
+    --------
+    >>> merged((Segment((0, 0), (1, -1)), Segment((1, -1), (3, -3)), Segment((3, -3), (4, 0))))
+    (Segment(start=(0.0, 0.0), end=(3.0, -3.0)), Segment(start=(3.0, -3.0), end=(4.0, 0.0)))
+    """
+    straight, before = straight_in(path), np.arange(-1, len(path) - 1)
+    starts, ends = (point_array(getattr(piece, name) for piece in path) for name in ("start", "end"))
+    size = np.maximum(np.abs(starts).max(axis=0), np.abs(ends[-1]))
+    level = straight & (starts[before, 1] == 0.0) & (ends[:, 1] == 0.0)
+    able = (straight == straight[before]) & (level | (starts[:, 1] != 0.0))
+    able[0] &= is_loop
+    able &= ~straight | _between(starts[before], starts, ends, size)
+    for k in np.flatnonzero(able & ~straight).tolist():
+        able[k] = bool(_whole((path[k - 1], path[k]), size))
+    if not able.any():
+        return path
+    first = int(np.argmin(able))
+    path, firsts = path[first:] + path[:first], np.flatnonzero(~np.roll(able, -first)).tolist() or [0]
+    groups = [path[low:high] for low, high in pairwise([*firsts, len(path)])]
+    return tuple(piece for group in groups for piece in _whole(group, size) or group)
+
+
+def _between(start: Floats, points: Floats, end: Floats, size: Floats) -> NDArray[np.bool_]:
+    """Return whether points lie between two others on the straight line, to rounding; all of shape (n, 2)."""
+    step, whole = points - start, end - start
+    along, across = np.sum(step * whole, axis=1), step[:, 0] * whole[:, 1] - step[:, 1] * whole[:, 0]
+    near = np.abs(across) <= ON_SIDE * (np.abs(whole) @ size[::-1])
+    length = np.hypot(*whole.T)
+    least = SHORTEST * size.max() * length
+    return np.asarray(near & (along > least) & (along < length**2 - least))
+
+
+def _whole(parts: tuple[Curve, ...], size: Floats) -> list[Curve]:
+    """Return the curve whose consecutive parts are the given pieces of one kind; an empty list if there is none."""
+    start, end = parts[0].start, parts[-1].end
+    if parts[0].is_straight:
+        joints = point_array(piece.start for piece in parts[1:])
+        return [Segment(start, end)] if _between(np.array([start]), joints, np.array([end]), size).all() else []
+    if end < start:
+        # in one direction of the two, so that coincident faces stay coincident
+        return [p.reversed() for p in _whole(tuple(part.reversed() for part in reversed(parts)), size)]
+    whole: Curve | None = parts[0]
+    for part in parts[1:]:
+        whole = whole and whole.joined(part, SAME_PIECE * float(size.max()))
+    return [whole] if whole else []
+
+
+# Largest angle between tangents, radians, and relative jump of the curvature, at a joint that counts as smooth. They
+# agree to a few rounding errors where a curve was cut in two.
+SMOOTH_ANGLE, SMOOTH_JUMP = 1e-9, 1e-9
+
+
+def singular_points_of(paths: Sequence[Sequence[Curve]]) -> Floats:
+    """Return the joints, shape (n, 2), of cycles of pieces at which the tangent or the curvature jumps."""
+    found = [after.start for path in paths for before, after in _neighbours(path) if not _is_smooth(before, after)]
+    return frozen(np.array(found, dtype=np.float64).reshape(-1, 2))
+
+
+def _neighbours(path: Sequence[Curve]) -> list[tuple[Curve, Curve]]:
+    return [(path[i - 1], path[i]) for i in range(len(path))]
+
+
+def _is_smooth(before: Curve, after: Curve) -> bool:
+    (tx, ty), (ux, uy) = before.tangent(1.0), after.tangent(0.0)
+    if abs(tx * uy - ty * ux) > SMOOTH_ANGLE or tx * ux + ty * uy < 0.0:
+        return False
+    left, right = before.curvature(1.0), after.curvature(0.0)
+    if not (math.isfinite(left) and math.isfinite(right)):
+        return False
+    return abs(left - right) <= SMOOTH_JUMP * max(abs(left), abs(right))
+
+
+def largest_curvature_of(paths: Sequence[Sequence[Curve]]) -> Estimate:
+    """Return the largest curvature of all pieces with a bound on its error."""
+    found = [piece.largest_curvature() for path in paths for piece in path]
+    value = max(v for v, _ in found)
+    error = 0.0 if value == math.inf else max(v + e for v, e in found) - value
+    method = "critical points of the pieces, checked in floating point by Bernstein coefficients"
+    return Estimate(value, max(0.0, error), "bound", method)

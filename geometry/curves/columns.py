@@ -109,7 +109,7 @@ BEZIER_COLUMNS = 15
 LOWS = 9
 REFINED_ARC_COLUMNS = 21
 
-# closed: one after another the closed forms of the hollows that have one, see `closed_forms`; places in a form.
+# closed: one after another the closed forms of the hollows that have one, see `blocks`; places in a form.
 FORM_LEFT = 0  # x of the ends of the opening
 FORM_RIGHT = 1
 UNCERTAINTY = 2  # a ray closer to a joint is traced hit by hit: a length in wedges, an angle in circular hollows

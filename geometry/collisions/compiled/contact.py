@@ -8,8 +8,8 @@ a safe step; if the parabola has no root, F has none. The steps converge quadrat
 roots of F are visited in order, downward and upward crossings, until one lies on the piece.
 
 **No face is met from behind.** A satellite that leaves one piece within rounding of another piece has F = 0 on both.
-The exact positions of the pieces decide whether it starts in front of the other piece, see `sides`. So the opposite
-face of a plate of zero thickness or of a sharp peak is not hit.
+The exact positions of the pieces decide whether it starts in front of the other piece, see `in_front_at`. So the
+opposite face of a plate of zero thickness or of a sharp peak is not hit.
 
 Lengths are in units of the wall, so the disk's radius is 1/scale and the wall's tops are at height 0. In the time t a
 disk with velocities (v1, v2) and spin omega moves a satellite at the angle a from the lowest point by
@@ -38,11 +38,10 @@ from ...curves.bezier import Bezier
 from ...curves.columns import range_of
 from ...tracing.compiled.pieces.arcs import arc_form, arc_normal, end_excess
 from ...tracing.compiled.pieces.formulas import near_end
-from ...tracing.compiled.pieces.kinds import Face
+from ...tracing.compiled.pieces.kinds import Arrival, Face, in_front_at
 from ...tracing.compiled.pieces.lines import line_at
 from ...tracing.compiled.pieces.options import compiled, inlined, inner
 from ...tracing.compiled.pieces.records import ARC, BEZIER, LINE, NO_PIECE, SIDE
-from ...tracing.compiled.pieces.sides import Arrival, in_front_at
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.double_double.numbers import extended
 from . import graph_table as g

@@ -5,7 +5,8 @@ stable, and no epsilon decides which piece is hit:
 
 * For hits on lines, arcs and Bezier pieces see `pieces`.
 * A piece within rounding of the ray's start is hit only if the start lies in front of it by the exact positions of the
-  joints, see `sides`. So the opposite face of a plate of zero thickness or of a sharp peak is not hit.
+  joints, see `in_front_at`. So the opposite face of a plate of zero thickness or of a sharp peak is not hit. The loop
+  only detects such pieces, and `hit_nearby` tests them again, so that the loop itself contains no call.
 * After each bounce the hit point is projected onto its piece, and the velocity is renormalised.
 """
 
@@ -18,23 +19,108 @@ from numba import types
 
 from ...curves import columns as c
 from ...curves.tolerances import NEARBY_SLACKS
-from ...scene.boxes import TREE_COLUMNS
+from ...scene.boxes import BOXES, CONTENT, TREE_COLUMNS
 from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.scene import no_tables
 from ...scene.structs import Struct
-from .nearby import UNCERTAIN, hit_nearby, line_starts_in_front, starts_in_front
+from ..double_double.numbers import extended
 from .pieces import arcs, beziers, records
 from .pieces.arcs import arc_form, arc_normal, on_smooth_end
 from .pieces.beziers import bend_number, nearest_bezier
 from .pieces.formulas import FLAT_TOP, TOP_CORNER, bounds_of, exit_time, opening_at, with_length_one
-from .pieces.kinds import CURVES, incidence, nearest_curve, reflect
+from .pieces.kinds import (
+    CURVES,
+    Arrival,
+    face_of,
+    in_front_at,
+    incidence,
+    line_in_front_of_line,
+    nearest_curve,
+    piece_nearby,
+    reflect,
+)
 from .pieces.lines import is_ahead, joint_side, line_at, line_hit
-from .pieces.options import compiled, inlined, inner
+from .pieces.options import allocating, compiled, inlined, inner, linked
 from .pieces.pointers import Late, call_late, checked, is_raised
-from .pieces.records import ARC, BEZIER, LINE, NO_DETAILS, NO_PIECE, NO_RAYS, OPENING, SIDE, Hit, Own, Rays
+from .pieces.records import ARC, BEZIER, FIRST_CURVE, LINE, NO_DETAILS, NO_PIECE, NO_RAYS, OPENING, SIDE, Hit, Own, Rays
 from .runs import skip_chords, skip_crossings
-from .tree import NO_LINE_HIT, nearest_line_in_boxes, tree_of
+from .tree import NO_LINE_HIT, first_boxes, nearest_line_in_boxes, next_leaf, tree_of
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
+
+# A value of `Hit.uncertainty`: the side of the piece on which the ray starts is not resolved.
+UNCERTAIN = 2
+# Constants of these types, because numba compiles a function again for every literal argument.
+FORWARD, A_LINE = np.bool_(True), np.int64(LINE)
+
+
+@allocating
+def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
+    """-> bool: whether a ray that left a piece starts, or may start, in front of a nearby piece; see `in_front_at`.
+
+    At least one of the pieces is a curve.
+    """
+    piece, start = face_of(tables, hit.kind, hit.number, hit.s), face_of(tables, own.kind, own.number, own.s)
+    arrival = Arrival(own.flown, slack, slack)
+    return in_front_at(tables.joints, piece, start, extended(px), extended(py), vx, vy, arrival)
+
+
+@inner
+def line_starts_in_front(joints, line, own, px, py, vx, vy, slack):
+    """-> bool: `starts_in_front` for a ray that left a line, and another line."""
+    arrival = Arrival(own.flown, slack, slack)
+    return line_in_front_of_line(joints, line, own.number, extended(px), extended(py), vx, vy, arrival)
+
+
+@linked
+def nearer(scope, found, piece, own, px, py, vx, vy):
+    """-> Hit: the earlier of a hit and of that on a nearby piece, given by kind and row, if the ray starts in front."""
+    tables, slack = scope.tables, scope.slack
+    kind, number = piece
+    is_own = own.kind == kind and own.number == number
+    t, s, tangent, is_clear = piece_nearby(kind, (scope, number, own, is_own, px, py, vx, vy))
+    if not t < found.time:
+        return found
+    from_piece = own.kind != OPENING and own.kind != SIDE
+    hit = Hit(max(t, 0.0), kind, number, s, tangent if is_clear or not from_piece else UNCERTAIN)
+    # no piece lies above the opening or beyond a side, so a piece within rounding of them is hit there
+    if is_clear or not from_piece:
+        return hit
+    if kind == LINE and own.kind == LINE:
+        arguments = tables.joints, number, own, px, py, vx, vy, slack
+        is_front = call_late(scope.slots.line_in_front, is_clear, arguments)
+    else:
+        is_front = call_late(scope.slots.in_front, is_clear, (tables, hit, own, px, py, vx, vy, slack))
+    return hit if is_front else found
+
+
+@inner
+def hit_nearby(scope, own, px, py, vx, vy):
+    """-> Hit: the first hit on nearby pieces with the ray's start on their front side.
+
+    The hit is UNCERTAIN if the gap between start and piece is within the slack, as in the apex of a wedge: double
+    precision does not determine how the ray continues.
+    """
+    found = Hit(np.inf, NO_PIECE, -1, 0.0, 0)
+    first, end = scope.joints
+    if scope.has_tree:
+        close = NEARBY_SLACKS * scope.slack
+        tree = tree_of(scope)
+        walk = first_boxes(tree, px, py, vx, vy, -close, close)
+        while True:
+            leaf, walk = next_leaf(tree, walk, FORWARD, px, py, vx, vy, -close, close)
+            if leaf < 0:
+                break
+            start = int(scope.tables.boxes[leaf, CONTENT])
+            for number in range(start, min(start + BOXES, end - 1)):
+                found = nearer(scope, found, (A_LINE, number), own, px, py, vx, vy)
+    else:
+        for number in range(first, end - 1):
+            found = nearer(scope, found, (A_LINE, number), own, px, py, vx, vy)
+    for index, (first, end) in enumerate(scope.curves):
+        for number in range(first, end):
+            found = nearer(scope, found, (FIRST_CURVE + index, number), own, px, py, vx, vy)
+    return found
+
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
 # Limit on the segments of a ray, 20 to 100 ms of work. A run of hits counts as one segment.
@@ -60,7 +146,7 @@ def scope_of(tables, h, slots):
 def nearest_line(scope, own, px, py, vx, vy, time):
     """-> (t, line, fraction, corner, nearby): the first line before ``time``, and the time to the first corner; or inf.
 
-    ``nearby`` is true if a line is so close that rounding of the start may decide the hit; see `nearby`.
+    ``nearby`` is true if a line is so close that rounding of the start may decide the hit; see `hit_nearby`.
     """
     tables, slack = scope.tables, scope.slack
     joints = tables.joints

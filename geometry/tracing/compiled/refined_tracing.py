@@ -40,11 +40,10 @@ from ..double_double.numbers import (
 )
 from .pieces import arcs
 from .pieces.formulas import TOP_CORNER, bounds_of, exit_time, mirror, opening_at, with_length_one
-from .pieces.kinds import refined_face, refined_hit, refined_surface
+from .pieces.kinds import Arrival, in_front_at, line_in_front_of_line, refined_face, refined_hit, refined_surface
 from .pieces.lines import line_ends, orientation
 from .pieces.options import compiled, linked
 from .pieces.records import ARC, BEZIER, FIRST_CURVE, LINE, NO_PIECE, OPENING, SIDE, Hit, RefinedScope, Sizes
-from .pieces.sides import Arrival, in_front_at, line_in_front_of_line
 from .runs import LAST_REFINED_HITS, refined_crossings, skip_refined_chords
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, UNRESOLVED, UNSETTLED = 0, 1, 2, 3, 4, 5

@@ -13,7 +13,7 @@ from campaigns.rays.thin_polygons import POLYGONS, follow_plainly, judge_plainly
 from numba import njit
 
 from asperity import geometry as geo
-from asperity.geometry.polygons.predicates import ExactPoints
+from asperity.geometry.polygons.triangulation import ExactPoints
 from asperity.geometry.tracing.compiled.pieces.lines import Line, line_hit, orientation
 from asperity.geometry.tracing.refinement import refined_trace
 

@@ -1,4 +1,4 @@
-"""All kinds of pieces: the nearest hit on a curve, the angle of incidence, the reflection, distances. Loads numba.
+"""All kinds of pieces: the nearest hit on a curve, the reflection, the side on which a ray starts. Loads numba.
 
 A kind of piece is a module beside `lines`, `arcs` and `beziers` with the same names: KIND, nearby, incidence, surface,
 refined_surface, refined_row, height and ends, and of curves also TABLE, nearest, refined_hit and refined_table. Here
@@ -7,6 +7,7 @@ the kinds are tried one after another, in an order that the compiler knows.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,9 @@ import numpy as np
 from .....core.checks import Floats
 from ...double_double.numbers import DoubleDouble, extended
 from . import arcs, beziers, lines
+from .beziers import STEPS
 from .formulas import mirror
+from .lines import height_over_line, line_ends
 from .options import inlined, inner, linked, linked_allocating
 from .records import FIRST_CURVE, NO_PIECE, OPENING, Hit
 
@@ -135,3 +138,74 @@ def refined_face(tables, hit):
     is_curve = hit.kind >= FIRST_CURVE
     rows = tables.curves[hit.kind - FIRST_CURVE if is_curve else 0]
     return Face(hit.kind, hit.number, rows[hit.number if is_curve else 0], hit.s)
+
+
+# Error of a double-double position projected onto a curve, as a fraction of the slack (64 roundings to 16 EPS).
+CURVE_NOISE = 2.0**-48
+# Distance behind a face, in slacks, beyond which the last segment did not start between the face and the own piece.
+BEHIND_SLACKS = 4.0
+
+
+class Arrival(NamedTuple):
+    """The arrival of a ray at its start: the length of the last segment and the accuracy of the position.
+
+    ``slack`` is the distance within which pieces are nearby; ``blur`` is the error of the position along the own piece.
+    If this error decides, for example if one piece stands on the other, the ray counts as in front.
+    """
+
+    flown: float
+    slack: float
+    blur: float
+
+
+@linked
+def came_through(ends, mx, my, px, py, vx, vy, arrival):
+    """-> bool: whether a ray's last segment, which ended at p with the velocity v, crossed a piece from behind.
+
+    ``ends`` are the ends of the piece, (mx, my) is its normal next to p.
+    """
+    x0, y0, x1, y1 = ends
+    if arrival.flown * (vx * mx + vy * my) <= BEHIND_SLACKS * arrival.slack:
+        return False
+    return (x0 - px) * vy - (y0 - py) * vx <= 0.0 <= (x1 - px) * vy - (y1 - py) * vx
+
+
+@linked
+def line_in_front_of_line(joints, line, own, px, py, vx, vy, arrival):
+    """-> bool: `in_front_at` for two lines, by their rows: the distance has the exact sign, see `height_over_line`."""
+    if height_over_line(joints, own, line, px, py, arrival.blur) <= 0.0:
+        return False
+    x0, y0, x1, y1 = line_ends(joints, own)
+    ex, ey = x1 - x0, y1 - y0
+    w = 2.0 * (vy * ex - vx * ey) / (ex * ex + ey * ey)
+    ends = line_ends(joints, line)
+    x0, y0, x1, y1 = ends
+    length = math.hypot(x1 - x0, y1 - y0)
+    mx, my = (y0 - y1) / length, (x1 - x0) / length
+    return not came_through(ends, mx, my, px.high, py.high, vx + w * ey, vy - w * ex, arrival)
+
+
+@linked
+def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
+    """-> bool: whether a ray that has just left the piece ``own`` starts in front of ``piece``, within the slack of it.
+
+    (``px``, ``py``), double-doubles, is the position, within rounding of ``own``. At least one piece is a curve.
+
+    The position has an error of some roundings of the hollow's size, so its distance from a piece close by means
+    nothing: beside the tip of a sharp peak, in the apex of a narrow wedge, on a plate of no thickness. But the joints
+    are exact, and the ray starts on its own piece. So the position is projected onto that, and the distance computed in
+    double-doubles; below the error of this computation it is 0, as between coincident faces. Two faces of a plate cross
+    within rounding if vertices that should lie on one line do not. Then the ray has passed through the back of one face
+    to the front of the other, and the first one does not stop it after its reflection.
+    """
+    nx, ny = px, py
+    for _ in range(STEPS):
+        height, nx, ny = height_over(own.kind, (joints, own, px, py))
+        px, py = px - height * nx, py - height * ny
+    height, mx, my = height_over(piece.kind, (joints, piece, px, py))
+    if height.high + arrival.blur * abs(mx.high * ny.high - my.high * nx.high) <= CURVE_NOISE * arrival.slack:
+        return False
+    w = 2.0 * (vx * nx.high + vy * ny.high)
+    vx, vy = vx - w * nx.high, vy - w * ny.high
+    ends = ends_of(piece.kind, (joints, piece))
+    return not came_through(ends, mx.high, my.high, px.high, py.high, vx, vy, arrival)
