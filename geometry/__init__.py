@@ -19,10 +19,9 @@ from ..verification.identity import verify
 from .cells.measured import Profile
 from .cells.profile import read_profile
 from .collisions.amplification import DiskStatus
-from .collisions.configuration_space import ConfigurationSpace
+from .collisions.configuration_space import ConfigurationSpace, collision_path
 from .collisions.cylinder import collide_cylinder, collide_modified
 from .collisions.pair import collide_pair
-from .collisions.paths import collision_path
 from .collisions.rigid import collide
 from .collisions.rim_on_wall import collide_rim
 from .collisions.transversality import good_fraction, shadow
@@ -48,11 +47,12 @@ from .walls.named import (
     flat,
     focusing_arcs,
     koch,
+    notched_angle,
     rectangular_teeth,
     triangular_teeth,
+    tube,
 )
 from .walls.random_heights import HeightCorrelation, SelfAffine, random_wall
-from .walls.retroreflectors import notched_angle, tube
 from .walls.wall import Wall, load_wall
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # Relative allowance for rounding in bounds on the reach of satellites and on the depth of the disk.
 ROOM = 1e-9
-# Relative error of positions, a few rounding errors of their size, as for rays (`curves/tolerances`).
+# Relative error of positions, a few rounding errors of their size, as for rays (`curves/columns`).
 SLACK = 16.0 * EPS
 
 

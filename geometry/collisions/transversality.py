@@ -19,8 +19,7 @@ from ..disk.disk import Disk
 from ..plotting.walls import LEVEL, RAY_COLOURS, draw_solid
 from ..tracing.tracing import trace, trajectory
 from ..walls.wall import Wall
-from .configuration_space import FLIGHT_POINTS, ConfigurationSpace
-from .paths import collision_path
+from .configuration_space import FLIGHT_POINTS, ConfigurationSpace, collision_path
 from .rigid import at_the_tops, checked_states
 
 if TYPE_CHECKING:

@@ -14,7 +14,6 @@ from ...core.checks import Floats, number_between, positive_number
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from . import columns as c
-from .columns import row_of
 from .curve import LARGEST_COORDINATE, ROUNDED, Bools, Curve, Point, as_point, inverted, parameters, stretch_factors
 from .reading import Table, check_keys, pair_of
 
@@ -183,7 +182,6 @@ class Arc(Curve):
         return points
 
     def tangent(self, s: ArrayLike) -> Floats:
-        """Return the unit tangents at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
         s = parameters(s)
         a, b = self.semi_axes
         if abs(self.end_angle - self.start_angle) > CHORD_SPAN:
@@ -257,18 +255,15 @@ class Arc(Curve):
         )
 
     def moved(self, dx: float, dy: float) -> Arc:
-        """Return the arc shifted by (dx, dy)."""
         dx, dy = as_point("moved", (dx, dy))
         center, start, end = ((x + dx, y + dy) for x, y in (self.center, self.start, self.end))
         return self._with(center=center, start=start, end=end)
 
     def pinned(self, start: Point, end: Point) -> Arc:
-        """Return the arc with its end points set to nearby points that are known exactly."""
         first, last = as_point("Arc start point", start), as_point("Arc end point", end)
         return self._with(start=first, end=last, rounding=0.0)
 
     def split(self, s: float) -> tuple[Arc, Arc]:
-        """Return the parts before and after the parameter ``s`` in (0, 1)."""
         s = number_between("s", s, 0.0, 1.0, closed="low high")
         angle = self.start_angle + s * (self.end_angle - self.start_angle)
         x, y = self.point(s)
@@ -283,7 +278,6 @@ class Arc(Curve):
         return self.point(self.steps(2.0 * self.half_span / step))
 
     def curvature(self, s: float) -> float:
-        """The curvature of a circle or an ellipse."""
         a, b = self.semi_axes
         t = self.start_angle + s * (self.end_angle - self.start_angle)
         turn = 1.0 if self.end_angle > self.start_angle else -1.0
@@ -303,7 +297,6 @@ class Arc(Curve):
         return value, ROUNDED * max(a / b, b / a) ** 2 * value
 
     def joined(self, after: Curve, tolerance: float) -> Arc | None:
-        """Return the arc of which both are parts; None if there is none."""
         if not isinstance(after, Arc):
             return None
         span = 2.0 * (self.half_span + after.half_span)
@@ -315,14 +308,12 @@ class Arc(Curve):
         return whole if whole.has_parts(self, after, self.half_span / (0.5 * span), tolerance) else None
 
     def to_table(self) -> Table:
-        """Centre, semi-axes, angles, and the ends, which may be pinned."""
         form = {"center": list(self.center), "semi_axes": list(self.semi_axes)}
         angles = [self.start_angle, self.end_angle]
         return {"kind": self.kind, **form, "angles": angles, "start": list(self.start), "end": list(self.end)}
 
     @classmethod
     def from_table(cls, table: Table) -> Arc:
-        """From centre, semi-axes and angles, pinned if the ends are given."""
         check_keys(table, {"kind", "center", "semi_axes", "angles"}, {"start", "end"})
         axes = table["semi_axes"]
         start, end = pair_of("angles", table["angles"])
@@ -360,7 +351,7 @@ class Arc(Curve):
             c.CHORD_X: direction[0], c.CHORD_Y: direction[1], c.SHORT_CHORD: short, c.SPAN: 2.0 * half,
             c.STRETCH: stretch,
         }  # fmt: skip
-        return row_of(c.ARC_COLUMNS, {**ends, **columns})
+        return c.row_of(c.ARC_COLUMNS, {**ends, **columns})
 
     @staticmethod
     def heights(rows: Floats) -> Floats:

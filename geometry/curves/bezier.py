@@ -16,10 +16,8 @@ from ...core.checks import Floats, number_between, positive_number, sequence, wh
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from . import columns as c
-from .columns import row_of
-from .curve import ROUNDED, Bools, Curve, Point, as_point, inverted, parameters, stretch_factors
+from .curve import ROUNDED, Bools, Curve, Point, as_point, cubic_roots, inverted, parameters, stretch_factors
 from .reading import Table, check_keys, points_of
-from .tolerances import NEARBY_MARGIN
 
 # Distance (in the parameter) from the minimum of the speed to [0, 1] above which the closed formula for the length of
 # a quadratic curve cancels. There 24 Gauss nodes are exact to rounding: the branch points are at least as far away.
@@ -30,8 +28,6 @@ WIDTHS, MOST_INTERVALS = tuple(10.0**-k for k in range(12, 1, -1)), 2000
 STILL = 8.0 * math.sqrt(EPS)
 # Sine of the angle to the tangent up to which a path along a wall that bends towards it is not resolved.
 GRAZE = 64.0 * EPS
-# Limit on steps for a root; every fourth is a bisection, of which 53 suffice.
-ROOT_STEPS = 220
 # Parameter next to an end at which B' = 0, as where a handle is retracted: B differs from the end by rounding there.
 NEXT_TO_END = 2.0**-26
 # Parameters from which on a cusp is not one of an end.
@@ -104,7 +100,6 @@ class Bezier(Curve):
         return np.array([p[0], 3.0 * (p[1] - p[0]), 3.0 * bend, p[3] - p[0] + 3.0 * (p[1] - p[2])])
 
     def point(self, s: ArrayLike) -> Floats:
-        """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
         return _bernstein(np.array(self.control_points), parameters(s))
 
     def _derivative(self) -> Floats:
@@ -151,7 +146,6 @@ class Bezier(Curve):
         return size * math.fsum(parts)
 
     def turning_points(self, axis: int) -> list[float]:
-        """Return the parameters in (0, 1) where coordinate ``axis`` has zero derivative, ascending."""
         v = self._derivative()[:, whole_number("axis", axis, 0, most=1)]
         if self.degree == 2:
             return _roots_inside([v[1] - v[0], v[0]])
@@ -162,12 +156,10 @@ class Bezier(Curve):
         return Bezier(self.control_points[::-1])
 
     def stretched(self, x_factor: float, y_factor: float) -> Bezier:
-        """Return the image under (x, y) -> (x_factor x, y_factor y)."""
         fx, fy = stretch_factors(x_factor, y_factor)
         return Bezier([(fx * x, fy * y) for x, y in self.control_points])
 
     def moved(self, dx: float, dy: float) -> Bezier:
-        """Return the curve shifted by (dx, dy)."""
         dx, dy = as_point("moved", (dx, dy))
         return Bezier([(x + dx, y + dy) for x, y in self.control_points])
 
@@ -194,7 +186,6 @@ class Bezier(Curve):
         return self.point(self.steps(math.sqrt(most / 8.0 / positive_number("tolerance", tolerance))))
 
     def curvature(self, s: float) -> float:
-        """The curvature; inf where b' = 0."""
         velocity, cross, _ = _polynomials(self)
         vx, vy = (float(np.polynomial.polynomial.polyval(s, part)) for part in velocity.T)
         speed = math.hypot(vx, vy)
@@ -223,7 +214,6 @@ class Bezier(Curve):
         return found, math.inf
 
     def joined(self, after: Curve, tolerance: float) -> Bezier | None:
-        """Return the curve of which both are parts; None if there is none."""
         if not isinstance(after, Bezier) or self.degree != after.degree:
             return None
         first, second = (np.array(part.control_points) for part in (self, after))
@@ -239,23 +229,20 @@ class Bezier(Curve):
         return whole if whole.has_parts(self, after, fraction, tolerance) else None
 
     def to_table(self) -> Table:
-        """The control points."""
         return {"kind": self.kind, "control_points": [list(p) for p in self.control_points]}
 
     @classmethod
     def from_table(cls, table: Table) -> Bezier:
-        """From the control points."""
         check_keys(table, {"kind", "control_points"}, set())
         return cls(points_of("control_points", table["control_points"]))
 
     def row(self, ends: Mapping[int, float]) -> Floats:
-        """The row of ``beziers``."""
         self = self.pinned((ends[c.START_X], ends[c.START_Y]), (ends[c.END_X], ends[c.END_Y]))
         points, powers = np.array(self.control_points), self.powers[1:]
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        reach = float(np.hypot(*(points - middle).T).max()) + NEARBY_MARGIN * float(np.abs(powers).sum())
+        reach = float(np.hypot(*(points - middle).T).max()) + c.NEARBY_MARGIN * float(np.abs(powers).sum())
         columns = {c.MIDDLE_X: middle[0], c.MIDDLE_Y: middle[1], c.REACH: reach}
-        return row_of(c.BEZIER_COLUMNS, {**ends, **dict(enumerate(powers.ravel(), c.X1)), **columns})
+        return c.row_of(c.BEZIER_COLUMNS, {**ends, **dict(enumerate(powers.ravel(), c.X1)), **columns})
 
     @staticmethod
     def heights(rows: Floats) -> Floats:
@@ -268,7 +255,6 @@ class Bezier(Curve):
         return True
 
     def hull(self, start: Point, end: Point) -> list[Point]:
-        """The control points."""
         return [start, *list(self.control_points[1:-1])[:2], *[end] * (5 - len(self.control_points))]
 
     def cusp(self) -> float | None:
@@ -306,14 +292,13 @@ class Bezier(Curve):
             s0 = self.parameter_of(position)
             divided = np.array([c[1] + s0 * (c[2] + s0 * c[3]), c[2] + s0 * c[3], c[3], np.zeros_like(s0)])
             c = np.where(own, divided, c)
-        roots = _cubic_roots(c, *self._ends(slack))
+        roots = cubic_roots(c, *self._ends(slack))
         point, tangent, _ = _values(a, roots)
         speed = np.hypot(tangent[..., 0], tangent[..., 1])
         normal = turn * np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1) / speed[..., np.newaxis]
         approach = -np.sum(normal * v[:, np.newaxis], axis=-1)
-        time = (
-            np.sum((point - position[:, np.newaxis]) * v[:, np.newaxis], axis=-1) / np.sum(v**2, axis=1)[:, np.newaxis]
-        )
+        along = np.sum((point - position[:, np.newaxis]) * v[:, np.newaxis], axis=-1)
+        time = along / np.sum(v**2, axis=1)[:, np.newaxis]
         with np.errstate(invalid="ignore"):
             fresh = np.where(own[:, np.newaxis], time > 0.0, time * approach >= -slack)
             hit = np.isfinite(roots) & (approach > 0.0) & fresh
@@ -471,37 +456,3 @@ def _values(coefficients: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
     a0, a1, a2, a3 = coefficients
     t = s[..., np.newaxis]
     return a0 + t * (a1 + t * (a2 + t * a3)), a1 + t * (2.0 * a2 + 3.0 * t * a3), 2.0 * a2 + 6.0 * t * a3
-
-
-def _cubic_roots(c: Floats, low: float, high: float) -> Floats:
-    """Return the roots (n, 3) in [low, high] of cubics with the coefficients (4, n), nan where there are fewer."""
-    # critical points, by the formula without cancellation
-    half, ends = -c[2], np.array([low, high])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        q = half + np.where(half >= 0.0, 1.0, -1.0) * np.sqrt(half * half - 3.0 * c[3] * c[1])
-        critical = np.array([q / (3.0 * c[3]), c[1] / q])
-    critical = np.where(np.isfinite(critical), np.clip(critical, low, high), high)
-    knots = np.concatenate([np.full((1, c.shape[1]), ends[0]), np.sort(critical, axis=0),
-                            np.full((1, c.shape[1]), ends[1])])  # fmt: skip
-
-    def value(s: Floats) -> Floats:
-        return np.asarray(c[0] + s * (c[1] + s * (c[2] + s * c[3])))
-
-    left, right = knots[:-1], knots[1:]
-    at_left, at_right = value(left), value(right)
-    crossed = (at_left <= 0.0) != (at_right <= 0.0)
-    s = 0.5 * (left + right)
-    settled = ~crossed
-    for step in range(ROOT_STEPS):
-        at = value(s)
-        same = (at <= 0.0) == (at_left <= 0.0)
-        left, right = np.where(same, s, left), np.where(same, right, s)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            change = at / (c[1] + s * (2.0 * c[2] + 3.0 * s * c[3]))
-        settled |= (np.abs(change) <= EPS) | (right - left <= EPS)
-        if np.all(settled):
-            break
-        newton, middle = s - change, 0.5 * (left + right)
-        following = np.where((newton > left) & (newton < right), newton, middle) if step % 4 else middle
-        s = np.where(settled, s, following)
-    return np.asarray(np.where(crossed, s, np.nan).T)

@@ -23,6 +23,8 @@ LARGEST_COORDINATE = 1e100
 MOST_STEPS = 1e7
 # Rounding takes parameters at most this far beyond the ends.
 BEYOND_ENDS = 1e-9
+# Limit on steps for a root; every fourth is a bisection, of which 53 suffice.
+ROOT_STEPS = 220
 # Halvings after which an interval of parameters has the width of rounding.
 HALVINGS = 56
 # Parameters at which two curves are compared, and rounding of a closed formula.
@@ -53,10 +55,9 @@ class Curve(ABC):
     kind: ClassVar[str] = ""
     kinds: ClassVar[dict[str, type[Curve]]] = {}
     is_straight: ClassVar[bool] = False
-    # of the compiled table: its place among those of all curves that rays meet, and its columns; see `columns`
+    # place of the compiled table among those of all curves that rays meet, and its columns; whether disks meet it
     table: ClassVar[int] = -1
     columns: ClassVar[int] = 0
-    # whether disks meet it
     meets_disks: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
@@ -290,3 +291,37 @@ def inverted(length_to: Callable[[Floats], Floats], length: Floats, most: float)
         short = length_to(middle) < length
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return np.asarray(0.5 * (low + high))
+
+
+def cubic_roots(c: Floats, low: float, high: float) -> Floats:
+    """Return the roots (n, 3) in [low, high] of cubics with the coefficients (4, n), nan where there are fewer."""
+    # critical points, by the formula without cancellation
+    half, ends = -c[2], np.array([low, high])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        q = half + np.where(half >= 0.0, 1.0, -1.0) * np.sqrt(half * half - 3.0 * c[3] * c[1])
+        critical = np.array([q / (3.0 * c[3]), c[1] / q])
+    critical = np.where(np.isfinite(critical), np.clip(critical, low, high), high)
+    knots = np.concatenate([np.full((1, c.shape[1]), ends[0]), np.sort(critical, axis=0),
+                            np.full((1, c.shape[1]), ends[1])])  # fmt: skip
+
+    def value(s: Floats) -> Floats:
+        return np.asarray(c[0] + s * (c[1] + s * (c[2] + s * c[3])))
+
+    left, right = knots[:-1], knots[1:]
+    at_left, at_right = value(left), value(right)
+    crossed = (at_left <= 0.0) != (at_right <= 0.0)
+    s = 0.5 * (left + right)
+    settled = ~crossed
+    for step in range(ROOT_STEPS):
+        at = value(s)
+        same = (at <= 0.0) == (at_left <= 0.0)
+        left, right = np.where(same, s, left), np.where(same, right, s)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = at / (c[1] + s * (2.0 * c[2] + 3.0 * s * c[3]))
+        settled |= (np.abs(change) <= EPS) | (right - left <= EPS)
+        if np.all(settled):
+            break
+        newton, middle = s - change, 0.5 * (left + right)
+        following = np.where((newton > left) & (newton < right), newton, middle) if step % 4 else middle
+        s = np.where(settled, s, following)
+    return np.asarray(np.where(crossed, s, np.nan).T)

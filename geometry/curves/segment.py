@@ -72,7 +72,6 @@ class Segment(Curve):
         return pieces
 
     def point(self, s: ArrayLike) -> Floats:
-        """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
         along = parameters(s)[..., np.newaxis]
         points: Floats = (1.0 - along) * np.array(self.start) + along * np.array(self.end)
         return points
@@ -91,12 +90,10 @@ class Segment(Curve):
 
     @property
     def box(self) -> Box:
-        """The bounding box (xmin, ymin, xmax, ymax) of the segment."""
         (x0, y0), (x1, y1) = self.start, self.end
         return min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)
 
     def turning_points(self, axis: int) -> list[float]:
-        """Return an empty list: a segment has no turning points."""
         return []
 
     def reversed(self) -> Segment:
@@ -104,21 +101,17 @@ class Segment(Curve):
         return Segment(self.end, self.start)
 
     def stretched(self, x_factor: float, y_factor: float) -> Segment:
-        """Return the image under (x, y) -> (x_factor x, y_factor y)."""
         fx, fy = stretch_factors(x_factor, y_factor)
         return Segment((fx * self.start[0], fy * self.start[1]), (fx * self.end[0], fy * self.end[1]))
 
     def moved(self, dx: float, dy: float) -> Segment:
-        """Return the segment shifted by (dx, dy)."""
         dx, dy = as_point("moved", (dx, dy))
         return Segment((self.start[0] + dx, self.start[1] + dy), (self.end[0] + dx, self.end[1] + dy))
 
     def pinned(self, start: Point, end: Point) -> Segment:
-        """Return the segment with its end points replaced."""
         return Segment(start, end)
 
     def split(self, s: float) -> tuple[Segment, Segment]:
-        """Return the parts before and after the parameter ``s`` in (0, 1)."""
         x, y = self.point(s)
         middle = (float(x), float(y))
         return Segment(self.start, middle), Segment(middle, self.end)
@@ -128,20 +121,16 @@ class Segment(Curve):
         return np.array([self.start, self.end])
 
     def curvature(self, s: float) -> float:
-        """0."""
         return 0.0
 
     def largest_curvature(self) -> tuple[float, float]:
-        """0, exactly."""
         return 0.0, 0.0
 
     def to_table(self) -> Table:
-        """The two ends."""
         return {"kind": self.kind, "start": list(self.start), "end": list(self.end)}
 
     @classmethod
     def from_table(cls, table: Table) -> Segment:
-        """From the two ends."""
         check_keys(table, {"kind", "start", "end"}, set())
         return cls(pair_of("start", table["start"]), pair_of("end", table["end"]))
 

@@ -21,14 +21,11 @@ from ..cells.cell import Cell
 from ..curves import columns as c
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
-from ..curves.columns import row_of, table_of
+from ..curves.columns import SMOOTH_JOINT, row_of, table_of
 from ..curves.crossings import directions_of, straight_in
 from ..curves.curve import Curve, Point
-from ..curves.tolerances import SMOOTH_JOINT
-from .boxes import TREE_COLUMNS, tree_of
-from .closed_forms import MOST_PIECES, closed_form_of
-from .escapes import escape_sectors
-from .facing import facing_pairs
+from .boxes import TREE_COLUMNS, escape_sectors, tree_of
+from .closed_forms import MOST_PIECES, closed_form_of, facing_pairs
 from .structs import Struct
 
 # Number of chords from which on a run along an arc pays for its two arctangents and one sincos.

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..curves import columns as c
+from ..curves.columns import JOINT_ULPS
 from ..curves.curve import Curve
-from ..curves.tolerances import JOINT_ULPS
 from ..scene.scene import Tables
 
 if TYPE_CHECKING:

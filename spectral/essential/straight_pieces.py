@@ -202,7 +202,6 @@ def _straight(law: WallLaw, x: Floats, theta: Floats) -> Floats:
 
 
 def _has_straight_pieces_below(wall: Wall) -> bool:
-
     loops = [wall.pieces, *wall.islands]
     if wall.closes:
         loops = [wall.cell.pieces[hollow.first : hollow.last] for hollow in wall.hollows]

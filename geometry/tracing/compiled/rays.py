@@ -18,7 +18,7 @@ import numpy as np
 from numba import types
 
 from ...curves import columns as c
-from ...curves.tolerances import NEARBY_SLACKS
+from ...curves.columns import NEARBY_SLACKS
 from ...scene.boxes import BOXES, CONTENT, TREE_COLUMNS
 from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.scene import no_tables

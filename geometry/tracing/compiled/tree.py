@@ -15,9 +15,8 @@ from numba import types
 from numba.extending import intrinsic
 
 from ...curves import columns as c
-from ...curves.tolerances import NEARBY_SLACKS
-from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, OTHER_X, OTHER_Y, PARENT
-from ...scene.escapes import ESCAPE_ROOM
+from ...curves.columns import NEARBY_SLACKS
+from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, ESCAPE_ROOM, OTHER_X, OTHER_Y, PARENT
 from .pieces.formulas import side
 from .pieces.lines import is_ahead, joint_side, line_at, line_hit, line_sides
 from .pieces.options import inlined, inner

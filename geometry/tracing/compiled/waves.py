@@ -17,7 +17,7 @@ import numpy as np
 
 from ....core.rounding import EPS
 from ...curves import columns as c
-from ...curves.tolerances import NEARBY, NEARBY_SLACKS, TANGENT_ULPS
+from ...curves.columns import NEARBY, NEARBY_SLACKS, TANGENT_ULPS
 from ..double_double.numbers import where
 from . import work as w
 from .pieces import arcs, beziers, formulas, lines

@@ -20,7 +20,7 @@ from .....core.compilation import jit
 from .....core.rounding import EPS
 from ....curves import columns as c
 from ....curves.arc import Arc
-from ....curves.tolerances import NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
+from ....curves.columns import NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
 from ...double_double.numbers import (
     LOCAL_ERROR,
     cross,

@@ -19,7 +19,7 @@ from numba.extending import overload
 from .....core.rounding import EPS
 from ....curves import columns as c
 from ....curves.bezier import Bezier
-from ....curves.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, SMOOTH_JOINT, TANGENT_ULPS
+from ....curves.columns import JOINT_ULPS, NEARBY, NEARBY_MARGIN, SMOOTH_JOINT, TANGENT_ULPS
 from ...double_double.numbers import (
     DOUBLE_DOUBLE,
     LOCAL_ERROR,
@@ -570,9 +570,8 @@ def refined_hit(scope, number, own, is_own, px, py, vx, vy, error):
     return t, s, undecided, (np.inf, slack, error), near_s
 
 
-def refined_table(rows):
-    """Return the table itself: a row with its ends defines the piece, see `refined_coefficients`."""
-    return rows
+# a row with its ends defines the piece, see `refined_coefficients`
+refined_table = np.asarray
 
 
 @linked_allocating

@@ -6,8 +6,8 @@ import numpy as np
 
 from .....core.rounding import EPS
 from ....curves import columns as c
+from ....curves.columns import JOINT_ULPS
 from ....curves.curve import Curve
-from ....curves.tolerances import JOINT_ULPS
 from ...double_double.numbers import dot, rounded, scaled, where
 from .options import inlined, linked
 from .records import NO_PIECE, OPENING, SIDE

@@ -14,7 +14,7 @@ import numpy as np
 from .....core.compilation import jit
 from .....core.rounding import EPS, UNIT_ROUNDOFF
 from ....curves import columns as c
-from ....curves.tolerances import NEARBY_SLACKS
+from ....curves.columns import NEARBY_SLACKS
 from ...double_double.numbers import dot, root, two_product, two_sum, where
 from .formulas import side
 from .options import inlined, linked, linked_allocating
