@@ -93,6 +93,8 @@ def density_matrix(law: DensityLaw, basis: Basis, tolerance: float) -> tuple[Flo
     over theta' between the edges of the cells and of the law's panels at that incoming angle.
     """
     edges = np.unique(np.concatenate((basis.edges, law.outgoing_breakpoints)))
+    # the kinks of a function of a user's are not known
+    smooth = type(law) is not DensityLaw
     if basis.is_partition and law.resolution < np.diff(edges).max():
         outer = np.unique(np.concatenate((edges, law.incoming_edges(edges))))
         mirrored = law.mirror_symmetric is True and np.abs(edges + edges[::-1] - np.pi).max() <= MIRROR_TOLERANCE
@@ -103,15 +105,13 @@ def density_matrix(law: DensityLaw, basis: Basis, tolerance: float) -> tuple[Flo
         affordable = [order for order, each in zip(CONDITIONAL_NODES, cost, strict=True) if each <= MOST_DENSITY_VALUES]
         order = affordable[0] if affordable else CONDITIONAL_NODES[-1]
         if min(cost) <= MOST_CONDITIONAL_VALUES:
-            levels = _conditional_levels(law, basis, edges, outer, order)
-            found, error = until_converged(
-                (_with_mirror_image(half) for half in levels) if mirrored else levels, tolerance
-            )
+            # where kinks are not known three levels are needed
+            levels = _conditional_levels(law, basis, edges, outer, order if smooth else order // 2, 2 if smooth else 3)
+            levels = (_with_mirror_image(half) for half in levels) if mirrored else levels
+            found, error = until_converged(levels, tolerance, smooth)
             # the rules over theta' are of one order
             return found, error + law._row_error * float(basis.normalisation.max())
-    levels = _density_levels(law, basis, edges)
-    # the kinks of a function of a user's are not known
-    return until_converged(levels, tolerance, smooth=type(law) is not DensityLaw)
+    return until_converged(_density_levels(law, basis, edges), tolerance, smooth)
 
 
 def _with_mirror_image(half: Floats) -> Floats:
@@ -125,9 +125,11 @@ def _conditional_cost(law: DensityLaw, edges: Floats, outer: Floats, order: int)
     return values
 
 
-def _conditional_levels(law: DensityLaw, basis: Basis, edges: Floats, outer: Floats, order: int) -> Iterator[Floats]:
+def _conditional_levels(
+    law: DensityLaw, basis: Basis, edges: Floats, outer: Floats, order: int, least: int
+) -> Iterator[Floats]:
     level, spent = 0, 0
-    while level < 2 or spent + _conditional_cost(law, edges, outer, order) <= MOST_DENSITY_VALUES:
+    while level < least or spent + _conditional_cost(law, edges, outer, order) <= MOST_DENSITY_VALUES:
         spent += _conditional_cost(law, edges, outer, order)
         count_time(VALUE_TIME * _conditional_cost(law, edges, outer, order))
         yield _conditional_rule(law, basis, edges, outer, order)

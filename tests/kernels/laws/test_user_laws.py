@@ -251,6 +251,28 @@ def test_matrices_of_densities_with_a_kink_that_nobody_mentions_have_errors_that
             assert np.linalg.norm(P.symmetric - exact) <= float(P.error)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("at", [1.7754339081045577, 1.4])
+def test_matrices_in_bins_of_densities_with_a_narrow_tent_that_nobody_mentions_have_errors_that_hold(at):
+    width, kinks = 0.07, (at - 0.07, at, at + 0.07)
+    edges = np.unique((0.0, *kinks, np.pi))
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    half = 0.5 * np.diff(edges)[:, None]
+    angle = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half * nodes
+
+    def tent(theta):
+        return np.maximum(1.0 - np.abs(theta - at) / width, 0.0)
+
+    mean = np.sum(half * weights * tent(angle) * 0.5 * np.sin(angle))
+
+    def density(theta, out):
+        return 0.5 * np.sin(out) * (1.0 + 0.9 * (tent(theta) - mean) * (tent(out) - mean))
+
+    known = ker.discretise(ker.DensityLaw(density, kinks), ker.Bins(4))
+    found = ker.discretise(ker.DensityLaw(density), ker.Bins(4), tolerance=1e-6)
+    assert np.linalg.norm(found.symmetric - known.symmetric) <= float(found.error) and float(known.error) < 1e-8
+
+
 def test_distances_of_densities_with_a_kink_that_nobody_mentions_have_errors_that_hold():
     for kink in KINKS:
         law = Bent(kink)
