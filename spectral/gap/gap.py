@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -17,79 +18,91 @@ from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
-from ..bounds.enclosure import as_power, enclosures
-from ..bounds.images import ROUNDED, is_costly, suits_panels
+from ..bounds.enclosure import Enclosures, as_power, enclosed_trial_space, enclosures
+from ..bounds.images import ROUNDED, is_costly, is_traced, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
-from ..bounds.trial_space import adapted_trial_space
-from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, matrix_spectrum
+from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, Verdict, matrix_spectrum
 from ..essential.compact import compact_matrix
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
-from .refinement import EIGENVALUES, HOW, RAYS_FRACTION, Refinement, refined
+from .refinement import EIGENVALUES, HOW, Refinement, refined
 from .shallow import shallow_gap
 from .theorems import gap_by_theorem, gap_of_exact, split_gap
 from .verdict import SpectralGap, isolated, made_from
 
-# Number of enclosed eigenvalues for densities; limit on this number for walls, and accuracy and levels of the pilot run
-# that determines it.
-ENCLOSED, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS = 3, 8, 1e-2, 2
-# Enclosures slightly wider than the tolerance are computed again with CLOSER times the tolerance. A gap whose error
-# exceeds the tolerance is accepted if its relative error is at most LARGEST_MISS.
-CLOSER, LARGEST_MISS = 0.25, 1e-3
-# Where enclosures for a smaller tolerance take too long, these are tried.
-SURE_TOLERANCES = 1e-9, 1e-6
+# Numbers of enclosed eigenvalues with the constants: of densities by modulus, of other laws the largest values.
+OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
+# Enclosures of traced walls begin with the tolerance COARSEST, others with the one asked for, or SURE if it is smaller.
+# Each is computed from the panels of the one before, for FINER times its tolerance; from an error that exceeds its
+# tolerance by less than 1/CLOSER, for CLOSER times it; from a larger one, or none, with another eigenvalue.
+COARSEST, SURE, FINER, CLOSER = 1e-2, 1e-9, 0.1, 0.25
+# Enclosures whose relative error exceeds LARGEST_MISS are held against rays.
+LARGEST_MISS = 0.1
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
 PLANAR = 1e-2
 # Number of eigenvalues computed to find the least one.
 MODULI = 3
 
 
-def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
-    """The gap from an indexed enclosure; None if it would be inaccurate, or take longer than `time_limited` allows."""
-    if isinstance(law, DensityLaw):
-        found = (_gap_of_enclosures(law, number, tolerance, edge) for number in (ENCLOSED, 2 * ENCLOSED))
-        return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
-    if not suits_panels(law) or is_costly(law):
+def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge, seconds: float) -> SpectralGap | None:
+    """The gap with the least error of the enclosures within a time limit; None without enclosures."""
+    best: SpectralGap | None = None
+    if isinstance(law, DensityLaw) or (suits_panels(law) and not is_costly(law)):
+        with suppress(OutOfTime), time_limited(seconds):
+            for gap in (
+                _of_density(law, tolerance, edge) if isinstance(law, DensityLaw) else _on_panels(law, tolerance, edge)
+            ):
+                best = gap if best is None or gap.error < best.error else best
+                if best.error <= tolerance:
+                    break
+    return best
+
+
+def _of_density(law: DensityLaw, tolerance: float, edge: EssentialEdge) -> Iterator[SpectralGap]:
+    for number in OF_DENSITIES:
+        gap = _gap_of_enclosures(law, enclosures(law, number, tolerance=tolerance), edge)
+        if gap is not None:
+            yield gap
+
+
+def _on_panels(law: Law, tolerance: float, edge: EssentialEdge) -> Iterator[SpectralGap]:
+    """Gaps of growing accuracy. The sequence does not depend on the tolerance if rays are traced."""
+    asked, number, start = COARSEST if is_traced(law) else max(tolerance, SURE), FEWEST, None
+    while number <= MOST and asked > EPS:
+        found = enclosed_trial_space(law, number, None, asked, np.positive, start)
+        start = found.basis.edges
+        gap = _gap_of_enclosures(law, found.enclosures, edge)
+        if gap is not None:
+            yield gap
+        if gap is None or gap.error > asked / CLOSER:
+            number += 1
+        else:
+            asked *= FINER if gap.error <= asked else CLOSER
+
+
+def _gap_of_enclosures(law: Law, found: Enclosures, edge: EssentialEdge) -> SpectralGap | None:
+    """The gap between a trial function, or the edge, and the bound of the largest eigenvalue, or of the rest."""
+    others = [item for item in found if item.index != 0]
+    top = max(others, key=lambda item: item.value, default=None)
+    if top is None or not any(item.index == 0 for item in found):
         return None
-    number = _number_to_enclose(law, edge) or (ENCLOSED if edge.low == 0.0 else None)
-    gap = None if number is None else _gap_of_enclosures(law, number, tolerance, edge)
-    if number is not None and gap is not None and tolerance < gap.error <= tolerance / CLOSER:
-        gap = _gap_of_enclosures(law, number, CLOSER * tolerance, edge) or gap
-    # other bases are hardly better than adapted panels
-    return gap if gap is not None and gap.error <= max(tolerance, LARGEST_MISS * gap.value) else None
-
-
-def _gap_of_enclosures(law: Law, number: int, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
-    found = enclosures(law, number, tolerance=tolerance)
-    listed = [item for item in found if item.label == "indexed" and item.index]
-    top = max(listed, key=lambda item: item.value, default=None)
-    if top is None or top.high >= 1.0:
+    if top.index is not None and top.low > max(found.separation.radius, 0.0) and top.high < 1.0:
+        how, evidence = f"bounds of the eigenvalue; {found.method}", (str(top),)
+        return SpectralGap(
+            1.0 - 0.5 * (top.low + top.high), 0.5 * top.width, top.kind, how, "isolated", evidence, law.frame
+        )
+    # no eigenvalue that is not listed is above the radius
+    reach = max(found.separation.radius, edge.high, *(item.high for item in others if item.index is not None))
+    low = max(edge.low, *(item.low for item in others))
+    if reach >= 1.0:
         return None
-    # no eigenvalue that is not listed may be larger
-    if top.low <= max(found.separation.radius, 0.0):
-        reach = max(found.separation.radius, edge.high, top.high)
-        how = f"bounds of all eigenvalues; {found.method}"
-        evidence = (f"no eigenvalue off the constants is above {reach:.3g}: {found.separation.reason}", *edge.reasons)
-        value, error = 1.0 - 0.5 * (edge.low + reach), 0.5 * (reach - edge.low)
-        return SpectralGap(value, error, "estimate", how, "essential edge", evidence, law.frame)
-    gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
-    return SpectralGap(
-        gap, error, top.kind, f"bounds of the eigenvalue; {found.method}", "isolated", (str(top),), law.frame
-    )
-
-
-def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
-    """The number of eigenvalues of largest modulus that include the largest one off the constants, by a pilot run.
-
-    None if the largest eigenvalue is not beyond the essential spectrum.
-    """
-    pilot = adapted_trial_space(law, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS)
-    values = pilot.values[np.argsort(-np.abs(pilot.values), kind="stable")]
-    found = np.flatnonzero(values[1:] > edge.high)
-    return int(found[0]) + 2 if found.size else None
+    verdict: Verdict = "isolated" if low > edge.high else "essential edge" if reach <= edge.high else "undecided"
+    how = f"bounds of all eigenvalues; {found.method}"
+    evidence = (f"no eigenvalue off the constants is above {reach:.3g}: {found.separation.reason}", *edge.reasons)
+    return SpectralGap(1.0 - 0.5 * (low + reach), 0.5 * (reach - low), "estimate", how, verdict, evidence, law.frame)
 
 
 @reported("spectral gap")
@@ -305,13 +318,17 @@ def _by_matrices(
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
-    for wanted in dict.fromkeys((tolerance, *(max(tolerance, sure) for sure in SURE_TOLERANCES))):
-        with suppress(OutOfTime), time_limited((1.0 - RAYS_FRACTION) * seconds):
-            enclosed = enclosed_gap(law, wanted, edge)
-            if enclosed is not None:
-                return enclosed
-            # in time, but not exact enough: a larger tolerance does not help
-            break
+    enclosed = enclosed_gap(law, tolerance, edge, seconds)
+    if enclosed is not None and enclosed.error <= max(tolerance, LARGEST_MISS * enclosed.value):
+        return enclosed
+    sampled = _by_rays(law, tolerance, rng, seconds, edge)
+    # the gap of slow functions is an upper bound, which faster ones may refute
+    refuted = enclosed is not None and sampled.value - sampled.error > enclosed.value + enclosed.error
+    return sampled if enclosed is None or (sampled.error < enclosed.error and not refuted) else enclosed
+
+
+def _by_rays(law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge) -> SpectralGap:
+    """The gap from Galerkin matrices of growing size."""
     steps = refined(law, tolerance, rng, seconds, edge)
     found, error = steps.finest, steps.error
     evidence = (*steps.evidence, *_lower_bound(law))
