@@ -26,6 +26,8 @@ from .images import ROUNDED, expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
+# Largest fraction of the wanted error on the panels that are not halved.
+LEFT = 0.5
 # A panel must begin below pi/2 by more than this to belong to the left half.
 HALF_ROUNDING = 1e-12
 # Default error of conditional expectations.
@@ -126,8 +128,10 @@ def residuals(
         )
         fraction = (error / wanted)[..., :leading].max(axis=(1, 2))
         affordable = max(most_angles - angles_used, 0) // (2 * len(POINTS))
-        worst = np.argsort(-fraction)[:affordable]
-        worst = worst[(fraction[worst] * len(fraction) > 1.0) & (np.diff(ends[:, worst], axis=0)[0] > NARROWEST)]
+        worst = np.argsort(-fraction)
+        left = fraction.sum() - np.cumsum(fraction[worst])
+        worst = worst[: min(1 + int(np.sum(left > LEFT)), affordable)]
+        worst = worst[np.diff(ends[:, worst], axis=0)[0] > NARROWEST]
         if np.all((error.sum(axis=0) <= wanted)[:, :leading]):
             break
         middle = ends[:, worst].mean(axis=0)
