@@ -206,11 +206,15 @@ def enclosures(
 
 @dataclass(frozen=True)
 class EnclosedTrialSpace:
-    """Enclosures with their trial functions; ``vectors``, shape (n, k), holds coefficients in ``basis``."""
+    """Enclosures with their trial functions; ``vectors``, shape (n, k), holds coefficients in ``basis``.
+
+    From the edges ``finer`` the panels of a smaller tolerance begin.
+    """
 
     enclosures: Enclosures
     basis: Basis
     vectors: Floats
+    finer: Floats | None = None
 
     @property
     def worst(self) -> float:
@@ -233,7 +237,7 @@ def enclosed_trial_space(
 ) -> EnclosedTrialSpace:
     """The result of `enclosures` for a self-adjoint law, with the trial functions.
 
-    On adapted panels the first edges may be given. By value (``rank`` is np.positive) the separation bounds the rest of
+    The ``finer`` edges of an earlier result may be the first ones. By value (``rank`` is np.positive) the separation bounds the rest of
     the spectrum from above only.
     """
     if basis is None and suits_panels(law):
@@ -246,19 +250,19 @@ def enclosed_trial_space(
             mirrored=space.mirrored, quotient_error=QUOTIENT_FRACTION * tolerance, leading=len(values),
         )  # fmt: skip
         found, after = both.split(len(values))
-        next_value = _reach(after, rank)
+        next_value, finer = _reach(after, rank), space.finer
     else:
         if basis is None:
             basis = Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
         values, vectors, names, next_value = _trial(law, basis, k, tolerance)
-        found = residuals(law, basis, vectors, values)
+        found, finer = residuals(law, basis, vectors, values), None
     order = np.argsort(-rank(found.quotients), kind="stable")
     apart = _first_that_separates(law, found, order, next_value, rank)
     method = f"trial functions in {basis!r}, residuals by adaptive quadrature at {found.angles_used} angles"
     # exact if images are computed to rounding; otherwise the difference of two rules estimates their errors
     exact = isinstance(law, ROUNDED) and isinstance(basis, Legendre)
     items = [_enclosed(found, apart, order, position, names, exact) for position in range(len(values))]
-    return EnclosedTrialSpace(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors)
+    return EnclosedTrialSpace(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors, finer)
 
 
 def _with_ties(items: list[Enclosure]) -> tuple[Enclosure, ...]:

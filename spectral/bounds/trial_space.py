@@ -61,6 +61,8 @@ class TrialSpace:
         Parities of ``vectors``.
     mirrored : bool
         Whether every function is even or odd under theta -> pi - theta.
+    finer : array
+        Edges of the panels of another level, up to pi/2 if ``mirrored``.
     """
 
     basis: Panels
@@ -70,6 +72,7 @@ class TrialSpace:
     following: Floats
     parities: tuple[Parity, ...]
     mirrored: bool
+    finer: Floats
 
 
 def adapted_trial_space(
@@ -77,7 +80,7 @@ def adapted_trial_space(
 ) -> TrialSpace:
     """Trial functions for the k eigenvalues of highest rank, with Kato-Temple bounds of about the tolerance.
 
-    The first panels have the edges ``start``, those of an earlier space.
+    The first panels have the edges ``start``, the ``finer`` ones of an earlier space.
 
     Notes
     -----
@@ -93,8 +96,6 @@ def _adapted(law: Law, k: int, tolerance: float, rank: Rank, start: Floats | Non
     """The trial functions; the bar shows their residual."""
     mirrored = bool(law.mirror_symmetric)
     edges, most_panels = _first_edges(law, mirrored) if start is None else start, MOST_PANELS[is_traced(law)]
-    if mirrored and start is not None:
-        edges = edges[: len(edges) // 2 + 1]
     goal, before = float(np.sqrt(tolerance)), None
     for number in count(1):
         level = _Level(law, edges, mirrored, MEAN_FRACTION * goal)
@@ -105,16 +106,17 @@ def _adapted(law: Law, k: int, tolerance: float, rank: Rank, start: Floats | Non
         joint = float(np.sqrt(squares[:, :k].sum()))
         bar.describe(f"residual {joint:.1g}, asked for {goal:.1g}")
         bar.update()
+        now = _Residuals(edges, squares[:, :k].sum(axis=1))
+        finer = _divided(now, before, goal, mirrored)
         if joint <= goal or number == MOST_LEVELS or len(edges) > most_panels:
             break
-        now = _Residuals(edges, squares[:, :k].sum(axis=1))
-        edges, before = _divided(now, before, goal, mirrored), now
+        edges, before = finer, now
     first = np.arange(1, k)[np.argsort(-values[1:k], kind="stable")]
     chosen = np.append(0, first)
     whole = level.extended(vectors, parity)
     return TrialSpace(
         level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:],
-        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored,
+        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored, finer,
     )  # fmt: skip
 
 

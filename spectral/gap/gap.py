@@ -73,7 +73,7 @@ def _on_panels(law: Law, tolerance: float, edge: EssentialEdge) -> Iterator[Spec
     asked, number, start = COARSEST if is_traced(law) else max(tolerance, SURE), FEWEST, None
     while number <= MOST and asked > EPS:
         found = enclosed_trial_space(law, number, None, asked, np.positive, start)
-        start = found.basis.edges
+        start = found.finer
         gap = _gap_of_enclosures(law, found.enclosures, edge)
         if gap is not None:
             yield gap
