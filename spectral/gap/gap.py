@@ -22,6 +22,7 @@ from ..bounds.enclosure import Enclosures, as_power, enclosed_trial_space, enclo
 from ..bounds.images import ROUNDED, is_costly, is_traced, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
+from ..bounds.trial_space import Rank
 from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, Verdict, matrix_spectrum
 from ..essential.compact import compact_matrix
 from ..essential.edge import EssentialEdge, essential_edge
@@ -35,10 +36,11 @@ from .verdict import SpectralGap, isolated, made_from
 
 # Numbers of enclosed eigenvalues with the constants: of densities by modulus, of other laws the largest values.
 OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
-# Enclosures of traced walls begin with the tolerance COARSEST, others with the one asked for, or SURE if it is smaller.
-# Each is computed from the panels of the one before, for FINER times its tolerance; from an error that exceeds its
-# tolerance by less than 1/CLOSER, for CLOSER times it; from a larger one, or none, with another eigenvalue.
-COARSEST, SURE, FINER, CLOSER = 1e-2, 1e-9, 0.1, 0.25
+# Enclosures of traced walls begin with the tolerance COARSEST, others with the one asked for or the first of SURE. Each is
+# computed from the panels of the one before, for FINER times its tolerance; from an error that exceeds its tolerance by
+# less than 1/CLOSER, for CLOSER times it; from a larger one, or none, with another eigenvalue. Where enclosures of
+# densities take too long, those for the tolerances SURE are tried.
+COARSEST, SURE, FINER, CLOSER = 1e-2, (1e-9, 1e-6), 0.1, 0.25
 # Enclosures whose relative error exceeds LARGEST_MISS are held against rays.
 LARGEST_MISS = 0.1
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
@@ -47,34 +49,37 @@ PLANAR = 1e-2
 MODULI = 3
 
 
-def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge, seconds: float) -> SpectralGap | None:
-    """The gap with the least error of the enclosures within a time limit; None without enclosures."""
+def enclosed_gap(
+    law: Law, tolerance: float, edge: EssentialEdge, seconds: float, rank: Rank = np.positive
+) -> SpectralGap | None:
+    """The gap, or 1 - slem if ranked by modulus, with the least error within a time limit; None without enclosures."""
     best: SpectralGap | None = None
-    if isinstance(law, DensityLaw) or (suits_panels(law) and not is_costly(law)):
+    if isinstance(law, DensityLaw):
+        return _of_density(law, tolerance, edge, seconds)
+    if suits_panels(law) and not is_costly(law):
         with suppress(OutOfTime), time_limited(seconds):
-            for gap in (
-                _of_density(law, tolerance, edge) if isinstance(law, DensityLaw) else _on_panels(law, tolerance, edge)
-            ):
+            for gap in _on_panels(law, tolerance, edge, rank):
                 best = gap if best is None or gap.error < best.error else best
                 if best.error <= tolerance:
                     break
     return best
 
 
-def _of_density(law: DensityLaw, tolerance: float, edge: EssentialEdge) -> Iterator[SpectralGap]:
-    for number in OF_DENSITIES:
-        gap = _gap_of_enclosures(law, enclosures(law, number, tolerance=tolerance), edge)
-        if gap is not None:
-            yield gap
+def _of_density(law: DensityLaw, tolerance: float, edge: EssentialEdge, seconds: float) -> SpectralGap | None:
+    for wanted in dict.fromkeys((tolerance, *(max(tolerance, sure) for sure in SURE))):
+        with suppress(OutOfTime), time_limited(seconds):
+            found = (_gap_of(law, enclosures(law, number, tolerance=wanted), edge) for number in OF_DENSITIES)
+            # in time, but not exact enough: a larger tolerance does not help
+            return next((gap for gap in found if gap is not None and gap.error <= wanted), None)
+    return None
 
 
-def _on_panels(law: Law, tolerance: float, edge: EssentialEdge) -> Iterator[SpectralGap]:
+def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> Iterator[SpectralGap]:
     """Gaps of growing accuracy. The sequence does not depend on the tolerance if rays are traced."""
-    asked, number, start = COARSEST if is_traced(law) else max(tolerance, SURE), FEWEST, None
+    asked, number, start = COARSEST if is_traced(law) else max(tolerance, SURE[0]), FEWEST, None
     while number <= MOST and asked > EPS:
-        found = enclosed_trial_space(law, number, None, asked, np.positive, start)
-        start = found.finer
-        gap = _gap_of_enclosures(law, found.enclosures, edge)
+        found = enclosed_trial_space(law, number, None, asked, rank, start)
+        start, gap = found.finer, _gap_of(law, found.enclosures, edge, rank)
         if gap is not None:
             yield gap
         if gap is None or gap.error > asked / CLOSER:
@@ -83,17 +88,19 @@ def _on_panels(law: Law, tolerance: float, edge: EssentialEdge) -> Iterator[Spec
             asked *= FINER if gap.error <= asked else CLOSER
 
 
-def _gap_of_enclosures(law: Law, found: Enclosures, edge: EssentialEdge) -> SpectralGap | None:
+def _gap_of(law: Law, found: Enclosures, edge: EssentialEdge, rank: Rank = np.positive) -> SpectralGap | None:
     """The gap between a trial function, or the edge, and the bound of the largest eigenvalue, or of the rest."""
-    others = [item for item in found if item.index != 0]
+    others = [
+        replace(item, value=-item.value, low=-item.high, high=-item.low) if rank(item.value) > item.value else item
+        for item in found if item.index != 0
+    ]  # fmt: skip
     top = max(others, key=lambda item: item.value, default=None)
-    if top is None or not any(item.index == 0 for item in found):
+    if top is None or len(others) == len(found):
         return None
     if top.index is not None and top.low > max(found.separation.radius, 0.0) and top.high < 1.0:
         how, evidence = f"bounds of the eigenvalue; {found.method}", (str(top),)
-        return SpectralGap(
-            1.0 - 0.5 * (top.low + top.high), 0.5 * top.width, top.kind, how, "isolated", evidence, law.frame
-        )
+        value, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
+        return SpectralGap(value, error, top.kind, how, "isolated", evidence, law.frame)
     # no eigenvalue that is not listed is above the radius
     reach = max(found.separation.radius, edge.high, *(item.high for item in others if item.index is not None))
     low = max(edge.low, *(item.low for item in others))
@@ -229,6 +236,10 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small
+    if is_traced(law) and gap_by_theorem(law) is None:
+        found = enclosed_gap(law, tolerance, essential_edge(law), time_limit, np.abs)
+        if found is not None and found.error <= max(tolerance, LARGEST_MISS * found.value):
+            return held_against_oscillations(law, found)
     upper = spectral_gap(law, tolerance, rng, time_limit=time_limit)
     if upper.verdict == "no gap" or lambertian_fraction(law) == upper.value:
         # the slem is 1, or is the norm 1 - a of the rest of a law with a Lambertian fraction a
