@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -39,7 +40,7 @@ def chain(number: int, pieces: int) -> geo.Wall:
             [
                 geo.Bezier([a, *((a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]) - 0.2 * rng.random())
                                  for f in (1 / 3, 2 / 3)), b])
-                for a, b in zip(joints, joints[1:], strict=False)
+                for a, b in pairwise(joints)
             ]
         )  # fmt: skip
 

@@ -237,8 +237,8 @@ def enclosed_trial_space(
 ) -> EnclosedTrialSpace:
     """The result of `enclosures` for a self-adjoint law, with the trial functions.
 
-    The ``finer`` edges of an earlier result may be the first ones. By value (``rank`` is np.positive) the separation bounds the rest of
-    the spectrum from above only.
+    The ``finer`` edges of an earlier result may be the first ones. By value (``rank`` is np.positive) the separation
+    bounds the rest of the spectrum from above only.
     """
     if basis is None and suits_panels(law):
         space = adapted_trial_space(law, k, TRIAL_FRACTION * tolerance, rank, start)

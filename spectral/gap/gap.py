@@ -36,11 +36,12 @@ from .verdict import SpectralGap, isolated, made_from
 
 # Numbers of enclosed eigenvalues with the constants: of densities by modulus, of other laws the largest values.
 OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
-# Enclosures of traced walls begin with the tolerance COARSEST, others with the one asked for or the first of SURE. Each is
-# computed from the panels of the one before, for FINER times its tolerance; from an error that exceeds its tolerance by
-# less than 1/CLOSER, for CLOSER times it; from a larger one, or none, with another eigenvalue. Where enclosures of
-# densities take too long, those for the tolerances SURE are tried.
-COARSEST, SURE, FINER, CLOSER = 1e-2, (1e-9, 1e-6), 0.1, 0.25
+# Enclosures are computed to these tolerances, each from the panels of the one before; for laws without rays to the one
+# asked for. Where an error exceeds the tolerance by less than 1/CLOSER, the tolerance is reduced by CLOSER; where it
+# exceeds it by more, or there is none, another eigenvalue is enclosed.
+TOLERANCES, CLOSER = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), 0.25
+# Where enclosures of densities take too long, these tolerances are tried.
+SURE = 1e-9, 1e-6
 # Enclosures whose relative error exceeds LARGEST_MISS are held against rays.
 LARGEST_MISS = 0.1
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
@@ -76,16 +77,22 @@ def _of_density(law: DensityLaw, tolerance: float, edge: EssentialEdge, seconds:
 
 def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> Iterator[SpectralGap]:
     """Gaps of growing accuracy. The sequence does not depend on the tolerance if rays are traced."""
-    asked, number, start = COARSEST if is_traced(law) else max(tolerance, SURE[0]), FEWEST, None
-    while number <= MOST and asked > EPS:
-        found = enclosed_trial_space(law, number, None, asked, rank, start)
-        start, gap = found.finer, _gap_of(law, found.enclosures, edge, rank)
-        if gap is not None:
-            yield gap
-        if gap is None or gap.error > asked / CLOSER:
-            number += 1
-        else:
-            asked *= FINER if gap.error <= asked else CLOSER
+    number, start = FEWEST, None
+    for wanted in TOLERANCES if is_traced(law) else (tolerance,):
+        asked, missed = wanted, True
+        while missed and number <= MOST:
+            found = enclosed_trial_space(law, number, None, asked, rank, start)
+            if edge.low > 0.0 and all(rank(item.value) <= edge.high for item in found.enclosures if item.index != 0):
+                # the edge is the answer
+                return
+            start, gap = found.finer, _gap_of(law, found.enclosures, edge, rank)
+            if gap is not None:
+                yield gap
+            missed = gap is None or gap.error > wanted
+            if gap is None or gap.error > wanted / CLOSER:
+                number += 1
+            else:
+                asked *= CLOSER
 
 
 def _gap_of(law: Law, found: Enclosures, edge: EssentialEdge, rank: Rank = np.positive) -> SpectralGap | None:
