@@ -243,11 +243,14 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small
-    if is_traced(law) and gap_by_theorem(law) is None:
-        found = enclosed_gap(law, tolerance, essential_edge(law), time_limit, np.abs)
+    edge = essential_edge(law)
+    if is_traced(law) and edge.high < 1.0 and gap_by_theorem(law) is None:
+        found = enclosed_gap(law, tolerance, edge, time_limit, np.abs)
         if found is not None and found.error <= max(tolerance, LARGEST_MISS * found.value):
             return held_against_oscillations(law, found)
-    upper = spectral_gap(law, tolerance, rng, time_limit=time_limit)
+        upper = _by_rays(law, tolerance, generator(rng, 0), time_limit, edge)
+    else:
+        upper = spectral_gap(law, tolerance, rng, time_limit=time_limit)
     if upper.verdict == "no gap" or lambertian_fraction(law) == upper.value:
         # the slem is 1, or is the norm 1 - a of the rest of a law with a Lambertian fraction a
         return upper
@@ -255,7 +258,6 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     lowest = int(np.argmin(listed.values))
     least, error = -float(listed.values[lowest]), float(listed.errors.total()[lowest])
     top = 1.0 - upper.value
-    edge = essential_edge(law)
     if least + error < top - upper.error or least <= edge.high:
         # the edge bounds the modulus of the essential spectrum, because the parts of the law are positive operators
         return upper
