@@ -33,7 +33,7 @@ LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
 MATRIX_TOLERANCE = 1e-8
 # Fraction of the width of an enclosure for squared residuals, and for errors of quotients, of adapted trial functions;
 # limits on the incoming angles for the quotients, for traced laws and for closed forms.
-TRIAL_FRACTION, QUOTIENT_FRACTION, MOST_TRACED_ANGLES, MOST_EXACT_ANGLES = 0.3, 0.5, 4_000, 40_000
+TRIAL_FRACTION, MOST_TRACED_ANGLES, MOST_EXACT_ANGLES = 0.3, 4_000, 40_000
 # Rounding of a Rayleigh quotient, a pairwise sum of some hundred products.
 QUOTIENT_ROUNDING = 4.0 * EPS
 
@@ -228,13 +228,9 @@ class EnclosedTrialSpace:
 
 
 def enclosed_trial_space(
-    law: Law,
-    k: int,
-    basis: Basis | None = None,
-    tolerance: float = MATRIX_TOLERANCE,
-    rank: Rank = np.abs,
+    law: Law, k: int, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE, rank: Rank = np.abs,
     start: Floats | None = None,
-) -> EnclosedTrialSpace:
+) -> EnclosedTrialSpace:  # fmt: skip
     """The result of `enclosures` for a self-adjoint law, with the trial functions.
 
     The ``finer`` edges of an earlier result may be the first ones. By value (``rank`` is np.positive) the separation
@@ -247,7 +243,7 @@ def enclosed_trial_space(
         both = residuals(
             law, basis, np.column_stack([vectors, space.following]), np.append(values, space.following_values),
             MOST_TRACED_ANGLES if is_traced(law) else MOST_EXACT_ANGLES,
-            mirrored=space.mirrored, quotient_error=QUOTIENT_FRACTION * tolerance, leading=len(values),
+            mirrored=space.mirrored, quotient_error=TRIAL_FRACTION * tolerance, leading=len(values),
         )  # fmt: skip
         found, after = both.split(len(values))
         next_value, finer = _reach(after, rank), space.finer
@@ -408,13 +404,9 @@ def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
 
 
 def _enclosed(
-    found: Residuals,
-    known: tuple[int, Separation],
-    order: NDArray[np.intp],
-    position: int,
-    names: tuple[Parity, ...],
-    exact: bool,
-) -> Enclosure:
+    found: Residuals, known: tuple[int, Separation], order: NDArray[np.intp], position: int,
+    names: tuple[Parity, ...], exact: bool,
+) -> Enclosure:  # fmt: skip
     number, apart = known
     own = names[position]
     value, norm = float(found.quotients[position]), float(found.norms[position])

@@ -26,8 +26,6 @@ from .images import ROUNDED, expectations_of
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
-# Largest fraction of the wanted error on the panels that are not halved.
-LEFT = 0.5
 # A panel must begin below pi/2 by more than this to belong to the left half.
 HALF_ROUNDING = 1e-12
 # Default error of conditional expectations.
@@ -73,16 +71,9 @@ class Residuals:
 
 
 def residuals(
-    law: Law,
-    basis: Basis,
-    vectors: Floats,
-    values: Floats,
-    most_angles: int = MOST_ANGLES,
-    *,
-    mirrored: bool = False,
-    quotient_error: float = 0.0,
-    leading: int | None = None,
-) -> Residuals:
+    law: Law, basis: Basis, vectors: Floats, values: Floats, most_angles: int = MOST_ANGLES, *,
+    mirrored: bool = False, quotient_error: float = 0.0, leading: int | None = None,
+) -> Residuals:  # fmt: skip
     """Rayleigh quotients and residuals of the functions with the coefficients ``vectors``, shape (n, k).
 
     ``values``, shape (k,), are approximate eigenvalues. ||P v - rho v||^2 is integrated directly; the difference
@@ -120,18 +111,12 @@ def residuals(
         )
         square = total[:, 1].sum(axis=0)
         # a Kato-Temple bound adds about the square to the quotient, so the error of the quotient should be smaller
-        wanted = np.stack(
-            [
-                np.maximum(FRACTION * square + 4.0 * EPS, quotient_error),
-                np.maximum(FRACTION * square + (8.0 * EPS) ** 2, FRACTION * quotient_error),
-            ]
-        )
+        least, rounding = np.array([[1.0], [FRACTION]]) * quotient_error, np.array([[4.0 * EPS], [(8.0 * EPS) ** 2]])
+        wanted = np.maximum(FRACTION * square + rounding, least)
         fraction = (error / wanted)[..., :leading].max(axis=(1, 2))
         affordable = max(most_angles - angles_used, 0) // (2 * len(POINTS))
-        worst = np.argsort(-fraction)
-        left = fraction.sum() - np.cumsum(fraction[worst])
-        worst = worst[: min(1 + int(np.sum(left > LEFT)), affordable)]
-        worst = worst[np.diff(ends[:, worst], axis=0)[0] > NARROWEST]
+        worst = np.argsort(-fraction)[:affordable]
+        worst = worst[(fraction[worst] * len(fraction) > 1.0) & (np.diff(ends[:, worst], axis=0)[0] > NARROWEST)]
         if np.all((error.sum(axis=0) <= wanted)[:, :leading]):
             break
         middle = ends[:, worst].mean(axis=0)
@@ -171,13 +156,9 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats, float]:
 
 
 def _integrals(
-    function: Callable[[Floats], tuple[Floats, Floats, Floats]],
-    values: Floats,
-    low: Floats,
-    high: Floats,
-    copies: float,
-    rules: Floats,
-) -> tuple[Floats, Floats, Floats]:
+    function: Callable[[Floats], tuple[Floats, Floats, Floats]], values: Floats, low: Floats, high: Floats,
+    copies: float, rules: Floats,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """Integrals of v (P v - rho v) and (P v - rho v)^2 over each panel, their errors, and effects of those of means.
 
     The function gives v, P v, shape (angles, k), and the errors of P v. An error e of P v adds e v to the first
@@ -189,13 +170,8 @@ def _integrals(
     rest, uncertainty = image - here * values, mean_error[:, None]
     shape = (*angle.shape, len(values))
     parts = np.stack([(here * rest).reshape(shape), (rest * rest).reshape(shape)], axis=2)
-    uncertainties = np.stack(
-        [
-            (np.abs(here) * uncertainty).reshape(shape),
-            ((2.0 * np.abs(rest) + uncertainty) * uncertainty).reshape(shape),
-        ],
-        2,
-    )
+    effects = np.abs(here) * uncertainty, (2.0 * np.abs(rest) + uncertainty) * uncertainty
+    uncertainties = np.stack([effect.reshape(shape) for effect in effects], axis=2)
     weight = copies * half[:, None, None, None] * SINE.density(angle)[..., None, None]
     at_nodes, at_ends = np.split(weight * parts, [len(NODES)], axis=1)
     beyond = (1.0 - NODES.max()) * np.abs(at_ends - np.einsum("eq,pqjk->pejk", AT_ENDS, at_nodes)).sum(axis=1)

@@ -29,7 +29,7 @@ from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
-from .refinement import EIGENVALUES, HOW, Refinement, refined
+from .refinement import EIGENVALUES, HOW, refined
 from .shallow import shallow_gap
 from .theorems import gap_by_theorem, gap_of_exact, split_gap
 from .verdict import SpectralGap, isolated, made_from
@@ -42,8 +42,9 @@ OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
 TOLERANCES, CLOSER = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), 0.25
 # Where enclosures of densities take too long, these tolerances are tried.
 SURE = 1e-9, 1e-6
-# Enclosures whose relative error exceeds LARGEST_MISS are held against rays.
-LARGEST_MISS = 0.1
+# A gap by a compact matrix is held against other methods if its relative error exceeds LARGEST_MISS, one by enclosures
+# against rays if it exceeds ROUGH.
+LARGEST_MISS, ROUGH = 1e-3, 0.1
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
 PLANAR = 1e-2
 # Number of eigenvalues computed to find the least one.
@@ -246,7 +247,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     edge = essential_edge(law)
     if is_traced(law) and edge.high < 1.0 and gap_by_theorem(law) is None:
         found = enclosed_gap(law, tolerance, edge, time_limit, np.abs)
-        if found is not None and found.error <= max(tolerance, LARGEST_MISS * found.value):
+        if found is not None and found.error <= max(tolerance, ROUGH * found.value):
             return held_against_oscillations(law, found)
         upper = _by_rays(law, tolerance, generator(rng, 0), time_limit, edge)
     else:
@@ -339,7 +340,7 @@ def _by_matrices(
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
     enclosed = enclosed_gap(law, tolerance, edge, seconds)
-    if enclosed is not None and enclosed.error <= max(tolerance, LARGEST_MISS * enclosed.value):
+    if enclosed is not None and enclosed.error <= max(tolerance, ROUGH * enclosed.value):
         return enclosed
     sampled = _by_rays(law, tolerance, rng, seconds, edge)
     # the gap of slow functions is an upper bound, which faster ones may refute
@@ -356,19 +357,15 @@ def _by_rays(law: Law, tolerance: float, rng: np.random.Generator, seconds: floa
     if gap is not None:
         return gap
     reasons, top = (*edge.reasons, *evidence), 1.0 - found.gap
-    if edge.low > 0.0 and top < edge.high + steps.noise and _is_relevant(edge, steps):
+    # the error of the edge is less than its distance from the largest eigenvalue
+    relevant = edge.error <= max(edge.value - top, steps.noise, 1e-3 * (1.0 - edge.value))
+    if edge.low > 0.0 and top < edge.high + steps.noise and relevant:
         short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
         return _at_edge(law, edge, (*reasons, short), found, steps.overshoot(edge.high))
     # without convergence the two-grid error is meaningless; the gap of a Galerkin matrix is an upper bound
     method = made_from(found, "not converged: an upper bound but for its noise")
     error = max(error, abs(found.gap))
     return SpectralGap(found.gap, error, "estimate", method, "undecided", reasons, law.frame, found)
-
-
-def _is_relevant(edge: EssentialEdge, steps: Refinement) -> bool:
-    """Whether the error of the edge is less than its distance from the largest eigenvalue of the refinement."""
-    top = 1.0 - steps.finest.gap
-    return edge.error <= max(edge.value - top, steps.noise, 1e-3 * (1.0 - edge.value))
 
 
 def _at_edge(
