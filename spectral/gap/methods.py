@@ -24,9 +24,9 @@ DEGREES = (48, 96)
 MATRIX_FRACTION = 0.1
 # Enclosures are first computed with FIRST times the tolerance, because they are wider than asked. Up to ATTEMPTS times
 # the tolerance is reduced, by SMALLEST_STEP at most, as long as the width decreases by the factor WORTHWHILE.
-FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 3, 1e-3, 0.5
+FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 6, 0.03, 0.5
 # Of traced walls the first enclosures have at least this tolerance.
-COARSE = 1e-3
+COARSE = 1e-2
 # Limit on the enclosed eigenvalues in the search for the largest one off the constants.
 MOST_ENCLOSED = 24
 
