@@ -42,9 +42,8 @@ OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
 TOLERANCES, CLOSER = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), 0.25
 # Where enclosures of densities take too long, these tolerances are tried.
 SURE = 1e-9, 1e-6
-# A gap by a compact matrix is held against other methods if its relative error exceeds LARGEST_MISS, one by enclosures
-# against rays if it exceeds ROUGH.
-LARGEST_MISS, ROUGH = 1e-3, 0.1
+# A gap that misses its tolerance is held against other methods if its relative error exceeds this.
+LARGEST_MISS = 1e-3
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
 PLANAR = 1e-2
 # Number of eigenvalues computed to find the least one.
@@ -143,9 +142,9 @@ def spectral_gap(
     rng : None, int or numpy.random.Generator
         Source of rays for traced laws; by default ``np.random.default_rng(0)``.
     time_limit : float
-        Limit in seconds: half for the enclosures of a traced law, half for the rays if these fail. It is counted as one
-        to five million ray segments or some 200,000 to a million rays a second, so that the result does not depend on
-        the machine. A longer limit allows more rays, hence a smaller error.
+        Limit in seconds for the enclosures of a traced law, and half of it again for rays if these fail. It is counted
+        as seven to ten million ray segments or some 200,000 to a million rays a second, so that the result does not
+        depend on the machine. A longer limit continues the same enclosures, and never makes them worse.
 
     Returns
     -------
@@ -163,6 +162,9 @@ def spectral_gap(
     essential spectrum. Enclosures, or Galerkin matrices, whose eigenvalues above the edge converge from below, decide
     whether an eigenvalue lies beyond the edge. If so, the gap is *isolated*. If the eigenvalues on all bases stay below
     the edge, the gap ends at the *essential edge*.
+
+    Enclosures of traced laws become more accurate in steps, 1e-2, 1e-3, 1e-4, 1e-6 and 1e-9, each from the panels of the
+    one before, until the tolerance is reached or the time is over; the best of them is the result.
 
     A law P J that is not self-adjoint in its convention, such as the law of a wall without mirror symmetry in the
     specular frame, need not have a real spectrum. The value is then 1 - ||P J|| on functions of mean 0, where ||P J||
@@ -247,7 +249,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     edge = essential_edge(law)
     if is_traced(law) and edge.high < 1.0 and gap_by_theorem(law) is None:
         found = enclosed_gap(law, tolerance, edge, time_limit, np.abs)
-        if found is not None and found.error <= max(tolerance, ROUGH * found.value):
+        if found is not None and found.error <= max(tolerance, LARGEST_MISS * found.value):
             return held_against_oscillations(law, found)
         upper = _by_rays(law, tolerance, generator(rng, 0), time_limit, edge)
     else:
@@ -340,7 +342,7 @@ def _by_matrices(
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
     enclosed = enclosed_gap(law, tolerance, edge, seconds)
-    if enclosed is not None and enclosed.error <= max(tolerance, ROUGH * enclosed.value):
+    if enclosed is not None and enclosed.error <= max(tolerance, LARGEST_MISS * enclosed.value):
         return enclosed
     sampled = _by_rays(law, tolerance, rng, seconds, edge)
     # the gap of slow functions is an upper bound, which faster ones may refute
