@@ -163,8 +163,8 @@ def spectral_gap(
     whether an eigenvalue lies beyond the edge. If so, the gap is *isolated*. If the eigenvalues on all bases stay below
     the edge, the gap ends at the *essential edge*.
 
-    Enclosures of traced laws become more accurate in steps, 1e-2, 1e-3, 1e-4, 1e-6 and 1e-9, each from the panels of the
-    one before, until the tolerance is reached or the time is over; the best of them is the result.
+    Enclosures of traced laws become more accurate in steps, 1e-2, 1e-3, 1e-4, 1e-6 and 1e-9, each from the panels of
+    the one before, until the tolerance is reached or the time is over; the best of them is the result.
 
     A law P J that is not self-adjoint in its convention, such as the law of a wall without mirror symmetry in the
     specular frame, need not have a real spectrum. The value is then 1 - ||P J|| on functions of mean 0, where ||P J||
