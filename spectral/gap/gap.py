@@ -82,7 +82,8 @@ def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> I
         asked, missed = wanted, True
         while missed and number <= MOST:
             found = enclosed_trial_space(law, number, None, asked, rank, start)
-            if edge.low > 0.0 and all(rank(item.value) <= edge.high for item in found.enclosures if item.index != 0):
+            values = np.array([item.value for item in found.enclosures if item.index != 0])
+            if edge.low > 0.0 and np.all(rank(values) <= edge.high):
                 # the edge is the answer
                 return
             start, gap = found.finer, _gap_of(law, found.enclosures, edge, rank)
@@ -98,16 +99,15 @@ def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> I
 def _gap_of(law: Law, found: Enclosures, edge: EssentialEdge, rank: Rank = np.positive) -> SpectralGap | None:
     """The gap between a trial function, or the edge, and the bound of the largest eigenvalue, or of the rest."""
     others = [
-        replace(item, value=-item.value, low=-item.high, high=-item.low) if rank(item.value) > item.value else item
+        replace(item, value=-item.value, low=-item.high, high=-item.low) if rank is np.abs and item.value < 0.0 else item
         for item in found if item.index != 0
     ]  # fmt: skip
     top = max(others, key=lambda item: item.value, default=None)
     if top is None or len(others) == len(found):
         return None
     if top.index is not None and top.low > max(found.separation.radius, 0.0) and top.high < 1.0:
-        how, evidence = f"bounds of the eigenvalue; {found.method}", (str(top),)
-        value, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
-        return SpectralGap(value, error, top.kind, how, "isolated", evidence, law.frame)
+        how, value = f"bounds of the eigenvalue; {found.method}", 1.0 - 0.5 * (top.low + top.high)
+        return SpectralGap(value, 0.5 * top.width, top.kind, how, "isolated", (str(top),), law.frame)
     # no eigenvalue that is not listed is above the radius
     reach = max(found.separation.radius, edge.high, *(item.high for item in others if item.index is not None))
     low = max(edge.low, *(item.low for item in others))
