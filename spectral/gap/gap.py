@@ -99,7 +99,7 @@ def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> I
 def _gap_of(law: Law, found: Enclosures, edge: EssentialEdge, rank: Rank = np.positive) -> SpectralGap | None:
     """The gap between a trial function, or the edge, and the bound of the largest eigenvalue, or of the rest."""
     others = [
-        replace(item, value=-item.value, low=-item.high, high=-item.low) if rank is np.abs and item.value < 0.0 else item
+        replace(item, value=-item.value, low=-item.high, high=-item.low) if rank is np.abs and item.value < 0 else item
         for item in found if item.index != 0
     ]  # fmt: skip
     top = max(others, key=lambda item: item.value, default=None)
