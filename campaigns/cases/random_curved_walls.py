@@ -83,9 +83,9 @@ def _attempt(kind, rng):
     return geo.Wall(pieces, period=1.25 if kind % 3 == 0 else 1.0)
 
 
-def random_curved_wall(kind: int) -> geo.Wall:
-    """Wall number ``kind`` of COUNT: the first valid attempt of its own fixed generator."""
-    rng = np.random.default_rng([20261121, kind])
+def random_curved_wall(kind: int, seed: int = 20261121) -> geo.Wall:
+    """Wall number ``kind`` of COUNT, or of another seed: the first valid attempt of its own fixed generator."""
+    rng = np.random.default_rng([seed, kind])
     while True:
         try:
             return _attempt(kind, rng)

@@ -50,7 +50,7 @@ Case = tuple[int, geo.Wall]
 Reference, Edge = tuple[Floats, float], tuple[float, float]
 
 
-def _first_valid(seed: int, number: int, attempt: Callable[[np.random.Generator], geo.Wall]) -> geo.Wall:
+def first_valid(seed: int, number: int, attempt: Callable[[np.random.Generator], geo.Wall]) -> geo.Wall:
     rng = np.random.default_rng([seed, number])
     while True:
         try:
@@ -74,7 +74,7 @@ def island_wall(number: int) -> geo.Wall:
             island = [geo.Segment(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
         return geo.Wall(wall.pieces, wall.period, islands=[island])
 
-    return _first_valid(20261122, number, attempt)
+    return first_valid(20261122, number, attempt)
 
 
 def mirrored_wall(number: int) -> geo.Wall:
@@ -88,7 +88,7 @@ def mirrored_wall(number: int) -> geo.Wall:
         between = [geo.Segment((end, y), (1.0 - end, y))] if number % 2 else []
         return geo.Wall([geo.Bezier(left), *between, geo.Bezier([(1.0 - px, py) for px, py in reversed(left)])])
 
-    return _first_valid(20261123, number, attempt)
+    return first_valid(20261123, number, attempt)
 
 
 def draw(number: int) -> Case:

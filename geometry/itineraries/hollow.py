@@ -35,6 +35,8 @@ MANY_CHANGES = 16
 SAMPLE_DISTANCE = 0.1
 # Critical angles per search, and the least width of their pieces as a fraction of the widest piece.
 MOST_CUTS, CUT_FRACTION = 6, 0.1
+# Nominal time of an incoming angle beside its ray segments, in seconds.
+ANGLE_TIME = 2e-4
 # Samples per incoming angle, at irregular positions, so that no symmetry of the wall hides a piece from all samples.
 FIRST_SAMPLES = 32
 GOLDEN = 0.6180339887498949
@@ -181,7 +183,7 @@ class HollowConditionals:
         self.rays += sum(found.rays for found in marched)
         segments = sum(found.segments for found in marched)
         self.segments += segments
-        count_time(segments * self.scene.segment_time)
+        count_time(segments * self.scene.segment_time + len(theta) * ANGLE_TIME)
         found_conditionals = {}
         for angle, width, found in zip(theta.tolist(), least.tolist(), marched, strict=True):
             found_conditionals[angle] = Conditional(*found.nodes, found.error, found.unresolved)

@@ -36,7 +36,7 @@ TREE_LINES = 48
 # Binary digits of coordinates on the grid of coincident Bezier faces; their coefficients have three more.
 GRID_DIGITS = 50
 # Nominal time of a segment in seconds, and how many times as long it takes on Bezier curves.
-SEGMENT_TIME, BEZIER_FACTOR = 2e-7, 4.0
+SEGMENT_TIME, BEZIER_FACTOR = 1e-7, 1.5
 
 
 def corners_of(pieces: Sequence[Curve]) -> NDArray[np.bool_]:
@@ -86,7 +86,7 @@ class Scene(Tables):
 
     @property
     def segment_time(self) -> float:
-        """Nominal time of a segment of a ray in adaptive quadrature, in seconds; measured as .2 and .8 microseconds."""
+        """Nominal time of a segment of a ray in adaptive quadrature, measured as .08 and .14 microseconds."""
         return BEZIER_FACTOR * SEGMENT_TIME if len(self.beziers) else SEGMENT_TIME
 
     @property

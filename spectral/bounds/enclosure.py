@@ -24,7 +24,7 @@ from .contraction import refuse_unless_self_adjoint
 from .images import ROUNDED, is_traced, suits_panels
 from .operator_residuals import Residuals, image_rule, residuals
 from .separation import Separation, rest_of_spectrum
-from .trial_space import adapted_trial_space
+from .trial_space import Rank, adapted_trial_space
 
 Label = Literal["indexed", "contains-spectrum"]
 
@@ -206,11 +206,15 @@ def enclosures(
 
 @dataclass(frozen=True)
 class EnclosedTrialSpace:
-    """Enclosures with their trial functions; ``vectors``, shape (n, k), holds coefficients in ``basis``."""
+    """Enclosures with their trial functions; ``vectors``, shape (n, k), holds coefficients in ``basis``.
+
+    From the edges ``finer`` the panels of a smaller tolerance begin.
+    """
 
     enclosures: Enclosures
     basis: Basis
     vectors: Floats
+    finer: Floats | None = None
 
     @property
     def worst(self) -> float:
@@ -224,11 +228,16 @@ class EnclosedTrialSpace:
 
 
 def enclosed_trial_space(
-    law: Law, k: int, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
-) -> EnclosedTrialSpace:
-    """The result of `enclosures` for a self-adjoint law, with the trial functions."""
+    law: Law, k: int, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE, rank: Rank = np.abs,
+    start: Floats | None = None,
+) -> EnclosedTrialSpace:  # fmt: skip
+    """The result of `enclosures` for a self-adjoint law, with the trial functions.
+
+    The ``finer`` edges of an earlier result may be the first ones. By value (``rank`` is np.positive) the separation
+    bounds the rest of the spectrum from above only.
+    """
     if basis is None and suits_panels(law):
-        space = adapted_trial_space(law, k, TRIAL_FRACTION * tolerance)
+        space = adapted_trial_space(law, k, TRIAL_FRACTION * tolerance, rank, start)
         basis, values, vectors, names = space.basis, space.values, space.vectors, space.parities
         # conditional expectations dominate the cost, so the following functions use the same incoming angles
         both = residuals(
@@ -237,19 +246,19 @@ def enclosed_trial_space(
             mirrored=space.mirrored, quotient_error=TRIAL_FRACTION * tolerance, leading=len(values),
         )  # fmt: skip
         found, after = both.split(len(values))
-        next_value = _reach(after)
+        next_value, finer = _reach(after, rank), space.finer
     else:
         if basis is None:
             basis = Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
         values, vectors, names, next_value = _trial(law, basis, k, tolerance)
-        found = residuals(law, basis, vectors, values)
-    order = np.argsort(-np.abs(found.quotients), kind="stable")
-    apart = _first_that_separates(law, found, order, next_value)
+        found, finer = residuals(law, basis, vectors, values), None
+    order = np.argsort(-rank(found.quotients), kind="stable")
+    apart = _first_that_separates(law, found, order, next_value, rank)
     method = f"trial functions in {basis!r}, residuals by adaptive quadrature at {found.angles_used} angles"
     # exact if images are computed to rounding; otherwise the difference of two rules estimates their errors
     exact = isinstance(law, ROUNDED) and isinstance(basis, Legendre)
     items = [_enclosed(found, apart, order, position, names, exact) for position in range(len(values))]
-    return EnclosedTrialSpace(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors)
+    return EnclosedTrialSpace(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors, finer)
 
 
 def _with_ties(items: list[Enclosure]) -> tuple[Enclosure, ...]:
@@ -340,10 +349,10 @@ def _of_matrix(found: Spectrum, k: int, beyond: float) -> Enclosures:
 
 
 def _first_that_separates(
-    law: Law, found: Residuals, order: NDArray[np.intp], next_value: float
+    law: Law, found: Residuals, order: NDArray[np.intp], next_value: float, rank: Rank = np.abs
 ) -> tuple[int, Separation]:
     """The largest number of leading values separated from the rest of the spectrum, and the bound of this rest."""
-    modulus = np.abs(found.quotients[order])
+    modulus = rank(found.quotients[order])
     following = np.append((modulus + found.norms[order])[1:], next_value)
     refused: Separation | None = None
     for number in range(len(order), 0, -1):
@@ -377,9 +386,9 @@ def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Fl
     return values, vectors, listed, _reach(after)
 
 
-def _reach(after: Residuals) -> float:
-    """The largest modulus in the intervals of these functions."""
-    return float(np.max(np.abs(after.quotients) + after.norms))
+def _reach(after: Residuals, rank: Rank = np.abs) -> float:
+    """The highest rank in the intervals of these functions."""
+    return float(np.max(rank(after.quotients) + after.norms))
 
 
 def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
@@ -395,13 +404,9 @@ def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
 
 
 def _enclosed(
-    found: Residuals,
-    known: tuple[int, Separation],
-    order: NDArray[np.intp],
-    position: int,
-    names: tuple[Parity, ...],
-    exact: bool,
-) -> Enclosure:
+    found: Residuals, known: tuple[int, Separation], order: NDArray[np.intp], position: int,
+    names: tuple[Parity, ...], exact: bool,
+) -> Enclosure:  # fmt: skip
     number, apart = known
     own = names[position]
     value, norm = float(found.quotients[position]), float(found.norms[position])

@@ -71,16 +71,9 @@ class Residuals:
 
 
 def residuals(
-    law: Law,
-    basis: Basis,
-    vectors: Floats,
-    values: Floats,
-    most_angles: int = MOST_ANGLES,
-    *,
-    mirrored: bool = False,
-    quotient_error: float = 0.0,
-    leading: int | None = None,
-) -> Residuals:
+    law: Law, basis: Basis, vectors: Floats, values: Floats, most_angles: int = MOST_ANGLES, *,
+    mirrored: bool = False, quotient_error: float = 0.0, leading: int | None = None,
+) -> Residuals:  # fmt: skip
     """Rayleigh quotients and residuals of the functions with the coefficients ``vectors``, shape (n, k).
 
     ``values``, shape (k,), are approximate eigenvalues. ||P v - rho v||^2 is integrated directly; the difference
@@ -118,12 +111,8 @@ def residuals(
         )
         square = total[:, 1].sum(axis=0)
         # a Kato-Temple bound adds about the square to the quotient, so the error of the quotient should be smaller
-        wanted = np.stack(
-            [
-                np.maximum(FRACTION * square + 4.0 * EPS, quotient_error),
-                np.maximum(FRACTION * square + (8.0 * EPS) ** 2, FRACTION * quotient_error),
-            ]
-        )
+        least, rounding = np.array([[1.0], [FRACTION]]) * quotient_error, np.array([[4.0 * EPS], [(8.0 * EPS) ** 2]])
+        wanted = np.maximum(FRACTION * square + rounding, least)
         fraction = (error / wanted)[..., :leading].max(axis=(1, 2))
         affordable = max(most_angles - angles_used, 0) // (2 * len(POINTS))
         worst = np.argsort(-fraction)[:affordable]
@@ -167,13 +156,9 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats, float]:
 
 
 def _integrals(
-    function: Callable[[Floats], tuple[Floats, Floats, Floats]],
-    values: Floats,
-    low: Floats,
-    high: Floats,
-    copies: float,
-    rules: Floats,
-) -> tuple[Floats, Floats, Floats]:
+    function: Callable[[Floats], tuple[Floats, Floats, Floats]], values: Floats, low: Floats, high: Floats,
+    copies: float, rules: Floats,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """Integrals of v (P v - rho v) and (P v - rho v)^2 over each panel, their errors, and effects of those of means.
 
     The function gives v, P v, shape (angles, k), and the errors of P v. An error e of P v adds e v to the first
@@ -185,13 +170,8 @@ def _integrals(
     rest, uncertainty = image - here * values, mean_error[:, None]
     shape = (*angle.shape, len(values))
     parts = np.stack([(here * rest).reshape(shape), (rest * rest).reshape(shape)], axis=2)
-    uncertainties = np.stack(
-        [
-            (np.abs(here) * uncertainty).reshape(shape),
-            ((2.0 * np.abs(rest) + uncertainty) * uncertainty).reshape(shape),
-        ],
-        2,
-    )
+    effects = np.abs(here) * uncertainty, (2.0 * np.abs(rest) + uncertainty) * uncertainty
+    uncertainties = np.stack([effect.reshape(shape) for effect in effects], axis=2)
     weight = copies * half[:, None, None, None] * SINE.density(angle)[..., None, None]
     at_nodes, at_ends = np.split(weight * parts, [len(NODES)], axis=1)
     beyond = (1.0 - NODES.max()) * np.abs(at_ends - np.einsum("eq,pqjk->pejk", AT_ENDS, at_nodes)).sum(axis=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
 from typing import Any, NamedTuple
@@ -36,6 +37,8 @@ EXTRA = 2
 # Additional functions of one parity in the iteration.
 GUARD = 12
 MOST_ITERATIONS, CONVERGED = 60, 0.02
+# Rank of eigenvalues: by modulus (np.abs) or by value (np.positive).
+Rank = Callable[[Floats], Floats]
 PARITIES: dict[int, Parity] = {1: "even", -1: "odd", 0: "none"}
 # Error of conditional expectations as a fraction of the wanted residual.
 MEAN_FRACTION = 0.03
@@ -53,11 +56,13 @@ class TrialSpace:
     vectors : array of shape (n, k)
         Coefficients in ``basis``, of unit norm.
     following_values, following : arrays of shape (2,) and (n, 2)
-        Eigenvalues and coefficients of the next eigenfunctions by modulus.
+        Eigenvalues and coefficients of the next eigenfunctions by rank.
     parities : tuple of {"even", "odd", "none"}
         Parities of ``vectors``.
     mirrored : bool
         Whether every function is even or odd under theta -> pi - theta.
+    finer : array
+        Edges of the panels of another level, up to pi/2 if ``mirrored``.
     """
 
     basis: Panels
@@ -67,10 +72,15 @@ class TrialSpace:
     following: Floats
     parities: tuple[Parity, ...]
     mirrored: bool
+    finer: Floats
 
 
-def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = MOST_LEVELS) -> TrialSpace:
-    """Trial functions for the k eigenvalues of largest modulus, with Kato-Temple bounds of about the tolerance.
+def adapted_trial_space(
+    law: Law, k: int, tolerance: float, rank: Rank = np.abs, start: Floats | None = None
+) -> TrialSpace:
+    """Trial functions for the k eigenvalues of highest rank, with Kato-Temple bounds of about the tolerance.
+
+    The first panels have the edges ``start``, the ``finer`` ones of an earlier space.
 
     Notes
     -----
@@ -78,34 +88,35 @@ def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = M
     matrix. It is accurate for smooth functions but not symmetric, because single P e_j have breakpoints inside panels.
     Subspace iteration from smooth functions gives its leading eigenvectors. Panels with large residuals are divided.
     """
-    with progress_bar(most_levels, "level", "enclosures") as bar:
-        return _adapted(law, k, tolerance, most_levels, bar)
+    with progress_bar(MOST_LEVELS, "level", "enclosures") as bar:
+        return _adapted(law, k, tolerance, rank, start, bar)
 
 
-def _adapted(law: Law, k: int, tolerance: float, most_levels: int, bar: Any) -> TrialSpace:
+def _adapted(law: Law, k: int, tolerance: float, rank: Rank, start: Floats | None, bar: Any) -> TrialSpace:
     """The trial functions; the bar shows their residual."""
     mirrored = bool(law.mirror_symmetric)
-    edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[is_traced(law)]
+    edges, most_panels = _first_edges(law, mirrored) if start is None else start, MOST_PANELS[is_traced(law)]
     goal, before = float(np.sqrt(tolerance)), None
     for number in count(1):
         level = _Level(law, edges, mirrored, MEAN_FRACTION * goal)
         with one_blas_thread():
-            values, vectors, parity = level.leading(k + EXTRA, CONVERGED * goal)
+            values, vectors, parity = level.leading(k + EXTRA, CONVERGED * goal, rank)
         squares = level.squared_residuals(values, vectors, parity)
-        goal = float(np.sqrt(tolerance * _room(values, k)))
+        goal = float(np.sqrt(tolerance * _room(rank(values), k)))
         joint = float(np.sqrt(squares[:, :k].sum()))
         bar.describe(f"residual {joint:.1g}, asked for {goal:.1g}")
         bar.update()
-        if joint <= goal or number == most_levels or len(edges) > most_panels:
-            break
         now = _Residuals(edges, squares[:, :k].sum(axis=1))
-        edges, before = _divided(now, before, goal, mirrored), now
+        finer = _divided(now, before, goal, mirrored)
+        if joint <= goal or number == MOST_LEVELS or len(edges) > most_panels:
+            break
+        edges, before = finer, now
     first = np.arange(1, k)[np.argsort(-values[1:k], kind="stable")]
     chosen = np.append(0, first)
     whole = level.extended(vectors, parity)
     return TrialSpace(
         level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:],
-        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored,
+        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored, finer,
     )  # fmt: skip
 
 
@@ -151,19 +162,19 @@ class _Level:
         blocks = vectors.reshape(len(self.angle), DEGREE + 1, -1)
         return np.asarray(np.einsum("pqd,pdk->pqk", self.local, blocks).reshape(self.angle.size, -1))
 
-    def leading(self, k: int, algebraic: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
-        """Eigenvalues of largest modulus, constants first, with vectors and parities (0 without mirror symmetry)."""
+    def leading(self, k: int, algebraic: float, rank: Rank) -> tuple[Floats, Floats, NDArray[np.intp]]:
+        """Eigenvalues of highest rank, constants first, with vectors and parities (0 without mirror symmetry)."""
         signs = list(self.images)
-        found = [self._leading_of(parity, k, algebraic) for parity in signs]
+        found = [self._leading_of(parity, k, algebraic, rank) for parity in signs]
         values = np.concatenate([part[0] for part in found])
         vectors = np.concatenate([part[1] for part in found], axis=1)
         parity = np.concatenate([np.full(len(part[0]), sign) for part, sign in zip(found, signs, strict=True)])
-        order = np.argsort(-np.abs(values), kind="stable")
+        order = np.argsort(-rank(values), kind="stable")
         # the constants are the first vector of the first part, regardless of rounding
         order = np.append(0, order[order != 0])[:k]
         return values[order], vectors[:, order], parity[order]
 
-    def _leading_of(self, parity: int, k: int, algebraic: float) -> tuple[Floats, Floats]:
+    def _leading_of(self, parity: int, k: int, algebraic: float, rank: Rank) -> tuple[Floats, Floats]:
         images = self.images[parity]
         start = Legendre(2 * (k + GUARD) if self.mirrored else k + GUARD).evaluate(self.angle.ravel())
         start = start[:, (0 if parity >= 0 else 1) :: 2] if self.mirrored else start
@@ -172,7 +183,7 @@ class _Level:
         wanted = slice(0, k)
         for _ in range(MOST_ITERATIONS):
             image = self.projected(images @ block)
-            values, turn = _ritz(block.T @ image)
+            values, turn = _ritz(block.T @ image, rank)
             vectors = block @ turn
             rest = (image @ turn - vectors * values)[:, wanted]
             if float(np.abs(rest).max()) <= 0.1 * algebraic and float(np.linalg.norm(rest)) <= algebraic:
@@ -204,20 +215,19 @@ class _Level:
         return np.concatenate([blocks, other]).reshape(-1, vectors.shape[1])
 
 
-def _ritz(projected: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues, by decreasing modulus, and eigenvectors of a nearly symmetric matrix."""
+def _ritz(projected: Floats, rank: Rank) -> tuple[Floats, Floats]:
+    """Eigenvalues, by decreasing rank, and eigenvectors of a nearly symmetric matrix."""
     values, vectors = np.linalg.eig(projected)
     if np.iscomplexobj(values) and np.any(values.imag != 0.0):
         values, vectors = np.linalg.eigh(0.5 * (projected + projected.T))
     values, vectors = np.real(values), np.real(vectors)
-    order = np.argsort(-np.abs(values), kind="stable")
+    order = np.argsort(-rank(values), kind="stable")
     return values[order], vectors[:, order]
 
 
-def _room(values: Floats, k: int) -> float:
-    """Distance in modulus of the last wanted value from the next, at least a hundredth of this value."""
-    modulus = np.abs(values)
-    return float(max(modulus[k - 1] - modulus[k], 0.01 * modulus[k - 1])) if len(values) > k else 1.0
+def _room(ranks: Floats, k: int) -> float:
+    """Distance of the last wanted rank from the next, at least a hundredth of it."""
+    return float(max(ranks[k - 1] - ranks[k], 0.01 * abs(ranks[k - 1]))) if len(ranks) > k else 1.0
 
 
 def _first_edges(law: Law, mirrored: bool) -> Floats:

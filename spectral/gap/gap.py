@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -17,79 +18,105 @@ from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.matrix_law import finite_matrix, not_a_law
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
-from ..bounds.enclosure import as_power, enclosures
-from ..bounds.images import ROUNDED, is_costly, suits_panels
+from ..bounds.enclosure import Enclosures, as_power, enclosed_trial_space, enclosures
+from ..bounds.images import ROUNDED, is_costly, is_traced, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
-from ..bounds.trial_space import adapted_trial_space
-from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, matrix_spectrum
+from ..bounds.trial_space import Rank
+from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, Verdict, matrix_spectrum
 from ..essential.compact import compact_matrix
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import without_identity
 from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
-from .refinement import EIGENVALUES, HOW, RAYS_FRACTION, Refinement, refined
+from .refinement import EIGENVALUES, HOW, refined
 from .shallow import shallow_gap
 from .theorems import gap_by_theorem, gap_of_exact, split_gap
 from .verdict import SpectralGap, isolated, made_from
 
-# Number of enclosed eigenvalues for densities; limit on this number for walls, and accuracy and levels of the pilot run
-# that determines it.
-ENCLOSED, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS = 3, 8, 1e-2, 2
-# Enclosures slightly wider than the tolerance are computed again with CLOSER times the tolerance. A gap whose error
-# exceeds the tolerance is accepted if its relative error is at most LARGEST_MISS.
-CLOSER, LARGEST_MISS = 0.25, 1e-3
-# Where enclosures for a smaller tolerance take too long, these are tried.
-SURE_TOLERANCES = 1e-9, 1e-6
+# Numbers of enclosed eigenvalues with the constants: of densities by modulus, of other laws the largest values.
+OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
+# Enclosures are computed to these tolerances, each from the panels of the one before; for laws without rays to the one
+# asked for. Where an error exceeds the tolerance by less than 1/CLOSER, the tolerance is reduced by CLOSER; where it
+# exceeds it by more, or there is none, another eigenvalue is enclosed.
+TOLERANCES, CLOSER = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), 0.25
+# Where enclosures of densities take too long, these tolerances are tried.
+SURE = 1e-9, 1e-6
+# A gap that misses its tolerance is held against other methods if its relative error exceeds this.
+LARGEST_MISS = 1e-3
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
 PLANAR = 1e-2
 # Number of eigenvalues computed to find the least one.
 MODULI = 3
 
 
-def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
-    """The gap from an indexed enclosure; None if it would be inaccurate, or take longer than `time_limited` allows."""
+def enclosed_gap(
+    law: Law, tolerance: float, edge: EssentialEdge, seconds: float, rank: Rank = np.positive
+) -> SpectralGap | None:
+    """The gap, or 1 - slem if ranked by modulus, with the least error within a time limit; None without enclosures."""
+    best: SpectralGap | None = None
     if isinstance(law, DensityLaw):
-        found = (_gap_of_enclosures(law, number, tolerance, edge) for number in (ENCLOSED, 2 * ENCLOSED))
-        return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
-    if not suits_panels(law) or is_costly(law):
+        return _of_density(law, tolerance, edge, seconds)
+    if suits_panels(law) and not is_costly(law):
+        with suppress(OutOfTime), time_limited(seconds):
+            for gap in _on_panels(law, tolerance, edge, rank):
+                best = gap if best is None or gap.error < best.error else best
+                if best.error <= tolerance:
+                    break
+    return best
+
+
+def _of_density(law: DensityLaw, tolerance: float, edge: EssentialEdge, seconds: float) -> SpectralGap | None:
+    for wanted in dict.fromkeys((tolerance, *(max(tolerance, sure) for sure in SURE))):
+        with suppress(OutOfTime), time_limited(seconds):
+            found = (_gap_of(law, enclosures(law, number, tolerance=wanted), edge) for number in OF_DENSITIES)
+            # in time, but not exact enough: a larger tolerance does not help
+            return next((gap for gap in found if gap is not None and gap.error <= wanted), None)
+    return None
+
+
+def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> Iterator[SpectralGap]:
+    """Gaps of growing accuracy. The sequence does not depend on the tolerance if rays are traced."""
+    number, start = FEWEST, None
+    for wanted in TOLERANCES if is_traced(law) else (tolerance,):
+        asked, missed = wanted, True
+        while missed and number <= MOST:
+            found = enclosed_trial_space(law, number, None, asked, rank, start)
+            values = np.array([item.value for item in found.enclosures if item.index != 0])
+            if edge.low > 0.0 and np.all(rank(values) <= edge.high):
+                # the edge is the answer
+                return
+            start, gap = found.finer, _gap_of(law, found.enclosures, edge, rank)
+            if gap is not None:
+                yield gap
+            missed = gap is None or gap.error > wanted
+            if gap is None or gap.error > wanted / CLOSER:
+                number += 1
+            else:
+                asked *= CLOSER
+
+
+def _gap_of(law: Law, found: Enclosures, edge: EssentialEdge, rank: Rank = np.positive) -> SpectralGap | None:
+    """The gap between a trial function, or the edge, and the bound of the largest eigenvalue, or of the rest."""
+    others = [
+        replace(item, value=-item.value, low=-item.high, high=-item.low) if rank is np.abs and item.value < 0 else item
+        for item in found if item.index != 0
+    ]  # fmt: skip
+    top = max(others, key=lambda item: item.value, default=None)
+    if top is None or len(others) == len(found):
         return None
-    number = _number_to_enclose(law, edge) or (ENCLOSED if edge.low == 0.0 else None)
-    gap = None if number is None else _gap_of_enclosures(law, number, tolerance, edge)
-    if number is not None and gap is not None and tolerance < gap.error <= tolerance / CLOSER:
-        gap = _gap_of_enclosures(law, number, CLOSER * tolerance, edge) or gap
-    # other bases are hardly better than adapted panels
-    return gap if gap is not None and gap.error <= max(tolerance, LARGEST_MISS * gap.value) else None
-
-
-def _gap_of_enclosures(law: Law, number: int, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
-    found = enclosures(law, number, tolerance=tolerance)
-    listed = [item for item in found if item.label == "indexed" and item.index]
-    top = max(listed, key=lambda item: item.value, default=None)
-    if top is None or top.high >= 1.0:
+    if top.index is not None and top.low > max(found.separation.radius, 0.0) and top.high < 1.0:
+        how, value = f"bounds of the eigenvalue; {found.method}", 1.0 - 0.5 * (top.low + top.high)
+        return SpectralGap(value, 0.5 * top.width, top.kind, how, "isolated", (str(top),), law.frame)
+    # no eigenvalue that is not listed is above the radius
+    reach = max(found.separation.radius, edge.high, *(item.high for item in others if item.index is not None))
+    low = max(edge.low, *(item.low for item in others))
+    if reach >= 1.0:
         return None
-    # no eigenvalue that is not listed may be larger
-    if top.low <= max(found.separation.radius, 0.0):
-        reach = max(found.separation.radius, edge.high, top.high)
-        how = f"bounds of all eigenvalues; {found.method}"
-        evidence = (f"no eigenvalue off the constants is above {reach:.3g}: {found.separation.reason}", *edge.reasons)
-        value, error = 1.0 - 0.5 * (edge.low + reach), 0.5 * (reach - edge.low)
-        return SpectralGap(value, error, "estimate", how, "essential edge", evidence, law.frame)
-    gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
-    return SpectralGap(
-        gap, error, top.kind, f"bounds of the eigenvalue; {found.method}", "isolated", (str(top),), law.frame
-    )
-
-
-def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
-    """The number of eigenvalues of largest modulus that include the largest one off the constants, by a pilot run.
-
-    None if the largest eigenvalue is not beyond the essential spectrum.
-    """
-    pilot = adapted_trial_space(law, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS)
-    values = pilot.values[np.argsort(-np.abs(pilot.values), kind="stable")]
-    found = np.flatnonzero(values[1:] > edge.high)
-    return int(found[0]) + 2 if found.size else None
+    verdict: Verdict = "isolated" if low > edge.high else "essential edge" if reach <= edge.high else "undecided"
+    how = f"bounds of all eigenvalues; {found.method}"
+    evidence = (f"no eigenvalue off the constants is above {reach:.3g}: {found.separation.reason}", *edge.reasons)
+    return SpectralGap(1.0 - 0.5 * (low + reach), 0.5 * (reach - low), "estimate", how, verdict, evidence, law.frame)
 
 
 @reported("spectral gap")
@@ -115,9 +142,9 @@ def spectral_gap(
     rng : None, int or numpy.random.Generator
         Source of rays for traced laws; by default ``np.random.default_rng(0)``.
     time_limit : float
-        Limit in seconds: half for the enclosures of a traced law, half for the rays if these fail. It is counted as one
-        to five million ray segments or some 200,000 to a million rays a second, so that the result does not depend on
-        the machine. A longer limit allows more rays, hence a smaller error.
+        Limit in seconds for the enclosures of a traced law, and half of it again for rays if these fail. It is counted
+        as seven to ten million ray segments or some 200,000 to a million rays a second, so that the result does not
+        depend on the machine. A longer limit continues the same enclosures, and never makes them worse.
 
     Returns
     -------
@@ -135,6 +162,9 @@ def spectral_gap(
     essential spectrum. Enclosures, or Galerkin matrices, whose eigenvalues above the edge converge from below, decide
     whether an eigenvalue lies beyond the edge. If so, the gap is *isolated*. If the eigenvalues on all bases stay below
     the edge, the gap ends at the *essential edge*.
+
+    Enclosures of traced laws become more accurate in steps, 1e-2, 1e-3, 1e-4, 1e-6 and 1e-9, each from the panels of
+    the one before, until the tolerance is reached or the time is over; the best of them is the result.
 
     A law P J that is not self-adjoint in its convention, such as the law of a wall without mirror symmetry in the
     specular frame, need not have a real spectrum. The value is then 1 - ||P J|| on functions of mean 0, where ||P J||
@@ -216,7 +246,14 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small
-    upper = spectral_gap(law, tolerance, rng, time_limit=time_limit)
+    edge = essential_edge(law)
+    if is_traced(law) and edge.high < 1.0 and gap_by_theorem(law) is None:
+        found = enclosed_gap(law, tolerance, edge, time_limit, np.abs)
+        if found is not None and found.error <= max(tolerance, LARGEST_MISS * found.value):
+            return held_against_oscillations(law, found)
+        upper = _by_rays(law, tolerance, generator(rng, 0), time_limit, edge)
+    else:
+        upper = spectral_gap(law, tolerance, rng, time_limit=time_limit)
     if upper.verdict == "no gap" or lambertian_fraction(law) == upper.value:
         # the slem is 1, or is the norm 1 - a of the rest of a law with a Lambertian fraction a
         return upper
@@ -224,7 +261,6 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     lowest = int(np.argmin(listed.values))
     least, error = -float(listed.values[lowest]), float(listed.errors.total()[lowest])
     top = 1.0 - upper.value
-    edge = essential_edge(law)
     if least + error < top - upper.error or least <= edge.high:
         # the edge bounds the modulus of the essential spectrum, because the parts of the law are positive operators
         return upper
@@ -305,13 +341,17 @@ def _by_matrices(
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
-    for wanted in dict.fromkeys((tolerance, *(max(tolerance, sure) for sure in SURE_TOLERANCES))):
-        with suppress(OutOfTime), time_limited((1.0 - RAYS_FRACTION) * seconds):
-            enclosed = enclosed_gap(law, wanted, edge)
-            if enclosed is not None:
-                return enclosed
-            # in time, but not exact enough: a larger tolerance does not help
-            break
+    enclosed = enclosed_gap(law, tolerance, edge, seconds)
+    if enclosed is not None and enclosed.error <= max(tolerance, LARGEST_MISS * enclosed.value):
+        return enclosed
+    sampled = _by_rays(law, tolerance, rng, seconds, edge)
+    # the gap of slow functions is an upper bound, which faster ones may refute
+    refuted = enclosed is not None and sampled.value - sampled.error > enclosed.value + enclosed.error
+    return sampled if enclosed is None or (sampled.error < enclosed.error and not refuted) else enclosed
+
+
+def _by_rays(law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge) -> SpectralGap:
+    """The gap from Galerkin matrices of growing size."""
     steps = refined(law, tolerance, rng, seconds, edge)
     found, error = steps.finest, steps.error
     evidence = (*steps.evidence, *_lower_bound(law))
@@ -319,19 +359,15 @@ def _by_matrices(
     if gap is not None:
         return gap
     reasons, top = (*edge.reasons, *evidence), 1.0 - found.gap
-    if edge.low > 0.0 and top < edge.high + steps.noise and _is_relevant(edge, steps):
+    # the error of the edge is less than its distance from the largest eigenvalue
+    relevant = edge.error <= max(edge.value - top, steps.noise, 1e-3 * (1.0 - edge.value))
+    if edge.low > 0.0 and top < edge.high + steps.noise and relevant:
         short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
         return _at_edge(law, edge, (*reasons, short), found, steps.overshoot(edge.high))
     # without convergence the two-grid error is meaningless; the gap of a Galerkin matrix is an upper bound
     method = made_from(found, "not converged: an upper bound but for its noise")
     error = max(error, abs(found.gap))
     return SpectralGap(found.gap, error, "estimate", method, "undecided", reasons, law.frame, found)
-
-
-def _is_relevant(edge: EssentialEdge, steps: Refinement) -> bool:
-    """Whether the error of the edge is less than its distance from the largest eigenvalue of the refinement."""
-    top = 1.0 - steps.finest.gap
-    return edge.error <= max(edge.value - top, steps.noise, 1e-3 * (1.0 - edge.value))
 
 
 def _at_edge(

@@ -14,7 +14,7 @@ from ...kernels import DensityLaw, Law, Legendre, discretise
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
-from ..bounds.images import ROUNDED, is_costly, suits_panels
+from ..bounds.images import ROUNDED, is_costly, is_traced, suits_panels
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
 from ..essential.compact import compact_matrix
 
@@ -24,7 +24,9 @@ DEGREES = (48, 96)
 MATRIX_FRACTION = 0.1
 # Enclosures are first computed with FIRST times the tolerance, because they are wider than asked. Up to ATTEMPTS times
 # the tolerance is reduced, by SMALLEST_STEP at most, as long as the width decreases by the factor WORTHWHILE.
-FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 3, 1e-3, 0.5
+FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 6, 0.03, 0.5
+# Of traced walls the first enclosures have at least this tolerance.
+COARSE = 1e-2
 # Limit on the enclosed eigenvalues in the search for the largest one off the constants.
 MOST_ENCLOSED = 24
 
@@ -47,8 +49,9 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng, seconds: float
         if isinstance(law, DensityLaw):
             return _of_density(law, k, tolerance)
         if suits_panels(law) and not is_costly(law):
-            with suppress(OutOfTime), time_limited(seconds):
-                return _enclosed(law, k, tolerance)
+            enclosed = _enclosed(law, k, tolerance, seconds)
+            if enclosed is not None:
+                return enclosed
     return _by_matrices(law, k, tolerance, rng)
 
 
@@ -64,25 +67,30 @@ def _by_matrices(law: Law, k: int, tolerance: float, rng: Rng) -> Spectrum:
     return best
 
 
-def _enclosed(law: Law, k: int, tolerance: float) -> Spectrum:
-    """Enclosures to the tolerance, with enough eigenvalues to include the largest one off the constants."""
-    number, asked = k, FIRST * tolerance
-    best = found = enclosed_trial_space(law, number, None, asked)
-    for _ in range(ATTEMPTS):
-        if not found.indexed:
-            break
-        if not _has_top(found) and number < MOST_ENCLOSED:
-            number = min(2 * number + 2, MOST_ENCLOSED)
-        elif found.worst > tolerance:
-            asked *= max(FIRST * tolerance / found.worst, SMALLEST_STEP)
-        else:
-            break
-        before, found = found, enclosed_trial_space(law, number, None, asked)
-        if len(found.enclosures) == len(before.enclosures) and found.worst > WORTHWHILE * before.worst:
-            # no further progress
-            break
-        best = found
-    return _spectrum_of(best, k)
+def _enclosed(law: Law, k: int, tolerance: float, seconds: float) -> Spectrum | None:
+    """Enclosures to the tolerance, with enough eigenvalues to include the largest one off the constants.
+
+    The time limit ends them with the best that they have reached.
+    """
+    number, asked, start = k, FIRST * (max(tolerance, COARSE) if is_traced(law) else tolerance), None
+    best: EnclosedTrialSpace | None = None
+    with suppress(OutOfTime), time_limited(seconds):
+        for _ in range(1 + ATTEMPTS):
+            found = enclosed_trial_space(law, number, None, asked, np.abs, start)
+            alike = best is not None and len(found.enclosures) == len(best.enclosures)
+            if best is not None and alike and found.worst > WORTHWHILE * best.worst:
+                # no further progress
+                break
+            best, start = found, found.finer
+            if not found.indexed:
+                break
+            if not _has_top(found) and number < MOST_ENCLOSED:
+                number = min(2 * number + 2, MOST_ENCLOSED)
+            elif found.worst > tolerance:
+                asked *= max(FIRST * tolerance / found.worst, SMALLEST_STEP)
+            else:
+                break
+    return None if best is None else _spectrum_of(best, k)
 
 
 def _of_density(law: DensityLaw, k: int, tolerance: float) -> Spectrum:
@@ -112,33 +120,23 @@ def _spectrum_of(found: EnclosedTrialSpace, k: int) -> Spectrum:
     radius = found.enclosures.separation.radius
     gap, gap_error, slem = 1.0, np.inf, 0.0
     if len(values) > 1:
-        top, gap_error, slem = (
-            float(values[1:].max()),
-            float(errors[1 + np.argmax(values[1:])]),
-            np.abs(values[1:]).max(),
-        )
-        gap = 1.0 - top
+        top, gap_error = float(values[1:].max()), float(errors[1 + np.argmax(values[1:])])
+        gap, slem = 1.0 - top, np.abs(values[1:]).max()
         if not _has_top(found) and found.indexed:
             # the rest of the spectrum may contain a larger eigenvalue
             gap_error = max(gap_error, radius - top)
     return Spectrum(
-        values=frozen(values[chosen]),
-        vectors=frozen(found.vectors[:, chosen]),
-        residuals=frozen(np.array([items[i].residual for i in chosen])),
-        errors=discretisation_only(errors[chosen]),
-        gap=gap,
-        gap_errors=discretisation_only(np.array([gap_error])),
-        slem=float(slem),
-        convention=found.enclosures.convention,
-        basis=found.basis,
-        method=found.enclosures.method,
+        values=frozen(values[chosen]), vectors=frozen(found.vectors[:, chosen]),
+        residuals=frozen(np.array([items[i].residual for i in chosen])), errors=discretisation_only(errors[chosen]),
+        gap=gap, gap_errors=discretisation_only(np.array([gap_error])), slem=float(slem),
+        convention=found.enclosures.convention, basis=found.basis, method=found.enclosures.method,
         parity=tuple(items[i].parity for i in chosen),
         completeness=(
             f"the rest of the spectrum is within {radius:.6g}: {found.enclosures.separation.reason}"
             if found.indexed
             else "not all have a known number: see enclosures(law, k)"
         ),
-    )
+    )  # fmt: skip
 
 
 def discretisation_only(width: Floats) -> SpectrumErrors:
@@ -160,16 +158,11 @@ def _raised(found: Spectrum, exponent: int, k: int) -> Spectrum:
         base, error = found.slem, float(width[np.argmin(found.values)])
     gap, grown = gap_of_power(1.0 - base if base != 1.0 - found.gap else found.gap, error, exponent)
     return replace(
-        found.at(order),
-        values=frozen(values[order]),
-        residuals=frozen((slope * found.residuals)[order]),
-        errors=found.errors.at(order, slope),
-        gap=gap,
-        gap_errors=discretisation_only(np.array([grown])),
-        slem=found.slem**exponent,
-        method=f"powers {exponent} of the eigenvalues; {found.method}",
+        found.at(order), values=frozen(values[order]), residuals=frozen((slope * found.residuals)[order]),
+        errors=found.errors.at(order, slope), gap=gap, gap_errors=discretisation_only(np.array([grown])),
+        slem=found.slem**exponent, method=f"powers {exponent} of the eigenvalues; {found.method}",
         matrix_error=exponent * found.matrix_error,
-    )
+    )  # fmt: skip
 
 
 def gap_of_power(gap: float, error: float, exponent: int) -> tuple[float, float]:

@@ -59,22 +59,13 @@ class Refinement:
     evidence: tuple[str, ...]
 
     @property
-    def chosen(self) -> int:
-        """Index of the last level, or of the one before if the noise of the last exceeds its change."""
-        if len(self.levels) > FEWEST_LEVELS:
-            before, last = self.levels[-2:]
-            if _noise(last) > abs(last.gap - before.gap) + _noise(before):
-                return len(self.levels) - 2
-        return len(self.levels) - 1
-
-    @property
     def finest(self) -> Spectrum:
-        """The spectrum of the chosen level."""
-        return self.levels[self.chosen]
+        """The spectrum of the last level."""
+        return self.levels[-1]
 
     @property
     def noise(self) -> float:
-        """Algebraic, matrix and sampling error of the chosen level."""
+        """Algebraic, matrix and sampling error of the last level."""
         return _noise(self.finest)
 
     @property
@@ -82,8 +73,7 @@ class Refinement:
         """Change by the last refinement plus noise if the levels converge, else (or if less) the error of the gap."""
         if len(self.levels) < 2 or not self.converges:
             return self.finest.gap_error
-        change = abs(self.levels[self.chosen].gap - self.levels[self.chosen - 1].gap)
-        return min(change + self.noise, self.finest.gap_error)
+        return min(abs(self.finest.gap - self.levels[-2].gap) + self.noise, self.finest.gap_error)
 
     def overshoot(self, edge: float) -> float:
         """Distance beyond an edge of the largest eigenvalue, extrapolated by a geometric series of its changes.
@@ -102,7 +92,10 @@ class Refinement:
 
 
 def refined(law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge) -> Refinement:
-    """Refine until the changes decrease and the error is below the tolerance, or the largest basis is reached."""
+    """Refine until the changes decrease and the error is below the tolerance, or to the largest basis.
+
+    The levels end with the one of least error, for a larger basis may have more noise.
+    """
     with progress_bar(None, "step", "gap") as bar:
         return _refined(law, tolerance, rng, seconds, edge, bar)
 
@@ -113,7 +106,7 @@ def _refined(
     """The refinement, whose last error the bar shows."""
     levels: list[Spectrum] = []
     evidence: list[str] = []
-    steps = Refinement((), False, ())
+    steps, best = Refinement((), False, ()), None
     near_edge = edge.low > NEGLIGIBLE
     for basis, samples in _steps(RAYS_FRACTION * seconds):
         wanted = max(MATRIX_FRACTION * tolerance, TOLERANCE_AT_EDGE if near_edge else 0.0)
@@ -124,6 +117,8 @@ def _refined(
         steps = Refinement(tuple(levels), _converges(levels, tolerance), tuple(evidence))
         bar.describe(f"error {steps.error:.1g}, asked for {tolerance:.1g}")
         bar.update()
+        if steps.converges and (best is None or steps.error < best.error):
+            best = steps
         near_edge = near_edge and 1.0 - found.gap - found.gap_error < edge.high
         if len(levels) >= FEWEST_LEVELS and steps.converges and steps.error <= tolerance:
             break
@@ -134,10 +129,7 @@ def _refined(
             and (basis.size >= DEGREE_AT_EDGE and (samples >= SAMPLES_AT_EDGE or not matrix.samples))
         ):
             break
-        if len(levels) > FEWEST_LEVELS and steps.finest is not found:
-            # a larger basis would only have more noise
-            break
-    return steps
+    return best or steps
 
 
 def _steps(seconds: float) -> Iterator[tuple[Basis, int]]:

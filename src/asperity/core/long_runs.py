@@ -146,7 +146,7 @@ _seconds_left: ContextVar[list[float] | None] = ContextVar("seconds_left", defau
 
 @contextmanager
 def time_limited(seconds: float) -> Iterator[None]:
-    """Limit the nominal time of conditional distributions.
+    """Limit the nominal time of conditional distributions; a limit within another one counts against both.
 
     Raises
     ------
@@ -160,11 +160,16 @@ def time_limited(seconds: float) -> Iterator[None]:
     Traceback (most recent call last):
     asperity.core.long_runs.OutOfTime: 2 seconds, 1 allowed
     """
-    token = _seconds_left.set([seconds])
+    outer = _seconds_left.get()
+    allowed = seconds if outer is None else min(seconds, outer[0])
+    left = [allowed]
+    token = _seconds_left.set(left)
     try:
         yield
     finally:
         _seconds_left.reset(token)
+        if outer is not None:
+            outer[0] -= allowed - left[0]
 
 
 def count_time(seconds: float) -> None:
@@ -172,9 +177,11 @@ def count_time(seconds: float) -> None:
     left = _seconds_left.get()
     if left is None:
         return
-    if seconds > left[0]:
-        raise OutOfTime(f"{seconds:.3g} seconds, {left[0]:.3g} allowed")
+    allowed = left[0]
+    # what is counted is spent, also beyond the limit
     left[0] -= seconds
+    if seconds > allowed:
+        raise OutOfTime(f"{seconds:.3g} seconds, {allowed:.3g} allowed")
 
 
 class Progress:

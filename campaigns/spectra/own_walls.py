@@ -1,0 +1,108 @@
+"""Gaps of walls as users draw them: reached or not, the processor time, and the error against two judges.
+
+A case is a random wall of one to five pieces in one of the conventions: mixed pieces, Bezier pieces, arcs that touch,
+islands, mirror images, several hollows below flat tops, and smooth profiles of 20 points. The judges are the gap at a
+tenth of the least tolerance with a long time limit, and matrices of the textbook tracer's rays, whose eigenvalues are
+lower bounds of those of the law. In the table each row is a tolerance; the outcomes count the gaps that reach it by the
+processor time that they take.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
+from campaigns.engine import Campaign, Judged
+from campaigns.spectra import verdicts
+
+WALLS, KINDS = 200, 8
+# Tolerances with their time limits, those of the judge, and the seconds by which gaps are counted.
+LIMITS, JUDGE, STEPS = {1e-3: 10.0, 1e-4: 10.0, 1e-6: 60.0}, (1e-7, 120.0), (2, 4, 15, 60, 120)
+PROFILE = geo.HeightCorrelation(0.2)
+Case = tuple[str, ker.Law, geo.Wall]
+
+
+def chain(number: int, pieces: int) -> geo.Wall:
+    """A wall of cubic Bezier pieces below their chords."""
+
+    def attempt(rng: np.random.Generator) -> geo.Wall:
+        inner = np.sort(rng.random(pieces - 1))
+        depth = rng.uniform(0.2, 0.5, pieces - 1)
+        joints = [(0.0, 0.0), *zip(inner.tolist(), (-depth).tolist(), strict=True), (1.0, 0.0)]
+        return geo.Wall(
+            [
+                geo.Bezier([a, *((a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]) - 0.2 * rng.random())
+                                 for f in (1 / 3, 2 / 3)), b])
+                for a, b in pairwise(joints)
+            ]
+        )  # fmt: skip
+
+    return verdicts.first_valid(20261128, number, attempt)
+
+
+def hollows(number: int) -> geo.Wall:
+    """Two or three hollows of other shapes, an arc or a Bezier piece each, with flat tops between them."""
+
+    def attempt(rng: np.random.Generator) -> geo.Wall:
+        pieces, x = [], 0.0
+        for _ in range(2 + number % 2):
+            width, top = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.05, 0.3))
+            low, high = (float(-rng.uniform(0.1, 0.8)) for _ in range(2))
+            end = x + width
+            pieces += [
+                geo.Bezier([(x, 0.0), (x + 0.3 * width, low), (x + 0.7 * width, high), (end, 0.0)]),
+                geo.Segment((end, 0.0), (end + top, 0.0)),
+            ]
+            x = end + top
+        return geo.Wall(pieces, period=x)
+
+    return verdicts.first_valid(20261129, number, attempt)
+
+
+def draw(number: int) -> Case:
+    """The wall's kind and its law, in alternate conventions."""
+    group, kind = divmod(number, KINDS)
+    name, wall = (
+        ("mixed pieces", random_curved_wall(group % COUNT)) if kind == 0 else
+        ("mixed pieces", random_curved_wall(group, 20261128)) if kind == 1 else
+        ("Bezier pieces", chain(number, 1 + group % 5)) if kind in (2, 3) else
+        ("island", verdicts.island_wall(100 + group)) if kind == 4 else
+        ("mirror image", verdicts.mirrored_wall(100 + group)) if kind == 5 else
+        ("several hollows", hollows(number)) if kind == 6 else
+        ("smooth profile", geo.random_wall(PROFILE, 20, rms_slope=0.2 + 0.1 * (group % 4), rng=number, smooth=True))
+    )  # fmt: skip
+    law = ker.WallLaw(wall)
+    return name, law.in_specular_frame() if group % 2 else law, wall
+
+
+def judge(case: Case) -> Iterator[Judged]:
+    """The gap to each tolerance against the judges."""
+    _, law, wall = case
+    found = {}
+    for tolerance, limit in LIMITS.items():
+        begun = time.process_time()
+        gap = spec.spectral_gap(law, tolerance, time_limit=limit)
+        found[tolerance] = gap, time.process_time() - begun
+    known = spec.spectral_gap(law, JUDGE[0], time_limit=JUDGE[1])
+    signs = (-1.0) ** np.arange(1, verdicts.DEGREES[-1]) if law.frame == "specular" else 1.0
+    tops, noise = verdicts.reference(verdicts.matrices(wall) * signs, norm=not known.self_adjoint)
+    most = 1.0 - float(tops[-1]) + noise + verdicts.NOISE_OF_SIZE
+    for tolerance, (gap, seconds) in found.items():
+        within = next((step for step in STEPS if seconds <= step), STEPS[-1])
+        outcome = f"within {within} s" if gap.error <= tolerance else f"missed: {gap.verdict}"
+        fault = f"rays of the textbook show a gap below {most:.4g}" if gap.value - gap.error > most else ""
+        yield Judged(f"{tolerance:g}", gap.error, abs(gap.value - known.value), known.error, fault, outcome)
+
+
+CAMPAIGNS = (
+    Campaign(
+        "own-walls", "Do gaps of walls as users draw them reach their tolerance, in time?", draw, judge, WALLS, [2]
+    ),
+)
