@@ -94,6 +94,8 @@ def has_chain(law: Law) -> bool:
 
 def holds_of_all(law: Law, test: Callable[[Law], bool]) -> bool:
     """Whether every part of a law that is not compound passes the test."""
+    # of a power without its factors, which may be millions
+    law = law.law if isinstance(law, Power) else law
     return fold(law, Rules(test, lambda terms: all(fact for _, fact in terms), all, lambda fact: fact))
 
 
