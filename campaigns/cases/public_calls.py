@@ -234,6 +234,9 @@ UNCALLED = {
     "matrix_on", "entries", "on_disc", "reflected", "add_products", "attempt", "apply_to_states", "save", "draw",
     "plot", "plot_eigenfunctions", "features", "Spectrum.at", "of_lists", "mixed", "followed_by",
     "sums", "fault",
+    # of a piece, asked by walls, containers and tables
+    "arrival", "curvature", "cut", "from_table", "goes_in_waves", "has_parts", "heights", "hull", "is_on", "joined",
+    "largest_curvature", "length_to", "of_table", "point_at_length", "row", "signed_area", "to_table", "touch",
 }  # fmt: skip
 # Functions of the user, what is handed on, how a matrix was made, and angles of which one gives no number, stay away.
 UNREPLACED = {

@@ -18,7 +18,7 @@ from ..bases.intervals import bisected
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.partitions import Bins
 from ..bases.polynomials import Legendre
-from ..expectations.angle_panels import NODES, NULL_RULES, AnglePanels
+from ..expectations.angle_panels import NODES, AnglePanels
 from ..expectations.basis_means import functions_of
 from ..laws.density import VALUE_TIME, DensityLaw, cut_by_edges, split_panels
 from ..laws.deterministic import IntervalExchangeLaw, InvolutionLaw, LeastResistanceLaw
@@ -303,7 +303,7 @@ def action_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
             found = law.conditionals(panels.angle, max(MEAN_FRACTION * tolerance, CONVERGED), degree, inside)
             panels.image = found.in_basis(basis).reshape(panels.image.shape)
             panels.mean_error = heights * found.error.reshape(panels.angle.shape)
-            difference = panels.differences(basis, NULL_RULES)
+            difference = panels.rule_errors(basis)
             done = last | (difference <= max(PANEL_FRACTION * tolerance, CONVERGED))
             converged[start : start + step] = done
             total += panels.selected(done).total(basis)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
-from ..expectations.angle_panels import KRONROD, NULL_RULES, SLOPES, STRETCHED
+from ..expectations.angle_panels import KRONROD, NULL_RULES, SLOPES, STRETCHED, error_of_null_rules
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .conditional import ConditionalDistance
@@ -29,9 +29,6 @@ MOST_CORNERS, MOST_OF_LEVEL, FEW_ATOMS = 2**21, 2**22, 32
 MOST_CELLS = (256, 1024)
 # Breakpoints at which panels are divided.
 MOST_BREAKPOINTS = 1536
-# Where the null rules decrease with their degree, the square of the last two below this fraction of that of the others,
-# the distance is smooth on a panel. At a kink one of them may vanish by chance, and all of them count.
-SMOOTH = 1.0 / 256.0
 # If the distance jumps at unknown incoming angles, halving a panel halves its error. All null rules may be small by
 # chance; a fraction of the change at the last halving guards against it.
 MEMORY = 0.25
@@ -123,8 +120,7 @@ class _Panels:
         then agree by chance. If such values turn more than twice, the error is at least their range times the measure.
         """
         squares = np.array([self.parts(order, rule, unit) ** 2 for rule in NULL_RULES])
-        high, low = squares[:2].sum(axis=0), squares[2:].sum(axis=0)
-        found = np.sqrt(np.where(high < SMOOTH * low, high, 0.25 * (high + low)))
+        found = error_of_null_rules(squares)
         powers = (self.rows / unit) ** order
         inside = np.searchsorted(cuts, self.high, side="left") > np.searchsorted(cuts, self.low, side="right")
         rough = inside | (self.low <= 0.0) | (self.high >= np.pi)

@@ -50,6 +50,16 @@ def _null_rules(count: int) -> Floats:
 
 
 NULL_RULES = _null_rules(4)
+# Where the null rules decrease with their degree, the squares of the first two below this fraction of those of the
+# others, the integrand is smooth. At a kink one of them may vanish by chance, and all of them count.
+SMOOTH = 1.0 / 256.0
+
+
+def error_of_null_rules(squares: Floats) -> Floats:
+    """Estimated errors from the squares of the null rules, which the first axis runs over."""
+    high, low = squares[:2].sum(axis=0), squares[2:].sum(axis=0)
+    return np.asarray(np.sqrt(np.where(high < SMOOTH * low, high, 0.25 * (high + low))))
+
 
 # Where nodes sample noise, polynomials with this number of coefficients are its trend. RESIDUALS maps values at the
 # nodes to their distances from the fitted polynomial.
@@ -173,8 +183,14 @@ class AnglePanels:
 
         For more null rules, the root mean square of their norms.
         """
-        squares = [np.sum(self._integrals(rule, basis) ** 2, axis=(1, 2)) for rule in rules]
-        return np.asarray(np.sqrt(np.mean(squares, axis=0)))
+        return np.asarray(np.sqrt(np.mean(self._squares(basis, rules), axis=0)))
+
+    def rule_errors(self, basis: Basis) -> Floats:
+        """The errors of the integrals by `error_of_null_rules`, shape (panels,)."""
+        return error_of_null_rules(self._squares(basis, NULL_RULES))
+
+    def _squares(self, basis: Basis, rules: Floats) -> Floats:
+        return np.array([np.sum(self._integrals(rule, basis) ** 2, axis=(1, 2)) for rule in rules])
 
     def standard_errors(self, basis: Basis) -> Floats:
         """The standard errors of the integrals, shape (panels,), if the expectations are independent around a trend.

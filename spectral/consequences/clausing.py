@@ -15,7 +15,7 @@ from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, RULE_OF_THREE, Estimate, student_95
 from ...core.long_runs import reported
 from ...core.rounding import EPS
-from ...kernels import KernelMatrix, Law, Legendre, discretise, lambertian, specular
+from ...kernels import KernelMatrix, Law, Legendre, discretise, specular
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw, HemisphereCombination
 from ...kernels.laws.structure import sum_of_words, words_of
 from .channel import LARGEST, in_paper_frame, reflected
@@ -193,7 +193,7 @@ def _found(
         return _by_flights(
             section, length, tolerance, rng, enter, partial(_leave, rest, section, diffuse, rng), diffuse
         )
-    if rest == lambertian() and diffuse * length <= longest:
+    if rest.is_lambertian and diffuse * length <= longest:
         return _by_integral_equation(GEOMETRIES[section], diffuse, length)
     if section == "channel":
         smooth = _by_polynomials(law, length, tolerance, rng)
@@ -202,7 +202,7 @@ def _found(
         turn, least = partial(_turn, rest, diffuse, rng), 2.0 * smooth.error
         flown = _by_flights(section, length, tolerance, rng, _entered_in_plane, turn, diffuse, least=least)
         return min(smooth, flown, key=lambda found: found.error)
-    if rest != lambertian():
+    if not rest.is_lambertian:
         raise InputError(
             "law: in a tube expected lambertian(), maxwell(a) or HemisphereLaw(law, orientation), because a planar law "
             f"does not tell the direction of its grooves, got {law!r}"

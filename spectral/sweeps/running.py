@@ -384,7 +384,7 @@ def name_of(function: Callable[..., object]) -> str:
     Examples
     --------
     >>> name_of(name_of)
-    'asperity.spectral.sweeps.quantities.name_of'
+    'asperity.spectral.sweeps.running.name_of'
     """
     # functions have names, the user's other callables may
     name = getattr(function, "__qualname__", None)

@@ -36,10 +36,10 @@ CURVES = [
     (lambda: Bezier([(0, 0), (1, nan), (1, 0)]), "control point 1"),
     (lambda: Bezier([(1, 1)] * 3), "points that differ"),
     (lambda: Segment((0, 0), (1, 0)).stretched(0, 1), "factors"),
-    (lambda: ARC.flattened(0.0), "tolerance"),
 ]
 
 WALLS = [
+    (lambda: ARC.flattened(0.0), "tolerance"),
     (lambda: flask(0.51), "piece 1 crosses itself or the neighbouring period"),
     (lambda: Wall([Bezier([(0, 0), (1.6, -1.5), (-0.6, -1.5), (1, 0)])]), "piece 0 crosses itself"),
     (lambda: islands(square(0.2, -0.5, 0.2), square(0.3, -0.45, 0.2)), "island 0 .* island 1"),

@@ -185,7 +185,8 @@ def hit_by_hit(wall):
     plain = geo.Wall(wall.pieces, wall.period, wall.islands)
     hollows, lines, arcs = (getattr(plain.scene, name).copy() for name in ("hollows", "lines", "arcs"))
     arcs[:, RUN_SINE], lines[:, [FIRST_PAIR, PAIRS_END]], hollows[:, FORM] = 0.0, 0.0, NO_FORM
-    plain.__dict__["scene"] = plain.scene._replace(hollows=hollows, lines=lines, arcs=arcs)
+    curves = tuple(arcs if table is plain.scene.arcs else table for table in plain.scene.curves)
+    plain.__dict__["scene"] = plain.scene._replace(hollows=hollows, lines=lines, curves=curves)
     return plain
 
 

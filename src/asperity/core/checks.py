@@ -213,19 +213,21 @@ def positive_number(name: str, value: Any) -> float:
     """Return ``value`` as a finite float greater than zero."""
     number = finite_number(name, value)
     if number < SMALLEST:
-        raise InputError(f"{name}: expected a number greater than 0, got {number!r}")
+        least = f", of at least {SMALLEST:g}" if number > 0.0 else ""
+        raise InputError(f"{name}: expected a number greater than 0{least}, got {number!r}")
     return number
 
 
 def number_between(name: str, value: Any, low: float, high: float, *, closed: str = "") -> float:
     """Return ``value`` in (low, high); ``closed`` holds ``"low"`` and/or ``"high"`` for ends that are allowed."""
     number = finite_number(name, value)
-    inside_low = number >= low if "low" in closed else number > (low or SMALLEST)
+    inside_low = number >= low if "low" in closed else (number > low if low else number >= SMALLEST)
     inside_high = number <= high if "high" in closed else number < high
     if not (inside_low and inside_high):
         left, right = "[" if "low" in closed else "(", "]" if "high" in closed else ")"
-        radians = "; angles are in radians" if high in (np.pi, 0.5 * np.pi) else ""
-        raise InputError(f"{name}: expected a number in {left}{low:g}, {high:g}{right}, got {number!r}{radians}")
+        more = "; angles are in radians" if high in (np.pi, 0.5 * np.pi) else ""
+        more += f"; take at least {SMALLEST:g}" if low == 0.0 < number < SMALLEST else ""
+        raise InputError(f"{name}: expected a number in {left}{low:g}, {high:g}{right}, got {number!r}{more}")
     return number
 
 
