@@ -140,7 +140,7 @@ TOOLS = {
     "gap": lambda law: spec.spectral_gap(law, tolerance=1e-5),
     "relaxation": lambda law: spec.mixing_time(law, 0.01, "L2").relaxation_time,
     "accommodation": lambda law: spec.accommodation(law).tangential, "resistance": ker.resistance,
-    "transmission": lambda law: spec.transmission(law, 0.5, tolerance=1e-2, rng=0), "diffusivity": spec.diffusivity,
+    "transmission": lambda law: spec.transmission(law, 0.5, tolerance=5e-4, rng=0), "diffusivity": spec.diffusivity,
     "specular share": spec.specular_share, "edge": lambda law: essential_edge(law).value,
     "norm": lambda law: spec.hilbert_schmidt_norm(law).value,
     "matrix": lambda law: ker.discretise(law, ker.Legendre(4)).symmetric[1, 1],
