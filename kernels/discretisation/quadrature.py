@@ -105,13 +105,14 @@ def density_matrix(law: DensityLaw, basis: Basis, tolerance: float) -> tuple[Flo
         affordable = [order for order, each in zip(CONDITIONAL_NODES, cost, strict=True) if each <= MOST_DENSITY_VALUES]
         order = affordable[0] if affordable else CONDITIONAL_NODES[-1]
         if min(cost) <= MOST_CONDITIONAL_VALUES:
-            # where kinks are not known three levels are needed
-            levels = _conditional_levels(law, basis, edges, outer, order if smooth else order // 2, 2 if smooth else 3)
+            # where kinks are not known three levels of odd orders: even ones agree on a jump near the middle
+            first, least = (order, 2) if smooth else (order // 2 | 1, 3)
+            levels = _conditional_levels(law, basis, edges, outer, first, least)
             levels = (_with_mirror_image(half) for half in levels) if mirrored else levels
             found, error = until_converged(levels, tolerance, smooth)
             # the rules over theta' are of one order
             return found, error + law._row_error * float(basis.normalisation.max())
-    return until_converged(_density_levels(law, basis, edges), tolerance, smooth)
+    return until_converged(_density_levels(law, basis, edges, smooth), tolerance, smooth)
 
 
 def _with_mirror_image(half: Floats) -> Floats:
@@ -133,7 +134,7 @@ def _conditional_levels(
         spent += _conditional_cost(law, edges, outer, order)
         count_time(VALUE_TIME * _conditional_cost(law, edges, outer, order))
         yield _conditional_rule(law, basis, edges, outer, order)
-        order, level = 2 * order, level + 1
+        order, level = 2 * order + order % 2, level + 1
 
 
 def _conditional_rule(law: DensityLaw, basis: Basis, edges: Floats, outer: Floats, order: int) -> Floats:
@@ -156,16 +157,16 @@ def _conditional_rule(law: DensityLaw, basis: Basis, edges: Floats, outer: Float
     return basis.normalisation[:, None] * flux.reshape(basis.size, basis.size) * basis.normalisation
 
 
-def _density_levels(law: DensityLaw, basis: Basis, edges: Floats) -> Iterator[Floats]:
+def _density_levels(law: DensityLaw, basis: Basis, edges: Floats, smooth: bool) -> Iterator[Floats]:
     intervals = edges.size - 1
     order = basis.nodes_per_interval
     if basis.is_partition:
         order = 4 if intervals <= 512 else 2 if intervals <= 1024 else 1
-    level = 0
+    order, level = order if smooth else order | 1, 0
     while level < 2 or (intervals * order) ** 2 <= MOST_DENSITY_VALUES:
         count_time(VALUE_TIME * (intervals * order) ** 2)
         yield _density_rule(law, basis, edges, order)
-        order, level = 2 * order, level + 1
+        order, level = 2 * order + order % 2, level + 1
 
 
 def _density_rule(law: DensityLaw, basis: Basis, edges: Floats, order: int) -> Floats:

@@ -22,7 +22,7 @@ from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_err
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
 from ...kernels.walls.conditionals import is_few
 from ...kernels.walls.wall_law import traced_wall
-from .images import ROUNDED, expectations_of
+from .images import ROUNDED, expectations_of, is_traced
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
@@ -33,6 +33,8 @@ MEAN_TOLERANCE = 1e-8
 # Where a law does not know all its breakpoints a jump may lie in any panel. The differences of two rules have this
 # margin then, and panels are cut at this fraction, because adapted trial functions fit the law at the nodes of theirs.
 MARGIN, CUT = 4.0, 0.4
+# The same for traced walls, where rays take some itineraries in narrow intervals of angles only.
+OF_TRACED = 2.0
 # Two points just inside the ends of a panel, and the values there of the polynomial through the values at the nodes.
 ENDS = (1.0 - 1e-6) * np.array([-1.0, 1.0])
 AT_ENDS = legvander(ENDS, len(NODES) - 1) @ np.linalg.inv(legvander(NODES, len(NODES) - 1))
@@ -149,10 +151,11 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats, float]:
             edges += [np.pi - one for one in edges[-2:]] if law.frame == "specular" else []
     joint = np.unique(np.clip(np.concatenate(edges), 0.0, np.pi))
     low, high = joint[:-1], joint[1:]
-    if holds_of_all(law, _knows_breakpoints):
+    known = holds_of_all(law, _knows_breakpoints)
+    if known and not is_traced(law):
         return low, high, 1.0
     cut = low + CUT * (high - low)
-    return np.append(low, cut), np.append(cut, high), MARGIN
+    return np.append(low, cut), np.append(cut, high), OF_TRACED if known else MARGIN
 
 
 def _integrals(

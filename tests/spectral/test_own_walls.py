@@ -44,6 +44,19 @@ def counted(function):
         return found, 1e9 - long_runs._seconds_left.get()[0]
 
 
+# some itineraries are taken in narrow intervals of angles only, between the nodes of coarse panels
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "value"), [(4, 1.0 - 0.0462200), (1, 1.0 - 0.0555477)])
+def test_coarse_enclosures_see_narrow_intervals_of_angles(seed, value):
+    law = ker.WallLaw(bezier_wall(seed))
+    for number, tolerance in ((2, 1e-2), (3, 1e-2), (3, 1e-3), (3, 1e-4), (2, 1e-4)):
+        largest = max(
+            (one for one in spec.enclosures(law, number, tolerance=tolerance) if one.index != 0),
+            key=lambda one: one.value,
+        )
+        assert largest.low - 5e-7 <= value <= largest.high + 5e-7
+
+
 # by enclosures of four eigenvalues with another order and tolerance
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "gap", "error"), [(0, 0.063472, 1.2e-5), (1, 0.05557, 4e-5), (4, 0.04623, 4e-5)])
