@@ -236,7 +236,8 @@ UNCALLED = {
     "sums", "fault",
     # of a piece, asked by walls, containers and tables
     "arrival", "curvature", "cut", "from_table", "goes_in_waves", "has_parts", "heights", "hull", "is_on", "joined",
-    "largest_curvature", "length_to", "of_table", "point_at_length", "row", "signed_area", "to_table", "touch",
+    "largest_curvature", "length_to", "of_table", "parameter_of", "point_at_length", "row", "signed_area", "steps",
+    "to_table", "touch",
 }  # fmt: skip
 # Functions of the user, what is handed on, how a matrix was made, and angles of which one gives no number, stay away.
 UNREPLACED = {
