@@ -87,7 +87,7 @@ def _settled(symmetric: Floats, error: float, basis: Basis) -> KernelMatrix:
 
 
 def density_matrix(law: DensityLaw, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """<e_i, P e_j> by Gauss rules whose order doubles, and the difference of the last two as error estimate.
+    """<e_i, P e_j> by Gauss rules whose order doubles, and its error by `until_converged`.
 
     Product rules miss a peak narrower than the cells of a partition. Each conditional distribution is then integrated
     over theta' between the edges of the cells and of the law's panels at that incoming angle.
@@ -100,12 +100,12 @@ def density_matrix(law: DensityLaw, basis: Basis, tolerance: float) -> tuple[Flo
         mirrored = law.mirror_symmetric is True and np.abs(edges + edges[::-1] - np.pi).max() <= MIRROR_TOLERANCE
         if mirrored:
             outer = np.append(outer[outer < 0.5 * np.pi - MIRROR_TOLERANCE], 0.5 * np.pi)
-        # The error estimate needs two levels; the second has twice the nodes of the first.
+        # Two levels are needed, of which the second has twice the nodes; three of odd orders cost up to twice as much.
         cost = [3 * _conditional_cost(law, edges, outer, order) for order in CONDITIONAL_NODES]
         affordable = [order for order, each in zip(CONDITIONAL_NODES, cost, strict=True) if each <= MOST_DENSITY_VALUES]
         order = affordable[0] if affordable else CONDITIONAL_NODES[-1]
         if min(cost) <= MOST_CONDITIONAL_VALUES:
-            # where kinks are not known three levels of odd orders: even ones agree on a jump near the middle
+            # where kinks are not known, three levels of odd orders: even ones agree on a jump near the middle
             first, least = (order, 2) if smooth else (order // 2 | 1, 3)
             levels = _conditional_levels(law, basis, edges, outer, first, least)
             levels = (_with_mirror_image(half) for half in levels) if mirrored else levels
