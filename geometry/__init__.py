@@ -28,10 +28,8 @@ from .collisions.transversality import good_fraction, shadow
 from .curves.arc import Arc
 from .curves.bezier import Bezier
 from .curves.segment import Segment
-from .disk.charts import RollingCharts
-from .disk.disk import Disk
-from .disk.inner_disk import InnerDisk
-from .disk.rim import SatelliteDisk
+from .disk.disk import Disk, InnerDisk, SatelliteDisk
+from .disk.satellites import RollingCharts
 from .plotting.walls import draw_wall
 from .tables.container import Container
 from .tracing.boundary_map import billiard_map, nested_reflection

@@ -23,7 +23,6 @@ from ...core.rounding import EPS
 from ..curves.crossings import directions_of, straight_in
 from ..curves.curve import Curve, Point, point_array
 from ..curves.segment import Segment
-from .hollow import Hollow, flat_tops, hollows_between
 
 
 @dataclass(frozen=True, repr=False)
@@ -396,3 +395,58 @@ def largest_curvature_of(paths: Sequence[Sequence[Curve]]) -> Estimate:
     error = 0.0 if value == math.inf else max(v + e for v, e in found) - value
     method = "critical points of the pieces, checked in floating point by Bernstein coefficients"
     return Estimate(value, max(0.0, error), "bound", method)
+
+
+@dataclass(frozen=True)
+class Hollow:
+    """One opening of a wall with the pieces below it.
+
+    Parameters
+    ----------
+    left, right : float
+        The opening is left < x < right at the level of the wall's highest points.
+    first, last : int
+        ``wall.cell.pieces[first:last]`` is the boundary of the hollow from its left end to its right end. A wall that
+        begins at (0, 0), and no side or curve of which is cut in parts, is its own ``cell``.
+    """
+
+    left: float
+    right: float
+    first: int
+    last: int
+
+    @property
+    def width(self) -> float:
+        """The width of the opening."""
+        return self.right - self.left
+
+
+def flat_tops(pieces: Sequence[Curve], vertices: Floats) -> list[int]:
+    """Return the indices of the pieces that run rightward along y = 0."""
+    level = (vertices[:-1, 1] == 0.0) & (vertices[1:, 1] == 0.0) & (vertices[1:, 0] > vertices[:-1, 0])
+    return [i for i in level.nonzero()[0].tolist() if pieces[i].is_straight]
+
+
+def hollows_between(tops: Sequence[int], vertices: Floats) -> tuple[Hollow, ...]:
+    """Return the hollows of a closed wall: the chains of pieces between flat tops, cut at joints at height 0.
+
+    Only joints with x strictly between the ends of a chain cut it. The other joints at height 0 belong to pieces that
+    run back below a flat top (a plate of zero thickness).
+    """
+    found: list[Hollow] = []
+    count = len(vertices) - 1
+    edges = [-1, *tops, count]
+    touching = vertices[:, 1] == 0.0
+    for before, after in pairwise(edges):
+        first, last = before + 1, after
+        if first == last:
+            continue
+        left, right = float(vertices[first, 0]), float(vertices[last, 0])
+        for joint in (first + 1 + touching[first + 1 : last].nonzero()[0]).tolist():
+            x = float(vertices[joint, 0])
+            if left < x < right:
+                found.append(Hollow(left, x, first, joint))
+                left, first = x, joint
+        if left < right:
+            found.append(Hollow(left, right, first, last))
+    return tuple(found)

@@ -14,10 +14,8 @@ from ...core.checks import Floats, finite_array, instance, number_between, posit
 from ...core.errors import InputError
 from ...core.tables import axes_or_new
 from ..disk import rolling
-from ..disk.charts import RollingCharts
-from ..disk.disk import Disk, contact_normal
-from ..disk.inner_disk import InnerDisk
-from ..disk.satellites import Satellites
+from ..disk.disk import Disk, InnerDisk, contact_normal
+from ..disk.satellites import RollingCharts, Satellites
 from ..plotting.walls import LEVEL, RAY_COLOURS, SOLID, draw_solid
 from ..walls.interior import in_solid
 from ..walls.wall import Wall

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, positive_number
 from ..disk import rolling
-from ..disk.charts import RollingCharts
 from ..disk.disk import Disk
+from ..disk.satellites import RollingCharts
 from ..tracing.tracing import MAX_COLLISIONS
 from ..walls.wall import Wall
 from .amplification import DiskCounts

@@ -11,8 +11,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..disk.disk import Disk
-from ..disk.rim import Features, SatelliteDisk
+from ..disk.disk import Disk, Features, SatelliteDisk
 from ..tracing.tracing import Status
 
 MAX_CONTACTS, MAX_STEPS = 1000, 100_000

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, instance, number_between, whole_number
 from ...core.errors import InputError
-from ..disk.rim import Features, SatelliteDisk
+from ..disk.disk import Features, SatelliteDisk
 from ..tracing.tracing import Status
 from ..walls.wall import Wall
 from .encounter import MAX_CONTACTS, Encounter, largest_bend_of

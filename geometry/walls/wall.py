@@ -15,9 +15,9 @@ from ...core.checks import Floats, instance, numbers, positive_number, sequence
 from ...core.errors import InputError, WallError
 from ...core.estimates import html_table
 from ..cells.cell import Cell
+from ..cells.hollow_shape import has_mirror_axis
 from ..cells.measured import Profile
 from ..cells.miniature import wall_miniature
-from ..cells.mirror_symmetry import has_mirror_axis
 from ..cells.profile import Seam, rolled, vertices_of_profile
 from ..cells.toml import read_wall, save_wall
 from ..cells.validity import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size

@@ -13,7 +13,7 @@ from ...core.checks import Floats, angles, instance
 from ...core.errors import AccuracyError
 from ...core.rounding import EPS
 from ...geometry import Arc, Wall
-from ...geometry.cells.hollow import Hollow
+from ...geometry.cells.cell import Hollow
 from ...geometry.cells.hollow_shape import HollowShape, side_by_side
 from ..expectations.conditionals import Conditionals
 from ..laws.isometry_table import IsometryTable

@@ -149,7 +149,7 @@ def raised(wall: Wall) -> Wall:
 
 def grazed(wall: Wall) -> Grazed:
     """The hollows of a wall whose sides are vertical or overhang where grazing rays meet them."""
-    from ...geometry.cells.hollow import flat_tops, hollows_between
+    from ...geometry.cells.cell import flat_tops, hollows_between
 
     highest = max((float(piece.box[3]) for loop in wall.islands for piece in loop), default=-np.inf)
     if wall.pieces[0].start[1] < 0.0 or highest >= 0.0:

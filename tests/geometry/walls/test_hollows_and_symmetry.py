@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from asperity import geometry as geo
 from asperity.geometry import Arc, Bezier, Segment, Wall
-from asperity.geometry.cells.hollow import Hollow
+from asperity.geometry.cells.cell import Hollow
 from wall_shapes import CLOSED, OPEN, flask, over_floor, square
 
 pi = math.pi

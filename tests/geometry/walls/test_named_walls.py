@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from asperity import geometry as geo
-from asperity.geometry.cells.hollow import Hollow
+from asperity.geometry.cells.cell import Hollow
 
 EPS = np.finfo(float).eps
 pi = math.pi

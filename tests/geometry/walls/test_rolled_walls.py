@@ -10,8 +10,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import WallError
 from asperity.geometry import Arc, Bezier, Segment
-from asperity.geometry.cells.cell import first_top, merged
-from asperity.geometry.cells.hollow import Hollow
+from asperity.geometry.cells.cell import Hollow, first_top, merged
 from asperity.geometry.tracing.tracing import entries
 
 LOW = geo.Wall.from_vertices([(0, -1.3), (0.2, -0.9), (0.7, -0.3), (0.8, -1.5), (1, -1.3)])
