@@ -21,9 +21,9 @@ from .cells.profile import read_profile
 from .collisions.amplification import DiskStatus
 from .collisions.configuration_space import ConfigurationSpace, collision_path
 from .collisions.cylinder import collide_cylinder, collide_modified
+from .collisions.encounter import collide_rim
 from .collisions.pair import collide_pair
 from .collisions.rigid import collide
-from .collisions.rim_on_wall import collide_rim
 from .collisions.transversality import good_fraction, shadow
 from .curves.arc import Arc
 from .curves.bezier import Bezier

@@ -15,8 +15,7 @@ from ..tracing.tracing import MAX_COLLISIONS
 from ..walls.wall import Wall
 from .amplification import DiskCounts
 from .configuration_space import ConfigurationSpace
-from .records import rolling_ring
-from .rigid import check_kinds, checked_states, collide, collide_ring
+from .rigid import check_kinds, checked_states, collide, collide_ring, rolling_ring
 
 # Newton steps on a convex function: at worst a step halves the error, near the root it squares the error.
 LANDING_STEPS = 80

@@ -8,7 +8,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.collisions.compiled import graph_table as graphs
-from asperity.geometry.collisions.records import ground_of
+from asperity.geometry.collisions.rigid import ground_of
 from disk_shapes import BEZIERS, DISK, PARABOLAS, states
 
 
