@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from .hollow import HollowConditionals
-from .pieces import Pieces
+from .hollow import HollowConditionals, Pieces
 
 # Mix a label, the number of its occurrences at one angle, and the number of one of them to a key.
 _MIXING = tuple(np.uint64(k) for k in (6364136223846793005, 1442695040888963407, 2862933555777941757))

@@ -6,8 +6,8 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.itineraries.compiled.patches import Cells, Grid, masses_of_patches, masses_of_rows, room_for
+from asperity.geometry.itineraries.hollow import Pieces
 from asperity.geometry.itineraries.patches import common_pieces, interpolation, positions
-from asperity.geometry.itineraries.pieces import Pieces
 from asperity.kernels.bases.measure import SINE
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import traced_matrix

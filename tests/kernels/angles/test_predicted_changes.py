@@ -6,7 +6,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.itineraries.compiled.march import LEVELS, nested_rules
-from asperity.geometry.itineraries.pieces import Pieces, samples_between
+from asperity.geometry.itineraries.hollow import Pieces, samples_between
 from asperity.kernels.expectations.angle_panels import AnglePanels
 from asperity.kernels.walls.conditionals import WallConditionals
 
