@@ -24,8 +24,7 @@ from ..cells.validity import canonical_island, canonical_path, check_crossings, 
 from ..curves.curve import LARGEST_COORDINATE, Curve
 from ..curves.segment import Segment
 from ..disk.disk import Disk
-from ..scene.plan import TracePlan, plan_of
-from ..scene.scene import Scene, scene_of
+from ..scene.scene import Scene, TracePlan, plan_of, scene_of
 
 
 @dataclass(frozen=True, repr=False, init=False)

@@ -19,7 +19,7 @@ from numba import types
 
 from ...curves import columns as c
 from ...curves.columns import NEARBY_SLACKS
-from ...scene.boxes import BOXES, CONTENT, TREE_COLUMNS
+from ...scene.closed_forms import BOXES, CONTENT, TREE_COLUMNS
 from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
 from ...scene.scene import no_tables
 from ...scene.structs import Struct

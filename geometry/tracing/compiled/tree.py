@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 
 from ...curves import columns as c
 from ...curves.columns import NEARBY_SLACKS
-from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, ESCAPE_ROOM, OTHER_X, OTHER_Y, PARENT
+from ...scene.closed_forms import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, ESCAPE_ROOM, OTHER_X, OTHER_Y, PARENT
 from .pieces.formulas import side
 from .pieces.lines import is_ahead, joint_side, line_at, line_hit, line_sides
 from .pieces.options import inlined, inner

@@ -8,7 +8,7 @@ import pytest
 from asperity import geometry as geo
 from asperity.geometry.curves.columns import ESCAPE_LEFT, ESCAPE_RIGHT, JOINT_X, JOINT_Y
 from asperity.geometry.scene import scene
-from asperity.geometry.scene.boxes import ESCAPE_MARGIN, MOST_LINES, escape_sectors
+from asperity.geometry.scene.closed_forms import ESCAPE_MARGIN, MOST_LINES, escape_sectors
 
 SLOT = [(0, 0), (0.2, -0.6), (0.5, -0.1), (0.5, -0.5), (0.51, -0.5), (0.51, -0.1), (0.9, -0.4), (1, 0)]
 NOTCH = [(0, 0), (0.1, -0.95), (0.45, -0.9), (0.55, -0.3), (0.5, -0.5), (0.47, -0.2), (1, 0)]
