@@ -36,7 +36,6 @@ from .tracing.boundary_map import billiard_map, nested_reflection
 from .tracing.generations import MushroomGenerations
 from .tracing.tracing import Status, trace, trajectory
 from .walls.catalogue import WALLS, wall_from_text
-from .walls.joined import join_walls
 from .walls.mushroom import mushrooms
 from .walls.named import (
     dispersing_arcs,
@@ -44,6 +43,7 @@ from .walls.named import (
     elliptical_arcs,
     flat,
     focusing_arcs,
+    join_walls,
     koch,
     notched_angle,
     rectangular_teeth,

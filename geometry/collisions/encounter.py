@@ -1,4 +1,7 @@
-"""Two rigid bodies with satellites and edges: free flight to the first contact, and the elastic impact there."""
+"""Two rigid bodies with satellites and edges: free flight to the first contact, and the elastic impact there.
+
+The bodies are two disks, or a disk with satellites of any sizes and positions, or with teeth, and a rough wall.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The deterministic collision of a disk and a wall: its arguments, the compiled calculation and its results."""
+"""The deterministic collision of a disk with a rough wall (Rudzis 2022, section 1.3): its arguments and its results.
+
+The compiled calculation has lengths in units of the wall, so the disk's radius is 1/scale.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""The disk: its masses, its kinetic-energy metric, its frame, and the angles of its velocities.
+"""The disk: its masses, its kinetic-energy metric, its frame, the angles of its velocities, and bodies of its shape.
 
 ``xp`` is the arithmetic: ``numpy`` for arrays, ``sympy`` for expressions. The library computes with these formulas,
-and the ledger proves them.
+and the ledger proves them. A `SatelliteDisk` has round satellites of any sizes and positions on its rim, or teeth; it
+is the body of a true collision. `InnerDisk` is D_0 inside the satellites, which never touches the wall.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ..disk import rolling
+from . import rolling
 
 
 def frame_rows(mass: Any, inertia: Any, xp: Any = np) -> list[list[Any]]:

@@ -1,4 +1,8 @@
-"""The satellites of the disk: evenly spaced points on its rim, the only points that touch the wall."""
+"""The satellites of the disk, evenly spaced points on its rim, and the charts of rolling about them.
+
+The satellites are the only points that touch the wall. The charts are the maps of rolling about a satellite, and the
+maps that straighten it.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, positive_number
 from ...core.errors import InputError
-from ..disk import rolling
+from . import rolling
 from .rolling import Matrix, Vector
 
 # Power of the scale in the default spacing, in (0, 1/2): the theorem needs spacing -> 0 and scale/spacing^2 -> 0.

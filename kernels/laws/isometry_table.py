@@ -337,7 +337,7 @@ def crossings_modulo_two(height_to_width: float, theta: Floats) -> Floats:
     rest = np.asarray(np.mod(np.where(crossings <= LARGEST_PLAIN, crossings, 0.0), 2.0))
     many = crossings > LARGEST_PLAIN
     if np.any(many):
-        from ...geometry.tracing.double_double.crevice import crossings_modulo_two as in_double_double
+        from ...geometry.tracing.double_double.numbers import crossings_modulo_two as in_double_double
 
         exceeding = many & (crossings > LARGEST_DOUBLE_DOUBLE)
         rest[many] = in_double_double(2.0 * height_to_width, theta[many])

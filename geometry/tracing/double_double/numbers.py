@@ -15,6 +15,7 @@ from fractions import Fraction
 from functools import partial
 from typing import Any
 
+import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, make_attribute_wrapper, models, overload, register_model
@@ -34,7 +35,6 @@ _TERMS = 28
 # 1/n! for n = 0 .. _TERMS as double-doubles, correctly rounded.
 _FACTORIALS = [Fraction(1, math.factorial(n)) for n in range(_TERMS + 1)]
 _INVERSE_FACTORIALS = tuple((float(exact), float(exact - Fraction(float(exact)))) for exact in _FACTORIALS)
-
 # Without wrappers and counts of references, which no operator needs, numba compiles an operator in half the time.
 OPTIONS: Any = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
 _compile = jit(linked=True, _nrt=False)
@@ -298,3 +298,18 @@ def direction_angle(x, y):
     sine, cosine = sine_cosine(abs(angle))
     rest = cross(cosine, -sine if angle < 0.0 else sine, x, y)
     return two_sum(angle, rest.high)
+
+
+@jit()
+def crossings_modulo_two(double_height, theta):
+    """Return d mod 2 for d = double_height |cot theta| < 2^53, with an error of at most about d 2^-100."""
+    found = np.empty(theta.size)
+    for k in range(theta.size):
+        sine, cosine = sine_cosine(theta[k])
+        pairs = 0.5 * double_height * (-cosine if cosine < 0.0 else cosine) / sine
+        # the high part may be an integer with a negative low part
+        whole = math.floor(pairs.high)
+        if whole == pairs.high and pairs.low < 0.0:
+            whole -= 1.0
+        found[k] = min(max(2.0 * (pairs - whole).high, 0.0), 2.0)
+    return found
