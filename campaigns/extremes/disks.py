@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity import geometry as geo
-from asperity.bench.quantities.collision import DISK
+from asperity.bench.problems import DISK
 from asperity.core.rounding import EPS
 from campaigns.engine import Campaign, Judged
 

@@ -20,8 +20,7 @@ import numpy as np
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.bench.problems import problem_names
-from asperity.bench.quantities.collision import DISK, correlation_of
+from asperity.bench.problems import DISK, correlation_of, problem_names
 from asperity.bench.quantities.laws import DIFFUSE, LAW_BASIS, LENGTH, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
 from asperity.bench.quantities.walls import wall_of
 from asperity.bench.standard_set import FILE

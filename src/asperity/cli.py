@@ -186,7 +186,7 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, verbose: bool
     from .geometry import wall_from_text
     from .kernels import WallLaw
     from .spectral import enclosures, spectral_gap
-    from .study.report import enclosures_as_list, enclosures_as_text, gap_as_dict, quotation
+    from .study.result import enclosures_as_list, enclosures_as_text, gap_as_dict, quotation
 
     law = WallLaw(wall_from_text(wall))
     chosen = law.in_specular_frame() if specular else law
@@ -501,7 +501,8 @@ def bench(problems: tuple[str, ...], quick: bool, out: Path, force: bool) -> Non
       asperity bench my-wall.toml --quick --out my-wall
     """
     from .bench import problems as known
-    from .bench import run, standard_set
+    from .bench import standard_set
+    from .bench import standard_set as run
 
     names = known.problem_names(problems)
     run.prepare_folder(out, names, force=force)

@@ -14,14 +14,21 @@ from scipy.stats import norm, t
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.bench import problems as collision_quantities
+from asperity.bench import problems as uniform_disk
 from asperity.bench.problems import OWN_QUANTITIES, QUANTITIES, methods_of, problem_names
-from asperity.bench.quantities import collision as collision_quantities
-from asperity.bench.quantities import collision as uniform_disk
-from asperity.bench.quantities.laws import LAW_BASIS, eta_at, resistance_of
-from asperity.bench.quantities.methods import matrix_methods
+from asperity.bench.quantities.laws import LAW_BASIS, eta_at, matrix_methods, resistance_of
 from asperity.bench.quantities.walls import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
-from asperity.bench.run import save
-from asperity.bench.standard_set import FINEST, QUICK, Effort, TimePlan, known_reference, made_references, run_problems
+from asperity.bench.standard_set import (
+    FINEST,
+    QUICK,
+    Effort,
+    TimePlan,
+    known_reference,
+    made_references,
+    run_problems,
+    save,
+)
 from asperity.core.child import ChildCrashed, ChildProcess, OutOfTime
 from asperity.errors import InputError
 from asperity.estimates import student_95
@@ -254,7 +261,7 @@ def test_a_picture_has_all_problems_of_a_scene_whatever_their_order(tmp_path, mo
     reports = [report_of([("auto", 1e-3, [0.2])], f"{scene}/{what}") for what in "ab" for scene in "xy"]
     drawn = []
     monkeypatch.setattr(
-        "asperity.bench.run._draw", lambda shown: drawn.append([one.problem for one in shown]) or Figure()
+        "asperity.bench.standard_set._draw", lambda shown: drawn.append([one.problem for one in shown]) or Figure()
     )
     save(reports, tmp_path)
     assert drawn == [["x/a", "x/b"], ["y/a", "y/b"]]

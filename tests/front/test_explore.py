@@ -15,11 +15,19 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
-from asperity.explore.answers import Answer, answers_to, first_answer, histogram, largest_gap
+from asperity.explore.answers import (
+    Answer,
+    Question,
+    answers_to,
+    first_answer,
+    histogram,
+    largest_gap,
+    pinned,
+    with_new_vertex,
+)
 from asperity.explore.background import GONE, Background
 from asperity.explore.drawing import pictured, pictured_and_answered
 from asperity.explore.files import LARGEST, new_folder, opened, plain_name, studied, unpacked, wall_as_toml
-from asperity.explore.question import Question, pinned, with_new_vertex
 from asperity.explore.server import _called
 from asperity.study.result import resistance_from
 

@@ -13,8 +13,7 @@ from ..core.errors import InputError
 from ..geometry import Wall
 from ..geometry.plotting.walls import MARGIN, RAY_COLOURS, RayPath, axis_labels, heights, vertical_stretch
 from ..study.pictures import chosen_rays
-from .answers import Answer, answers_to
-from .question import Question
+from .answers import Answer, Question, answers_to
 
 # What is grey is seen on white and on black.
 KNOWN, SOLID, GREY = "#0072B2", "#d1d1d1", "#808080"

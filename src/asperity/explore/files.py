@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from ..core.errors import AsperityError, InputError
 from ..geometry import Wall, wall_from_text
 from ..study import study_wall
-from .question import Question
+from .answers import Question
 
 # Largest file that is opened, in bytes: a profile of a million points.
 LARGEST = 64 * 2**20

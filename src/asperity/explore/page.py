@@ -17,11 +17,9 @@ from ..core.errors import AsperityError
 from ..geometry import WALLS, Disk, Wall, wall_from_text
 from ..study.result import resistance_from
 from . import drawing
-from .answers import Answer
+from .answers import MOST_HANDLES, Answer, Question, draggable_vertices, pinned, with_new_vertex
 from .background import Background
 from .files import new_folder, opened, plain_name, studied, unpacked, wall_as_toml
-from .question import MOST_HANDLES, Question, draggable_vertices, pinned, with_new_vertex
-from .style import TEXT
 
 # Milliseconds between two looks for better answers.
 INTERVAL = 40
@@ -38,6 +36,13 @@ CONVENTIONS = {"retroreflection = identity": "paper", "specular = identity": "sp
 STRETCH: dict[str, Any] = {"sizing_mode": "stretch_width"}
 # As many columns of figures as fit.
 GRID = {"display": "grid", "grid-template-columns": "repeat(auto-fit, minmax(min(400px, 100%), 1fr))"}
+
+# Of the text of the page.
+TEXT = """
+:host { font-family: system-ui, sans-serif; }
+.asperity-answers td { padding: 1px 10px 1px 0; vertical-align: top; overflow-wrap: anywhere; }
+.asperity-answers td:first-child { opacity: 0.75; white-space: nowrap; }
+"""
 
 
 class Page:

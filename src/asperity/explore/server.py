@@ -18,7 +18,6 @@ from typing import Any
 from ..core.errors import INTERRUPTED, InputError
 from ..geometry import WALLS, wall_from_text
 from .background import end_all, private_folder
-from .style import COMPONENTS, HEAD
 
 ADDRESS, PORT = "127.0.0.1", 5006
 # The file descriptor.
@@ -30,6 +29,38 @@ LARGEST_MESSAGE = 96 * 2**20
 # Milliseconds after which the computation of a closed tab ends, and between two checks.
 CLOSED_AFTER, CHECKED_EVERY = 3000, 2000
 FIRST_WALL = "triangular-teeth"
+# Styles: dark where the system is. In every component, where the light colours of panel come later.
+COMPONENTS = """
+.bk-btn.bk-active { outline: 2px solid #56B4E9; outline-offset: -2px; }
+@media (prefers-color-scheme: dark) {
+  :host {
+    --panel-background-color: #1b1e22 !important; --panel-on-background-color: #e8e8e8 !important;
+    --panel-surface-color: #2b3035 !important; --panel-on-surface-color: #e8e8e8 !important;
+    --panel-secondary-color: #343a40 !important; --panel-on-secondary-color: #ffffff !important;
+    --panel-border-color: #4a4f55 !important; --color: #d0d0d0 !important; --file: #343a40 !important;
+  }
+  select.bk-input { appearance: auto !important; background-image: none !important; }
+  .noUi-target { background: #2b3035; border-color: #4a4f55; box-shadow: none; }
+  .noUi-connect { background: #6a7078; }
+}
+"""
+# Of the whole page; bokeh draws axes and text in the colours that begin with --bk.
+HEAD = """
+{% block postamble %}
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<style>
+@media (prefers-color-scheme: dark) {
+  :root {
+    color-scheme: dark; background: #1b1e22; --icon-color: #b0b0b0; --bk-text-color: #e8e8e8;
+    --bk-background-fill-color: #1b1e22; --bk-border-fill-color: #1b1e22;
+    --bk-outline-line-color: #4a4f55; --bk-grid-line-color: #4a4f55;
+    --bk-axis-line-color: #b0b0b0; --bk-major-tick-line-color: #b0b0b0; --bk-minor-tick-line-color: #b0b0b0;
+    --bk-major-label-text-color: #d0d0d0; --bk-axis-label-text-color: #d0d0d0;
+  }
+}
+</style>
+{% endblock %}
+"""
 
 
 def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = None) -> Any:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from ..geometry import Wall, focusing_arcs, koch
-from .answers import first_answer
+from .answers import Question, first_answer
 from .drawing import pictured
-from .question import Question
 
 for _wall in (Wall.from_vertices([(0, 0), (0.4, -0.3), (1, 0)]), focusing_arcs(1.0), koch(3)):
     first_answer(Question(_wall, ""))

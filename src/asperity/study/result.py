@@ -1,14 +1,19 @@
-"""The results of a study of a wall, as plain fields, and what its gap implies: relaxation, diffusion, flatness."""
+"""The results of a study of a wall as plain fields, what its gap implies, and its report as text and as values for JSON."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from textwrap import shorten
 from typing import Any
 
+import numpy as np
+
 from ..core.errors import AsperityError
-from ..core.estimates import NORMAL_95, Estimate, Summary, estimate_as_dict, finite
+from ..core.estimates import NORMAL_95, Estimate, Summary, estimate_as_dict, finite, with_error
 from ..core.rounding import EPS
+from ..core.version import __version__
 from ..geometry import Disk, Wall
 from ..kernels import CollisionLaw, KernelMatrix, Law
 from ..spectral import SpectralGap, Spectrum, mean_squared_slope
@@ -16,6 +21,7 @@ from ..spectral.bounds.enclosure import Enclosures
 from ..spectral.consequences.diffusion import Diffusivity, logarithmic_slope
 from ..spectral.consequences.mixing import relaxation_time, slem_from_gap
 from ..spectral.consequences.momentum_accommodation import WEIGHTS, Accommodation
+from ..spectral.plotting import CONVENTIONS
 
 
 @dataclass(frozen=True, repr=False)
@@ -192,3 +198,265 @@ def _modulus_gap(gap: SpectralGap | None, specular_gap: SpectralGap | None, foun
         error = float(found.errors.total()[lowest])
         return Estimate(1.0 + float(found.values[lowest]), error, "estimate", f"least eigenvalue in {found.basis!r}")
     return Estimate(nearer.value, nearer.error, nearer.kind, f"gap in the {nearer.convention} convention")
+
+
+AVERAGES = ("tangential", "normal", "maxwell_fraction", "misfit")
+# Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
+KAC_Z = 4.5
+# Characters; with ``verbose`` the whole reason is shown.
+LONGEST_REFUSAL = 110
+# Pieces of a curved wall, above which it is a profile: the named curved walls have at most five.
+MOST_PIECES = 8
+
+
+def report_of(study: StudyResult, by_angle: bool, verbose: bool) -> str:
+    """What was found, one fact a line; an error in brackets belongs to the last digits.
+
+    With ``verbose`` the lines below a fact say how it was found. A disk that was given comes first. Of a profile the
+    momentum that it takes on comes before its gap.
+    """
+    wall, disk, found = study.wall, study.disk, study.consequences
+    unit = f" {wall.unit}" if wall.unit else ""
+    cells = counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell"
+    islands = f", {counted(len(wall.islands), 'island')}" if wall.islands else ""
+    symmetry = "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
+    # of every block the first line is the fact
+    blocks = {
+        "wall": [
+            f"{study.name}: period {wall.period:g}{unit}, depth {wall.depth:.6g}{unit}, "
+            f"{counted(len(wall.pieces), 'piece')}, {symmetry}",
+            f"length {wall.arc_length:.6g}{unit}, {cells}{islands}",
+        ],
+    }
+    of_disk = {
+        "disk": [
+            f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
+            "as deep"
+        ],
+        "collision": _gap_lines(study, "collision_gap", "gap of that wall ")
+        + [f"law of that wall {line}" for line in _matrix_lines(study.collision_matrix)],
+        "conserved": [
+            f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
+            f"{study.conservation['rolling_momentum_defect']:.0e}"
+        ],
+    }
+    of_profile = wall.is_polygonal or len(wall.pieces) > MOST_PIECES
+    blocks |= of_disk if study.disk_given else {}
+    blocks |= _momentum_lines(study) if of_profile or by_angle or verbose else {}
+    blocks |= {
+        "rays": _ray_lines(study.tracer),
+        "law": _matrix_lines(study.matrix),
+        "gap": _gap_lines(study, "gap"),
+        "": _gap_lines(study, "specular_gap"),
+    }
+    blocks |= {"spectrum": _spectrum_lines(study), "enclosed": _enclosed_lines(study)} if verbose else {}
+    blocks |= {"relaxation": _relaxation_lines(found), "diffusion": _diffusion_lines(found)}
+    blocks |= of_disk if verbose or not (study.disk_given or of_profile) else {}
+    shown = {title: lines if verbose else [_short(lines[0])] for title, lines in blocks.items()}
+    shown |= {"by angle": _at_angles(study.accommodation)} if by_angle else {}
+    return "\n".join(
+        f"{'' if number else title:11s}{line}" for title, lines in shown.items() for number, line in enumerate(lines)
+    )
+
+
+def _short(line: str) -> str:
+    return shorten(line, LONGEST_REFUSAL, placeholder=" ...") if line.startswith("refused: ") else line
+
+
+def _momentum_lines(study: StudyResult) -> dict[str, list[str]]:
+    """The momentum of a gas that the wall takes on, and the resistance of a body with it."""
+    found, flatness = study.accommodation, study.consequences.flatness
+    if found is None:
+        return {"momentum": [f"refused: {study.refusals['accommodation']}"]}
+    best = "has" if 0.0 < found.maxwell_fraction.value < 1.0 else "has, of those from 0 to 1,"
+    slope = f"; mean squared slope {flatness:.6g}" if math.isfinite(flatness) else ""
+    return {
+        "momentum": [
+            f"accommodation tangential {found.tangential}, normal {found.normal}",
+            f"{found.tangential.kind}: {found.tangential.method}",
+        ],
+        "resistance": [f"{study.resistance} times that of a smooth tumbling body{slope}"],
+        "Maxwell": [f"fraction {found.maxwell_fraction} {best} the nearest mean velocities, misfit {found.misfit}"],
+    }
+
+
+def _at_angles(found: Accommodation | None) -> list[str]:
+    return [] if found is None else [f"{angle}: {words}" for angle, words in found.by_angle().items()]
+
+
+def _ray_lines(tracer: TracerCheck | None) -> list[str]:
+    if tracer is None:
+        return ["not tested: the wall is flat or open"]
+    total, escaped = sum(tracer.counts.values()), tracer.counts.get("escaped", 0)
+    count = f"all {total}" if escaped == total else f"{escaped} of {total}"
+    found, expected = tracer.mean_collisions, tracer.expected_collisions
+    flagged = [f", {n} {status.replace('_', ' ')}" for status, n in tracer.counts.items() if n and status != "escaped"]
+    lines = [
+        f"{count} left the wall after {found} collisions on average, Kac's formula {expected:.6g}",
+        f"length of boundary over opening (Kac): z = {tracer.z_score:+.2f}{''.join(flagged)}",
+    ]
+    if tracer.z_score < -KAC_Z:
+        lines.append(
+            "Kac's formula presumes that every ray inside can come from the opening; "
+            f"{100.0 * (1.0 - found.value / expected):.3g} % of the boundary's rays cannot if the tracer is right, as "
+            "those that stay in a mushroom's cap for ever"
+        )
+    elif tracer.z_score > KAC_Z:
+        lines.append("more collisions than Kac's formula allows: do not trust this wall's numbers")
+    return lines
+
+
+def _matrix_lines(matrix: KernelMatrix) -> list[str]:
+    symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
+    missed = f", tolerance {matrix.requested_tolerance:g} NOT met" if matrix.tolerance_met is False else ""
+    rays = f", {matrix.samples} rays" if matrix.samples else ""
+    noise = "" if symmetry.z_score is None else f" (z = {symmetry.z_score:+.2f} against the sampling noise)"
+    return [
+        f"{matrix.basis!r} by {matrix.method}, Frobenius error {float(matrix.error):.2g}{missed}",
+        f"{matrix.error.kind}{rays}; asymmetry {float(symmetry):.2g}{noise}, rows sum to 1 within {float(rows):.2g}",
+    ]
+
+
+def _gap_lines(study: StudyResult, which: str, name: str = "") -> list[str]:
+    gap: SpectralGap | None = getattr(study, which)
+    if gap is None:
+        return [f"refused: {study.refusals[which]}"]
+    words = CONVENTIONS[gap.convention]
+    if gap.self_adjoint:
+        fact = f"{'0' if gap.verdict == 'no gap' else gap} {gap.verdict} ({words})"
+    else:
+        norm = Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method)
+        fact = f"norm {norm} on functions of mean 0, not self-adjoint ({words})"
+    met = "met" if gap.error <= study.tolerance else "NOT met"
+    # in brackets an error as large as the gap leaves none of its digits
+    how = f"{gap.value:.4g} with error {gap.error:.2g}, tolerance {study.tolerance:g} {met}; {gap.kind}: {gap.method}"
+    return [f"{name}{fact}", how, *gap.evidence]
+
+
+def _relaxation_lines(found: Consequences) -> list[str]:
+    slem, time = found.slem, found.relaxation_time
+    if slem is None or time is None:
+        return ["refused with the gap"]
+    fact = f"{time} steps"
+    if not math.isfinite(time.error):
+        fact = "infinite: a modulus in the spectrum is 1" if found.without_gap else "not known: slem may be 1"
+    return [fact, f"slem {slem} ({slem.kind}: {slem.method})"]
+
+
+def _diffusion_lines(consequences: Consequences) -> list[str]:
+    found = consequences.diffusion
+    if found is None:
+        return [f"refused: {consequences.refusal}"]
+    return [
+        f"D = {found}; r = 1, speed 1, tau the exit time",
+        f"eta = {with_error(found.eta, found.eta_error)}, zeta = {with_error(found.zeta, found.zeta_error)} "
+        f"({found.kind}: {found.method})",
+    ]
+
+
+def _spectrum_lines(study: StudyResult) -> list[str]:
+    """Eigenvalues with their errors; then how they were found."""
+    found = study.spectrum
+    if found is None:
+        return [f"refused: {study.refusals['spectrum']}"]
+    numbers = found.estimates()
+    # the second largest modulus may be that of the most negative
+    order = sorted(range(len(numbers)), key=lambda i: (i > 0, -abs(numbers[i].value)))
+    shown = [str(numbers[i]) + ("" if found.parity[i] == "none" else f" {found.parity[i]}") for i in order]
+    of_grid = study.gap is not None and study.gap.verdict == "no gap"
+    caution = "; they belong to the grid, for the law has no gap" if of_grid else ""
+    return [
+        f"the {len(shown)} of largest modulus: {', '.join(shown)} ({found.convention} convention, estimate: "
+        f"{numbers[0].method}{caution})",
+        f"completeness: {found.completeness}",
+    ]
+
+
+def _enclosed_lines(study: StudyResult) -> list[str]:
+    found = study.enclosures
+    return [f"refused: {study.refusals['enclosures']}"] if found is None else enclosures_as_text(found)
+
+
+def enclosures_as_text(found: Enclosures) -> list[str]:
+    """One line an enclosure, to paste into a paper, and one line of what they have in common."""
+    return [f"{found.convention} convention; {found.method}", *map(str, found)]
+
+
+def counted(number: int, word: str) -> str:
+    """A number of things."""
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def _accommodation(found: Accommodation) -> dict[str, Any]:
+    """Plain values; a coefficient that is not defined is None."""
+    averages = {name: estimate_as_dict(getattr(found, name)) for name in AVERAGES}
+    columns = found.incidence_deg, found.tangential_at, found.tangential_errors, found.normal_at, found.normal_errors
+    names = "incidence_deg", "tangential", "tangential_error", "normal", "normal_error"
+    rows = [dict(zip(names, map(finite, row), strict=True)) for row in np.transpose(columns).tolist()]
+    return {**averages, "at": rows, "kind_at": found.kind_at}
+
+
+def study_as_dict(study: StudyResult) -> dict[str, Any]:
+    """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""
+    wall, disk, found = study.wall, study.disk, study.spectrum
+    gaps = [None if gap is None else gap_as_dict(gap) for gap in (study.gap, study.specular_gap, study.collision_gap)]
+    return {
+        "asperity": __version__,
+        "tolerance": study.tolerance,
+        "wall": {
+            "name": study.name, "period": wall.period, "depth": wall.depth, "arc_length": wall.arc_length,
+            "pieces": len(wall.pieces), "hollows": len(wall.hollows), "islands": len(wall.islands),
+            "closes": wall.closes, "polygonal": wall.is_polygonal, "mirror_symmetric": wall.is_mirror_symmetric,
+        },
+        "tracer": None if study.tracer is None else {
+            "rays": dict(study.tracer.counts), "mean_collisions": estimate_as_dict(study.tracer.mean_collisions),
+            "kac": study.tracer.expected_collisions, "z_score": study.tracer.z_score,
+        },
+        "law": _matrix(study.matrix),
+        "gap": {"paper": gaps[0], "specular": gaps[1]},
+        "eigenvalues": None if found is None else {
+            "convention": found.convention, "basis": repr(found.basis), "method": found.estimates()[0].method,
+            "values": found.values.tolist(), "errors": finite(found.errors.total()), "kind": "estimate",
+            "parity": list(found.parity), "completeness": found.completeness,
+            **{part: finite(getattr(found.errors, part)) for part in ("algebraic", "discretisation", "sampling")},
+        },
+        "enclosures": study.enclosures and enclosures_as_list(study.enclosures),
+        "collision": {
+            "mass": disk.mass, "inertia": disk.inertia, "foreshortening": disk.foreshortening,
+            "law": _matrix(study.collision_matrix), "gap": gaps[2], **study.conservation,
+        },
+        "consequences": study.consequences.as_dict(),
+        "accommodation": study.accommodation and _accommodation(study.accommodation),
+        "resistance": study.resistance and estimate_as_dict(study.resistance),
+        "refusals": dict(study.refusals),
+    }  # fmt: skip
+
+
+def gap_as_dict(gap: SpectralGap) -> dict[str, Any]:
+    """A gap as plain values, ready for JSON."""
+    return {
+        **estimate_as_dict(gap), "verdict": gap.verdict, "convention": gap.convention, "evidence": list(gap.evidence),
+        "self_adjoint": gap.self_adjoint,
+    }  # fmt: skip
+
+
+def quotation(gap: SpectralGap) -> str:
+    """One line to paste into a paper: value, error, kind, verdict, convention, version."""
+    number = "0" if gap.verdict == "no gap" else gap
+    what = "spectral gap" if gap.self_adjoint else "not known to be self-adjoint, 1 - norm on functions of mean 0:"
+    return f"{what} {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; asperity {__version__}"
+
+
+def enclosures_as_list(found: Enclosures) -> list[dict[str, Any]]:
+    """Enclosures as plain values, ready for JSON."""
+    return [{**asdict(item), "method": found.method, "convention": found.convention} for item in found]
+
+
+def _matrix(matrix: KernelMatrix) -> dict[str, Any]:
+    symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
+    return {
+        "basis": repr(matrix.basis), "method": matrix.method, "samples": matrix.samples,
+        "frobenius_error": estimate_as_dict(matrix.error), "tolerance_met": matrix.tolerance_met,
+        "symmetry_defect": {"value": float(symmetry), "norm": symmetry.norm, "z_score": finite(symmetry.z_score)},
+        "stochastic_defect": {"value": float(rows), "norm": rows.norm},
+    }  # fmt: skip

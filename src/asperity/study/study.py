@@ -30,8 +30,7 @@ from ..spectral.consequences.momentum_accommodation import from_degrees
 from ..spectral.gap.law_spectrum import with_gap
 from ..spectral.gap.methods import law_eigenvalues
 from .pictures import RESOLUTION, save_pictures
-from .report import report_of, study_as_dict
-from .result import StudyResult, TracerCheck, consequences_of
+from .result import StudyResult, TracerCheck, consequences_of, report_of, study_as_dict
 
 BINS = 128
 TOLERANCE = 1e-3

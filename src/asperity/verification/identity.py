@@ -77,7 +77,7 @@ def verify(
     >>> verify(2 * m <= m**2 + 1).answer
     'proved'
     """
-    from .claims import claims_of
+    from .derivation import claims_of
 
     claims, relations = claims_of(lhs, rhs, assumptions)
     if time_limit is not None:
