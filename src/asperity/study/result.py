@@ -1,4 +1,4 @@
-"""The results of a study of a wall as plain fields, what its gap implies, and its report as text and as values for JSON."""
+"""The results of a study of a wall as plain fields, what its gap implies, and its report as text and as JSON."""
 
 from __future__ import annotations
 
