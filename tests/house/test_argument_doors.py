@@ -5,7 +5,7 @@ import operator
 
 import numpy as np
 import pytest
-from campaigns.cases.public_calls import CALLS, method_calls
+from campaigns.cases.public_calls import CALLS, MISSING, method_calls
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -47,6 +47,11 @@ for call in (
     except ValueError as reason:
         print(reason)
 """
+
+
+def test_every_public_parameter_has_an_example():
+    method_calls()
+    assert not MISSING, "a row of `ARGUMENTS` or of `SPECIAL` in campaigns/cases/public_calls is missing"
 
 
 def test_a_matrix_does_not_end_the_process():
