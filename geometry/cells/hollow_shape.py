@@ -33,8 +33,8 @@ class HollowShape:
 
     Parameters
     ----------
-    kinds : tuple of str
-        The types of its pieces from left to right.
+    kinds : tuple of type
+        The classes of its pieces from left to right.
     vertices : array, shape (pieces + 1, 2)
         From (0, 0) to (1, 0).
     inner : array, shape (curved pieces, 3, 2)
@@ -43,7 +43,7 @@ class HollowShape:
         Bound on the error of a coordinate due to rounding of the wall's coordinates.
     """
 
-    kinds: tuple[str, ...]
+    kinds: tuple[type[Curve], ...]
     vertices: Floats
     inner: Floats
     rounding: float
@@ -58,7 +58,7 @@ class HollowShape:
         curved = [piece.point(INNER) for piece in pieces if not piece.is_straight]
         inner = (np.reshape(curved, (-1, len(INNER), 2)) - corner) / hollow.width
         size = max(wall.period / hollow.width, float(np.abs(vertices).max()))
-        kinds = tuple(type(piece).__name__ for piece in pieces)
+        kinds = tuple(map(type, pieces))
         return cls(kinds, frozen(vertices), frozen(inner), SHAPE_TOLERANCE * size)
 
     def mirrored(self) -> HollowShape:
@@ -78,14 +78,14 @@ class HollowShape:
     @property
     def apex_angle(self) -> float | None:
         """The angle at the bottom of an isosceles triangle, radians; None for every other shape."""
-        if self.kinds != ("Segment",) * 2 or abs(self.vertices[1, 0] - 0.5) > SHAPE_TOLERANCE:
+        if self.kinds != (Segment,) * 2 or abs(self.vertices[1, 0] - 0.5) > SHAPE_TOLERANCE:
             return None
         return 2.0 * math.atan2(0.5, -self.vertices[1, 1])
 
     @property
     def height_to_width(self) -> float | None:
         """Depth over width of a rectangle; None for every other shape."""
-        if self.kinds != ("Segment",) * 3:
+        if self.kinds != (Segment,) * 3:
             return None
         (left, depth), (right, other) = self.vertices[1:3].tolist()
         level = depth < 0.0 and abs(other - depth) <= SHAPE_TOLERANCE * abs(depth)
@@ -102,7 +102,7 @@ def distinct_hollows(wall: Cell) -> list[tuple[HollowShape, list[Hollow]]]:
     >>> [(round(shape.apex_angle, 12), len(hollows)) for shape, hollows in distinct_hollows(wall)]
     [(0.927295218002, 2)]
     """
-    found: dict[tuple[str, ...], list[tuple[HollowShape, list[Hollow]]]] = {}
+    found: dict[tuple[type[Curve], ...], list[tuple[HollowShape, list[Hollow]]]] = {}
     cell = wall.cell
     for hollow in cell.hollows:
         shape = HollowShape.of(cell, hollow)

@@ -399,7 +399,7 @@ def _mirrored(pieces: _Pieces) -> _Pieces:
     low, high, sine, cosine, offset, leaf, sign, bounces = pieces
     turned = np.where(sign > 0, -offset, 2.0 * np.pi - offset)
     images = _Pieces(np.pi - high, np.pi - low, sine, -cosine, turned, leaf + leaf.max(initial=-1) + 1, sign, bounces)
-    return _Pieces(*(np.concatenate(pair) for pair in zip(pieces, images, strict=True)))
+    return _Pieces(*map(np.concatenate, zip(pieces, images, strict=True)))
 
 
 def _fixed(array: NDArray[Any]) -> NDArray[Any]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -96,8 +97,9 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     points = checked_chain(hollow_vertices)
     relative = points - points[0]
     unit = math.ldexp(1.0, math.frexp(float(np.abs(relative).max()))[1])
-    corners, beyond = _clipped(ExactPoints(points / unit))
-    _shorten(ExactPoints(points / unit), corners, beyond)
+    chain = ExactPoints(points / unit)
+    corners, beyond = _clipped(chain)
+    _shorten(chain, corners, beyond)
     entrance = int(np.flatnonzero(beyond == OPENING)[0])
     high, low = _directions(ExactPoints(points))
     for array in (corners, beyond):
@@ -287,7 +289,7 @@ class ExactPoints:
     def _lattice(self) -> list[Vector]:
         """The coordinates as integer multiples of a common unit."""
         ratios = [value.as_integer_ratio() for value in self.points.ravel().tolist()]
-        unit = max(denominator for _, denominator in ratios)
+        _, unit = max(ratios, key=itemgetter(1))
         whole = [numerator * (unit // denominator) for numerator, denominator in ratios]
         return list(zip(whole[::2], whole[1::2], strict=True))
 
@@ -351,5 +353,5 @@ class ExactPoints:
         return bx - ax, by - ay
 
     def _cross(self, a: int, b: int, c: int) -> int:
-        (along, up), (right, above) = self._step(a, b), self._step(a, c)
-        return along * above - up * right
+        (ax, ay), (bx, by), (cx, cy) = self._lattice[a], self._lattice[b], self._lattice[c]
+        return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)

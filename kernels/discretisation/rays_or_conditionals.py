@@ -14,8 +14,8 @@ from .isometries import by_isometry_table
 from .method import Budget, sobol_matrix
 from .traced import by_adaptive_angles, first_segments
 
-# These rays take .02 to .1 s.
-FIRST_RAYS = 2**17
+# These rays take .02 to .1 s. Their error has hardly ever been below the second number.
+FIRST_RAYS, LEAST_ERROR = 2**17, 1e-5
 # Walls of more pieces, and walls that do not close, have no conditionals.
 MOST_PIECES = 16
 # Nor walls whose first panels are predicted to need more than this fraction of the limit on ray segments.
@@ -27,7 +27,8 @@ RAYS_GAIN = 1.0 / 16.0
 def by_rays_or_conditionals(law: WallLaw, basis: Basis, budget: Budget) -> KernelMatrix:
     """The first of these matrices of an undivided wall that meets the tolerance, or else the most exact one.
 
-    1. Isometries of a polygonal wall, if its beams resolve; if it has many pieces, after the first rays, but on panels.
+    1. Isometries of a polygonal wall, if its beams resolve. If it has many pieces, after the first rays, but not on
+       panels, and not if no rays reach the tolerance.
     2. The first rays.
     3. Conditional distributions, of walls that close and have few pieces.
     4. All rays.
@@ -35,7 +36,8 @@ def by_rays_or_conditionals(law: WallLaw, basis: Basis, budget: Budget) -> Kerne
     The error does not grow if the tolerance falls.
     """
     # on panels, mostly between the factors of a chain, rays would have to resolve hundreds of functions
-    if (len(law.wall.cell.pieces) <= FEW_PIECES or isinstance(basis, Panels)) and law.isometry_table() is not None:
+    few = len(law.wall.cell.pieces) <= FEW_PIECES
+    if (few or isinstance(basis, Panels) or budget.tolerance < LEAST_ERROR) and law.isometry_table() is not None:
         return by_isometry_table(law, basis, budget)
     sampler = SobolSampler(law, basis, budget.rng)
     first = _by_rays(sampler, replace(budget, rays=min(FIRST_RAYS, budget.rays)))

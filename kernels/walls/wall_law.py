@@ -236,7 +236,7 @@ def hollow_law(cell: Wall, hollow: Hollow) -> Law | None:
         return TriangularTeethLaw(shape.apex_angle)
     if shape.height_to_width is not None:
         return RectangularTeethLaw(shape.height_to_width)
-    if shape.kinds != ("Arc",) or not isinstance(arc, Arc) or not arc.is_circular or arc.direction < 0:
+    if len(pieces) > 1 or not isinstance(arc, Arc) or not arc.is_circular or arc.direction < 0:
         return None
     return CircularArcLaw(min(arc.half_span, 0.5 * np.pi)) if arc.half_span <= 0.5 * np.pi * (1.0 + ROUNDED) else None
 
