@@ -67,7 +67,8 @@ def numbers(name: str, value: ArrayLike) -> Floats:
     """
     try:
         array = np.asarray(value)
-        masked = _is_masked(value)
+        # a plain array has no mask
+        masked = array is not value and _is_masked(value)
         objects = array.dtype.kind == "O"
         if masked or array.dtype.kind not in "biufO" or (objects and not all(map(_is_real, array.flat))):
             raise TypeError("of another kind")
