@@ -40,7 +40,7 @@ EQUIVALENT = {
     ("S6.01", "billiard_maps._normal: gradient = q / AXES ** 2"): _NORMAL,
 }
 
-_FEWER_DIGITS = "the same number with fewer digits: tests/geometry/disks/test_charts.py looks at the digits"
+_FEWER_DIGITS = "the same number with fewer digits: tests/geometry/disk/test_charts.py looks at the digits"
 _SERIES = "angle * square / 6.0 * series, angle - np.sin(angle))"
 _GUARD = "a bound that holds by itself in exact arithmetic and guards against rounding"
 _UNFOLDED, _CLIPPED = "polygons.TriangularTeethLaw._unfolded: return", "(right, base, np.clip(count, np."

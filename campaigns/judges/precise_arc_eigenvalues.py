@@ -1,7 +1,7 @@
 """Eigenvalues of focusing arcs by a second method: the complete Galerkin matrix on graded panels, entry by entry.
 
-``python -m campaigns.judges.precise_arc_eigenvalues`` prints what tests/spectral/test_adapted_panels.py holds the
-enclosures against. The entries are integrals over the polygons of each number of hits
+``python -m campaigns.judges.precise_arc_eigenvalues`` prints what tests/spectral/bounds/test_adapted_panels.py holds
+the enclosures against. The entries are integrals over the polygons of each number of hits
 (kernels/discretisation/arcs.py), which share nothing with rows, residuals and adapted panels but the law; moduli
 converge from below.
 """

@@ -1,6 +1,6 @@
 """The exact laws of fifty random polygonal hollows, against identities and against 10^6 traced rays each.
 
-``tests/kernels/polygons/test_marching.py`` compares the beams of the same hollows with interval marching, the second
+``tests/geometry/polygons/test_marching.py`` compares the beams of the same hollows with interval marching, the second
 exact method.
 """
 

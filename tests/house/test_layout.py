@@ -109,6 +109,15 @@ def test_every_folder_has_a_floor_and_at_most_fourteen_modules():
         assert len(inside) <= MOST_MODULES, folder
 
 
+def test_tests_lie_where_their_sources_lie():
+    # what is compiled is tested with what calls it, parts of the ledger with the ledger
+    folders = {name.replace(".", "/") for name in FLOORS}
+    tested = {str(path.parent.relative_to(TREE / "tests")) for path in (TREE / "tests").rglob("test_*.py")}
+    assert tested - folders == {"front", "house", "properties"}
+    inside = {name for name in folders if set(name.split("/")) & {*COMPILED, "ledger", "quantities"} - {name}}
+    assert folders - tested - inside == set(ROOMS)
+
+
 def test_no_file_has_the_name_of_a_function_or_class_in_it():
     # a name imported from the file would take the file's place in its package
     for name, tree in TREES.items():

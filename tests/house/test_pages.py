@@ -282,7 +282,7 @@ def python_blocks():
     for page in [*pages, DOCS.parent / "README.md"]:
         blocks = re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
         # neither a batch system nor a package that the library does not use is at hand; scripts that start workers are
-        # run in tests/runs/test_sweep_faults.py
+        # run in tests/spectral/sweeps/test_sweep_faults.py
         blocks = [block for block in blocks if not re.search(r"SLURMCluster|uncertainties|client=\d", block)]
         if blocks:
             yield pytest.param(page.name, blocks, id=page.name)

@@ -128,7 +128,7 @@ def test_the_semicircle_turns_grazing_flights_round():
 
 def test_the_page_on_diffusion_has_the_means_of_cotangents_that_rays_give():
     """Every number of its table, to a unit of the last digit."""
-    page = (Path(__file__).parents[2] / "docs" / "theory" / "knudsen-diffusion.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "theory" / "knudsen-diffusion.md").read_text(encoding="utf-8")
     walls = {
         "arcs, half angle 0.3": geo.focusing_arcs(0.3),
         "bumps, curvature 1": geo.dispersing_arcs(1.0),

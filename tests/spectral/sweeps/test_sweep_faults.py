@@ -167,7 +167,7 @@ def has_points(path):
     return path.exists() and path.stat().st_size > 16384
 
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 BLOCKS = [
     pytest.param(block, id=f"{page.name}-{number}")
     for page in sorted(DOCS.glob("*.md"))
