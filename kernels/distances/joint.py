@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import count
 from typing import NamedTuple
@@ -22,6 +23,7 @@ from ..matrices.matrix import KernelMatrix, frobenius_error, joint_kind
 from ..sampling.streams import estimate
 from .cell_transport import DIAGONAL, Cells, transport_bounds
 from .conditional import CellsAndAtoms, Term, Terms, cells_and_atoms, terms_of
+from .flows import flow_cost, potential_value
 from .transport import cell_middles, matrices_error, stochastic_rows
 
 # Limits on the pairs of occupied cells, at 100 bytes and some microseconds per pair, and on the cells along a side.
@@ -35,6 +37,8 @@ FIRST_CELLS, MORE = 32, 1.1
 LEAST_GROWTH, MULTIPLE = 1.5, 4
 # More occupied cells than this multiple of those along a side lie on areas, else on curves.
 AREA = 6
+# If the error is larger than this fraction of the distance, these cells along a side serve a potential and a flow.
+POOR, POTENTIAL_CELLS, FLOW_CELLS = 0.1, 128, 1024
 # The tolerance of the matrices of laws, as a fraction of the wanted error and between these limits, and that of
 # conditional distributions for the mass that both laws have in common.
 LAW_PART, LAW_TOLERANCES, COMMON_TOLERANCE = 0.01, (1e-10, 1e-5), 1e-6
@@ -92,9 +96,25 @@ class _Side(NamedTuple):
             certain &= found.error.kind == "bound"
         return total, error, certain
 
+    def masses(self, edges: Floats, tolerance: float) -> tuple[Floats, float, bool]:
+        """The masses of cells, a bound of the mass that is wrong in them, and whether it is one for certain."""
+        total, error, certain = np.zeros((edges.size - 1, edges.size - 1)), 0.0, True
+        for (share, term), rays in zip(self.terms, self.drawn, strict=True):
+            if rays is not None:
+                total += share * _counted(rays, edges)[:, 0, :, 0]
+                certain = False
+                continue
+            found = discretise(term.law, Bins(edges), tolerance=tolerance)
+            total += share * found.flux
+            error += share * float(found.error)
+            certain &= found.error.kind == "bound"
+        return total, error, certain
+
 
 def joint_law_distance(first: Law, second: Law, order: float, tolerance: float) -> Estimate:
     """W_p between the flux measures of two laws: the middle of two bounds, from ever more cells.
+
+    For p = 1 a potential and a flow replace the plan if it has too few cells, as of curves near an area.
 
     For p = 1 only the difference of the laws matters, so that equal terms cancel. Mass that both laws send from one
     angle to the same cell stays within the cell, at the cost of moving it there.
@@ -123,12 +143,28 @@ def joint_law_distance(first: Law, second: Law, order: float, tolerance: float) 
                 break
             size = following
     kind: ErrorKind = "bound" if certain and also and not matched else "estimate"
+    how = f"a potential and a plan on {size} x {size} cells"
+    if order == 1.0 and error > max(tolerance, POOR * high):
+        below, above, known = _by_flows(sides, wanted)
+        low, high, kind = max(low, below), min(high, above), kind if known else "estimate"
+        error, how = 0.5 * abs(high - low) + sum(own), how + f", and a flow on {FLOW_CELLS} x {FLOW_CELLS}"
     if order > 1.0 and error > tolerance:  # distances do not fall with the order
         least = joint_law_distance(first, second, 1.0, tolerance)
         low, kind = max(low, least.value - least.error), kind if least.kind == "bound" else "estimate"
         error = 0.5 * abs(high - low) + sum(own)
-    how = f"a potential and a plan on {size} x {size} cells, between {low:.8g} and {high:.8g}"
-    return Estimate(0.5 * (low + high), error, kind, how)
+    return Estimate(0.5 * (low + high), error, kind, f"{how}, between {low:.8g} and {high:.8g}")
+
+
+def _by_flows(sides: Sequence[_Side], wanted: float) -> tuple[float, float, bool]:
+    """Bounds of W_1 by a potential and by a flow, and whether they are bounds for certain."""
+    edges, fine = (np.linspace(0.0, np.pi, size + 1) for size in (POTENTIAL_CELLS, FLOW_CELLS))
+    (one, wrong, certain), (other, more, also) = (side.moments(edges, wanted) for side in sides)
+    scale = (DIAGONAL / edges[1]) ** np.arange(3)
+    difference = scale[:, None, None] * (one - other) * scale
+    (first, less, known), (second, lost, counted) = (side.masses(fine, wanted) for side in sides)
+    below = potential_value(difference, edges[1]) - DIAGONAL * (wrong + more)
+    above = flow_cost(first, second, fine[1]) + DIAGONAL * (less + lost)
+    return below, above, certain and also and known and counted
 
 
 def _differing(first: Terms, second: Terms) -> tuple[Terms, Terms]:
