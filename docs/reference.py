@@ -41,7 +41,7 @@ TASKS = (
 # Classes that only other objects return or are built upon, by the public name on whose page they are documented: their
 # names in its module, or their full names below asperity.
 RETURNED = {
-    "geometry.Wall": "Curve TracePlan geometry.cells.hollow.Hollow",
+    "geometry.Wall": "Curve TracePlan geometry.cells.cell.Hollow",
     "geometry.wall_from_text": "NamedWall",
     "geometry.trace": "Trace",
     "geometry.billiard_map": "BoundaryStates",
