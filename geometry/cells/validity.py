@@ -129,7 +129,7 @@ def _curves(given: Sequence[Curve], name: str) -> Pieces:
         raise WallError(f"{name}: expected a sequence of curves, got {given!r}") from reason
     if not all(issubclass(kind, Curve) for kind in set(map(type, pieces))):
         i, piece = next((i, piece) for i, piece in enumerate(pieces) if not isinstance(piece, Curve))
-        raise WallError(f"{name}[{i}]: expected a Segment, an Arc or a Bezier, got {piece!r}")
+        raise WallError(f"{name}[{i}]: expected a curve such as a Segment, an Arc or a Bezier, got {piece!r}")
     if not pieces:
         raise WallError(f"{name}: expected at least one piece, got none")
     return pieces

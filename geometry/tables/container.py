@@ -47,7 +47,7 @@ class Container(Summary):
         A point p_i on every straight wall without ends.
     normals : array_like, shape (k, 2)
         The unit normal n_i of every such wall, into the region.
-    curves : sequence of Segment, Arc and Bezier, optional
+    curves : sequence of Curve, optional
         Closed loops with the region on their left: at most one outer loop, counterclockwise, and obstacles, clockwise.
 
     Raises
@@ -102,7 +102,7 @@ class Container(Summary):
 
         Parameters
         ----------
-        curves : sequence of Segment, Arc and Bezier
+        curves : sequence of Curve, such as Segment, Arc and Bezier
             The curves, on which the centre of the disk is reflected.
 
         Raises

@@ -33,7 +33,7 @@ class Wall(Cell):
 
     Parameters
     ----------
-    pieces : sequence of Segment, Arc or Bezier
+    pieces : sequence of Curve, such as Segment, Arc and Bezier
         A connected path from (0, y0) on the left to (period, y0) on the right, y0 <= 0. Pieces may overhang and may
         touch each other, also along plates of zero thickness, but must not cross.
     period : float

@@ -45,5 +45,6 @@ def test_disks_refuse_pieces_that_they_do_not_meet(monkeypatch):
 @pytest.mark.parametrize("kind", ['["arc"]', '"Arc"', '"curve"', '""', "3"])
 def test_a_file_names_no_class_but_the_registered_kinds(kind, tmp_path):
     (tmp_path / "wall.toml").write_text(f"period = 1\n[[pieces]]\nkind = {kind}\n")
-    with pytest.raises(InputError, match="'kind': expected 'arc', 'bezier' or 'segment', got"):
+    *names, last = map(repr, sorted(Curve.kinds))
+    with pytest.raises(InputError, match=f"'kind': expected {', '.join(names)} or {last}, got"):
         geo.load_wall(tmp_path / "wall.toml")
