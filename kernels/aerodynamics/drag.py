@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, finite_number, instance, positive_number
-from ...core.errors import InputError
+from ...core.checks import Floats, finite_array, finite_number, positive_number
 from ...core.estimates import Estimate, Summary, student_95
 from ...core.long_runs import TIME_LIMIT, reported
 from ...geometry.scene.scene import SEGMENT_TIME
@@ -22,7 +21,7 @@ from ..bases.polynomials import Directions
 from ..discretisation.method import Budget
 from ..discretisation.methods import matrix_by
 from ..expectations.conditionals import Conditionals
-from ..laws.law import Law, is_atomic
+from ..laws.law import Law, check_paper_frame, is_atomic
 from ..laws.structure import has_chain, multiplied_out
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import half_width
@@ -121,9 +120,7 @@ def resistance(
     >>> round(float(resistance(ker.lambertian())), 12) == round(0.75 * (1 + np.pi**2 / 16), 12)
     True
     """
-    instance("law", law, Law, "ker.lambertian()")
-    if law.frame != "paper":
-        raise InputError(f"law: expected one in the paper's convention, got {law!r}; call in_specular_frame() on it")
+    check_paper_frame("law", law)
     wanted, seconds = positive_number("tolerance", tolerance), positive_number("time_limit", time_limit)
 
     if cost is air_resistance and not has_chain(law):
@@ -263,8 +260,7 @@ def spin_force(law: Law, spin: float, radius: float = 1.0) -> SpinForce:
     >>> round(3 * float(smooth.along), 9), abs(round(float(smooth.across), 9)), abs(round(float(smooth.torque), 9))
     (8.0, 0.0, 0.0)
     """
-    if not isinstance(law, Law) or law.frame != "paper":
-        raise InputError(f"law: expected one in the paper's convention, got {law!r}")
+    check_paper_frame("law", law)
     rate, size = finite_number("spin", spin), positive_number("radius", radius)
     whole = np.linspace(-0.5 * math.pi, 0.5 * math.pi, PANELS // 2 + 1)
     edges = np.unique(np.concatenate((whole, normals_at_breakpoints(law, rate))))

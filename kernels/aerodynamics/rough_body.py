@@ -31,7 +31,7 @@ from ..bases.given import Vectorised
 from ..bases.intervals import bisected
 from ..bases.measure import SINE
 from ..laws.density import split_panels
-from ..laws.law import Law
+from ..laws.law import Law, check_paper_frame
 from ..matrices.defects import SymmetryDefect, defect_of_pairs
 from .drag import PANELS, StreamForce, integral, normals_at_breakpoints, pushes, resistance, scaled
 
@@ -355,8 +355,7 @@ class RoughBody(Summary):
                 f"law: expected a function from the direction of a normal to a law, it failed: {reason}"
             ) from reason
         for law in each:
-            if not isinstance(law, Law) or law.frame != "paper":
-                raise InputError(f"law: expected one in the paper's convention, got {law!r}")
+            check_paper_frame("law", law)
         return each
 
     def _changes(self) -> tuple[tuple[Law, ...], Floats]:

@@ -33,7 +33,7 @@ from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.given import Vectorised, seed_by_name
 from ..bases.polynomials import Legendre
-from ..laws.law import Combination, Law, as_weight, retroreflection, specular
+from ..laws.law import Combination, Law, as_weight, check_paper_frame, retroreflection, specular
 from ..laws.tensor_law import Discretiser, TensorLaw, Term, checked_pair
 from ..walls.wall_law import isometries
 from .operator import isometry_matrix
@@ -392,11 +392,9 @@ class CollisionLaw(VelocityLaw):
     disk: Disk
 
     def __post_init__(self) -> None:
-        instance("law", self.law, Law, "ker.WallLaw(wall.foreshorten(disk))")
+        check_paper_frame("law", self.law, "ker.WallLaw(wall.foreshorten(disk))")
         _ = self.law.parts  # raises InputError unless the weights of a combination make it a law
         instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
-        if self.law.frame != "paper":
-            raise InputError("law: expected a law in the paper's convention, got one in the specular frame")
 
     @classmethod
     def from_wall(cls, wall: Wall, disk: Disk) -> CollisionLaw:
@@ -455,8 +453,7 @@ class CollisionCombination(VelocityLaw):
         if not self.terms or len({bool(flip) for _, _, flip in self.terms}) < len(self.terms):
             raise InputError(f"terms: expected one with flip, one without, or both, got {len(self.terms)} terms")
         for weight, law, _ in self.terms:
-            if not isinstance(law, Law) or law.frame != "paper":
-                raise InputError(f"terms: expected laws in the paper's convention, got {law!r}")
+            check_paper_frame("terms", law)
             if finite_number("weights", weight) < 0.0:
                 raise InputError(f"weights: expected ones of at least 0, got {weight!r} for {law!r}")
 

@@ -16,15 +16,14 @@ from ..bases.basis import Basis
 from ..bases.partitions import Bins, Panels
 from ..bases.polynomials import Directions, Legendre
 from ..laws.density import DensityLaw
-from ..laws.deterministic import IntervalExchangeLaw, InvolutionLaw, LeastResistanceLaw
+from ..laws.deterministic import LeastResistanceLaw
 from ..laws.law import Combination, Composition, Law, SpecularFrame, sum_of
 from ..laws.matrix_law import acts_on_bins
-from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import LONGEST_WORD, has_chain, holds_of_all, lists_branches, multiplied_out
 from ..matrices.defects import SymmetryDefect
 from ..matrices.matrix import KernelMatrix
 from ..walls.circular_arc import CircularArcLaw
-from ..walls.wall_law import WallLaw, traced_wall
+from ..walls.wall_law import WallLaw
 from .arcs import by_arc_polygons
 from .isometries import by_branches, by_isometry_table
 from .method import Budget, Method, MethodName, by_independent_rays, by_sobol_rays
@@ -41,33 +40,33 @@ from .quadrature import (
 from .rays_or_conditionals import by_rays_or_conditionals
 from .traced import by_adaptive_angles
 
+
+def _of(kind: type[Law], where: Callable[[Any, Basis], bool] = lambda law, basis: True) -> Callable[[Law, Basis], bool]:
+    """The test for laws of one kind, for which the method is a theorem, perhaps with a condition."""
+    return lambda law, basis: isinstance(law, kind) and where(law, basis)
+
+
 # Methods without rays, except the first. The docstring of `discretise` states the table.
 METHODS: tuple[Method, ...] = (
-    Method("auto", lambda law, _: isinstance(law, WallLaw) and sum_of(law.parts) is law, by_rays_or_conditionals),
+    Method("auto", _of(WallLaw, where=lambda law, _: sum_of(law.parts) is law), by_rays_or_conditionals),
     Method("exact", lambda law, _: law.isometry_table() is not None, by_isometry_table),
     # compositions can have too many isometries; see `_of_chain`
     Method("exact", lambda law, _: lists_branches(law) and not has_chain(law), by_branches),
     Method(
-        "exact", lambda law, basis: isinstance(law, HenyeyGreensteinLaw) and isinstance(basis, Legendre), by_eigenvalues
+        "exact", lambda law, basis: law.eigenvalue_ratio is not None and isinstance(basis, Legendre), by_eigenvalues
     ),
     Method("exact", lambda law, _: acts_on_bins(law), by_blocks),
-    Method("quadrature", lambda law, _: isinstance(law, CircularArcLaw), by_arc_polygons),
+    Method("quadrature", _of(CircularArcLaw), by_arc_polygons),
     # `by_conditionals` integrates the three smooth functions of Directions for each incoming angle on the law's panels
-    Method(
-        "quadrature", lambda law, basis: isinstance(law, DensityLaw) and not isinstance(basis, Directions), by_density
-    ),
-    Method(
-        "quadrature",
-        lambda law, basis: isinstance(law, LeastResistanceLaw) and isinstance(basis, Bins),
-        by_interval_masses,
-    ),
-    Method("quadrature", lambda law, _: isinstance(law, (InvolutionLaw, IntervalExchangeLaw)), by_map),
+    Method("quadrature", _of(DensityLaw, where=lambda _, basis: not isinstance(basis, Directions)), by_density),
+    Method("quadrature", _of(LeastResistanceLaw, where=lambda _, basis: isinstance(basis, Bins)), by_interval_masses),
+    Method("quadrature", lambda law, _: law.angle_map is not None, by_map),
     Method("quadrature", has_conditionals, by_conditionals),
 )
 # Methods with rays. They are tried if no method above accepts the law and its parts do not give its matrix.
 SAMPLED: tuple[Method, ...] = (
     Method("qmc", lambda law, _: law.random_map() is not None, by_sobol_rays),
-    Method("quadrature", lambda law, _: traced_wall(law) is not None, by_adaptive_angles),
+    Method("quadrature", lambda law, _: law.traced_wall is not None, by_adaptive_angles),
     Method("monte-carlo", lambda law, _: True, by_independent_rays),
 )
 # Panels for the question whether a factor needs rays, whose answer is the same on all panels.
@@ -115,11 +114,8 @@ def _method(methods: Sequence[Method], law: Law, wanted: str, basis: Basis) -> C
 
 
 def _from_parts(law: Law, wanted: str, basis: Basis) -> Computation | None:
-    if isinstance(law, Combination):
-        return _of_sum(law, wanted, basis)
-    if isinstance(law, Composition):
-        return _of_chain(law, wanted, basis)
-    return _of_mirrored(law, wanted, basis) if isinstance(law, SpecularFrame) else None
+    of_parts = {Combination: _of_sum, Composition: _of_chain, SpecularFrame: _of_mirrored}.get(type(law))
+    return None if of_parts is None else of_parts(law, wanted, basis)
 
 
 def _of_sum(law: Combination, wanted: str, basis: Basis) -> Computation | None:

@@ -15,9 +15,7 @@ from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..bases.partitions import Panels
 from ..bases.polynomials import Legendre
-from ..laws.deterministic import InvolutionLaw, jumps_of_map
 from ..laws.law import Combination, Law
-from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import lists_branches
 from ..matrices.matrix import KernelMatrix
 from .method import Budget, computed, rounding
@@ -181,12 +179,12 @@ def _terms(law: Law) -> Sequence[tuple[float, Law]]:
 
 
 def _on_panels(law: Law, panels: Panels, matrix_of: Callable[[Law, Basis], KernelMatrix]) -> tuple[Floats, float]:
-    degrees = _degrees_used(law.g) if isinstance(law, HenyeyGreensteinLaw) else HIGHEST_DEGREE + 1
-    if isinstance(law, HenyeyGreensteinLaw) and degrees <= HIGHEST_DEGREE:
+    ratio = law.eigenvalue_ratio
+    if ratio is not None and (degrees := _degrees_used(ratio)) <= HIGHEST_DEGREE:
         polynomials = Legendre(degrees)
         angle, mass = SINE.quadrature(panels.edges, _nodes(polynomials, panels))
         ends = local_values(panels, angle).T @ (mass[:, None] * polynomials.evaluate(angle))
-        return np.asarray((ends * law.g ** np.arange(polynomials.n)) @ ends.T), 0.0
+        return np.asarray((ends * ratio ** np.arange(polynomials.n)) @ ends.T), 0.0
     matrix = matrix_of(law, panels)
     return matrix.symmetric, float(matrix.error)
 
@@ -207,11 +205,11 @@ def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
     special = [basis.edges]
     for law in dict.fromkeys(laws):
         special.append(law.outgoing_breakpoints)
-        if isinstance(law, InvolutionLaw):
-            jumps = jumps_of_map(law.map)
-            special += [jumps, np.asarray(law.map(basis.edges[1:-1]))] if jumps.size <= BREAKPOINTS else []
-            continue
-        special.append(law.breakpoints(BREAKPOINTS)[0])
+        jumps = law.breakpoints(BREAKPOINTS)[0]
+        if law.angle_map is None:
+            special.append(jumps)
+        elif jumps.size <= BREAKPOINTS:
+            special += [jumps, np.asarray(law.angle_map(basis.edges[1:-1]))]
     found = np.unique(np.clip(np.concatenate(special), 0.0, np.pi))
     found = found[np.append(True, np.diff(found) > SAME_EDGE)]
     found[-1] = np.pi

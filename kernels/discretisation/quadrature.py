@@ -21,13 +21,11 @@ from ..bases.polynomials import Legendre
 from ..expectations.angle_panels import NODES, AnglePanels
 from ..expectations.basis_means import functions_of
 from ..laws.density import VALUE_TIME, DensityLaw, cut_by_edges, split_panels
-from ..laws.deterministic import IntervalExchangeLaw, InvolutionLaw, LeastResistanceLaw
-from ..laws.law import DrivenLaw, Law, knows_errors
+from ..laws.deterministic import LeastResistanceLaw
+from ..laws.law import Law, knows_errors
 from ..laws.matrix_law import finite_matrix, uniform_on_bins
-from ..laws.phase_function import HenyeyGreensteinLaw
-from ..laws.structure import is_compound, lists_branches
+from ..laws.structure import lists_branches
 from ..matrices.matrix import KernelMatrix
-from ..walls.wall_law import traced_wall
 from .method import Budget, computed, rounding, until_converged
 
 # Limits on the evaluations of a density and on the points of a map: one or two seconds of work each.
@@ -48,9 +46,10 @@ CONDITIONAL_CHUNK = 2**17
 GRADING = 0.25 ** np.arange(1.0, 17.0)
 
 
-def by_eigenvalues(law: HenyeyGreensteinLaw, basis: Legendre, budget: Budget) -> KernelMatrix:
-    """The matrix of Henyey-Greenstein scattering in Legendre polynomials, in which it is diagonal."""
-    diagonal = np.diag(law.g ** np.arange(float(basis.size)))
+def by_eigenvalues(law: Law, basis: Legendre, budget: Budget) -> KernelMatrix:
+    """The matrix of a law with an ``eigenvalue_ratio`` in Legendre polynomials, in which it is diagonal."""
+    assert law.eigenvalue_ratio is not None  # as the table of methods asks
+    diagonal = np.diag(law.eigenvalue_ratio ** np.arange(float(basis.size)))
     how = "eigenvalues g^l of the polynomials of degree l, to rounding"
     return computed(diagonal, basis, "exact", EPS * basis.size**0.5, how, "bound")
 
@@ -70,9 +69,10 @@ def by_density(law: DensityLaw, basis: Basis, budget: Budget) -> KernelMatrix:
     return _settled(*density_matrix(law, basis, budget.tolerance), basis)
 
 
-def by_map(law: InvolutionLaw | IntervalExchangeLaw, basis: Basis, budget: Budget) -> KernelMatrix:
+def by_map(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
     """The matrix of a deterministic law by rules on intervals between the jumps of its map, which are halved."""
-    return _settled(*map_matrix(law.map, law.breakpoints(0)[0], basis, budget.tolerance), basis)
+    assert law.angle_map is not None  # as the table of methods asks
+    return _settled(*map_matrix(law.angle_map, law.breakpoints(0)[0], basis, budget.tolerance), basis)
 
 
 def by_interval_masses(law: LeastResistanceLaw, basis: Bins, budget: Budget) -> KernelMatrix:
@@ -243,10 +243,10 @@ GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 
 def has_conditionals(law: Law, basis: Basis) -> bool:
     """Whether a law is not compound, and knows the errors of its conditional distributions and its breakpoints."""
-    if is_compound(law) or _has_too_many_breakpoints(law):
+    if law.is_compound or _has_too_many_breakpoints(law):
         return False
-    driven = isinstance(law, DrivenLaw) and law.isometry_table() is None
-    return traced_wall(law) is None and (isinstance(basis, Legendre) or not driven) and knows_errors(law)
+    driven = law.is_driven and law.isometry_table() is None
+    return law.traced_wall is None and (isinstance(basis, Legendre) or not driven) and knows_errors(law)
 
 
 def by_conditionals(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:

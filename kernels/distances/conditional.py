@@ -233,7 +233,7 @@ def _first_and_others(law: Law) -> tuple[Law, Law] | None:
     """The first factor of a product and the law of the others; None for other laws."""
     if isinstance(law, SpecularFrame):
         factors = _first_and_others(law.law)
-        return None if factors is None else (factors[0], SpecularFrame.of(factors[1]))
+        return None if factors is None else (factors[0], factors[1].in_specular_frame())
     if isinstance(law, Power):
         return law.law, Power(law.law, law.exponent - 1)
     if isinstance(law, Composition):
@@ -269,7 +269,7 @@ def cells_and_atoms(terms: Terms, theta: Floats, edges: Floats, tolerance: float
         total += weight * given._replace(weights=np.where(level, 0.0, given.weights)).masses(edges)[back]
         if level.any():
             flat = np.bincount(given.owner, weights=np.where(level, given.weights, 0.0), minlength=incoming.size)[back]
-            position = np.pi - theta if not isinstance(term.law, SpecularFrame) else theta
+            position = np.pi - theta if term.law.frame == "paper" else theta
             atoms.append(np.stack((position, weight * flat))[..., None])
     position, mass = np.concatenate(atoms, axis=2)
     return CellsAndAtoms(total, position, mass, wrong)

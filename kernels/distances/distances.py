@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from math import ceil, log2
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ..bases.measure import SINE
 from ..bases.polynomials import Legendre
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
-from ..laws.matrix_law import not_a_law
+from ..laws.matrix_law import check_law
 from ..laws.tensor_law import TensorLaw, Term
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .joint import joint_law_distance, joint_matrix_distance
@@ -126,24 +126,25 @@ def distance(
     choice("kind", kind, get_args(Kind))
     power = wasserstein_order(order)
     positive_number("tolerance", tolerance)
-    if isinstance(first, TensorLaw) and isinstance(second, TensorLaw):
-        return _between_collisions(first.parts_checked(), second.parts_checked(), power, kind, tolerance)
+    tensors = [law.parts_checked() for law in (first, second) if isinstance(law, TensorLaw)]
+    if len(tensors) == 2:
+        return _between_collisions(*tensors, power, kind, tolerance)
     for law in (first, second):
-        if isinstance(law, TensorLaw) or not isinstance(law, (Law, KernelMatrix)):
-            raise not_a_law("distance", "two laws or kernel matrices, or two collision laws", law)
-    assert not isinstance(first, TensorLaw) and not isinstance(second, TensorLaw)
-    if first.frame != second.frame:
+        check_law("distance", law, "two laws or kernel matrices, or two collision laws", KernelMatrix)
+    one, other = cast("tuple[Law | KernelMatrix, Law | KernelMatrix]", (first, second))
+    if one.frame != other.frame:
         raise InputError(
-            f"distance: expected laws in the same frame, got {first.frame!r} and {second.frame!r}; use "
+            f"distance: expected laws in the same frame, got {one.frame!r} and {other.frame!r}; use "
             "in_specular_frame() on one"
         )
     if kind == "pseudometric":
-        return _labelled(moment_distance(first, second, tolerance))
-    if isinstance(first, Law) and isinstance(second, Law):
-        if kind == "joint":
-            return _labelled(joint_law_distance(first, second, power, tolerance))
-        return _labelled(law_distance(first, second, power, kind == "sup", tolerance))
-    return _between_matrices(*_on_same_bins(first, second, tolerance), power, kind)
+        return _labelled(moment_distance(one, other, tolerance))
+    laws = [law for law in (one, other) if isinstance(law, Law)]
+    if len(laws) < 2:
+        return _between_matrices(*_on_same_bins(one, other, tolerance), power, kind)
+    if kind == "joint":
+        return _labelled(joint_law_distance(*laws, power, tolerance))
+    return _labelled(law_distance(*laws, power, kind == "sup", tolerance))
 
 
 def _between_collisions(
@@ -159,13 +160,13 @@ def _between_collisions(
 def _on_same_bins(
     first: Law | KernelMatrix, second: Law | KernelMatrix, tolerance: float
 ) -> tuple[KernelMatrix, KernelMatrix]:
-    if isinstance(first, Law):
-        assert isinstance(second, KernelMatrix)  # two laws do not come here
-        first = discretise(first, second.basis, tolerance=0.1 * tolerance)
-    elif isinstance(second, Law):
-        second = discretise(second, first.basis, tolerance=0.1 * tolerance)
-    check_comparable(first, second)
-    return first, second
+    basis = next(one.basis for one in (first, second) if isinstance(one, KernelMatrix))
+    one, other = (
+        one if isinstance(one, KernelMatrix) else discretise(one, basis, tolerance=0.1 * tolerance)
+        for one in (first, second)
+    )
+    check_comparable(one, other)
+    return one, other
 
 
 def _between_matrices(first: KernelMatrix, second: KernelMatrix, order: float, kind: Kind) -> Distance:

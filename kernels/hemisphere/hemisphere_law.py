@@ -22,7 +22,7 @@ from ..bases.given import seed_by_name
 from ..bases.polynomials import Legendre
 from ..bases.spaces import Zernike, zernike_functions
 from ..discretisation.discretisation import discretise
-from ..laws.law import Law, as_weight, drawn_terms, used_terms
+from ..laws.law import Law, as_weight, drawn_terms, in_frame, used_terms
 from ..laws.tensor_law import Discretiser, SpatialLaw
 from ..matrices.matrix import KernelMatrix, frobenius_error
 
@@ -307,7 +307,7 @@ class HemisphereLaw(DirectionLaw):
     @property
     def specular(self) -> Law:
         """The planar law in the specular frame, the convention of the disc."""
-        return self.law if self.law.frame == "specular" else self.law.in_specular_frame()
+        return in_frame(self.law, "specular")
 
     def on_disc(self, planar: Floats, degrees: NDArray[np.int64], orders: NDArray[np.int64]) -> Floats:
         """The matrix in Zernike functions, from that of the planar law in Legendre polynomials."""
@@ -325,7 +325,7 @@ class HemisphereLaw(DirectionLaw):
             angle = rng.uniform(0.0, 2.0 * np.pi, x.size)
         cosine, sine = np.cos(angle), np.sin(angle)
         across, along = x * sine - y * cosine, x * cosine + y * sine
-        paper = self.law if self.law.frame == "paper" else self.law.in_specular_frame()
+        paper = in_frame(self.law, "paper")
         theta = paper.sample(clipped_inside(np.arctan2(-down, -across)), rng)
         speed = np.hypot(across, down)
         tangential = in_the_plane(speed * np.cos(theta), along, angle)

@@ -31,8 +31,8 @@ from ..bases.polynomials import Legendre
 from ..collisions.collision_law import CollisionLaw
 from ..discretisation.discretisation import discretise
 from ..distances.distances import Distance, distance
-from ..laws.law import Law
-from ..laws.matrix_law import MatrixLaw, not_a_law
+from ..laws.law import Law, in_frame
+from ..laws.matrix_law import MatrixLaw, check_law
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
 from .hollows import (
@@ -288,12 +288,11 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
     else:
         # a matrix in bins stands for its law
         wanted = MatrixLaw(law) if isinstance(law, KernelMatrix) else law
-        if not isinstance(wanted, Law):
-            raise not_a_law("law", "a Law such as ker.lambertian() or a KernelMatrix", wanted)
+        check_law("law", wanted, "a Law such as ker.lambertian() or a KernelMatrix")
         if wanted.reversible is False:
             raise InputError(f"{UNSYMMETRIC}, got {law!r}")
         # the change is its own inverse
-        wanted = wanted if wanted.frame == "paper" else wanted.in_specular_frame()
+        wanted = in_frame(wanted, "paper")
         matrix = discretise(wanted, Legendre(moments), tolerance=TARGET_FRACTION * tolerance)
     symmetric = matrix.symmetric[:moments, :moments]
     allowed = 4.0 * float(matrix.error) + ROUNDED * len(symmetric)

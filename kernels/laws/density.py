@@ -79,6 +79,7 @@ class DensityLaw(Law):
     asperity.errors.InputError: density: expected rows that integrate to 1, got 2 at theta = 0.015...
     """
 
+    has_density = True
     sampling_error: float = 0.0
     _function: DensityFunction
     _panel_count: int = PANEL_COUNTS[0]

@@ -119,6 +119,10 @@ class InvolutionLaw(Law):
         """The angles where the map jumps or reverses direction, as far as 4096 probes show them."""
         return jumps_of_map(self.map), 0.0
 
+    @property
+    def angle_map(self) -> Callable[[Floats], Floats]:
+        return self.map
+
     def random_map(self) -> RandomMap:
         """The map T, independent of the uniform number."""
         return lambda x, theta: (np.asarray(self.map(theta), dtype=np.float64), None)
@@ -215,6 +219,10 @@ class IntervalExchangeLaw(Law):
         partner = read_only(number[column, row])
         for name, value in (("starts", frozen(starts)), ("widths", frozen(widths)), ("partner", partner)):
             object.__setattr__(self, name, value)
+
+    @property
+    def angle_map(self) -> Callable[[Floats], Floats]:
+        return self.map
 
     def image(self, theta: Floats) -> Floats:
         """The outgoing angle of every incoming angle."""

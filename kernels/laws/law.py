@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import islice
-from typing import TypeAlias, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +45,9 @@ from ..expectations.piecewise import INTERVALS_OF_MEANS, MOST_OF_MEANS, SEEN, Pi
 from .branches import MOST_BRANCHES, chained, chained_breakpoints, joined, merged
 from .isometry_table import IsometryTable
 from .tables import Table, WithAtoms, tabulated
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
 
 # Smallest and largest float64 in (0, 1), up to subnormal numbers.
 SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
@@ -94,6 +97,10 @@ class Law(Value, ABC):
         True for theta' = theta, False for theta' = pi - theta, None for other laws.
     outgoing_breakpoints : ndarray
         The known outgoing angles at which densities jump or have a kink for every incoming angle.
+    is_compound : bool
+        Whether the law is a sum, composition, power or change of frame of other laws.
+    is_driven : bool
+        Whether `random_map` is the reflection of a ray that enters at a random point, piecewise smooth in this point.
 
     Notes
     -----
@@ -109,6 +116,8 @@ class Law(Value, ABC):
     is_lambertian: bool = False
     retro: bool | None = None
     outgoing_breakpoints: Floats = frozen(())
+    is_compound: bool = False
+    is_driven: bool = False
     # A law is an operator, not an array: with None, numpy leaves ``np.float64(0.3) * law`` to this class.
     __array_ufunc__ = None
 
@@ -315,6 +324,46 @@ class Law(Value, ABC):
         """
         return ((1.0, self),)
 
+    @property
+    def has_density(self) -> bool:
+        """Whether every conditional distribution has a density, bounded as a function of both angles."""
+        return self.is_lambertian
+
+    @property
+    def eigenvalue_ratio(self) -> float | None:
+        """The g of a law that multiplies the Legendre polynomial of degree l in cos(theta) by g^l; else None."""
+        return 0.0 if self.is_lambertian else None
+
+    @property
+    def is_compact(self) -> bool:
+        """Whether the law is known to be a compact operator."""
+        return self.eigenvalue_ratio is not None
+
+    @property
+    def is_isometric(self) -> bool:
+        """Whether by theorem the law is a mixture of isometries theta' = +-theta + const for almost every angle."""
+        return self.retro is not None
+
+    @property
+    def keeps_sine(self) -> bool:
+        """Whether it is known that theta' is theta or pi - theta."""
+        return self.retro is not None
+
+    @property
+    def lambertian_fraction(self) -> float:
+        """The known fraction a in P~ = a L + (1 - a) R, with L Lambertian and R a law."""
+        return 1.0 if self.is_lambertian else 0.0
+
+    @property
+    def angle_map(self) -> Callable[[Floats], Floats] | None:
+        """The map T of a deterministic law theta' = T(theta), an involution if the law is reversible; else None."""
+        return None
+
+    @property
+    def traced_wall(self) -> Wall | None:
+        """The wall of a law that is known by its rays only; None for walls with parts or isometries and other laws."""
+        return None
+
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Increasing incoming angles in (0, pi) between which P~(theta, .) varies smoothly, about ``limit`` at most.
 
@@ -343,7 +392,7 @@ class Law(Value, ABC):
 
     def in_specular_frame(self) -> Law:
         """P_F = P~ J, the law in Feres' convention, where specular reflection is the identity; an involution."""
-        return SpecularFrame.of(self)
+        return SpecularFrame(self)
 
     def __matmul__(self, other: Law) -> Law:
         """This law followed by the other."""
@@ -358,14 +407,16 @@ class Law(Value, ABC):
 
     def __rmul__(self, weight: float) -> Combination:
         factor = as_weight(weight)
-        return foreign(weight) if factor is None else Combination(((factor, self),))
+        if factor is None:
+            return foreign(weight)  # type: ignore[no-any-return]
+        return Combination(tuple((factor * own, law) for own, law in Combination.of(self).terms))
 
     __mul__ = __rmul__
 
     def __add__(self, other: Law) -> Combination:
         if not isinstance(other, Law):
             return foreign(other)
-        return Combination.of(self) + Combination.of(other)
+        return Combination(Combination.of(self).terms + Combination.of(other).terms)
 
 
 class BranchLaw(Law):
@@ -376,6 +427,10 @@ class BranchLaw(Law):
     """
 
     reversible = True
+
+    @property
+    def is_isometric(self) -> bool:
+        return True
 
     @abstractmethod
     def _branches(self, theta: Floats) -> tuple[Floats, Floats]: ...
@@ -410,6 +465,8 @@ class DrivenLaw(Law):
     entry points, without a known error.
     """
 
+    is_driven = True
+
     @abstractmethod
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle for the entry point ``x``, a fraction of the period in (0, 1), and the angle ``theta``."""
@@ -428,6 +485,18 @@ class DrivenLaw(Law):
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         outgoing = self.reflect((np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS, theta[:, None])
         return Conditionals.of_atoms(outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS), np.nan)
+
+
+def in_frame(law: Law, frame: Frame) -> Law:
+    """The law in a convention, whichever it is in."""
+    return law if law.frame == frame else law.in_specular_frame()
+
+
+def check_paper_frame(name: str, law: Law, example: str = "ker.lambertian()") -> None:
+    """Refuse what is no law in the paper's convention."""
+    instance(name, law, Law, example)
+    if law.frame != "paper":
+        raise InputError(f"{name}: expected one in the paper's convention, got {law!r}; call in_specular_frame() on it")
 
 
 def answer_of(law: Law, method: Callable[..., T], theta: Floats, *wanted: object) -> T:
@@ -559,6 +628,8 @@ class Combination(Law):
 
     terms: tuple[tuple[float, Law], ...]
 
+    is_compound = True
+
     def __post_init__(self) -> None:
         pairs = isinstance(self.terms, tuple) and all(isinstance(term, tuple) and len(term) == 2 for term in self.terms)
         if not pairs or not self.terms:
@@ -589,18 +660,9 @@ class Combination(Law):
         """The terms; raises InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
         return used_terms(self.terms, self)
 
-    def __add__(self, other: Law) -> Combination:
-        if not isinstance(other, Law):
-            return foreign(other)
-        return Combination(self.terms + Combination.of(other).terms)
-
-    def __rmul__(self, weight: float) -> Combination:
-        factor = as_weight(weight)
-        if factor is None:
-            return foreign(weight)  # type: ignore[no-any-return]
-        return Combination(tuple((factor * own, law) for own, law in self.terms))
-
-    __mul__ = __rmul__
+    def in_specular_frame(self) -> Combination:
+        """The sum of the transformed terms."""
+        return Combination(tuple((weight, term.in_specular_frame()) for weight, term in self.terms))
 
     def adjoint(self) -> Law:
         """The combination of the adjoints, with the same weights."""
@@ -677,6 +739,8 @@ def as_factor(law: Law) -> str:
 
 class _Chain(Law):
     """Laws applied one after the other."""
+
+    is_compound = True
 
     @abstractmethod
     def factors(self) -> tuple[Law, ...]:
@@ -822,7 +886,7 @@ def simplified(laws: tuple[Law, ...]) -> tuple[Law, ...]:
 
     The reversible laws after it preserve its measure; of others this is not known.
     """
-    laws = tuple(law for law in laws if not _is_identity(law))
+    laws = tuple(law for law in laws if not is_identity(law))
     last = max((k for k, law in enumerate(laws) if law.is_lambertian), default=None)
     if last is None:
         return laws
@@ -830,10 +894,9 @@ def simplified(laws: tuple[Law, ...]) -> tuple[Law, ...]:
     return (laws[last], *after[next((k for k, law in enumerate(after) if not law.reversible), len(after)) :])
 
 
-def _is_identity(law: Law) -> bool:
-    if isinstance(law, SpecularFrame):
-        return law.law == specular()
-    return law == retroreflection()
+def is_identity(law: Law) -> bool:
+    """Whether a law keeps all angles: retroreflection, or specular reflection in the other frame."""
+    return in_frame(law, "paper").retro is (law.frame == "paper")
 
 
 @dataclass(frozen=True, repr=False)
@@ -900,7 +963,7 @@ def has_fixed_nodes(law: Law) -> bool:
 def is_flat_top(law: Law, theta: Floats, given: Conditionals) -> NDArray[np.bool_]:
     """Which nodes of conditional distributions at ``theta`` are those of flat tops, the only atoms of traced walls."""
     specular = np.pi - theta
-    found = mirrored_angle(specular) if isinstance(law, SpecularFrame) else specular
+    found = specular if law.frame == "paper" else mirrored_angle(specular)
     return np.asarray((given.nodes == found[given.owner]) & (not law.is_lambertian))
 
 
@@ -965,6 +1028,8 @@ class SpecularFrame(Law):
 
     law: Law
 
+    is_compound = True
+
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.lambertian()")
         mirror = self.law.mirror_symmetric
@@ -972,20 +1037,15 @@ class SpecularFrame(Law):
         set_properties(self, reversible=mirror if self.law.reversible else None, is_lambertian=self.law.is_lambertian)
         set_properties(self, outgoing_breakpoints=frozen(np.pi - self.law.outgoing_breakpoints[::-1]))
 
-    @staticmethod
-    def of(law: Law) -> Law:
-        """The law in the other frame: for a `SpecularFrame` its inner law, for a sum the sum of transformed terms."""
-        if isinstance(law, SpecularFrame):
-            return law.law
-        if isinstance(law, Combination):
-            return Combination(tuple((weight, SpecularFrame.of(term)) for weight, term in law.terms))
-        return SpecularFrame(law)
+    def in_specular_frame(self) -> Law:
+        """The inner law."""
+        return self.law
 
     def adjoint(self) -> Law:
         """(P J)* = J P*, written as J (P* J) J, where J is a law in this frame."""
         if self.reversible:
             return self
-        transformed = SpecularFrame.of(self.law.adjoint())
+        transformed = self.law.adjoint().in_specular_frame()
         return (
             transformed if self.mirror_symmetric else Composition((_flip(self.frame), transformed, _flip(self.frame)))
         )

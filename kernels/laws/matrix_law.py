@@ -73,6 +73,7 @@ class MatrixLaw(DensityLaw):
     True
     """
 
+    is_compact = True
     array: Floats
     edges: Floats
     _masses: Floats
@@ -298,9 +299,10 @@ def _matrix_on(law: Law, edges: Floats) -> KernelMatrix:
     )  # fmt: skip
 
 
-def not_a_law(name: str, expected: str, value: object) -> InputError:
-    """The refusal of a value that is not a law, with what makes one of it."""
-    return InputError(f"{name}: expected {expected}, got {given(value, Law)}")
+def check_law(name: str, value: object, expected: str, *others: type) -> None:
+    """Refuse what is neither a law nor of one of the other kinds, with what makes a law of it."""
+    if not isinstance(value, (Law, *others)):
+        raise InputError(f"{name}: expected {expected}, got {given(value, Law)}")
 
 
 def _bin_edges(basis: Basis, size: int) -> Floats:

@@ -11,6 +11,7 @@ from ...core.checks import Floats, finite_array, number_between, shaped, whole_n
 from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.measure import SINE
 from .density import DensityLaw, angle_pair
+from .law import set_properties
 
 
 @dataclass(frozen=True, repr=False)
@@ -52,8 +53,12 @@ class HenyeyGreensteinLaw(DensityLaw):
     mirror_symmetric = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "g", number_between("g", self.g, -1.0, 1.0))
-        object.__setattr__(self, "is_lambertian", self.g == 0.0)
+        g = number_between("g", self.g, -1.0, 1.0)
+        set_properties(self, g=g, is_lambertian=g == 0.0)
+
+    @property
+    def eigenvalue_ratio(self) -> float:
+        return self.g
 
     def eigenvalue(self, degree: int) -> float:
         """The eigenvalue g^l of the Legendre polynomial of degree l in cos(theta)."""

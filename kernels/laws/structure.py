@@ -82,11 +82,6 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     return rules.leaf(law) if parts[0][1] is law else fold(parts[0][1], rules)
 
 
-def is_compound(law: Law) -> bool:
-    """Whether the law is a sum, composition, power or change of frame of other laws."""
-    return isinstance(law, (Combination, Composition, Power, SpecularFrame))
-
-
 def has_chain(law: Law) -> bool:
     """Whether the law contains a composition or power, so that numbers of branches multiply."""
     return fold(law, Rules(lambda _: False, lambda terms: any(fact for _, fact in terms), lambda _: True, lambda f: f))
@@ -169,7 +164,7 @@ def law_of(word: Word) -> Law:
     if len(word) == 2 and word[1] == specular():
         if isinstance(word[0], Combination):
             return sum_of_words((weight, (term, word[1])) for weight, term in word[0].terms)
-        return SpecularFrame.of(word[0])
+        return word[0].in_specular_frame()
     return Composition(word)
 
 

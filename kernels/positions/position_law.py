@@ -29,7 +29,7 @@ from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate
 from ...geometry import Wall
 from ..bases.given import Vectorised, seed_by_name
 from ..bases.measure import SINE
-from ..laws.law import Combination, Law
+from ..laws.law import Combination, Law, check_paper_frame
 
 PositionFunction = Callable[[Floats, Floats], Floats]
 
@@ -78,8 +78,7 @@ class PositionLaw(Summary):
         if len(laws) != len(edges) - 1:
             raise InputError(f"laws: expected one for each of {len(edges) - 1} intervals, got {len(laws)}")
         for law in laws:
-            if law.frame != "paper":
-                raise InputError(f"laws: expected laws in the paper's convention, got {law!r}")
+            check_paper_frame("laws", law)
         object.__setattr__(self, "edges", frozen(edges))
         object.__setattr__(self, "laws", laws)
 

@@ -22,7 +22,7 @@ from ...core.version import __version__
 from ...core.workers import BACKLOG, connected, in_order, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
-from ..laws.law import DrivenLaw, Law, entry_inside, outgoing_angles
+from ..laws.law import Law, entry_inside, outgoing_angles
 from ..walls.wall_law import WallLaw
 from .rays import RaySums
 
@@ -149,7 +149,7 @@ class IndependentRays(Job):
         theta = SINE.sample(number, own)
         # the map of a driven law tells besides which rays escaped
         closed = isinstance(self.law, WallLaw) and not self.law.has_traced_parts
-        reflect = self.law.random_map() if isinstance(self.law, DrivenLaw) and not closed else None
+        reflect = self.law.random_map() if self.law.is_driven and not closed else None
         if reflect is None:
             return theta, self.law.sample(theta, own), None
         outgoing, escaped = reflect(entry_inside(own.random(theta.shape)), theta.copy())

@@ -96,6 +96,10 @@ class PolygonLaw(BranchLaw):
         whole_number("max_beams", self.max_beams, 1)
         object.__setattr__(self, "mirror_symmetric", True if wall.is_mirror_symmetric else None)
 
+    @property
+    def keeps_sine(self) -> bool:
+        return has_sides_of_axes(self.wall)
+
     @cached_property
     def _shapes(self) -> list[tuple[HollowShape, float]]:
         """The shapes of the hollows, and the widths of all hollows of each, as fractions of the period."""
@@ -178,6 +182,12 @@ class PolygonLaw(BranchLaw):
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
         return if_escaped(self, *traced_reflection(self.wall, x, theta))
+
+
+def has_sides_of_axes(wall: Wall) -> bool:
+    """Whether all pieces of a wall are horizontal or vertical segments, which keep the sine of every angle."""
+    steps = [np.subtract(piece.end, piece.start) for loop in (wall.pieces, *wall.islands) for piece in loop]
+    return wall.is_polygonal and all(np.count_nonzero(step) == 1 for step in steps)
 
 
 def table_of_beams(beams: Beams) -> IsometryTable:

@@ -58,6 +58,7 @@ class RectangularTeethLaw(BranchLaw):
     height_to_width: float
 
     mirror_symmetric = True
+    keeps_sine = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "height_to_width", positive_number("height_to_width", self.height_to_width))

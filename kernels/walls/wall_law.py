@@ -17,11 +17,11 @@ from ...geometry.cells.cell import Hollow
 from ...geometry.cells.hollow_shape import HollowShape, side_by_side
 from ..expectations.conditionals import Conditionals
 from ..laws.isometry_table import IsometryTable
-from ..laws.law import BranchLaw, DrivenLaw, Law, specular, sum_of
+from ..laws.law import DrivenLaw, Law, specular, sum_of
 from ..laws.structure import holds_of_all
 from .circular_arc import CircularArcLaw
 from .conditionals import UNRESOLVED_TOLERANCE, if_escaped, is_few, traced_conditionals, traced_reflection
-from .polygons import PolygonLaw, TriangularTeethLaw
+from .polygons import PolygonLaw, TriangularTeethLaw, has_sides_of_axes
 from .rectangular import RectangularTeethLaw
 
 # Relative tolerance, a few roundings, for the sum of widths against the period and for an arc against a semicircle.
@@ -110,6 +110,18 @@ class WallLaw(DrivenLaw):
         """Whether a part has no closed form."""
         return any(isinstance(part, WallLaw) for _, part in self.parts)
 
+    @property
+    def is_isometric(self) -> bool:
+        return self.wall.is_polygonal
+
+    @property
+    def keeps_sine(self) -> bool:
+        return has_sides_of_axes(self.wall)
+
+    @property
+    def traced_wall(self) -> Wall | None:
+        return self.wall if self._known is None else None
+
     @cached_property
     def _divided(self) -> tuple[tuple[float, Law], ...] | None:
         return parts_of_wall(self.wall)
@@ -165,17 +177,7 @@ def made_of_isometries(law: Law) -> bool:
     Such laws are the laws of walls of straight pieces, whether their beams resolve or not, specular reflection,
     retroreflection, and compounds of these.
     """
-    return holds_of_all(law, _is_isometric)
-
-
-def _is_isometric(law: Law) -> bool:
-    isometric = law.retro is not None or isinstance(law, BranchLaw)
-    return law.wall.is_polygonal if isinstance(law, WallLaw) else isometric
-
-
-def traced_wall(law: Law) -> Wall | None:
-    """The wall of a law that is known by its rays only; None for walls with parts or isometries and for other laws."""
-    return law.wall if isinstance(law, WallLaw) and law._known is None else None
+    return holds_of_all(law, lambda part: part.is_isometric)
 
 
 def parts_of_wall(wall: Wall) -> tuple[tuple[float, Law], ...] | None:

@@ -21,7 +21,7 @@ from ...kernels.walls.wall_law import made_of_isometries
 from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
 from ..eigenvalues.spectra import Spectrum, check_reversible, matrix_spectrum
 from .contraction import refuse_unless_self_adjoint
-from .images import ROUNDED, is_traced, suits_panels
+from .images import is_traced, suits_panels
 from .operator_residuals import Residuals, image_rule, residuals
 from .separation import Separation, rest_of_spectrum
 from .trial_space import Rank, adapted_trial_space
@@ -256,7 +256,7 @@ def enclosed_trial_space(
     apart = _first_that_separates(law, found, order, next_value, rank)
     method = f"trial functions in {basis!r}, residuals by adaptive quadrature at {found.angles_used} angles"
     # exact if images are computed to rounding; otherwise the difference of two rules estimates their errors
-    exact = isinstance(law, ROUNDED) and isinstance(basis, Legendre)
+    exact = law.eigenvalue_ratio is not None and isinstance(basis, Legendre)
     items = [_enclosed(found, apart, order, position, names, exact) for position in range(len(values))]
     return EnclosedTrialSpace(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors, finer)
 

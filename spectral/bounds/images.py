@@ -7,21 +7,16 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE, count_time
 from ...core.rounding import EPS
-from ...kernels import Basis, CircularArcLaw, DensityLaw, Law, Panels
+from ...kernels import Basis, CircularArcLaw, Law, Panels
 from ...kernels.bases.assembly import is_mirror_symmetric, reflection_matrix
 from ...kernels.bases.intervals import cell_among
 from ...kernels.expectations.arcs import ArcMeans
 from ...kernels.expectations.basis_means import Means, functions_of, height_of, weighted_means
-from ...kernels.laws.density import LambertianLaw
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.matrix_law import ENTRY_ROUNDING, MatrixLaw, uniform_on_bins
-from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import holds_of_all
 from ...kernels.walls.conditionals import is_chaotic, is_few, traced_conditionals
-from ...kernels.walls.wall_law import traced_wall
 
-# Laws whose images of polynomials are computed to rounding.
-ROUNDED = HenyeyGreensteinLaw, LambertianLaw
 # Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays.
 ANGLES_AT_ONCE, NODE_TIME = 512, 3e-7
 
@@ -39,20 +34,19 @@ def suits_panels(law: Law) -> bool:
         return law.mirror_symmetric is True and suits_panels(law.law)
     if isinstance(law, (Composition, Power)):
         return False
-    if isinstance(law, DensityLaw):
-        return isinstance(law, LambertianLaw)
-    wall = traced_wall(law)
-    return knows_errors(law) if wall is None else is_few(wall)
+    if law.has_density:
+        return law.is_lambertian
+    return knows_errors(law) if law.traced_wall is None else is_few(law.traced_wall)
 
 
 def is_traced(law: Law) -> bool:
     """Whether rays are traced. This takes about a millisecond per angle, fifty times as long as closed forms."""
-    return not holds_of_all(law, lambda part: traced_wall(part) is None)
+    return not holds_of_all(law, lambda part: part.traced_wall is None)
 
 
 def is_costly(law: Law) -> bool:
     """Whether a thousand angles take minutes, because a hollow is chaotic."""
-    return not holds_of_all(law, lambda part: (wall := traced_wall(part)) is None or not is_chaotic(wall))
+    return not holds_of_all(law, lambda part: part.traced_wall is None or not is_chaotic(part.traced_wall))
 
 
 def expectations(law: Law, basis: Basis) -> Means:
@@ -71,7 +65,7 @@ def expectations(law: Law, basis: Basis) -> Means:
         rows = law.array @ uniform_on_bins(law.edges, *functions_of(basis)).in_basis(basis)
         exact = np.full(len(rows), ENTRY_ROUNDING)
         return lambda theta, tolerance: (rows[cell := cell_among(law.edges, theta)], exact[cell])
-    if isinstance(law, LambertianLaw):
+    if law.is_lambertian:
         return lambda theta, tolerance: (np.tile(basis.constant, (theta.size, 1)), np.zeros(theta.size))
     return _of_nodes(law, basis)
 
@@ -95,7 +89,7 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
 def _of_nodes(law: Law, basis: Basis) -> Means:
     """Expectations from conditional distributions. Those of a traced wall share what they find at other angles."""
     degree, edges = functions_of(basis)
-    wall = traced_wall(law)
+    wall = law.traced_wall
     shared = None if wall is None or not is_few(wall) else traced_conditionals(wall, degree, edges)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:

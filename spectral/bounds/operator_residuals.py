@@ -17,12 +17,10 @@ from ...kernels.bases.measure import SINE
 from ...kernels.discretisation.quadrature import GRAZING_EDGES
 from ...kernels.expectations.angle_panels import KRONROD, NODES, NULL_RULES
 from ...kernels.expectations.basis_means import Means, weighted_means
-from ...kernels.laws.density import LambertianLaw
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
 from ...kernels.walls.conditionals import is_few
-from ...kernels.walls.wall_law import traced_wall
-from .images import ROUNDED, expectations_of, is_traced
+from .images import expectations_of, is_traced
 
 # Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
@@ -134,7 +132,7 @@ def residuals(
 
 def _knows_breakpoints(law: Law) -> bool:
     """Whether a law is smooth between its breakpoints, or is a wall's, whose conditional distributions tell more."""
-    smooth = isinstance(law, ROUNDED) or traced_wall(law) is not None
+    smooth = law.eigenvalue_ratio is not None or law.traced_wall is not None
     return smooth or bool(np.isfinite(law.breakpoints(1)[1]))
 
 
@@ -145,7 +143,7 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats, float]:
     """
     edges = [basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES]
     for part in {part for word in words_of(law) or () for part in word}:
-        if isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw):
+        if isinstance(part, DensityLaw) and not part.is_lambertian:
             # the law is symmetric: where p(theta, .) has breakpoints, p(., theta') has them
             edges += [part.outgoing_breakpoints, part.incoming_edges(basis.edges)]
             edges += [np.pi - one for one in edges[-2:]] if law.frame == "specular" else []
@@ -206,10 +204,10 @@ def _rule(law: Law, basis: Basis, vectors: Floats) -> Means:
     if isinstance(law, SpecularFrame):
         fine, coefficients = mirror_refinement(basis)
         return _rule(law.law, fine, reflection_matrix(fine) @ (coefficients.T @ vectors))
-    if isinstance(law, LambertianLaw):
+    if law.is_lambertian:
         mean = basis.constant @ vectors
         return lambda theta, tolerance: (np.tile(mean, (theta.size, 1)), np.zeros(theta.size))
-    if (wall := traced_wall(law)) is not None and not is_few(wall):
+    if law.traced_wall is not None and not is_few(law.traced_wall):
         raise _refusal(law, "its conditional distributions take too long")
     if knows_errors(law):
         return expectations_of(law, Panels(basis.edges, 0) if isinstance(basis, Bins) else basis, vectors)

@@ -9,10 +9,8 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.estimates import ErrorKind
 from ...core.rounding import EPS
-from ...kernels import Law, MatrixLaw
-from ...kernels.laws.density import LambertianLaw
+from ...kernels import Law
 from ...kernels.laws.matrix_law import finite_matrix
-from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold
 from ..eigenvalues.dense import symmetric_half
 from ..essential.compact import compact_matrix
@@ -86,7 +84,7 @@ def lambertian_fraction(law: Law) -> float:
     0.4375
     """
     rules: Rules[float] = Rules(
-        lambda leaf: 1.0 if isinstance(leaf, LambertianLaw) else 0.0,
+        lambda leaf: leaf.lambertian_fraction,
         lambda terms: sum(weight * fraction for weight, fraction in terms),
         lambda fractions: 1.0 - float(np.prod([1.0 - fraction for fraction in fractions])),
         lambda fraction: fraction,
@@ -96,13 +94,11 @@ def lambertian_fraction(law: Law) -> float:
 
 def _of_series(law: Law, values: Floats, width: float) -> Separation | None:
     """The bound of a law with eigenvalues g^l: the sum of all squares of those of P^p, minus the listed terms."""
-    g = law.g if isinstance(law, HenyeyGreensteinLaw) else 0.0
-    if not isinstance(law, (HenyeyGreensteinLaw, LambertianLaw)):
-        return None
-    if isinstance(law, HenyeyGreensteinLaw) and g == 0.0:
-        return Separation(0.0, "bound", "the law is Lambertian: of rank 1")
-    power = max(1, round(np.log(POWER_TARGET) / np.log(abs(g)))) if g else 1
-    total = 1.0 / -np.expm1(2 * power * np.log(abs(g))) if g else 1.0
+    g = law.eigenvalue_ratio
+    if not g:
+        return None if g is None else Separation(0.0, "bound", "the law is Lambertian: of rank 1")
+    power = max(1, round(np.log(POWER_TARGET) / np.log(abs(g))))
+    total = 1.0 / -np.expm1(2 * power * np.log(abs(g)))
     listed = float(np.sum(np.maximum(np.abs(values) - width, 0.0) ** (2 * power)))
     radius = float((max(total - listed, 0.0) + 16.0 * EPS * total) ** (0.5 / power))
     what = "P" if power == 1 else f"P^{power}"
@@ -115,7 +111,7 @@ def _of_series(law: Law, values: Floats, width: float) -> Separation | None:
 def _of_matrix(law: Law, listed: int) -> Separation | None:
     """The next modulus of a matrix that is near the law in norm, plus its distance."""
     exact = finite_matrix(law)
-    matrix = compact_matrix(law) if exact is None else exact if isinstance(law, MatrixLaw) else None
+    matrix = compact_matrix(law) if exact is None else exact if law.is_compact else None
     if matrix is None or matrix.beyond is None:
         return None
     moduli = np.sort(np.abs(np.linalg.eigvalsh(symmetric_half(matrix.symmetric))))[::-1]

@@ -26,8 +26,9 @@ from ...core.checks import (
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, with_errors
 from ...core.long_runs import Engine, all_parts, identity_of, reported
-from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
+from ...kernels import Law
 from ...kernels.bases.measure import SINE
+from ...kernels.laws.law import in_frame
 from ...kernels.laws.structure import holds_of_all
 
 Arrangement = Literal["mirror", "half-turn"]
@@ -178,7 +179,7 @@ def simulated_times(
 def in_paper_frame(law: Law) -> Law:
     """The law in the paper's convention; an InputError if it is no law."""
     instance("law", law, Law, "ker.WallLaw(wall)")
-    return law.in_specular_frame() if law.frame == "specular" else law
+    return in_frame(law, "paper")
 
 
 def checked(
@@ -195,21 +196,12 @@ def checked(
 
 def refuse_kept_sines(law: Law) -> None:
     """An InputError if every ray keeps its angle to the wall."""
-    if holds_of_all(law, _keeps_sines):
+    if holds_of_all(law, lambda part: part.keeps_sine):
         raise InputError(
             "law: every ray keeps its angle to the wall, so all flights of a particle are equally long, the mean "
             f"exit times are infinite and the particles have no common diffusivity; got {law!r}, expected a law that "
             "changes angles, as a mixture with lambertian() does"
         )
-
-
-def _keeps_sines(law: Law) -> bool:
-    """Whether a law is known to consist of theta' = theta and theta' = pi - theta."""
-    if isinstance(law, (WallLaw, PolygonLaw)):
-        wall = law.wall
-        steps = [np.subtract(piece.end, piece.start) for loop in (wall.pieces, *wall.islands) for piece in loop]
-        return wall.is_polygonal and all(np.count_nonzero(step) == 1 for step in steps)
-    return law.retro is not None or isinstance(law, RectangularTeethLaw)
 
 
 def reflected(law: Law, incoming: Floats, rng: np.random.Generator) -> Floats:

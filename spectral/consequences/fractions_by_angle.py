@@ -15,9 +15,9 @@ from ...core.rounding import EPS
 from ...geometry import Wall, trace
 from ...geometry.cells.hollow_shape import distinct_hollows
 from ...geometry.polygons.beams import Beams, beams_of
-from ...kernels import SINE, Bins, CircularArcLaw, DensityLaw, Law, WallLaw
+from ...kernels import SINE, Bins, CircularArcLaw, Law, WallLaw
 from ...kernels.laws.isometry_table import SAME_OFFSET, IsometryTable
-from ...kernels.laws.law import Composition, DrivenLaw, specular
+from ...kernels.laws.law import Composition, RandomMap, specular
 from ...kernels.laws.structure import law_of, words_of
 from ...kernels.walls.rectangular import FIRST_CROSSING, crevice_nodes, crevice_pieces
 from .channel import in_paper_frame
@@ -218,31 +218,32 @@ def _specular_part(law: Law, theta: Floats | None, rng: np.random.Generator) -> 
         return value, error + missed, kind, "isometries of the law"
     inner = in_paper_frame(law)
     factors = inner.laws if isinstance(inner, Composition) else (inner,)
-    if any(one.is_lambertian or isinstance(one, (DensityLaw, CircularArcLaw)) for one in factors):
+    if any(one.has_density or isinstance(one, CircularArcLaw) for one in factors):
         return zero, zero, "bound", "densities have none"
     if all(one == specular() for one in factors):
         return zero + (len(factors) % 2 == 1), zero, "bound", "specular factors"
     if isinstance(inner, WallLaw) and _has_curved_hollows(inner.wall.cell):
         flat = inner.wall.cell.flat_top / inner.wall.period
         return zero + (flat if inner is law else 0.0), zero, "bound", "flat tops"
-    if not isinstance(inner, DrivenLaw):
+    reflect = inner.random_map() if inner.is_driven else None
+    if reflect is None:
         raise InputError(f"law: expected one of which the specular fraction is known, got {law!r}")
     if theta is None:
-        near, lost = _near_specular(law, inner, rng.random(RAYS), SINE.sample(RAYS, rng))
+        near, lost = _near_specular(law, reflect, rng.random(RAYS), SINE.sample(RAYS, rng))
         each = [(fraction_estimate(float(near.mean()), RAYS, ""), lost)]
     else:
         strata = [(np.arange(RAYS) + rng.random(RAYS)) / RAYS for _ in theta]
-        found = (_near_specular(law, inner, x, np.full(RAYS, angle)) for x, angle in zip(strata, theta, strict=True))
+        found = (_near_specular(law, reflect, x, np.full(RAYS, angle)) for x, angle in zip(strata, theta, strict=True))
         each = [(mean_of_strata(near.astype(np.float64), 1.0, ""), lost) for near, lost in found]
     values, errors = np.array([(one.value, one.error + lost) for one, lost in each]).T
     return values, errors, "estimate", f"{RAYS} rays"
 
 
-def _near_specular(law: Law, inner: DrivenLaw, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], float]:
+def _near_specular(law: Law, reflect: RandomMap, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], float]:
     """Which rays are reflected specularly, of a law in the other frame retroreflected, and the unresolved fraction."""
     theta = np.where(np.abs(theta - 0.5 * np.pi) < BESIDE, 0.5 * np.pi + BESIDE, theta)
-    outgoing, escaped = inner.reflect_with_status(np.maximum(x, EPS), theta)
-    target = np.pi - theta if law is inner else theta
+    outgoing, escaped = reflect(np.maximum(x, EPS), theta)
+    target = np.pi - theta if law.frame == "paper" else theta
     return np.abs(outgoing - target) < CLOSE, 0.0 if escaped is None else 1.0 - float(np.mean(escaped))
 
 

@@ -14,7 +14,8 @@ from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
 from ...geometry import Wall
 from ...kernels import KernelMatrix, Law, Legendre, discretise
-from ...kernels.laws.matrix_law import finite_matrix, not_a_law
+from ...kernels.laws.law import in_frame
+from ...kernels.laws.matrix_law import check_law, finite_matrix
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..gap.gap import modulus_gap
 
@@ -130,8 +131,7 @@ def mixing_time(
     within = number_between("within", within, 0.0, np.inf)
     choice("distance", distance, get_args(Distance))
     choice("start", start, get_args(Start))
-    if not isinstance(kernel, Law | KernelMatrix | Spectrum):
-        raise not_a_law("kernel", "a Law, a KernelMatrix or a Spectrum", kernel)
+    check_law("kernel", kernel, "a Law, a KernelMatrix or a Spectrum", KernelMatrix, Spectrum)
     size = number_between("initial", initial, 0.0, np.inf, closed="low")
     gap = _modulus_gap(kernel)
     slem = slem_from_gap(gap)
@@ -360,7 +360,7 @@ def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) ->
     """
     whole_number("degrees", degrees, 1)
     instance("law", law, Law, "ker.WallLaw(wall)")
-    specular = law if law.frame == "specular" else law.in_specular_frame()
+    specular = in_frame(law, "specular")
     matrix = discretise(specular, Legendre(2 * degrees + 2), tolerance=tolerance)
     order = np.arange(1, degrees + 1)
     diagonal = np.diagonal(matrix.symmetric)[order]

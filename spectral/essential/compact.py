@@ -16,7 +16,7 @@ from ...core.checks import Floats, instance, positive_number
 from ...core.estimates import ErrorKind, Estimate
 from ...core.long_runs import count_time
 from ...core.rounding import EPS
-from ...kernels import DensityLaw, InvolutionLaw, KernelMatrix, Law, Legendre, Panels, discretise
+from ...kernels import DensityLaw, KernelMatrix, Law, Legendre, Panels, discretise
 from ...kernels.bases.measure import SINE, gauss_on_intervals
 from ...kernels.laws.density import VALUE_TIME
 from ...kernels.laws.law import IsometryLaw
@@ -262,4 +262,4 @@ def _contains_involution(law: Law) -> bool:
     def of_any(terms: Sequence[tuple[float, bool]]) -> bool:
         return any(fact for _, fact in terms)
 
-    return fold(law, Rules(lambda leaf: isinstance(leaf, InvolutionLaw), of_any, all, lambda fact: fact))
+    return fold(law, Rules(lambda leaf: leaf.angle_map is not None, of_any, all, lambda fact: fact))

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...core.checks import Floats, instance
 from ...core.estimates import ErrorKind, Summary, with_error
-from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
-from ...kernels.laws.phase_function import HenyeyGreensteinLaw
+from ...kernels import Law, WallLaw
 from ...kernels.laws.structure import Rules, fold
 from ...kernels.walls.wall_law import made_of_isometries
 from .grazing import SWAP, GrazingLimit, grazing_limit
@@ -112,7 +111,7 @@ def _taken_apart(law: Law) -> _Part:
 
 
 def _leaf(law: Law) -> _Part:
-    if law.is_lambertian or isinstance(law, (HenyeyGreensteinLaw, MatrixLaw)):
+    if law.is_compact:
         return _Part((0.0, 0.0), np.zeros((2, 2)), 0.0, 0.0, True, (f"{law!r} is compact",))
     if made_of_isometries(law):
         if law.retro is not None:
@@ -128,9 +127,9 @@ def _leaf(law: Law) -> _Part:
     elif limit.error == 0.0:
         how += ", by the shape of the wall at y = 0"
     note = f"{law!r}: grazing rays, E[sin(theta)/sin(theta')] {how}"
-    if isinstance(law, DensityLaw):
+    if law.has_density:
         return _Part((0.0, 0.0), limit.matrix, *errors, False, (note, f"{law!r} has a density, taken as bounded"))
-    if isinstance(law, InvolutionLaw):
+    if law.angle_map is not None and law.reversible:
         reason = f"{law!r} is an involution: f + f o T is kept for every f"
         return _Part((0.0, 1.0), limit.matrix, *errors, True, (reason,))
     modulus, fraction = (0.0, 0.0), 0.0

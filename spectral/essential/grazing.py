@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, singledispatch
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +12,9 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.rounding import EPS
 from ...geometry import trace
-from ...kernels import CircularArcLaw, DensityLaw, Law, WallLaw
+from ...kernels import CircularArcLaw, Law, WallLaw
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
-from ...kernels.laws.law import DrivenLaw, entry_inside
+from ...kernels.laws.law import entry_inside
 
 if TYPE_CHECKING:
     from ...geometry import Wall
@@ -77,6 +77,7 @@ class GrazingLimit:
         return float(np.max(np.abs(np.linalg.eigvals(self.matrix))))
 
 
+@singledispatch
 def grazing_limit(law: Law) -> GrazingLimit:
     r"""The limit at grazing of the law's action on 1/sin(theta), for each of the ends 0 and pi.
 
@@ -113,9 +114,7 @@ def grazing_limit(law: Law) -> GrazingLimit:
     >>> grazing_limit(ker.WallLaw(geo.dispersing_arcs(1e-9))).root
     0.0
     """
-    if isinstance(law, CircularArcLaw) and _is_plain(float(np.cos(law.half_angle))):
-        return GrazingLimit(np.zeros((2, 2)), 0.0, 0.0)
-    return _limit_of_wall(law) if isinstance(law, (CircularArcLaw, WallLaw)) else _limit(law, Grazed())
+    return _limit(law, Grazed())
 
 
 @dataclass(frozen=True)
@@ -127,11 +126,17 @@ class Grazed:
     scale: float | None = None
 
 
+@grazing_limit.register(CircularArcLaw)
 @lru_cache(maxsize=REMEMBERED)
-def _limit_of_wall(law: CircularArcLaw | WallLaw) -> GrazingLimit:
+def _limit_of_arc(law: CircularArcLaw) -> GrazingLimit:
+    is_plain = _is_plain(float(np.cos(law.half_angle)))
+    return GrazingLimit(np.zeros((2, 2)), 0.0, 0.0) if is_plain else _limit(law, Grazed(scale=1.0))
+
+
+@grazing_limit.register(WallLaw)
+@lru_cache(maxsize=REMEMBERED)
+def _limit_of_wall(law: WallLaw) -> GrazingLimit:
     """The limit of a wall, cached for the gaps in both conventions and the diffusivity."""
-    if isinstance(law, CircularArcLaw):
-        return _limit(law, Grazed(scale=1.0))
     # the cell has the same law, and its entry points refer to its hollows
     cell = law.wall.cell if law.wall.closes else raised(law.wall)
     return _limit(law if cell is law.wall else WallLaw(cell), grazed(cell))
@@ -267,7 +272,7 @@ def _at_angle(law: Law, angle: float, end: int, parts: tuple[tuple[float, float]
         near = outgoing < 0.5 * np.pi
         return np.stack([np.where(near, fraction, 0.0), np.where(near, 0.0, fraction)], axis=-1)
 
-    reflect = law.random_map() if isinstance(law, DrivenLaw) else None
+    reflect = law.random_map() if law.is_driven else None
     if reflect is not None:
 
         def integrand(x: Floats) -> Floats:
@@ -281,7 +286,7 @@ def _at_angle(law: Law, angle: float, end: int, parts: tuple[tuple[float, float]
     else:
         # not by `apply`, whose nodes come so near to 0 and pi that laws round them there
         value, error = law.conditionals([theta], degree=DEGREE).mean(ratio)[0], 0.0
-        if isinstance(law, DensityLaw):
+        if law.has_density:
             error = float(angle)
     return value, error + ANGLE_ROUNDING / angle
 

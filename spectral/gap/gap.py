@@ -13,13 +13,13 @@ from ...core.errors import AccuracyError
 from ...core.estimates import with_error
 from ...core.long_runs import TIME_LIMIT, OutOfTime, reported, time_limited
 from ...core.rounding import EPS
-from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law
+from ...kernels import CollisionLaw, KernelMatrix, Law
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
-from ...kernels.laws.matrix_law import finite_matrix, not_a_law
+from ...kernels.laws.matrix_law import check_law, finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import Enclosures, as_power, enclosed_trial_space, enclosures
-from ..bounds.images import ROUNDED, is_costly, is_traced, suits_panels
+from ..bounds.images import is_costly, is_traced, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import Rank
@@ -55,7 +55,7 @@ def enclosed_gap(
 ) -> SpectralGap | None:
     """The gap, or 1 - slem if ranked by modulus, with the least error within a time limit; None without enclosures."""
     best: SpectralGap | None = None
-    if isinstance(law, DensityLaw):
+    if law.has_density:
         return _of_density(law, tolerance, edge, seconds)
     if suits_panels(law) and not is_costly(law):
         with suppress(OutOfTime), time_limited(seconds):
@@ -66,7 +66,7 @@ def enclosed_gap(
     return best
 
 
-def _of_density(law: DensityLaw, tolerance: float, edge: EssentialEdge, seconds: float) -> SpectralGap | None:
+def _of_density(law: Law, tolerance: float, edge: EssentialEdge, seconds: float) -> SpectralGap | None:
     for wanted in dict.fromkeys((tolerance, *(max(tolerance, sure) for sure in SURE))):
         with suppress(OutOfTime), time_limited(seconds):
             found = (_gap_of(law, enclosures(law, number, tolerance=wanted), edge) for number in OF_DENSITIES)
@@ -190,8 +190,7 @@ def spectral_gap(
         return gap_of_grooves(law, tolerance, rng, lambda one: spectral_gap(one, PLANAR, rng, time_limit=seconds))
     if isinstance(law, KernelMatrix):
         return _of_matrix(law)
-    if not isinstance(law, Law):
-        raise not_a_law("law", "a Law, a CollisionLaw, a HemisphereLaw or a KernelMatrix", law)
+    check_law("law", law, "a Law, a CollisionLaw, a HemisphereLaw or a KernelMatrix")
     other = self_adjoint_elsewhere(law)
     if other is not None:
         return _contraction(law, other, tolerance, rng, seconds)
@@ -238,7 +237,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     0.5
     """
     matrix = None if made_of_isometries(law) else finite_matrix(law)
-    compact = None if matrix is not None or isinstance(law, ROUNDED) else compact_matrix(law)
+    compact = None if matrix is not None or law.eigenvalue_ratio is not None else compact_matrix(law)
     near = compact if matrix is None else matrix
     if near is not None and (near is matrix or float(near.error) <= tolerance):
         refuse_unless_self_adjoint(law)
@@ -304,7 +303,7 @@ def _by_refinement(law: Law, tolerance: float, rng: np.random.Generator, seconds
     if fraction < 1.0:
         own = gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, rng, seconds)
         return _scaled(own, fraction)
-    compact = compact_matrix(law) if not isinstance(law, ROUNDED) else None
+    compact = compact_matrix(law) if law.eigenvalue_ratio is None else None
     if compact is None:
         return _by_edge(law, tolerance, rng, seconds)
     found = gap_of_exact(compact)

@@ -12,7 +12,7 @@ from ...core.errors import InputError
 from ...core.long_runs import TIME_LIMIT, reported
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, KernelMatrix, Law
-from ...kernels.laws.matrix_law import not_a_law
+from ...kernels.laws.matrix_law import check_law
 from ..bounds.contraction import refuse_unless_self_adjoint
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..essential.edge import essential_edge
@@ -93,8 +93,7 @@ def spectrum(
         if tolerance is not None or rng is not None:
             raise InputError("tolerance, rng: only for laws; a KernelMatrix is discretised already")
         return matrix_spectrum(kernel, k)
-    if not isinstance(kernel, Law):
-        raise not_a_law("kernel", "a KernelMatrix, a Law or a CollisionLaw", kernel)
+    check_law("kernel", kernel, "a KernelMatrix, a Law or a CollisionLaw")
     refuse_unless_self_adjoint(kernel)
     return _with_verdict(kernel, law_eigenvalues(kernel, k, wanted, rng, seconds), wanted, rng, seconds)
 

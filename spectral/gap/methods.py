@@ -10,11 +10,11 @@ import numpy as np
 from ...core.checks import Floats, Rng, frozen
 from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
-from ...kernels import DensityLaw, Law, Legendre, discretise
+from ...kernels import Law, Legendre, discretise
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
-from ..bounds.images import ROUNDED, is_costly, is_traced, suits_panels
+from ..bounds.images import is_costly, is_traced, suits_panels
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
 from ..essential.compact import compact_matrix
 
@@ -40,13 +40,13 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng, seconds: float
         found = law_eigenvalues(base, max(k, 2), tolerance / exponent, rng, seconds)
         return _raised(found, exponent, k)
     matrix = None if made_of_isometries(law) else finite_matrix(law, k)
-    if matrix is None and not isinstance(law, ROUNDED):
+    if matrix is None and law.eigenvalue_ratio is None:
         near = compact_matrix(law)
         matrix = near if near is not None and float(near.error) <= tolerance else None
     if matrix is not None:
         return matrix_spectrum(matrix, k)
     if not made_of_isometries(law):
-        if isinstance(law, DensityLaw):
+        if law.has_density:
             return _of_density(law, k, tolerance)
         if suits_panels(law) and not is_costly(law):
             enclosed = _enclosed(law, k, tolerance, seconds)
@@ -93,7 +93,7 @@ def _enclosed(law: Law, k: int, tolerance: float, seconds: float) -> Spectrum | 
     return None if best is None else _spectrum_of(best, k)
 
 
-def _of_density(law: DensityLaw, k: int, tolerance: float) -> Spectrum:
+def _of_density(law: Law, k: int, tolerance: float) -> Spectrum:
     first, *others = [Legendre(factor * max(DEGREES[0], 2 * k)) for factor in (1, 2, 4)]
     best = enclosed_trial_space(law, k, first)
     for basis in others:

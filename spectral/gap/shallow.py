@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import singledispatch
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...kernels import CircularArcLaw, Law, PolygonLaw, WallLaw
 from ...kernels.bases.measure import gauss_on_intervals, gauss_rule
-from ...kernels.laws.law import Combination, IsometryLaw, SpecularFrame
+from ...kernels.laws.law import Combination, SpecularFrame
 from ..essential.edge import EssentialEdge
 from .verdict import SpectralGap
 
@@ -235,28 +236,42 @@ def _frequencies(slopes: Slopes, slowest: float) -> Floats:
     return np.concatenate([np.geomspace(slowest, fastest, 200), np.arange(slowest, fastest, step)])
 
 
+@singledispatch
 def slopes_of(law: Law) -> Slopes | None:
     """The slopes of a law of shallow walls, whose rays meet them once unless they graze; None for other laws."""
-    if isinstance(law, SpecularFrame):
-        return slopes_of(law.law)
-    if isinstance(law, Combination):
-        parts = [(weight, slopes_of(term)) for weight, term in law.parts]
-        known = [(weight, part) for weight, part in parts if part is not None]
-        if len(known) < len(parts):
-            return None
-        return Slopes(
-            np.concatenate([part.angle for _, part in known]),
-            np.concatenate([weight * part.weight for weight, part in known]),
-            max(part.steepest for _, part in known),
-            min(part.least_turn for _, part in known),
-        )
-    if isinstance(law, IsometryLaw) and not law.retro:
-        return Slopes(np.zeros(1), np.ones(1), 0.0, np.inf)
-    if isinstance(law, CircularArcLaw) and law.half_angle <= STEEPEST:
-        from ...geometry import focusing_arcs
+    return Slopes(np.zeros(1), np.ones(1), 0.0, np.inf) if law.retro is False else None
 
-        return _slopes_of_wall(focusing_arcs(law.half_angle))
-    return _slopes_of_wall(law.wall) if isinstance(law, (WallLaw, PolygonLaw)) else None
+
+@slopes_of.register(SpecularFrame)
+def _(law: SpecularFrame) -> Slopes | None:
+    return slopes_of(law.law)
+
+
+@slopes_of.register(Combination)
+def _(law: Combination) -> Slopes | None:
+    parts = [(weight, slopes_of(term)) for weight, term in law.parts]
+    known = [(weight, part) for weight, part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    return Slopes(
+        np.concatenate([part.angle for _, part in known]),
+        np.concatenate([weight * part.weight for weight, part in known]),
+        max(part.steepest for _, part in known),
+        min(part.least_turn for _, part in known),
+    )
+
+
+@slopes_of.register(CircularArcLaw)
+def _(law: CircularArcLaw) -> Slopes | None:
+    from ...geometry import focusing_arcs
+
+    return _slopes_of_wall(focusing_arcs(law.half_angle)) if law.half_angle <= STEEPEST else None
+
+
+@slopes_of.register(WallLaw)
+@slopes_of.register(PolygonLaw)
+def _(law: WallLaw | PolygonLaw) -> Slopes | None:
+    return _slopes_of_wall(law.wall)
 
 
 def _slopes_of_wall(wall: Wall) -> Slopes | None:

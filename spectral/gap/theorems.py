@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ...kernels import InvolutionLaw, KernelMatrix, Law
+from ...kernels import KernelMatrix, Law
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.separation import lambertian_fraction
@@ -37,7 +37,7 @@ def gap_by_theorem(law: Law) -> SpectralGap | None:
             "so no L^2 gap exists, and a gap on a grid is an artefact of the grid"
         )
         return _stated(law, 0.0, 0.0, "no gap", reason)
-    if isinstance(law, InvolutionLaw):
+    if law.angle_map is not None and law.reversible:
         reason = "the law is an involution T: f + f o T is kept for every f, so 1 has infinite multiplicity"
         return _stated(law, 0.0, 0.0, "no gap", reason)
     matrix = finite_matrix(law)

@@ -18,7 +18,6 @@ from ...core.long_runs import reported
 from ...core.version import __version__
 from ...geometry import Arc, dispersing_arcs
 from ...kernels import CircularArcLaw, Law, WallLaw, lambertian, specular
-from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import words_of
 from .checker import Refused, check, ctx, enclose
 from .search import BITS, certificates
@@ -237,10 +236,8 @@ def in_words(content: dict[str, Any]) -> str:
 
 
 def _family(law: Law, whole: Law) -> dict[str, Any]:
-    if law == lambertian():
-        return {"family": "powers", "mean_cosine": _with_radius(0.0)}
-    if isinstance(law, HenyeyGreensteinLaw):
-        return {"family": "powers", "mean_cosine": _with_radius(law.g)}
+    if law.eigenvalue_ratio is not None:
+        return {"family": "powers", "mean_cosine": _with_radius(law.eigenvalue_ratio)}
     if isinstance(law, CircularArcLaw):
         return {"family": "focusing arcs", "half_angle": _with_radius(law.half_angle)}
     if isinstance(law, WallLaw) and (curvature := _curvature(law)) is not None:

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from traceback import format_exception_only
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from ...core.checkpoints import Checkpoint
 from ...core.checks import finite_number, instance, positive_number, shortened
@@ -25,7 +25,8 @@ from ...core.version import __version__
 from ...core.workers import connected, results
 from ...geometry import Wall
 from ...kernels import CollisionLaw, Law, WallLaw, resistance
-from ...kernels.laws.matrix_law import not_a_law
+from ...kernels.laws.law import in_frame
+from ...kernels.laws.matrix_law import check_law
 from ..consequences.diffusion import logarithmic_slope
 from ..consequences.mixing import relaxation_time, slem_from_gap
 from ..consequences.momentum_accommodation import accommodation
@@ -221,9 +222,8 @@ def law_of(made: object) -> Law:
         return WallLaw(made)
     if isinstance(made, CollisionLaw):
         return made.law
-    if not isinstance(made, Law):
-        raise not_a_law("family", "a function that returns a wall or a law", made)
-    return made
+    check_law("family", made, "a function that returns a wall or a law")
+    return cast(Law, made)
 
 
 def in_words(reason: Exception) -> str:
@@ -286,7 +286,7 @@ def _gap(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
 
 
 def _gap_in_the_specular_frame(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
-    return _gap(law if law.frame == "specular" else law.in_specular_frame(), tolerance)
+    return _gap(in_frame(law, "specular"), tolerance)
 
 
 def _slem(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
@@ -300,7 +300,7 @@ def _relaxation_time(law: Law, tolerance: float) -> tuple[Sequence[Estimate], st
 
 
 def _resistance(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
-    return [resistance(law.in_specular_frame() if law.frame == "specular" else law, tolerance)], ""
+    return [resistance(in_frame(law, "paper"), tolerance)], ""
 
 
 def _eta(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
