@@ -29,7 +29,7 @@ from .collisions.weak_tests import weak_limit as weak_limit
 from .discretisation.discretisation import discretise as discretise
 from .distances.distances import distance as distance
 from .distances.distances import retroreflection_distance as retroreflection_distance
-from .distances.two_sample import difference_test as difference_test
+from .distances.transport import difference_test as difference_test
 from .expectations.conditionals import Conditionals as Conditionals
 from .hemisphere.hemisphere_law import HemisphereLaw as HemisphereLaw
 from .inverse.cell_sequences import dichotomy as dichotomy
@@ -50,15 +50,15 @@ from .laws.matrix_law import MatrixLaw as MatrixLaw
 from .laws.phase_function import henyey_greenstein as henyey_greenstein
 from .matrices.matrix import KernelMatrix as KernelMatrix
 from .matrices.matrix import load_matrix as load_matrix
-from .positions.distance_of_states import position_distance as position_distance
 from .positions.position_law import PositionLaw as PositionLaw
 from .positions.position_law import displacements as displacements
+from .positions.position_law import position_distance as position_distance
 from .sampling.streams import estimate as estimate
 from .sampling.streams import estimate_stream as estimate_stream
 from .thermal.spring_wall import SpringWall as SpringWall
 from .walls.circular_arc import CircularArcLaw as CircularArcLaw
-from .walls.mushroom_law import MushroomLaw as MushroomLaw
 from .walls.polygons import PolygonLaw as PolygonLaw
 from .walls.polygons import TriangularTeethLaw as TriangularTeethLaw
 from .walls.rectangular import RectangularTeethLaw as RectangularTeethLaw
+from .walls.wall_law import MushroomLaw as MushroomLaw
 from .walls.wall_law import WallLaw as WallLaw

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Value, finite_array, frozen, instance, shaped, whole_number
 from ...core.errors import AsperityError, InputError
+from .angles import cell_among
 from .given import Vectorised
-from .intervals import cell_among
 from .measure import AngularMeasure, gauss_rule
 
 Frame = Literal["paper", "specular"]

@@ -34,7 +34,7 @@ from ..bases.basis import Basis
 from ..bases.given import Vectorised, seed_by_name
 from ..bases.polynomials import Legendre
 from ..laws.law import Combination, Law, as_weight, check_paper_frame, retroreflection, specular
-from ..laws.tensor_law import Discretiser, TensorLaw, Term, checked_pair
+from ..laws.structure import Discretiser, TensorLaw, Term, checked_pair
 from ..walls.wall_law import isometries
 from .operator import isometry_matrix
 

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
-from ..bases.angles import clipped_inside, mirrored_angle
+from ..bases.angles import between_cuts, clipped_inside, edges_inside, joined_lists, mirrored_angle
 from ..bases.assembly import add_blocks, add_masses, is_mirror_symmetric, mirror_image
 from ..bases.basis import Basis
-from ..bases.intervals import between_cuts, edges_inside, joined_lists
 from ..bases.measure import gauss_on_intervals
 from ..bases.partitions import Panels
 from ..matrices.matrix import KernelMatrix

@@ -21,8 +21,7 @@ from ..bases.partitions import Bins
 from ..bases.spaces import TensorBasis
 from ..laws.law import Law
 from ..laws.matrix_law import MatrixLaw, finite_matrix
-from ..laws.structure import Rules, fold, holds_of_all
-from ..laws.tensor_law import SpatialLaw
+from ..laws.structure import Rules, SpatialLaw, fold, holds_of_all
 from ..matrices.matrix import KernelMatrix
 from ..sampling.sobol import PARTS
 from .method import (

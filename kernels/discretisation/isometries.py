@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE
-from ..bases.angles import clipped_inside
+from ..bases.angles import between_cuts, clipped_inside, edges_inside
 from ..bases.assembly import add_masses, add_products, largest_square_sum
 from ..bases.basis import Basis
-from ..bases.intervals import between_cuts, edges_inside
 from ..bases.measure import gauss_on_intervals
 from ..bases.partitions import Panels
 from ..bases.polynomials import Displacement

@@ -16,9 +16,8 @@ from ..bases.basis import Basis
 from ..bases.polynomials import node_rounding
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from ..sampling.chunks import IndependentRays, count_long
+from ..sampling.chunks import IndependentRays, RaySums, count_long
 from ..sampling.counts import BATCHES, LARGEST_REPLICATES
-from ..sampling.rays import RaySums
 from ..sampling.sobol import PARTS, SobolSampler
 
 MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]

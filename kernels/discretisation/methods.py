@@ -37,8 +37,7 @@ from .quadrature import (
     by_map,
     has_conditionals,
 )
-from .rays_or_conditionals import by_rays_or_conditionals
-from .traced import by_adaptive_angles
+from .traced import by_adaptive_angles, by_rays_or_conditionals
 
 
 def _of(kind: type[Law], where: Callable[[Any, Basis], bool] = lambda law, basis: True) -> Callable[[Law, Basis], bool]:

@@ -12,14 +12,14 @@ from ...core.checks import Floats, shortened
 from ...core.errors import InputError
 from ...core.long_runs import NUMBERS_AT_ONCE, count_time
 from ...core.rounding import EPS
+from ..bases.angles import bisected
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
-from ..bases.intervals import bisected
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.partitions import Bins
 from ..bases.polynomials import Legendre
 from ..expectations.angle_panels import NODES, AnglePanels
-from ..expectations.basis_means import functions_of
+from ..expectations.conditionals import functions_of
 from ..laws.density import VALUE_TIME, DensityLaw, cut_by_edges, split_panels
 from ..laws.deterministic import LeastResistanceLaw
 from ..laws.law import Law, knows_errors

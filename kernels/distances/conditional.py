@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.long_runs import progress_bar
-from ..bases.intervals import cell_among
+from ..bases.angles import cell_among
 from ..bases.partitions import Bins
 from ..discretisation.discretisation import discretise
 from ..expectations.conditionals import Distributions

@@ -21,7 +21,7 @@ from ..bases.polynomials import Legendre
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
 from ..laws.matrix_law import check_law
-from ..laws.tensor_law import TensorLaw, Term
+from ..laws.structure import TensorLaw, Term
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .joint import joint_law_distance, joint_matrix_distance
 from .rowwise import law_distance, matrix_distance

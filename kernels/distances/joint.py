@@ -14,7 +14,7 @@ from ...core.checks import Floats
 from ...core.estimates import ErrorKind, Estimate
 from ...core.long_runs import progress_bar
 from ...core.rounding import EPS
-from ..bases.intervals import cell_among
+from ..bases.angles import cell_among
 from ..bases.measure import SINE
 from ..bases.partitions import Bins, Panels
 from ..discretisation.discretisation import discretise

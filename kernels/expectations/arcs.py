@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ..bases.intervals import cell_among, joined_lists
+from ..bases.angles import cell_among, joined_lists
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.partitions import Panels
 from ..bases.polynomials import legendre_moments

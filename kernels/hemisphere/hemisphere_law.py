@@ -23,7 +23,7 @@ from ..bases.polynomials import Legendre
 from ..bases.spaces import Zernike, zernike_functions
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law, as_weight, drawn_terms, in_frame, used_terms
-from ..laws.tensor_law import Discretiser, SpatialLaw
+from ..laws.structure import Discretiser, SpatialLaw
 from ..matrices.matrix import KernelMatrix, frobenius_error
 
 # Ratio of the largest degree between the factors of a product to that of the matrix, and of the error that the limit on

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..bases.angles import clipped_inside
-from ..bases.intervals import edges_inside
+from ..bases.angles import clipped_inside, edges_inside
 
 # Angles of the same isometry computed by different formulas differ by a few roundings of numbers up to 2 pi.
 SAME_ANGLE = 16.0 * EPS

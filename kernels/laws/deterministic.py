@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, angles, finite_array, frozen, instance, read_only
 from ...core.errors import InputError
-from ..bases.angles import clipped_inside
-from ..bases.intervals import bisected
+from ..bases.angles import bisected, clipped_inside
 from ..bases.measure import SINE, gauss_on_intervals
 from ..bases.partitions import Bins
 from ..expectations.conditionals import Conditionals

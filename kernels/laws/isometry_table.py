@@ -14,8 +14,7 @@ from ...core.checks import Floats, Value, angles, read_only, whole_number
 from ...core.errors import InputError
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
-from ..bases.angles import clipped_inside
-from ..bases.intervals import MOST_BREAKPOINTS, joined_lists, without_extremal
+from ..bases.angles import MOST_BREAKPOINTS, clipped_inside, joined_lists, without_extremal
 from ..bases.measure import SINE
 
 Whole = NDArray[np.int64]

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, finite_array, frozen, given
 from ...core.errors import InputError
 from ...core.rounding import EPS
-from ..bases.angles import clipped_inside
+from ..bases.angles import cell_among, clipped_inside
 from ..bases.basis import Basis, Frame
-from ..bases.intervals import cell_among
 from ..bases.measure import SINE
 from ..bases.partitions import Bins
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between

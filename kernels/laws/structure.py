@@ -1,4 +1,4 @@
-"""Recursion over compound laws: properties of sums, products and powers from those of their parts, and words.
+"""Laws made of other laws: recursion over sums, products and powers, words, and laws of several angles.
 
 A word is a chain of laws in the order of application; the empty word is the identity.
 """
@@ -6,13 +6,19 @@ A word is a chain of laws in the order of application; the empty word is the ide
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain, product
-from typing import Generic, TypeVar
+from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 
+from ...core.checks import Value
+from ...core.errors import InputError
+from ..bases.basis import Basis
+from ..bases.spaces import TensorBasis
+from ..matrices.matrix import KernelMatrix
 from .law import (
     Combination,
     Composition,
@@ -196,3 +202,35 @@ def _multiplied(parts: Sequence[Sum | None]) -> Sum | None:
         if len(total) > MOST_WORDS or max(map(len, total)) > LONGEST_WORD:
             return None
     return total
+
+
+# Weight, law of theta, and whether psi becomes pi - psi (else it is unchanged).
+Term: TypeAlias = tuple[float, Law, bool]
+# `discretise` with all its arguments but law and basis.
+Discretiser: TypeAlias = Callable[[Law, Basis], KernelMatrix]
+
+
+class SpatialLaw(Value, ABC):
+    """A law of several angles or of velocities in space, whose matrix is computed from those of laws of one angle."""
+
+    @abstractmethod
+    def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
+        """The matrix in a basis; raises InputError for a basis of other functions."""
+
+
+class TensorLaw(SpatialLaw):
+    """A law of the angles (theta, psi), computed from laws of the single angles."""
+
+    @abstractmethod
+    def parts_checked(self) -> tuple[Term, ...]:
+        """The terms, of which the law is the sum; raises InputError if their weights do not sum to 1 within 1e-12."""
+
+
+def checked_pair(basis: Basis) -> TensorBasis:
+    """The basis, if it is a product of one for theta and one for psi; else raises InputError."""
+    if isinstance(basis, TensorBasis) and [factor.measure.name for factor in basis.factors] == ["sin", "sin2"]:
+        return basis
+    raise InputError(
+        "basis: expected a product of one basis in theta and one in psi, such as "
+        f"TensorBasis((Bins(16), Bins(8, weight='sin2'))), got {basis!r}"
+    )

@@ -39,10 +39,9 @@ from ..bases.assembly import is_mirror_symmetric, mirror_image
 from ..bases.basis import AngleFunction, Basis, BasisOfPoints, Frame, checked_basis
 from ..bases.partitions import Bins
 from ..bases.spaces import TensorBasis
-from . import archive
-from .archive import Arrays, Record, Stored
+from . import output as archive
 from .defects import STOCHASTIC_NORM, STOCHASTIC_NORM_CELLS, Defect, SymmetryDefect, relative_asymmetry
-from .plot import draw_kernel
+from .output import Arrays, Record, Stored, draw_kernel
 
 # Cells a side when a kernel in polynomials is drawn.
 GRID = 240

@@ -19,8 +19,7 @@ from ..bases.measure import SINE
 from ..laws.law import Law, entry_inside, outgoing_angles
 from ..matrices.matrix import KernelMatrix
 from . import chunks
-from .chunks import Job, count_long
-from .rays import RaySums
+from .chunks import Job, RaySums, count_long
 
 if TYPE_CHECKING:
     from scipy.stats.qmc import Sobol

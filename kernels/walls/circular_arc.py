@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, number_between, whole_number
-from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
-from ..bases.intervals import MOST_BREAKPOINTS, between_cuts, edges_inside
+from ..bases.angles import MOST_BREAKPOINTS, between_cuts, clipped_inside, edges_inside, mirrored_angle, mixed_arccos
 from ..bases.measure import SINE
 from ..expectations.arcs import arc_lines, followed_hits
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between

@@ -15,8 +15,7 @@ from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.rounding import EPS
 from ...geometry import Wall
-from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
-from ..bases.intervals import MOST_BREAKPOINTS, without_extremal
+from ..bases.angles import MOST_BREAKPOINTS, clipped_inside, mirrored_angle, mixed_arccos, without_extremal
 from ..expectations.conditionals import Conditionals
 from ..laws.branches import merged
 from ..laws.isometry_table import IsometryTable

@@ -8,10 +8,10 @@ from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE, count_time
 from ...core.rounding import EPS
 from ...kernels import Basis, CircularArcLaw, Law, Panels
+from ...kernels.bases.angles import cell_among
 from ...kernels.bases.assembly import is_mirror_symmetric, reflection_matrix
-from ...kernels.bases.intervals import cell_among
 from ...kernels.expectations.arcs import ArcMeans
-from ...kernels.expectations.basis_means import Means, functions_of, height_of, weighted_means
+from ...kernels.expectations.conditionals import Means, functions_of, height_of, weighted_means
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.matrix_law import ENTRY_ROUNDING, MatrixLaw, uniform_on_bins
 from ...kernels.laws.structure import holds_of_all

@@ -16,7 +16,7 @@ from ...kernels.bases.assembly import mirror_refinement, reflection_matrix
 from ...kernels.bases.measure import SINE
 from ...kernels.discretisation.quadrature import GRAZING_EDGES
 from ...kernels.expectations.angle_panels import KRONROD, NODES, NULL_RULES
-from ...kernels.expectations.basis_means import Means, weighted_means
+from ...kernels.expectations.conditionals import Means, weighted_means
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
 from ...kernels.walls.conditionals import is_few

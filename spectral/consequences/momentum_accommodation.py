@@ -18,7 +18,7 @@ from ...kernels import SINE, Law, Panels, PolygonLaw, WallLaw, discretise
 from ...kernels.bases.basis import Basis
 from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
 from ...kernels.bases.polynomials import MEAN_SINE, SINE_NORM, Directions
-from ...kernels.expectations.basis_means import Means
+from ...kernels.expectations.conditionals import Means
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.law import Combination, is_atomic
 from ...kernels.laws.structure import has_chain, law_of, words_of

@@ -1,7 +1,8 @@
-"""The edge of the essential spectrum of a law."""
+"""The edge of the essential spectrum of a law, and the law without the identity in it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -11,6 +12,7 @@ import numpy as np
 from ...core.checks import Floats, instance
 from ...core.estimates import ErrorKind, Summary, with_error
 from ...kernels import Law, WallLaw
+from ...kernels.laws.law import in_frame, is_identity, sum_of
 from ...kernels.laws.structure import Rules, fold
 from ...kernels.walls.wall_law import made_of_isometries
 from .grazing import SWAP, GrazingLimit, grazing_limit
@@ -199,3 +201,22 @@ def _in_other_frame(part: _Part) -> _Part:
 
 # The rules for laws made of isometries only, whose grazing limits are not needed.
 ISOMETRIES = Rules(_isometric, _mixture, _chain, _in_other_frame)
+
+
+def without_identity(law: Law) -> tuple[float, Law]:
+    """The weight 1 - a and the law R in P = a 1 + (1 - a) R, if P is a sum with an identity term; else 1 and P.
+
+    The identity is retroreflection in the paper's convention and specular reflection in the other.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> without_identity(0.75 * ker.retroreflection() + 0.25 * ker.henyey_greenstein(0.5))
+    (0.25, henyey_greenstein(0.5))
+    """
+    terms = [(weight, in_frame(term, law.frame)) for weight, term in in_frame(law, "paper").parts]
+    rest = [(weight, term) for weight, term in terms if not is_identity(term)]
+    if len(rest) in (0, len(terms)):
+        return 1.0, law
+    fraction = math.fsum(weight for weight, _ in rest)
+    return fraction, sum_of(tuple((weight / fraction, term) for weight, term in rest))

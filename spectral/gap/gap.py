@@ -25,8 +25,7 @@ from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import Rank
 from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, Verdict, matrix_spectrum
 from ..essential.compact import compact_matrix
-from ..essential.edge import EssentialEdge, essential_edge
-from ..essential.exact import without_identity
+from ..essential.edge import EssentialEdge, essential_edge, without_identity
 from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
 from .refinement import EIGENVALUES, HOW, refined

@@ -10,7 +10,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.core.long_runs import all_parts
 from asperity.kernels.sampling import chunks
-from asperity.kernels.sampling.rays import RaySums
+from asperity.kernels.sampling.chunks import RaySums
 
 RAYS = 5 * 2**16 + 123
 BINS = ker.Bins(8)

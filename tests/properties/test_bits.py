@@ -18,7 +18,7 @@ from asperity.geometry.tracing import tracing
 from asperity.geometry.tracing.compiled.waves import MOST_HITS
 from asperity.kernels.billiards import billiard
 from asperity.kernels.sampling import chunks, streams
-from asperity.kernels.sampling.rays import RaySums
+from asperity.kernels.sampling.chunks import RaySums
 from asperity.spectral.consequences import channel
 from commands import environment, parts_in, started
 

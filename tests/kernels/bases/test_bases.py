@@ -15,6 +15,7 @@ from asperity.kernels import SINE, SINE_SQUARED, Basis, Bins, Legendre, Panels, 
 from asperity.kernels.bases import assembly as products_module
 from asperity.kernels.bases import measure as weights_module
 from asperity.kernels.bases import partitions as panels_module
+from asperity.kernels.bases.angles import cell_among
 from asperity.kernels.bases.assembly import (
     add_products,
     is_mirror_symmetric,
@@ -24,7 +25,6 @@ from asperity.kernels.bases.assembly import (
     overlaps,
     reflection_matrix,
 )
-from asperity.kernels.bases.intervals import cell_among
 from asperity.kernels.bases.measure import gauss_on_intervals, gauss_rule, measure_by_name
 from asperity.kernels.bases.polynomials import Directions, legendre_moments, node_rounding
 from asperity.kernels.discretisation.method import rounding

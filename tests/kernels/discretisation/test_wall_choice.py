@@ -8,8 +8,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.bench.quantities.walls import wall_of
 from asperity.kernels.discretisation.method import Budget
-from asperity.kernels.discretisation.rays_or_conditionals import FIRST_RAYS
-from asperity.kernels.discretisation.traced import traced_matrix
+from asperity.kernels.discretisation.traced import FIRST_RAYS, traced_matrix
 from asperity.kernels.sampling.sobol import SobolSampler
 
 # A rough profile of 200 pieces, whose beams resolve completely, and a curve whose beams never do.

@@ -6,7 +6,7 @@ import pytest
 from asperity import kernels as ker
 from asperity.errors import InputError
 from asperity.kernels.bases.assembly import reflection_matrix
-from asperity.kernels.sampling import rays as ray_sums
+from asperity.kernels.sampling import chunks as ray_sums
 from asperity.kernels.sampling.sobol import PARTS, SOBOL_BITS, SobolSampler, sobol_sequence
 
 TEETH = ker.TriangularTeethLaw(1.1)

@@ -12,9 +12,9 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
 from asperity.kernels.laws.law import DrivenLaw, RandomMap
-from asperity.kernels.sampling import rays
+from asperity.kernels.sampling import chunks as rays
+from asperity.kernels.sampling.chunks import RaySums
 from asperity.kernels.sampling.counts import LEVEL
-from asperity.kernels.sampling.rays import RaySums
 from asperity.kernels.sampling.sobol import PARTS, SobolSampler
 
 

@@ -1,4 +1,4 @@
-"""Kernel matrices as files: an .npz archive with every field, exact to the last bit, or a .csv for others."""
+"""Kernel matrices outside of the package: as .npz files with every field, exact to the last bit, as .csv, as pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Callable
 from operator import contains
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.lib import format as npy
@@ -17,19 +17,20 @@ from numpy.lib import format as npy
 from ...core.checks import SHOWN, Floats, check_memory, whole_number
 from ...core.errors import InputError
 from ...core.files import ending_in, regular_file, write_whole
-from ...core.tables import numbers_as_csv
-from ..bases.basis import Basis
+from ...core.tables import axes_or_new, numbers_as_csv
+from ..bases.basis import Basis, Frame
 from ..bases.partitions import Bins, Panels
 from ..bases.polynomials import Legendre
 from ..bases.spaces import TensorBasis, Zernike
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 FORMAT, VERSION = "asperity kernel matrix", 1
 # Of a record, in characters; and of a byte of a deflated member, in bytes that it inflates to.
 LONGEST_RECORD, DEFLATION = 2**24, 1032
-
 # The reflection that keeps the angle, by convention.
 SAME_ANGLE = {"paper": "retroreflection", "specular": "specular reflection"}
-
 Record = dict[str, Any]
 Arrays = dict[str, np.ndarray[Any, Any]]
 T = TypeVar("T")
@@ -177,3 +178,38 @@ def _basis_from(described: dict[str, Any], arrays: Stored, most: int) -> Basis:
     equal = Bins(edges.size - 1, described["weight"])
     # equal bins are shown by their number
     return equal if np.array_equal(equal.edges, edges) else Bins(edges, described["weight"])
+
+
+# Atoms have densities up to the number of bins; with a square-root colour scale smaller densities remain visible.
+COLOUR_POWER = 0.5
+# Differences of the measures of bins below which they are equal to rounding.
+EQUAL = 1e-12
+TICKS = ([0.0, 0.5 * np.pi, np.pi], ["0", "π/2", "π"])
+
+
+def draw_kernel(edges: Floats, density: Floats, frame: Frame, ax: Axes | None = None) -> Axes:
+    """Draw the density of P(theta, d theta') with respect to the invariant measure on the cells between edges.
+
+    A new figure is made unless ``ax`` is given. A dashed line shows retroreflection, a dotted line specular reflection.
+    """
+    from matplotlib.colors import PowerNorm
+
+    ax = axes_or_new(ax, figsize=(5.6, 4.4))
+    highest = float(density.max())
+    norm = PowerNorm(COLOUR_POWER, vmin=0.0, vmax=highest if highest > 0.0 else 1.0)
+    mesh = ax.pcolormesh(edges, edges, np.maximum(density, 0.0).T, cmap="viridis", norm=norm, rasterized=True)
+    ends = np.array([0.0, np.pi])
+    retro, specular = (ends, np.pi - ends) if frame == "paper" else (np.pi - ends, ends)
+    ax.plot(ends, retro, color="white", alpha=0.6, linewidth=0.8, linestyle="--", label="retroreflection")
+    ax.plot(ends, specular, color="white", alpha=0.6, linewidth=0.8, linestyle=":", label="specular")
+    ax.set(xlim=(0.0, np.pi), ylim=(0.0, np.pi), aspect="equal")
+    ax.set_xticks(*TICKS)
+    ax.set_yticks(*TICKS)
+    ax.set_xlabel("incoming angle θ (rad)")
+    ax.set_ylabel("outgoing angle θ' (rad)")
+    measure = -np.diff(np.cos(edges))
+    bins = f" in {len(measure)} bins of equal measure" if np.ptp(measure) < EQUAL else ""
+    figure = ax.get_figure()
+    if figure is not None:
+        figure.colorbar(mesh, ax=ax, label=f"density{bins}\n(invariant measure sin θ' dθ'/2)")
+    return ax
