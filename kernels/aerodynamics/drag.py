@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, finite_number, positive_number
 from ...core.estimates import Estimate, Summary, student_95
-from ...core.long_runs import TIME_LIMIT, reported
+from ...core.long_runs import TIME_LIMIT, reported, slices
 from ...geometry.scene.scene import SEGMENT_TIME
 from ..bases.basis import Basis
 from ..bases.given import Vectorised
@@ -329,8 +329,7 @@ def _mean_directions(law: Law, theta: Floats) -> tuple[Floats, Floats]:
     law = multiplied_out(law) if has_chain(law) else law
     angle, back = law._distinct(theta)
     means, errors = [np.empty((0, 2))], [np.empty(0)]
-    for start in range(0, angle.size, AT_ONCE):
-        some = angle[start : start + AT_ONCE]
+    for some in (angle[part] for part in slices(angle.size, AT_ONCE)):
         given = law.conditionals(some, MEAN_TOLERANCE, FEWEST_DEGREES)
         mean, error = given.mean(_components), given.error
         if np.isnan(error).any():

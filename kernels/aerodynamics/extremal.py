@@ -10,7 +10,7 @@ import numpy as np
 from ...core.checks import Floats, choice, positive_number, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, Summary
-from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.long_runs import NUMBERS_AT_ONCE, slices
 from ..bases.measure import SINE, gauss_on_intervals
 from ..bases.partitions import Bins
 from ..discretisation.discretisation import discretise
@@ -163,8 +163,7 @@ def dual_bound(potential: Floats, cost: CostFunction, curvature: float) -> float
     nodes = np.linspace(0.0, np.pi, count)
     transform = np.full(count, np.inf)
     step = max(1, NUMBERS_AT_ONCE // count)
-    for start in range(0, count, step):
-        part = slice(start, start + step)
+    for part in slices(count, step):
         table = cost(nodes[part, None], nodes) - potential[part, None]
         transform = np.minimum(transform, table.min(axis=0))
     weights = hat_masses(nodes)

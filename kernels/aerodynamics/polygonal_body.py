@@ -116,11 +116,9 @@ class PolygonalBody(Summary):
                 f"polygons: expected disjoint interiors, got polygons that overlap in an area of "
                 f"{total - whole.area:.3g}; replace those that overlap by their union"
             )
-        object.__setattr__(self, "_outline", whole)
-        object.__setattr__(self, "polygons", tuple(found))
-        object.__setattr__(self, "_starts", frozen(np.concatenate(found)))
         sides = np.concatenate([np.roll(points, -1, axis=0) - points for points in found])
-        object.__setattr__(self, "_sides", frozen(sides))
+        starts = frozen(np.concatenate(found))
+        self._set(_outline=whole, polygons=tuple(found), _starts=starts, _sides=frozen(sides))
 
     def scatter(self, position: ArrayLike, velocity: ArrayLike) -> Scattering:
         """Reflect particles until they fly free.

@@ -145,20 +145,17 @@ class RoughBody(Summary):
                 raise InputError(
                     f"law: expected one, a function or {normals.size}, one for every side, got {len(laws)}"
                 )
-        for name, value in zip(given, (normals, lengths, cuts), strict=True):
-            object.__setattr__(self, name, frozen(value))
-        object.__setattr__(self, "law", laws)
+        self._set(normals=frozen(normals), lengths=frozen(lengths), breakpoints=frozen(cuts), law=laws)
         found, changes = self._changes()
         edges = np.concatenate((np.linspace(0.0, TURN, PANELS + 1), np.mod(cuts, TURN), changes))
-        object.__setattr__(self, "_laws", found)
-        object.__setattr__(self, "_edges", frozen(np.unique(edges)))
+        self._set(_laws=found, _edges=frozen(np.unique(edges)))
         (size, *miss), errors, _ = self._integral(_components, 4, 0.0, self._edges)
         if not np.hypot(*miss) <= CLOSED * size + errors[0] or size == 0.0:
             raise InputError(
                 f"normals: expected the boundary of a body, got one of length {size:.3g} that misses itself by "
                 f"{np.hypot(*miss):.3g}"
             )
-        object.__setattr__(self, "perimeter", Estimate(size, errors[0], "estimate", QUADRATURE))
+        self._set(perimeter=Estimate(size, errors[0], "estimate", QUADRATURE))
 
     @classmethod
     def disk(cls, law: Laws, radius: float = 1.0, breakpoints: ArrayLike = ()) -> RoughBody:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.errors import InputError
-from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.long_runs import NUMBERS_AT_ONCE, slices
 from .basis import Basis
 from .partitions import Bins, Panels
 from .polynomials import Legendre
@@ -52,8 +52,7 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
         add_blocks(total, basis, source, target, values, weight[:, None] * images)
         return
     step = max(1, NUMBERS_AT_ONCE // basis.size)
-    for start in range(0, incoming.size, step):
-        part = slice(start, start + step)
+    for part in slices(incoming.size, step):
         values, images = basis.evaluate(incoming[part]), weight[part, None] * basis.evaluate(outgoing[part])
         with nullcontext() if values.size * basis.size <= SMALL_PRODUCT else one_blas_thread():
             total += values.T @ images

@@ -9,7 +9,7 @@ from typing import Any, Literal, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Value, finite_array, frozen, instance, shaped, whole_number
+from ...core.checks import Floats, Value, finite_array, frozen, instance, is_of_package, shaped, whole_number
 from ...core.errors import AsperityError, InputError
 from .angles import cell_among
 from .given import Vectorised
@@ -170,7 +170,7 @@ def checked_basis(basis: Any) -> None:
     An object is examined once, at its own nodes and at more. The tests examine the classes of this package.
     """
     instance("basis", basis, Basis, "ker.Bins(64)")
-    if type(basis).__module__.startswith(__package__) or isinstance(basis, BasisOfPoints) or CHECKED in vars(basis):
+    if is_of_package(basis) or isinstance(basis, BasisOfPoints) or CHECKED in vars(basis):
         return
     try:
         for what, found, expected in _promises(basis):

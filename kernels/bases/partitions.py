@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, check_memory, finite_array, frozen, instance, number_between, shaped, whole_number
+from ...core.long_runs import slices
 from .basis import Basis, checked_edges
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
@@ -64,10 +65,9 @@ class Panels(Basis):
 
     def __init__(self, edges: ArrayLike, degree: int, weight: WeightName = "sin") -> None:
         cells = Bins(np.atleast_1d(finite_array("edges", edges)), weight)
-        object.__setattr__(self, "_cells", cells)
-        object.__setattr__(self, "degree", whole_number("degree", degree, 0))
+        self._set(_cells=cells, degree=whole_number("degree", degree, 0))
         check_memory("degree", "the basis", cells.size * (self.degree + 1) ** 2)
-        object.__setattr__(self, "_coefficients", frozen(self._orthonormalise()))
+        self._set(_coefficients=frozen(self._orthonormalise()))
 
     @classmethod
     def for_wall(cls, wall: Wall, degree: int = 6, smallest: float = SMALLEST) -> Panels:
@@ -135,8 +135,7 @@ class Panels(Basis):
         polynomials, owner = np.polynomial.legendre.legvander(position.ravel(), self.degree), panel.ravel()
         values = np.empty(polynomials.shape)
         # in parts whose coefficients fit into the processor's cache
-        for start in range(0, owner.size, AT_ONCE):
-            part = slice(start, start + AT_ONCE)
+        for part in slices(owner.size, AT_ONCE):
             np.einsum("ak,aki->ai", polynomials[part], self._coefficients[owner[part]], out=values[part])
         return panel, values.reshape(*angle.shape, self.degree + 1)
 
@@ -280,10 +279,8 @@ class Bins(Basis):
         if equal:
             check_memory("bins", "the edges", whole_number("bins", divisions, 1))
         edges = _equal_edges(whole_number("bins", divisions, 1), measure) if equal else checked_edges(divisions)
-        object.__setattr__(self, "_edges", frozen(edges))
-        object.__setattr__(self, "_weights", frozen(measure.mass(edges[:-1], edges[1:])))
-        object.__setattr__(self, "_measure", measure)
-        object.__setattr__(self, "_equal", equal)
+        weights = frozen(measure.mass(edges[:-1], edges[1:]))
+        self._set(_edges=frozen(edges), _weights=weights, _measure=measure, _equal=equal)
 
     @property
     def is_partition(self) -> bool:

@@ -51,8 +51,7 @@ class Legendre(Basis):
     weight: WeightName
 
     def __init__(self, n: int, weight: WeightName = "sin") -> None:
-        object.__setattr__(self, "n", whole_number("n", n, 1))
-        object.__setattr__(self, "weight", measure_by_name(weight).name)
+        self._set(n=whole_number("n", n, 1), weight=measure_by_name(weight).name)
 
     @property
     def is_polynomial(self) -> bool:

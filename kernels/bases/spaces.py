@@ -57,7 +57,7 @@ class TensorBasis(BasisOfPoints):
                 "factors: expected two bases or more, as in TensorBasis((Bins(16), Bins(8, weight='sin2'))), "
                 f"got {factors!r}"
             )
-        object.__setattr__(self, "factors", flat)
+        self._set(factors=flat)
 
     @property
     def is_partition(self) -> bool:
@@ -159,7 +159,7 @@ class Zernike(BasisOfPoints):
     degree: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "degree", whole_number("degree", self.degree, 0))
+        self._set(degree=whole_number("degree", self.degree, 0))
 
     @cached_property
     def degrees(self) -> NDArray[np.int64]:

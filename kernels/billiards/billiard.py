@@ -295,7 +295,7 @@ class CollisionAlongWall(Summary):
     def __post_init__(self) -> None:
         instance("law", self.law, PositionLaw, "ker.PositionLaw([0, 1], [ker.specular()])")
         instance("disk", self.disk, Disk, "geo.Disk()")
-        object.__setattr__(self, "parts", tuple(CollisionLaw(law, self.disk) for law in self.law.laws))
+        self._set(parts=tuple(CollisionLaw(law, self.disk) for law in self.law.laws))
 
     @seed_by_name
     def sample_at(self, x: ArrayLike, velocity: ArrayLike, rng: Rng = None) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.long_runs import NUMBERS_AT_ONCE, slices
 from ...core.rounding import EPS
 from ..bases.angles import between_cuts, clipped_inside, edges_inside, joined_lists, mirrored_angle
 from ..bases.assembly import add_blocks, add_masses, is_mirror_symmetric, mirror_image
@@ -158,8 +158,7 @@ def _add_strips(
     for chosen, order in ((short, NODES_SHORT), (~short, long_nodes)):
         selected = np.flatnonzero(chosen)
         step = max(1, NUMBERS_AT_ONCE // (order * cut))
-        for start in range(0, selected.size, step):
-            part = strips.part(selected[start : start + step])
+        for part in (strips.part(selected[some]) for some in slices(selected.size, step)):
             theta, weight = gauss_on_intervals(part.low, part.high, order)
             strip = part.part(np.repeat(np.arange(part.hits.size), order))
             mass += _add_cut_strips(total, basis, edges, strip, theta, weight / (4.0 * np.sin(half_angle)), mirrored)
@@ -207,8 +206,7 @@ def _add_cut_strips(
     for chosen, order in ((short, NODES_SHORT), (~short, basis.nodes_per_interval)):
         selected = np.flatnonzero(chosen)
         step = max(1, NUMBERS_AT_ONCE // (order * (basis.degree + 1 if isinstance(basis, Panels) else basis.size)))
-        for start in range(0, selected.size, step):
-            part = selected[start : start + step]
+        for part in (selected[some] for some in slices(selected.size, step)):
             chord, fraction = gauss_on_intervals(low[part], high[part], order)
             owner = strip[part]
             each = np.repeat(owner, order)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.long_runs import NUMBERS_AT_ONCE, slices
 from ..bases.angles import between_cuts, clipped_inside, edges_inside
 from ..bases.assembly import add_masses, add_products, largest_square_sum
 from ..bases.basis import Basis
@@ -96,9 +96,8 @@ def _add_cuts(law: Law, basis: Basis, middle: Floats, displacement: Displacement
 
 def _add_pieces(law: Law, basis: Basis, low: Floats, high: Floats, order: int, total: Floats, pieces: int) -> None:
     # Large steps, because every step adds whole matrices.
-    step = max(pieces, 1)
-    for start in range(0, low.size, step):
-        angle, weight = gauss_on_intervals(low[start : start + step], high[start : start + step], order)
+    for part in slices(low.size, max(pieces, 1)):
+        angle, weight = gauss_on_intervals(low[part], high[part], order)
         mass = weight * basis.measure.density(angle)
         probability, outgoing = law.branches(angle)
         for slot in range(outgoing.shape[-1]):
@@ -223,8 +222,7 @@ def _add_nodes(
     for nodes in np.unique(number):
         chosen = np.nonzero(number == nodes)[0]
         step = max(NUMBERS_AT_ONCE // int(nodes), 1)
-        for begin in range(0, chosen.size, step):
-            part = chosen[begin : begin + step]
+        for part in (chosen[some] for some in slices(chosen.size, step)):
             angle, weight = gauss_on_intervals(low[part], high[part], int(nodes))
             owner = np.repeat(piece[part], nodes)
             image = table.images(angle, owner)

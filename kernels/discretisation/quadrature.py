@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.checks import Floats, shortened
 from ...core.errors import InputError
-from ...core.long_runs import NUMBERS_AT_ONCE, count_time
+from ...core.long_runs import NUMBERS_AT_ONCE, count_time, slices
 from ...core.rounding import EPS
 from ..bases.angles import bisected
 from ..bases.assembly import add_products, largest_square_sum
@@ -142,8 +142,7 @@ def _conditional_rule(law: DensityLaw, basis: Basis, edges: Floats, outer: Float
     source = basis.index(angle)
     flux = np.zeros(basis.size**2)
     step = max(1, CONDITIONAL_CHUNK // (FRACTION_NODES[0] * edges.size))
-    for start in range(0, angle.size, step):
-        part = slice(start, start + step)
+    for part in slices(angle.size, step):
         row, low, high, fraction = cut_by_edges(law.panels(angle[part]), edges)
         nodes = np.asarray(FRACTION_NODES)[np.searchsorted(FRACTIONS, fraction)]
         target = basis.index(0.5 * (low + high))
@@ -176,15 +175,14 @@ def _density_rule(law: DensityLaw, basis: Basis, edges: Floats, order: int) -> F
     step = max(NUMBERS_AT_ONCE // angle.size // order, 1) * order
     owner = basis.index(0.5 * (edges[1:] + edges[:-1])) if basis.is_partition else None
     values = basis.evaluate(angle) if owner is None else None
-    for start in range(0, angle.size, step):
-        rows = slice(start, start + step)
+    for rows in slices(angle.size, step):
         block = mass[rows, None] * law.density(angle[rows, None], angle) * weight
         if values is not None:
             total += values[rows].T @ (block @ values)
             continue
         assert owner is not None  # a basis is a partition or has values
         block = block.reshape(-1, order, owner.size, order).sum(axis=(1, 3))
-        np.add.at(total, (owner[start // order : start // order + block.shape[0], None], owner), block)
+        np.add.at(total, (owner[rows.start // order :][: block.shape[0], None], owner), block)
     return total if values is not None else basis.normalisation[:, None] * total * basis.normalisation
 
 

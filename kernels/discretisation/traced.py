@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, check_memory
 from ...core.errors import AccuracyError
+from ...core.long_runs import slices
 from ...core.rounding import EPS
 from ..bases.assembly import is_mirror_symmetric, mirror_image
 from ..bases.basis import Basis
@@ -342,8 +343,7 @@ class _Integrator:
             self._fill_cells(self.cells, panels, np.flatnonzero(mask.any(axis=1)), tolerance)
             return
         panel, node = np.nonzero(mask)
-        for first in range(0, len(panel), ANGLES_AT_ONCE):
-            few = slice(first, first + ANGLES_AT_ONCE)
+        for few in slices(len(panel), ANGLES_AT_ONCE):
             conditionals, _ = self.conditionals(panels.angle[panel[few], node[few]], tolerance[panel[few]])
             self.angle_count += conditionals.error.size
             panels.image[panel[few], node[few]] = conditionals.in_basis(self.basis)
@@ -353,8 +353,7 @@ class _Integrator:
     def _fill_cells(self, cells: CellMasses, panels: AnglePanels, chosen: NDArray[np.int64], tolerance: Floats) -> None:
         """Compute the integrals and expectations of indicators of cells on chosen panels."""
         step = max(1, ANGLES_AT_ONCE // len(NODES))
-        for first in range(0, len(chosen), step):
-            few = chosen[first : first + step]
+        for few in (chosen[part] for part in slices(len(chosen), step)):
             found = cells(panels.low[few], panels.high[few], panels.angle[few], tolerance[few])
             self.angle_count += len(few) * len(NODES)
             panels.image[few], panels.integral[few] = found.rest, found.integrals

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
+from ...core.long_runs import slices
 from ...core.rounding import EPS
 
 # Largest distance on the square, the unit of length here, so that powers neither overflow nor exceed 1.
@@ -250,13 +251,12 @@ def _least_costs(one: Cells, other: Cells, slopes: list[Floats], order: float) -
 
     found = np.empty((one.mass.size, other.mass.size))
     step = max(1, PAIRS_AT_ONCE // other.mass.size)
-    for start in range(0, one.mass.size, step):
-        some = rows[start : start + step]
+    for some in (rows[part] for part in slices(one.mass.size, step)):
         found[some[:, 0]] = bound(some, columns, at_means)
     reach = NEAR * (one.radius[:, None] + other.radius)
     near = np.nonzero(_powers(one.mean, other.mean, 1.0) < reach)
-    for start in range(0, near[0].size, PAIRS_AT_ONCE):
-        i, j = (side[start : start + PAIRS_AT_ONCE] for side in near)
+    for part in slices(near[0].size, PAIRS_AT_ONCE):
+        i, j = near[0][part], near[1][part]
         for slope in (slopes[0][i], slopes[1][j]):
             found[i, j] = np.maximum(found[i, j], bound(i, j, lambda *_, slope=slope: slope))
     return found

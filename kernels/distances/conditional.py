@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.long_runs import progress_bar
+from ...core.long_runs import progress_bar, slices
 from ..bases.angles import cell_among
 from ..bases.partitions import Bins
 from ..discretisation.discretisation import discretise
@@ -106,8 +106,7 @@ class ConditionalDistance:
         found, error = np.empty(theta.size), np.empty(theta.size)
         step = max(1, POINTS_AT_ONCE // max(points.size, self.atoms))
         with progress_bar(theta.size, "angle", "distance") as bar:
-            for start in range(0, theta.size, step):
-                part = slice(start, start + step)
+            for part in slices(theta.size, step):
                 one, other = self._parts(theta[part], points)
                 if self.order == 1.0:
                     found[part] = _area_between(points, one, other)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.estimates import ErrorKind, Estimate
-from ...core.long_runs import progress_bar
+from ...core.long_runs import progress_bar, slices
 from ...core.rounding import EPS
 from ..bases.angles import cell_among
 from ..bases.measure import SINE
@@ -200,8 +200,7 @@ def _matched(sides: list[Terms], edges: Floats, one: Floats, other: Floats) -> t
     angle, weight = SINE.quadrature(edges, NODES)
     common, cost = np.zeros((size, size)), 0.0
     step = NODES * max(1, MASSES_AT_ONCE // (NODES * fine.size))
-    for start in range(0, angle.size, step):
-        some = slice(start, start + step)
+    for some in slices(angle.size, step):
         laws = [cells_and_atoms(terms, angle[some], fine, COMMON_TOLERANCE, False) for terms in sides if terms]
         if len(laws) < 2:
             return one, other, 0.0, False
@@ -212,7 +211,7 @@ def _matched(sides: list[Terms], edges: Floats, one: Floats, other: Floats) -> t
         moved = uneven + np.sum(same * (np.abs(mean - mean2) + spread + spread2), axis=1)
         cost += float(weight[some] @ moved) / DIAGONAL
         same = weight[some, None] * (same + np.minimum(halves[0].sum(axis=2), halves[1].sum(axis=2)))
-        common[start // NODES : (start + step) // NODES] = same.reshape(-1, NODES, size).sum(axis=1)
+        common[some.start // NODES : some.stop // NODES] = same.reshape(-1, NODES, size).sum(axis=1)
     masses = one[:, 0, :, 0], other[:, 0, :, 0]
     common = np.clip(common, 0.0, np.minimum(*masses))
     # the smaller mass keeps its mean, the difference stays exact

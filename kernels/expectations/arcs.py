@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import slices
 from ..bases.angles import cell_among, joined_lists
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.partitions import Panels
@@ -117,8 +118,7 @@ class ArcMeans:
         whole = lines.of_angles(fraction, theta.size)
         found = np.empty((len(single), self._polynomials.shape[2]))
         long = np.flatnonzero(~single)
-        for start in range(0, long.size, PIECES_AT_ONCE):
-            part = long[start : start + PIECES_AT_ONCE]
+        for part in (long[some] for some in slices(long.size, PIECES_AT_ONCE)):
             found[part] = self._integrals(lines.offset[part], lines.slope[part], lines.lower[part], lines.upper[part])
         known = np.flatnonzero(single)
         angle = lines.angle[known]

@@ -1,4 +1,4 @@
-"""Conditional distributions of the outgoing angle as weighted angles with errors, and their means of basis functions."""
+"""Conditional distributions of the outgoing angle as weighted angles with errors, and their means of functions."""
 
 from __future__ import annotations
 

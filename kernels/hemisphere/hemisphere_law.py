@@ -298,7 +298,7 @@ class HemisphereLaw(DirectionLaw):
             turn = finite_number("orientation", self.orientation)
             if abs(turn) > 2.0 * np.pi:
                 raise InputError(f"orientation: expected an angle in radians, at most 2 pi, got {turn!r}")
-            object.__setattr__(self, "orientation", turn)
+            self._set(orientation=turn)
 
     def products(self) -> tuple[Term, ...]:
         """The only term, the law itself."""

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, common_shape, finite_array, frozen, number_between
 from ...core.errors import AccuracyError, InputError
-from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.long_runs import NUMBERS_AT_ONCE, slices
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.given import Vectorised
 from ..bases.measure import SINE, gauss_rule
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
-from .law import Combination, Law, set_properties, specular
+from .law import Combination, Law, specular
 
 DensityFunction = Callable[[Floats, Floats], Floats]
 # Tolerance for the integral 1 of a conditional density; it admits densities known to single precision.
@@ -90,12 +90,12 @@ class DensityLaw(Law):
             raise InputError(f"density: expected a function of (theta, theta_out), got {density!r}")
         points = np.unique(finite_array("breakpoints", breakpoints))
         inside = frozen(points[(points > 0.0) & (points < np.pi)])
-        set_properties(self, _function=density, outgoing_breakpoints=inside)
+        self._set(_function=density, outgoing_breakpoints=inside)
         panels, row_error = self._panels_needed()
-        set_properties(self, _panel_count=panels, _row_error=row_error)
+        self._set(_panel_count=panels, _row_error=row_error)
         reversible, mirror_symmetric = self._measured_symmetries()
-        set_properties(self, reversible=reversible, mirror_symmetric=mirror_symmetric)
-        set_properties(self, sampling_error=self._measured_sampling_error())
+        sampling_error = self._measured_sampling_error()
+        self._set(reversible=reversible, mirror_symmetric=mirror_symmetric, sampling_error=sampling_error)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise FrozenInstanceError(f"{type(self).__name__} is immutable: cannot set {name}")
@@ -167,8 +167,7 @@ class DensityLaw(Law):
         edges = self._cells()
         step = max(1, NUMBERS_AT_ONCE // edges.size)
         outgoing = np.empty(flat.size)
-        for start in range(0, flat.size, step):
-            part = slice(start, start + step)
+        for part in slices(flat.size, step):
             outgoing[part] = _inverse_cdf(edges, self.density(flat[part, None], clipped_inside(edges)), draw[part])
         return outgoing.reshape(theta.shape)
 

@@ -77,7 +77,7 @@ class InvolutionLaw(Law):
         self._check_return(theta, self._mapped(image))
         self._check_measure(theta, beside, image)
         mirrored = np.pi - self._mapped(np.pi - theta)
-        object.__setattr__(self, "mirror_symmetric", bool(np.max(np.abs(mirrored - image)) <= RETURN_TOLERANCE))
+        self._set(mirror_symmetric=bool(np.max(np.abs(mirrored - image)) <= RETURN_TOLERANCE))
 
     def _mapped(self, theta: Floats) -> Floats:
         image = finite_array("map", self.map(theta))
@@ -215,9 +215,7 @@ class IntervalExchangeLaw(Law):
         starts = SINE.cdf(edges[:-1])[row] + before - before[first][row]
         number = np.full(flux.shape, -1, dtype=np.int64)
         number[row, column] = np.arange(row.size)
-        partner = read_only(number[column, row])
-        for name, value in (("starts", frozen(starts)), ("widths", frozen(widths)), ("partner", partner)):
-            object.__setattr__(self, name, value)
+        self._set(starts=frozen(starts), widths=frozen(widths), partner=read_only(number[column, row]))
 
     @property
     def angle_map(self) -> Callable[[Floats], Floats]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Value, angles, read_only, whole_number
 from ...core.errors import InputError
-from ...core.long_runs import NUMBERS_AT_ONCE
+from ...core.long_runs import NUMBERS_AT_ONCE, slices
 from ...core.rounding import EPS
 from ..bases.angles import MOST_BREAKPOINTS, clipped_inside, joined_lists, without_extremal
 from ..bases.measure import SINE
@@ -261,10 +261,9 @@ class IsometryTable(Value):
         bucket = np.clip((theta * (buckets / np.pi)).astype(np.int64), 0, buckets - 1)
         size = first[bucket + 1] - first[bucket]
         step = max(NUMBERS_AT_ONCE // max(int(size.max(initial=1)), 1), 1)
-        for begin in range(0, max(theta.size, 1), step):
-            part = slice(begin, begin + step)
+        for part in slices(max(theta.size, 1), step):
             owner, group = joined_lists(size[part])
-            query = begin + owner
+            query = part.start + owner
             piece = members[first[bucket[query]] + group]
             at = theta[query]
             # A breakpoint belongs to the piece on its right.

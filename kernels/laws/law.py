@@ -571,12 +571,6 @@ def entry_inside(x: Floats) -> Floats:
     return np.asarray(np.clip(x, SMALLEST, LARGEST))
 
 
-def set_properties(law: Law, **properties: object) -> None:
-    """Set attributes of an immutable law during its construction."""
-    for name, value in properties.items():
-        object.__setattr__(law, name, value)
-
-
 def entries(x: ArrayLike, theta: ArrayLike) -> tuple[Floats, Floats]:
     """Return entry points and incoming angles as float64, whose shapes broadcast."""
     at, incoming = entry_points(x), angles("theta", theta)
@@ -638,11 +632,9 @@ class Combination(Law):
                 raise InputError(f"terms: expected laws, got {law!r}")
             if not math.isfinite(weight):
                 raise InputError(f"terms: expected finite weights, got {weight!r} for {law!r}")
-        laws = [law for _, law in self.terms]
-        set_properties(self, frame=common_frame(laws, "add"))
-        used = [law for weight, law in self.terms if weight]
-        set_properties(self, reversible=_sum_property([law.reversible for law in used]))
-        set_properties(self, mirror_symmetric=_sum_property([law.mirror_symmetric for law in used]))
+        frame, used = common_frame([law for _, law in self.terms], "add"), [law for weight, law in self.terms if weight]
+        reversible, mirror = ([law.reversible for law in used], [law.mirror_symmetric for law in used])
+        self._set(frame=frame, reversible=_sum_property(reversible), mirror_symmetric=_sum_property(mirror))
 
     @staticmethod
     def of(law: Law) -> Combination:
@@ -847,10 +839,13 @@ class Composition(_Chain):
             flat.extend(law.laws if isinstance(law, Composition) else (law,))
         if not flat:
             raise InputError("laws: expected at least one, got none")
-        set_properties(self, laws=tuple(flat), frame=common_frame(flat, "compose"))
+        self._set(laws=tuple(flat), frame=common_frame(flat, "compose"))
         palindrome = all(law is back or law == back for law, back in zip(flat, reversed(flat), strict=True))
-        set_properties(self, reversible=True if palindrome and all(law.reversible for law in flat) else None)
-        set_properties(self, mirror_symmetric=True if all(law.mirror_symmetric for law in flat) else None)
+        reversible, mirror = (
+            palindrome and all(law.reversible for law in flat),
+            all(law.mirror_symmetric for law in flat),
+        )
+        self._set(reversible=reversible or None, mirror_symmetric=mirror or None)
 
     @staticmethod
     def of(first: Law, second: Law) -> Law:
@@ -919,10 +914,9 @@ class Power(_Chain):
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.lambertian()")
         whole_number("exponent", self.exponent, 0)
-        set_properties(
-            self, frame=self.law.frame, mirror_symmetric=self.law.mirror_symmetric or self.exponent == 0 or None
-        )
-        set_properties(self, reversible=self.law.reversible or self.exponent == 0 or None)
+        law, identity = self.law, self.exponent == 0
+        mirror, reversible = law.mirror_symmetric or identity or None, law.reversible or identity or None
+        self._set(frame=law.frame, mirror_symmetric=mirror, reversible=reversible)
 
     def adjoint(self) -> Law:
         """(P^n)* = (P*)^n."""
@@ -1032,9 +1026,9 @@ class SpecularFrame(Law):
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.lambertian()")
         mirror = self.law.mirror_symmetric
-        set_properties(self, frame=_other_frame(self.law.frame), mirror_symmetric=mirror)
-        set_properties(self, reversible=mirror if self.law.reversible else None, is_lambertian=self.law.is_lambertian)
-        set_properties(self, outgoing_breakpoints=frozen(np.pi - self.law.outgoing_breakpoints[::-1]))
+        self._set(frame=_other_frame(self.law.frame), mirror_symmetric=mirror)
+        self._set(reversible=mirror if self.law.reversible else None, is_lambertian=self.law.is_lambertian)
+        self._set(outgoing_breakpoints=frozen(np.pi - self.law.outgoing_breakpoints[::-1]))
 
     def in_specular_frame(self) -> Law:
         """The inner law."""

@@ -25,7 +25,7 @@ from .density import (
     not_invariant,
     split_panels,
 )
-from .law import Composition, Law, set_properties
+from .law import Composition, Law
 from .structure import Rules, fold, holds_of_all
 
 # Rows divided by their sums add up to 1 within a few roundings. Rows of a matrix with symmetrised flux may not; such a
@@ -104,16 +104,15 @@ class MatrixLaw(DensityLaw):
             raise InputError(f"matrix: expected rows that sum to 1, got {sums[worst]:.12g} in row {worst}; {remedy}")
         masses = SINE.mass(edges[:-1], edges[1:])
         array = array / sums[:, None]
-        set_properties(self, array=frozen(array), edges=frozen(edges), _masses=masses)
-        set_properties(self, outgoing_breakpoints=frozen(edges[1:-1]))
-        set_properties(self, frame=frame)
+        self._set(array=frozen(array), edges=frozen(edges), _masses=masses, frame=frame)
+        self._set(outgoing_breakpoints=frozen(edges[1:-1]))
         flux = masses[:, None] * array
         close = max(SYMMETRY_TOLERANCE, rounding)
-        set_properties(self, reversible=bool(np.max(np.abs(flux - flux.T)) <= close * np.max(flux)))
+        reversible = bool(np.max(np.abs(flux - flux.T)) <= close * np.max(flux))
         even = bool(np.max(np.abs(masses - masses[::-1])) <= SYMMETRY_TOLERANCE)
         mirror = bool(np.max(np.abs(array - array[::-1, ::-1])) <= close)
         # On bins that are not symmetric about pi/2 the entries do not determine the mirror symmetry.
-        set_properties(self, mirror_symmetric=mirror if even else None)
+        self._set(reversible=reversible, mirror_symmetric=mirror if even else None)
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""

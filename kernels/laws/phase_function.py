@@ -11,7 +11,6 @@ from ...core.checks import Floats, finite_array, number_between, shaped, whole_n
 from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.measure import SINE
 from .density import DensityLaw, angle_pair
-from .law import set_properties
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,7 +53,7 @@ class HenyeyGreensteinLaw(DensityLaw):
 
     def __post_init__(self) -> None:
         g = number_between("g", self.g, -1.0, 1.0)
-        set_properties(self, g=g, is_lambertian=g == 0.0)
+        self._set(g=g, is_lambertian=g == 0.0)
 
     @property
     def eigenvalue_ratio(self) -> float:

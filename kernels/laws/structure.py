@@ -26,7 +26,6 @@ from .law import (
     Power,
     SpecularFrame,
     retroreflection,
-    set_properties,
     simplified,
     specular,
 )
@@ -157,7 +156,7 @@ def sum_of_words(terms: Iterable[tuple[float, Word]]) -> Law:
     if len(laws) == 1:
         return laws[0][1]
     whole = object.__new__(Combination)
-    set_properties(whole, terms=tuple(laws), frame="paper")
+    whole._set(terms=tuple(laws), frame="paper")
     return whole
 
 

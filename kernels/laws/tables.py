@@ -16,6 +16,7 @@ from ...core.checks import Floats, Rng, angles, check_memory, frozen, generator,
 from ...core.errors import InputError
 from ...core.estimates import Summary
 from ...core.files import write_whole
+from ...core.long_runs import slices
 from ...core.tables import needed, numbers_as_csv
 from ..bases.basis import Frame
 from ..bases.given import seed_by_name
@@ -193,8 +194,7 @@ def _quantiles(parts: Parts, theta: Floats, probability: Floats, cells: int) -> 
     """Quantiles, shape (angles, probabilities), the largest error of the distribution functions, and these at edges."""
     edges, at = np.linspace(0.0, np.pi, cells + 1), np.clip(probability, END, 1.0 - END)
     found, missed, whole = np.empty((theta.size, at.size)), 0.0, np.zeros((theta.size, cells + 1))
-    for start in range(0, theta.size, AT_ONCE):
-        own = slice(start, start + AT_ONCE)
+    for own in slices(theta.size, AT_ONCE):
         chosen = theta[own]
         below, error = np.zeros((chosen.size, cells + 1)), np.zeros(chosen.size)
         atoms = [np.empty((2, chosen.size, 0))]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import slices
 
 # Entries of a temporary array, where a square matrix is worked on some rows at a time.
 BLOCK = 2**17
@@ -88,8 +89,7 @@ def relative_asymmetry(symmetric: NDArray[Any], scale: Floats | None = None) -> 
 
 def row_blocks(size: int) -> Iterator[slice]:
     """The rows of a square matrix, so many at a time that temporary arrays have at most `BLOCK` entries."""
-    step = max(1, BLOCK // size)
-    return (slice(start, start + step) for start in range(0, size, step))
+    return slices(size, max(1, BLOCK // size))
 
 
 def occupied_pairs(counts: NDArray[Any]) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:

@@ -217,7 +217,7 @@ class KernelMatrix(Value):
                 "error: expected an Estimate of at least 0 such as Estimate(0.0, 0.0, 'bound', 'given'), got "
                 f"{self.error!r}; the law of transition probabilities between bins, ker.MatrixLaw(array), needs none"
             )
-        object.__setattr__(self, "symmetric", frozen(symmetric))
+        self._set(symmetric=frozen(symmetric))
         if self.counts is not None:
             counts = np.asarray(self.counts)
             if counts.dtype.kind not in "iu":
@@ -227,7 +227,7 @@ class KernelMatrix(Value):
                     f"counts: expected whole numbers of at least 0, shape {(n, n)}, got {counts.dtype} of shape "
                     f"{counts.shape}"
                 )
-            object.__setattr__(self, "counts", frozen(counts, np.int64))
+            self._set(counts=frozen(counts, np.int64))
         self._check_fields()
 
     def _check_fields(self) -> None:

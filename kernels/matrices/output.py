@@ -1,4 +1,4 @@
-"""Kernel matrices outside of the package: as .npz files with every field, exact to the last bit, as .csv, as pictures."""
+"""Kernel matrices outside of the package: as .npz files with every field, to the last bit, as .csv, as pictures."""
 
 from __future__ import annotations
 

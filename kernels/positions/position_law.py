@@ -82,8 +82,7 @@ class PositionLaw(Summary):
             raise InputError(f"laws: expected one for each of {len(edges) - 1} intervals, got {len(laws)}")
         for law in laws:
             check_paper_frame("laws", law)
-        object.__setattr__(self, "edges", frozen(edges))
-        object.__setattr__(self, "laws", laws)
+        self._set(edges=frozen(edges), laws=laws)
 
     @property
     def weights(self) -> Floats:

@@ -60,7 +60,7 @@ class CircularArcLaw(DrivenLaw):
 
     def __post_init__(self) -> None:
         checked = number_between("half_angle", self.half_angle, 0.0, 0.5 * np.pi, closed="high")
-        object.__setattr__(self, "half_angle", checked)
+        self._set(half_angle=checked)
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left tip."""

@@ -93,7 +93,7 @@ class PolygonLaw(BranchLaw):
             )
         positive_number("tolerance", self.tolerance)
         whole_number("max_beams", self.max_beams, 1)
-        object.__setattr__(self, "mirror_symmetric", True if wall.is_mirror_symmetric else None)
+        self._set(mirror_symmetric=True if wall.is_mirror_symmetric else None)
 
     @property
     def keeps_sine(self) -> bool:
@@ -260,7 +260,7 @@ class TriangularTeethLaw(BranchLaw):
     mirror_symmetric = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "angle", number_between("angle", self.angle, 0.0, np.pi))
+        self._set(angle=number_between("angle", self.angle, 0.0, np.pi))
 
     def _branches(self, theta: Floats) -> tuple[Floats, Floats]:
         """Probabilities and angles, shape ``theta.shape + (4,)``.

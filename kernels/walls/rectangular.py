@@ -61,7 +61,7 @@ class RectangularTeethLaw(BranchLaw):
     keeps_sine = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "height_to_width", positive_number("height_to_width", self.height_to_width))
+        self._set(height_to_width=positive_number("height_to_width", self.height_to_width))
 
     def crossings(self, theta: ArrayLike) -> Floats:
         """The number of crevice widths crossed between entry and exit, d = 2 r abs(cot theta)."""

@@ -44,8 +44,16 @@ MOST_CURVED = 4
 MANY_TOLERANCE = 1e-4
 
 
+class _TracedLaw(DrivenLaw):
+    """A law whose rays are traced; subclasses define `reflect_with_status`."""
+
+    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+        """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
+        return if_escaped(self, *self.reflect_with_status(x, theta))
+
+
 @dataclass(frozen=True)
-class WallLaw(DrivenLaw):
+class WallLaw(_TracedLaw):
     """The law P~ of a wall, for rays that enter at a uniform point of the period.
 
     `reflect` and `reflect_with_status` trace rays, and `sample` does so unless every part has a closed form. `apply`,
@@ -102,7 +110,7 @@ class WallLaw(DrivenLaw):
         instance("wall", self.wall, Wall, "geo.triangular_teeth(0.7)")
         # an asymmetric cell may still have a symmetric law, hence None
         symmetric = self.wall.is_mirror_symmetric or (self._divided and sum_of(self._divided).mirror_symmetric)
-        object.__setattr__(self, "mirror_symmetric", True if symmetric else None)
+        self._set(mirror_symmetric=True if symmetric else None)
 
     @property
     def parts(self) -> tuple[tuple[float, Law], ...]:
@@ -140,10 +148,6 @@ class WallLaw(DrivenLaw):
         ``x`` in (0, 1) is the entry point as a fraction of the period. Never raises an AccuracyError.
         """
         return traced_reflection(self.wall, x, theta)
-
-    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
-        """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
-        return if_escaped(self, *self.reflect_with_status(x, theta))
 
     def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
         return None if self._known is None else self._known._branches(theta)
@@ -308,7 +312,7 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
 
 
 @dataclass(frozen=True)
-class MushroomLaw(DrivenLaw):
+class MushroomLaw(_TracedLaw):
     """The law P~ of `geometry.MushroomGenerations`, for rays that enter at a uniform point of the period.
 
     All mushrooms are similar, and reflection does not depend on their size. So a ray enters one with the probability
@@ -354,10 +358,6 @@ class MushroomLaw(DrivenLaw):
         # above, the ray enters on the flat top to the right of the mushroom of generation 1
         entry = np.interp(entry_points(x), [0.0, self.wall.opened, 1.0], [*self.wall.opening, LARGEST])
         return traced_reflection(self.wall.mushroom, entry, theta)
-
-    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
-        """Outgoing angle for the entry point ``x`` in (0, 1), see `reflect_with_status`, and the angle ``theta``."""
-        return if_escaped(self, *self.reflect_with_status(x, theta))
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Those of generation 1, with its flat tops reduced to those of the last generation."""

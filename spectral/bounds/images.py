@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.long_runs import NUMBERS_AT_ONCE, count_time
+from ...core.long_runs import NUMBERS_AT_ONCE, count_time, slices
 from ...core.rounding import EPS
 from ...kernels import Basis, CircularArcLaw, Law, Panels
 from ...kernels.bases.angles import cell_among
@@ -77,9 +77,8 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
     height, each = height_of(basis, vectors), expectations(law, basis)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        step = max(1, NUMBERS_AT_ONCE // basis.size)
         finer = tolerance / max(height, 1.0)
-        parts = [each(theta[start : start + step], finer) for start in range(0, theta.size, step)]
+        parts = [each(theta[part], finer) for part in slices(theta.size, max(1, NUMBERS_AT_ONCE // basis.size))]
         images = np.concatenate([image @ vectors for image, _ in parts])
         return images, height * np.concatenate([error for _, error in parts])
 
@@ -94,8 +93,7 @@ def _of_nodes(law: Law, basis: Basis) -> Means:
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         images, errors = [np.empty((0, basis.size))], [np.empty(0)]
-        for start in range(0, theta.size, ANGLES_AT_ONCE):
-            some = theta[start : start + ANGLES_AT_ONCE]
+        for some in (theta[part] for part in slices(theta.size, ANGLES_AT_ONCE)):
             if shared is None:
                 found = law.conditionals(some, max(tolerance, EPS), degree, edges)
                 count_time(NODE_TIME * found.nodes.size)

@@ -27,6 +27,7 @@ from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, with_errors
 from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...kernels import Law
+from ...kernels.bases.angles import joined_lists
 from ...kernels.bases.measure import SINE
 from ...kernels.laws.law import in_frame
 from ...kernels.laws.structure import holds_of_all
@@ -292,8 +293,8 @@ class Channel:
 def _passed(levels: Floats, reached: NDArray[np.int64], ends: Floats) -> tuple[NDArray[np.int64], ...]:
     """Particles and the levels that their flights to these ends pass, as index pairs; then all numbers of levels."""
     after = np.maximum(reached, np.searchsorted(levels, ends, side="right"))
-    particle = np.repeat(np.arange(len(ends)), after - reached)
-    return particle, np.arange(len(particle)) - np.repeat(np.cumsum(after - reached) - after, after - reached), after
+    particle, rank = joined_lists(after - reached)
+    return particle, reached[particle] + rank, after
 
 
 @dataclass(frozen=True)

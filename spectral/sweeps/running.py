@@ -285,10 +285,6 @@ def _gap(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
     return [found], found.verdict
 
 
-def _gap_in_the_specular_frame(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
-    return _gap(in_frame(law, "specular"), tolerance)
-
-
 def _slem(law: Law, tolerance: float) -> tuple[Sequence[Estimate], str]:
     found = modulus_gap(law, tolerance)
     return [slem_from_gap(found)], found.verdict
@@ -317,7 +313,7 @@ _ACCOMMODATION = ("tangential_accommodation", "normal_accommodation", "maxwell_f
 QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
         "gap": Quantity(("gap",), _gap),
-        "gap_specular": Quantity(("gap_specular",), _gap_in_the_specular_frame),
+        "gap_specular": Quantity(("gap_specular",), lambda law, tol: _gap(in_frame(law, "specular"), tol)),
         "slem": Quantity(("slem",), _slem),
         "relaxation_time": Quantity(("relaxation_time",), _relaxation_time),
         "resistance": Quantity(("resistance",), _resistance),

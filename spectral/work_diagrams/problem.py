@@ -55,10 +55,8 @@ class ReferenceValue(Summary):
     made_by: tuple[str, ...] = ()
 
     def __init__(self, value: ArrayLike, error: float, source: str, made_by: tuple[str, ...] = ()) -> None:
-        object.__setattr__(self, "value", frozen(finite_array("value", value)))
-        object.__setattr__(self, "error", finite_number("error", error))
-        object.__setattr__(self, "source", str(source))
-        object.__setattr__(self, "made_by", sequence("made_by", made_by, str, "'panels'"))
+        self._set(value=frozen(finite_array("value", value)), error=finite_number("error", error), source=str(source))
+        self._set(made_by=sequence("made_by", made_by, str, "'panels'"))
         if self.error < 0.0:
             raise InputError(f"error: expected a number of at least 0, got {error!r}")
         if not self.source:
@@ -109,7 +107,7 @@ class WorkProblem(Summary):
         shapes = {reference.value.shape for reference in given}
         if len(shapes) > 1:
             raise InputError(f"references: expected values of one shape, got {sorted(shapes)}")
-        object.__setattr__(self, "references", given)
+        self._set(references=given)
 
     def reference_for(self, method: str) -> ReferenceValue:
         """The first reference that does not share its code with ``method``; an InputError if there is none."""

@@ -65,8 +65,7 @@ class WorkRow(Summary):
 
     def __post_init__(self) -> None:
         choice("status", self.status, get_args(RowStatus))
-        object.__setattr__(self, "budget", float(self.budget))
-        object.__setattr__(self, "seconds", tuple(map(float, self.seconds)))
+        self._set(budget=float(self.budget), seconds=tuple(map(float, self.seconds)))
 
     @property
     def is_done(self) -> bool:

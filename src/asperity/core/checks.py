@@ -265,6 +265,11 @@ def shortened(value: object) -> str:
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
+def is_of_package(value: object) -> bool:
+    """Whether the class of an object is one of this package, which its tests examine, not of the user's."""
+    return type(value).__module__.partition(".")[0] == __name__.partition(".")[0]
+
+
 def foreign(operand: object) -> Any:
     """What an operator returns for an operand that is not its own, so that Python raises a TypeError."""
     if isinstance(operand, np.ma.MaskedArray):  # it would take the other operand for an array of entries
@@ -385,6 +390,11 @@ class Value:
 
     Those in its attributes and in tuples in them; numpy copies and pickles all arrays as writable ones.
     """
+
+    def _set(self, **attributes: object) -> None:
+        """Set attributes of an immutable object during its construction."""
+        for name, value in attributes.items():
+            object.__setattr__(self, name, value)
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
         made = super().__reduce_ex__(protocol)

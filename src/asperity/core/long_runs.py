@@ -42,6 +42,17 @@ RENEWED_SECONDS = 0.1
 MANY = 10_000
 
 
+def slices(number: int, step: int) -> Iterator[slice]:
+    """A sequence of so many entries, at most ``step`` of them at a time.
+
+    Examples
+    --------
+    >>> list(slices(3, 2))
+    [slice(0, 2, None), slice(2, 4, None)]
+    """
+    return (slice(start, start + step) for start in range(0, number, step))
+
+
 class Engine(TypedDict, total=False):
     """Where a long run stores what it has, and who computes.
 
