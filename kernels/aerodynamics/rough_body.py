@@ -232,7 +232,8 @@ class RoughBody(Summary):
         (value,), (error,), panels = self._integral(mean, 2, tolerance * size, self._edges)
         parts: Sequence[Estimate] = list(known.values())
         if cost is not None or directions is not None:
-            chosen = Vectorised(cost or _momentum, scalar=True)
+            # the momentum transfer along the stream
+            chosen = Vectorised(cost or (lambda u, v: 1.0 + np.cos(v - u)), scalar=True)
             density = Vectorised(directions or (lambda direction: 1.0), scalar=True)
             value, error, parts = self._mean_cost(
                 lambda u, v: chosen(u, v) * density(u), 0.75 * tolerance * size, panels
@@ -402,8 +403,3 @@ def _components(law: Law, normals: Floats) -> Floats:
     """1 and the unit vector, with their rounding."""
     one = np.ones(normals.size)
     return np.stack([one, np.cos(normals), np.sin(normals), ROUNDING * one])
-
-
-def _momentum(incoming: Floats, outgoing: Floats) -> Floats:
-    """1 + u . u', the momentum transfer along the stream."""
-    return np.asarray(1.0 + np.cos(outgoing - incoming))

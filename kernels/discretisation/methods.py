@@ -183,16 +183,14 @@ def _of_chain(law: Composition, wanted: str, basis: Basis) -> Computation | None
     if wanted in ("auto", "exact") and all(map(lists_branches, law.laws)):
         found.append(partial(by_branches, law, basis))
     if wanted in ("auto", "quadrature") and holds_of_all(law, _needs_no_rays):
-        found.append(lambda budget: by_panels(law.laws, basis, budget, _best_matrix))
+        found.append(
+            lambda budget: by_panels(law.laws, basis, budget, lambda part, on, own: matrix_by(part, "auto", on, own))
+        )
     return partial(_most_exact, found) if found else None
 
 
 def _needs_no_rays(law: Law) -> bool:
     return any(method.accepts(law, ANY_PANELS) for method in METHODS if method.name != "auto")
-
-
-def _best_matrix(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-    return matrix_by(law, "auto", basis, budget)
 
 
 def _most_exact(computations: Sequence[Computation], budget: Budget) -> KernelMatrix:

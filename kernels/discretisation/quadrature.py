@@ -108,15 +108,11 @@ def density_matrix(law: DensityLaw, basis: Basis, tolerance: float) -> tuple[Flo
             # where kinks are not known, three levels of odd orders: even ones agree on a jump near the middle
             first, least = (order, 2) if smooth else (order // 2 | 1, 3)
             levels = _conditional_levels(law, basis, edges, outer, first, least)
-            levels = (_with_mirror_image(half) for half in levels) if mirrored else levels
+            levels = (half + half[::-1, ::-1] for half in levels) if mirrored else levels
             found, error = until_converged(levels, tolerance, smooth)
             # the rules over theta' are of one order
             return found, error + law._row_error * float(basis.normalisation.max())
     return until_converged(_density_levels(law, basis, edges, smooth), tolerance, smooth)
-
-
-def _with_mirror_image(half: Floats) -> Floats:
-    return half + half[::-1, ::-1]
 
 
 def _conditional_cost(law: DensityLaw, edges: Floats, outer: Floats, order: int) -> int:

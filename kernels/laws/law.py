@@ -802,7 +802,8 @@ class _Chain(Law):
         self._refuse_long(len(laws))
         found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)), 0.0)
         cuts = [*(_breakpoints_of_start(laws[k:]) for k in range(1, len(laws))), edges]
-        rules = [_conditionals_of(law, tolerance, degree, cut) for law, cut in zip(laws, cuts, strict=True)]
+        wanted = {"tolerance": tolerance, "degree": degree}
+        rules = [partial(law.conditionals, **wanted, edges=cut) for law, cut in zip(laws, cuts, strict=True)]
         each = [rule(theta[:1]).nodes.size for rule in rules]
         for index, rule in enumerate(rules):
             self._refuse_long(0, math.prod(each[index:], start=found.nodes.size))
@@ -841,11 +842,9 @@ class Composition(_Chain):
             raise InputError("laws: expected at least one, got none")
         self._set(laws=tuple(flat), frame=common_frame(flat, "compose"))
         palindrome = all(law is back or law == back for law, back in zip(flat, reversed(flat), strict=True))
-        reversible, mirror = (
-            palindrome and all(law.reversible for law in flat),
-            all(law.mirror_symmetric for law in flat),
-        )
-        self._set(reversible=reversible or None, mirror_symmetric=mirror or None)
+        reversible = palindrome and all(law.reversible for law in flat)
+        mirror_symmetric = all(law.mirror_symmetric for law in flat)
+        self._set(reversible=reversible or None, mirror_symmetric=mirror_symmetric or None)
 
     @staticmethod
     def of(first: Law, second: Law) -> Law:
@@ -998,10 +997,6 @@ def _means_of(law: Law, given: Piecewise, theta: Floats) -> Floats:
     return mean.reshape(theta.shape + mean.shape[1:])
 
 
-def _conditionals_of(law: Law, tolerance: float, degree: int, edges: Floats) -> Callable[[Floats], Conditionals]:
-    return lambda theta: law.conditionals(theta, tolerance, degree, edges)
-
-
 @dataclass(frozen=True, repr=False)
 class SpecularFrame(Law):
     """P J, f -> P(J f) with J f(theta) = f(pi - theta): the law in the other frame.
@@ -1026,7 +1021,7 @@ class SpecularFrame(Law):
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.lambertian()")
         mirror = self.law.mirror_symmetric
-        self._set(frame=_other_frame(self.law.frame), mirror_symmetric=mirror)
+        self._set(frame="paper" if self.law.frame == "specular" else "specular", mirror_symmetric=mirror)
         self._set(reversible=mirror if self.law.reversible else None, is_lambertian=self.law.is_lambertian)
         self._set(outgoing_breakpoints=frozen(np.pi - self.law.outgoing_breakpoints[::-1]))
 
@@ -1073,10 +1068,6 @@ class SpecularFrame(Law):
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)}.in_specular_frame()"
-
-
-def _other_frame(frame: Frame) -> Frame:
-    return "paper" if frame == "specular" else "specular"
 
 
 def _flip(frame: Frame) -> Law:

@@ -101,11 +101,9 @@ def holds_of_all(law: Law, test: Callable[[Law], bool]) -> bool:
 
 def lists_branches(law: Law) -> bool:
     """Whether every part of a law lists its isometries and breakpoints; walls of straight pieces may not."""
-    return holds_of_all(law, _answers)
-
-
-def _answers(law: Law) -> bool:
-    return law._branches(PROBE) is not None and math.isfinite(law.breakpoints(FEW_BREAKPOINTS)[1])
+    return holds_of_all(
+        law, lambda part: part._branches(PROBE) is not None and math.isfinite(part.breakpoints(FEW_BREAKPOINTS)[1])
+    )
 
 
 def words_of(law: Law) -> Sum | None:

@@ -188,11 +188,11 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
         return
     wide = sums.tables.astype(np.promote_types(sums.tables.dtype, np.int32))
     run = _Run(job, _State(np.zeros(job.tasks, dtype=bool), wide, sums.unresolved))
+    # task by task the checkpoint says what is done: so their size belongs to it
+    identity = {"version": __version__, "law": job.law, "basis": job.basis, **job.identity()}
     try:
         with ExitStack() as stack:
-            store = (
-                None if path is None else stack.enter_context(Checkpoint(path, _identity(job), key=engine.get("key")))
-            )
+            store = None if path is None else stack.enter_context(Checkpoint(path, identity, key=engine.get("key")))
             bar = stack.enter_context(progress_bar(job.total, "ray"))
             run.all_tasks(store, stack.enter_context(connected(client)), bar)
     except KeyboardInterrupt as stop:
@@ -200,11 +200,6 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
         how = lost if path is None else f"{path} has them: give the same call"
         raise KeyboardInterrupt(f"stopped after {run.rays_done} of {job.total} rays; {how}") from stop
     sums.tables, sums.unresolved, sums.most = run.state.tables, run.state.unresolved, job.total
-
-
-def _identity(job: Job) -> dict[str, Any]:
-    # task by task the checkpoint says what is done: so their size belongs to it
-    return {"version": __version__, "law": job.law, "basis": job.basis, **job.identity()}
 
 
 class _State(NamedTuple):
