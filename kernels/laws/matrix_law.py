@@ -17,14 +17,7 @@ from ..bases.measure import SINE
 from ..bases.partitions import Bins
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from .density import (
-    NEGATIVE_TOLERANCE,
-    SYMMETRY_TOLERANCE,
-    DensityLaw,
-    angle_pair,
-    not_invariant,
-    split_panels,
-)
+from .density import NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw, angle_pair, not_invariant, split_panels
 from .law import Composition, Law
 from .structure import Rules, fold, holds_of_all
 

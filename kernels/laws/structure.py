@@ -19,16 +19,7 @@ from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.spaces import TensorBasis
 from ..matrices.matrix import KernelMatrix
-from .law import (
-    Combination,
-    Composition,
-    Law,
-    Power,
-    SpecularFrame,
-    retroreflection,
-    simplified,
-    specular,
-)
+from .law import Combination, Composition, Law, Power, SpecularFrame, retroreflection, simplified, specular
 
 Fact = TypeVar("Fact")
 Word = tuple[Law, ...]

@@ -8,15 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import (
-    Floats,
-    Rng,
-    generator,
-    number_between,
-    positive_number,
-    shaped,
-    whole_number,
-)
+from ...core.checks import Floats, Rng, generator, number_between, positive_number, shaped, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.rounding import EPS
