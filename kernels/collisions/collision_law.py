@@ -502,9 +502,12 @@ def _expectation(
     value = np.empty(theta_all.shape)
     for k, angle in enumerate(rolled):
         here = psi_index.reshape(psi_all.shape) == k
-        psi = np.asarray(angle)
-        value[here] = law.apply(lambda outgoing, psi=psi: function(outgoing, psi), theta_all[here], edges)
+        value[here] = law.apply(partial(_with_psi, function, angle), theta_all[here], edges)
     return value
+
+
+def _with_psi(function: VelocityFunction, psi: Floats, theta: Floats) -> Floats:
+    return function(theta, np.asarray(psi))
 
 
 def no_slip(disk: Disk) -> CollisionLaw:

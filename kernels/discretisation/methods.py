@@ -113,8 +113,9 @@ def _method(methods: Sequence[Method], law: Law, wanted: str, basis: Basis) -> C
 
 
 def _from_parts(law: Law, wanted: str, basis: Basis) -> Computation | None:
-    of_parts = {Combination: _of_sum, Composition: _of_chain, SpecularFrame: _of_mirrored}.get(type(law))
-    return None if of_parts is None else of_parts(law, wanted, basis)
+    kinds: dict[type, Callable[[Any, str, Basis], Computation | None]]
+    kinds = {Combination: _of_sum, Composition: _of_chain, SpecularFrame: _of_mirrored}
+    return kinds[type(law)](law, wanted, basis) if type(law) in kinds else None
 
 
 def _of_sum(law: Combination, wanted: str, basis: Basis) -> Computation | None:

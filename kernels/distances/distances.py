@@ -128,7 +128,7 @@ def distance(
     positive_number("tolerance", tolerance)
     tensors = [law.parts_checked() for law in (first, second) if isinstance(law, TensorLaw)]
     if len(tensors) == 2:
-        return _between_collisions(*tensors, power, kind, tolerance)
+        return _between_collisions(tensors[0], tensors[1], power, kind, tolerance)
     for law in (first, second):
         check_law("distance", law, "two laws or kernel matrices, or two collision laws", KernelMatrix)
     one, other = cast("tuple[Law | KernelMatrix, Law | KernelMatrix]", (first, second))
@@ -143,8 +143,8 @@ def distance(
     if len(laws) < 2:
         return _between_matrices(*_on_same_bins(one, other, tolerance), power, kind)
     if kind == "joint":
-        return _labelled(joint_law_distance(*laws, power, tolerance))
-    return _labelled(law_distance(*laws, power, kind == "sup", tolerance))
+        return _labelled(joint_law_distance(laws[0], laws[1], power, tolerance))
+    return _labelled(law_distance(laws[0], laws[1], power, kind == "sup", tolerance))
 
 
 def _between_collisions(

@@ -802,8 +802,8 @@ class _Chain(Law):
         self._refuse_long(len(laws))
         found = Conditionals.of_atoms(theta[:, None], np.ones((theta.size, 1)), 0.0)
         cuts = [*(_breakpoints_of_start(laws[k:]) for k in range(1, len(laws))), edges]
-        wanted = {"tolerance": tolerance, "degree": degree}
-        rules = [partial(law.conditionals, **wanted, edges=cut) for law, cut in zip(laws, cuts, strict=True)]
+        pairs = zip(laws, cuts, strict=True)
+        rules = [partial(law.conditionals, tolerance=tolerance, degree=degree, edges=cut) for law, cut in pairs]
         each = [rule(theta[:1]).nodes.size for rule in rules]
         for index, rule in enumerate(rules):
             self._refuse_long(0, math.prod(each[index:], start=found.nodes.size))

@@ -6,6 +6,7 @@ For each part there are closed forms, beams or traced rays.
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -45,7 +46,10 @@ MANY_TOLERANCE = 1e-4
 
 
 class _TracedLaw(DrivenLaw):
-    """A law whose rays are traced; subclasses define `reflect_with_status`."""
+    """A law whose rays are traced."""
+
+    @abstractmethod
+    def reflect_with_status(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]: ...
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
