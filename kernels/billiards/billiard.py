@@ -19,7 +19,7 @@ from ...geometry.tables.boundary import FlightStatus
 from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
 from ..collisions.satellite_law import SatelliteLaw
-from ..laws.law import Law
+from ..laws.law import Law, outcomes_of
 from ..positions.position_law import PositionLaw
 from .record import BilliardRecord
 
@@ -303,13 +303,7 @@ class CollisionAlongWall(Summary):
         at, incoming = finite_array("x", x), finite_array("velocity", velocity)
         if at.ndim != 1 or incoming.shape != (len(at), 3):
             raise InputError(f"velocity: expected shape (n, 3) for n positions, got {incoming.shape} for {at.shape}")
-        source, where = generator(rng), self.law.interval(at)
-        outgoing = np.empty(incoming.shape)
-        for k, part in enumerate(self.parts):
-            here = where == k
-            if here.any():
-                outgoing[here] = part.sample(incoming[here], source)
-        return outgoing
+        return outcomes_of(self.parts, self.law.interval(at), incoming, generator(rng))
 
     def check_wall(self, container: Container, wall: int) -> None:
         """Raise an InputError if the wall is a curve and the edges do not run from 0 to its length."""

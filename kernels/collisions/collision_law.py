@@ -6,7 +6,8 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
+from operator import add
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +34,7 @@ from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.given import Vectorised, seed_by_name
 from ..bases.polynomials import Legendre
-from ..laws.law import Combination, Law, as_weight, check_paper_frame, retroreflection, specular
+from ..laws.law import Law, as_weight, check_paper_frame, outcomes_of, retroreflection, specular
 from ..laws.structure import Discretiser, TensorLaw, Term, checked_pair
 from ..walls.wall_law import isometries
 from .operator import isometry_matrix
@@ -123,10 +124,7 @@ class VelocityLaw(TensorLaw):
         if len(terms) == 1:
             return terms[0][1].sample(theta, rng), np.full(theta.shape, terms[0][2])
         first = rng.random(theta.shape) < terms[0][0]
-        outgoing = np.empty(theta.shape)
-        for chosen, (_, law, _) in zip((first, ~first), terms, strict=True):
-            if chosen.any():
-                outgoing[chosen] = law.sample(theta[chosen], rng)
+        outgoing = outcomes_of([law for _, law, _ in terms], np.where(first, 0, 1), theta, rng)
         return outgoing, first == terms[0][2]
 
     @seed_by_name
@@ -472,20 +470,12 @@ def _law_of(terms: Sequence[Term], disk: Disk) -> VelocityLaw:
             joined.append((*used[0], flip))
         elif used:
             total = math.fsum(weight for weight, _ in used)
-            joined.append((total, _sum_of([(weight / total, law) for weight, law in used]), flip))
+            joined.append((total, reduce(add, ((weight / total) * law for weight, law in used)), flip))
     joined = joined or [terms[0]]
     (weight, law, flip), *others = joined
     if flip and not others and abs(weight - 1.0) <= WEIGHT_TOLERANCE:
         return CollisionLaw(law, disk)
     return CollisionCombination(tuple(joined), disk)
-
-
-def _sum_of(parts: Sequence[tuple[float, Law]]) -> Law:
-    """The weighted sum, with nested sums flattened."""
-    flat: list[tuple[float, Law]] = []
-    for weight, law in parts:
-        flat += [(weight * own, part) for own, part in Combination.of(law).terms]
-    return Combination(tuple(flat))
 
 
 def _expectation(

@@ -12,6 +12,7 @@ from ...core.checks import Floats
 from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
 from ..expectations.angle_panels import KRONROD, NULL_RULES, SLOPES, STRETCHED, error_of_null_rules
+from ..laws.density import split_panels
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .conditional import ConditionalDistance
@@ -213,9 +214,7 @@ def _panel_edges(between: ConditionalDistance, level: int) -> Floats:
     end = np.pi / between.halves
     points = _breakpoints(between, BREAKPOINTS * 2**level)
     coarse = np.unique(np.concatenate((np.linspace(0.0, end, PANELS // between.halves + 1), points)))
-    pieces = 2**level
-    fine = coarse[:-1, None] + np.arange(pieces) / pieces * np.diff(coarse)[:, None]
-    return np.append(fine.ravel(), end)
+    return split_panels(coarse, 2**level)
 
 
 def _nearest_cut(low: Floats, high: Floats, cuts: Floats) -> Floats:

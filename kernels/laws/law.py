@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import islice
-from typing import TYPE_CHECKING, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -566,6 +566,16 @@ def drawn_terms(
     return np.asarray(np.minimum(choice, len(terms) - 1))
 
 
+def outcomes_of(laws: Sequence[Any], choice: NDArray[np.intp], incoming: Floats, rng: np.random.Generator) -> Floats:
+    """Draw what becomes of incoming angles or velocities, each by the law that is chosen for it."""
+    outgoing = np.empty(incoming.shape)
+    for index, law in enumerate(laws):
+        chosen = choice == index
+        if chosen.any():
+            outgoing[chosen] = law.sample(incoming[chosen], rng)
+    return outgoing
+
+
 def entry_inside(x: Floats) -> Floats:
     """Clip uniform numbers to the open interval (0, 1)."""
     return np.asarray(np.clip(x, SMALLEST, LARGEST))
@@ -679,13 +689,7 @@ class Combination(Law):
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         terms = self.parts
-        choice = drawn_terms(terms, theta.shape, rng)
-        outgoing = np.empty(theta.shape)
-        for index, (_, law) in enumerate(terms):
-            chosen = choice == index
-            if chosen.any():
-                outgoing[chosen] = law.sample(theta[chosen], rng)
-        return outgoing
+        return outcomes_of([law for _, law in terms], drawn_terms(terms, theta.shape, rng), theta, rng)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         wanted = theta, tolerance, degree, edges

@@ -32,7 +32,7 @@ from ..bases.measure import SINE
 from ..bases.polynomials import Legendre
 from ..discretisation.discretisation import discretise
 from ..distances.distances import flux_means
-from ..laws.law import Combination, Law, check_paper_frame
+from ..laws.law import Combination, Law, check_paper_frame, outcomes_of
 
 PositionFunction = Callable[[Floats, Floats], Floats]
 
@@ -107,12 +107,7 @@ class PositionLaw(Summary):
         """Draw an outgoing angle for every state (x, theta); the arrays broadcast. The position stays x."""
         at, incoming = broadcast(x=finite_array("x", x), theta=angles("theta", theta))
         source = generator(rng)
-        where, outgoing = self.interval(at), np.empty(at.shape)
-        for k, law in enumerate(self.laws):
-            here = where == k
-            if here.any():
-                outgoing[here] = law.sample(incoming[here], source)
-        return outgoing
+        return outcomes_of(self.laws, self.interval(at), incoming, source)
 
     def apply(self, function: PositionFunction, x: ArrayLike, theta: ArrayLike, edges: ArrayLike = ()) -> Floats:
         """The expectation E[f(x', Theta') | x, theta] of a vectorised f(x, theta), with x' = x, as `Law.apply`."""

@@ -18,6 +18,7 @@ from ...core.rounding import EPS
 from ...kernels import KernelMatrix, Law, Legendre, discretise, specular
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw, HemisphereCombination
 from ...kernels.laws.structure import sum_of_words, words_of
+from ...kernels.walls.rectangular import sum_rule
 from .channel import LARGEST, in_paper_frame, reflected
 
 Section = Literal["channel", "tube"]
@@ -312,17 +313,13 @@ def _runs(diffuse: float) -> tuple[Floats, Floats]:
 
     Sums over k = 2^j, ..., 2^(j+1) - 1 by the Gauss rule for these numbers, from the discrete Chebyshev polynomials.
     """
-    from scipy.linalg import eigh_tridiagonal
-
     if diffuse == 1.0:
         return np.ones(1), np.ones(1)
     number, weight = [], []
     for size in 2.0 ** np.arange(math.log2(FLIGHTS / diffuse) + 1.0):
-        order = np.arange(1.0, min(size, RULE))
-        beside = order * np.sqrt((1.0 - (order / size) ** 2) / (16.0 * order**2 - 4.0))
-        node, vector = eigh_tridiagonal(np.full(order.size + 1, 0.5 - 0.5 / size), beside)
-        number.append(size * (1.0 + node))
-        weight.append(size * vector[0] ** 2)
+        node, mass = sum_rule(np.array([size]), int(min(size, RULE)))
+        number.append(size + node[0])
+        weight.append(mass[0])
     flights = np.concatenate(number)
     return flights, np.concatenate(weight) * diffuse * np.exp((flights - 1.0) * math.log1p(-diffuse))
 
