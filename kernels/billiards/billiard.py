@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, Unpack, runtime_checkable
+from typing import Any, Protocol, Unpack, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,16 +15,13 @@ from ...core.errors import InputError
 from ...core.estimates import Summary
 from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...geometry import Container, Disk
-from ...geometry.tables.boundary import FlightStatus
+from ...geometry.tables.boundary import FlightStatus, Touch
 from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
 from ..collisions.satellite_law import SatelliteLaw
 from ..laws.law import Law, outcomes_of
 from ..positions.position_law import PositionLaw
 from .record import BilliardRecord
-
-if TYPE_CHECKING:
-    from ...geometry.tables.boundary import Touch
 
 # Relative change of the energy of a disk at a wall that is rounding.
 SAME_ENERGY = 1e-9

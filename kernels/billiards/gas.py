@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,14 +13,12 @@ from ...core.checks import Floats, Rng, check_memory, generator, instance, numbe
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
 from ...core.long_runs import reported
+from ...geometry import Container
 from ...geometry.tables.boundary import FlightStatus
 from ..collisions.collision_law import smooth
 from .billiard import Reflector, check_inside, laws_of_walls, reflected
 from .pair_law import PairLaw
 from .record import BilliardRecord
-
-if TYPE_CHECKING:
-    from ...geometry import Container
 
 # Depth, relative to the diameter, up to which two disks may overlap by rounding.
 OVERLAP = 1e-9

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +14,12 @@ from ...core.checks import Floats, Rng, check_memory, generator, instance, whole
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
 from ...core.long_runs import reported
-from ...geometry import Container
-from ...geometry.tables.boundary import FlightStatus
+from ...geometry import Container, Disk
+from ...geometry.tables.boundary import FlightStatus, Touch
 from ..collisions.collision_law import CollisionLaw
 from ..collisions.operator import no_slip_matrix, smooth_matrix
 from ..laws.law import IsometryLaw
 from .billiard import Reflector, laws_of_walls
-
-if TYPE_CHECKING:
-    from ...geometry import Disk
-    from ...geometry.tables.boundary import Touch
 
 # The exponent is measured between the last two of these fractions of the collisions, and for comparison between the
 # first two. A perturbation that grows like the p-th power of the time gives p ln 4 over 3/4 of the time, and four times

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, choice, number_between, shaped, whole_number
 from ...core.estimates import Summary
 from ...core.tables import axes_or_new
+from ...geometry import Container, Disk
 from ...geometry.tables.boundary import FlightStatus
 from ...geometry.tracing.tracing import numbers_of
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-    from ...geometry import Container, Disk
 
 Coordinates = Literal["boundary", "velocity"]
 # Colours, one a disk, and again from the first.

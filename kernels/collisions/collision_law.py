@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
 from operator import add
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,21 +27,21 @@ from ...core.checks import (
     whole_number,
 )
 from ...core.errors import InputError
-from ...core.estimates import html_table
+from ...core.estimates import Estimate, html_table
 from ...geometry import Disk, Wall
+from ...geometry.collisions.rigid import checked_states
 from ..bases.angles import clipped_inside
+from ..bases.assembly import reflection_matrix
 from ..bases.basis import Basis
 from ..bases.given import Vectorised, seed_by_name
 from ..bases.polynomials import Legendre
+from ..discretisation.discretisation import discretise
 from ..laws.law import Law, as_weight, check_paper_frame, outcomes_of, retroreflection, specular
 from ..laws.structure import Discretiser, TensorLaw, Term, checked_pair
-from ..walls.wall_law import isometries
-from .operator import isometry_matrix
-
-if TYPE_CHECKING:
-    from ..matrices.defects import SymmetryDefect
-    from ..matrices.matrix import KernelMatrix
-    from .operator import CollisionOperator
+from ..matrices.defects import SymmetryDefect
+from ..matrices.matrix import KernelMatrix
+from ..walls.wall_law import WallLaw, isometries
+from .operator import CollisionOperator, isometry_matrix
 
 # Pairs of angles are evaluated as a grid if the grid of their distinct values has at most this many points per pair.
 GRID_EXCESS = 4
@@ -157,7 +156,6 @@ class VelocityLaw(TensorLaw):
         >>> position.tolist(), velocity.round(12).tolist()
         ([[0.25, 3.0]], [[1.0, 1.0, 0.0]])
         """
-        from ...geometry.collisions.rigid import checked_states
 
         at, moving = checked_states(position, velocity)
         return at.copy(), self.sample(moving, rng=rng)
@@ -257,8 +255,6 @@ class VelocityLaw(TensorLaw):
         are passed to `discretise`. A law with a closed form, such as that of `from_wall` for teeth and for the
         elliptical arcs of the disk, is discretised by it, without rays.
         """
-        from ..discretisation.discretisation import discretise
-        from .operator import CollisionOperator
 
         parts: dict[bool, KernelMatrix] = {}
         for weight, law, flip in self.parts_checked():
@@ -268,9 +264,6 @@ class VelocityLaw(TensorLaw):
 
     def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
         """The matrix on a basis of products e_i(theta) f_j(psi): the sum of the tensor products of its terms."""
-        from ...core.estimates import Estimate
-        from ..bases.assembly import reflection_matrix
-        from ..matrices.matrix import KernelMatrix
 
         theta_basis, psi_basis = checked_pair(basis).factors
         exact = Estimate(0.0, 0.0, "bound", "the flip of psi")
@@ -400,7 +393,6 @@ class CollisionLaw(VelocityLaw):
 
         Source: Rudzis 2022, section 1.3.7 and Theorem 5.1.
         """
-        from ..walls.wall_law import WallLaw
 
         instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
         return cls(WallLaw(wall.foreshorten(disk)), disk)

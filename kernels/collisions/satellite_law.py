@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, finite_array, generator, shaped, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.tables import axes_or_new
+from ...geometry import Disk, Wall, collide, trace
+from ...geometry.collisions.configuration_space import ConfigurationSpace
 from ..bases.given import seed_by_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ...geometry import Disk, Wall
 
 # Draws of a position at most. Contacts that double precision cannot resolve are drawn again.
 MOST_DRAWS = 20
@@ -61,7 +62,6 @@ class SatelliteLaw:
     spacing: float | None = None
 
     def __post_init__(self) -> None:
-        from ...geometry.collisions.configuration_space import ConfigurationSpace
 
         object.__setattr__(self, "spacing", ConfigurationSpace(self.wall, self.disk, self.scale, self.spacing).spacing)
 
@@ -87,7 +87,6 @@ class SatelliteLaw:
 
     def attempt(self, moving: Floats, rng: np.random.Generator) -> Floats:
         """Draw outgoing velocities as `sample`, nan for disks that do not come back."""
-        from ...geometry import collide
 
         assert self.spacing is not None
         out, rest = np.full(moving.shape, np.nan), np.arange(len(moving))
@@ -140,7 +139,6 @@ class SatelliteLaw:
         >>> law.draw_limit((1.0, 1.2), np.random.default_rng(1), samples=50).get_xlabel()
         "theta' (radians)"
         """
-        from ...geometry import trace
 
         rng = generator(rng)
         whole_number("samples", samples, 1)

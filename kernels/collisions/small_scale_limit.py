@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,10 +30,8 @@ from ...core.estimates import NORMAL_95, Estimate, Summary, student_95, with_err
 from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...core.rounding import EPS
 from ...core.tables import data_frame
-from ...geometry import Wall
-
-if TYPE_CHECKING:
-    from ...geometry import Disk
+from ...geometry import Disk, Wall, collide, collide_cylinder, collide_modified, trace
+from ...geometry.collisions.configuration_space import ConfigurationSpace
 
 # A slope with an error needs three points.
 FEWEST_SCALES = 3
@@ -207,7 +205,6 @@ def limit_study(
     >>> bool(np.all(np.diff(study.state_distance) < 0))
     True
     """
-    from ...geometry.collisions.configuration_space import ConfigurationSpace
 
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     eps = shaped("scales", np.atleast_1d(finite_array("scales", scales)), "n")
@@ -269,7 +266,6 @@ class _Repetitions:
 
     def _measured(self, scale: float, spacing: float, psi: float, rng: np.random.Generator) -> list[float]:
         """The columns of one repetition in the order of COLUMNS."""
-        from ...geometry import collide, collide_cylinder, collide_modified, trace
 
         disk, wall, target = self.disk, self.wall, self.limit
         directions, turns, starts = self.samples

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,12 +25,10 @@ from ...core.errors import InputError
 from ...core.estimates import Summary, student_95
 from ...core.long_runs import reported
 from ...core.rounding import EPS
+from ...geometry import Disk, Wall, collide, collide_cylinder, trace
+from ...geometry.collisions.configuration_space import ConfigurationSpace
 from ..bases.measure import SINE, SINE_SQUARED
 from .collision_law import StateFunction
-
-if TYPE_CHECKING:
-    from ...geometry import Disk, Wall
-    from ...geometry.collisions.configuration_space import ConfigurationSpace
 
 # Two functions of a state, f(y, theta, psi) of the outcome and g(y, theta, psi) of the incoming state.
 Pair = tuple[StateFunction, StateFunction]
@@ -154,7 +152,6 @@ def weak_limit(
     >>> found.names[:2]
     ('1', 'cos theta')
     """
-    from ...geometry.collisions.configuration_space import ConfigurationSpace
 
     eps = shaped("scales", np.atleast_1d(finite_array("scales", scales)), "n")
     if not eps.size:
@@ -208,8 +205,6 @@ def _tested_once(
 ) -> tuple[Floats, float, Floats]:
     """Both differences for every pair, shape (2, pairs); the unresolved fraction; the largest |f g| x volume."""
     from scipy.stats.qmc import Sobol
-
-    from ...geometry import collide, collide_cylinder, trace
 
     disk, wall, scale = space.disk, space.wall, space.scale
     period = scale * wall.period

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from ...core.checks import Floats, check_memory
 from ...core.errors import AccuracyError
 from ...core.long_runs import slices
 from ...core.rounding import EPS
+from ...geometry import Wall
 from ..bases.assembly import is_mirror_symmetric, mirror_image
 from ..bases.basis import Basis
 from ..bases.partitions import Panels
@@ -28,9 +28,6 @@ from ..walls.conditionals import WallConditionals
 from ..walls.wall_law import FEW_PIECES, WallLaw
 from .isometries import by_isometry_table
 from .method import Budget, computed, rounding, sobol_matrix
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 # Fraction of a matrix's limit on ray segments that one angle may use, and the least such number. In bottles with a neck
 # of a hundredth of their width no number completes an angle.

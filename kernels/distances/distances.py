@@ -14,7 +14,7 @@ import numpy as np
 from ...core.checks import Floats, Rng, choice, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, mean_of_strata
-from ...geometry import Wall
+from ...geometry import Wall, trace
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..bases.polynomials import Legendre
@@ -272,8 +272,6 @@ def retroreflection_distance(reflector: Wall | Law, rays: int = 2**14, rng: Rng 
     source = generator(rng)
     theta = SINE.quantile((np.arange(number) + source.random(number)) / number)
     if isinstance(reflector, Wall):
-        from ...geometry import trace
-
         found = trace(reflector, reflector.period * source.random(number), theta)
         outgoing, lost = np.where(found.escaped, found.theta, theta), 1.0 - float(np.mean(found.escaped))
     elif isinstance(reflector, Law) and reflector.frame == "paper":

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number, sequence
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Summary
+from ...geometry import Disk, Wall
 from ..collisions.small_scale_limit import limit_study
 from ..distances.distances import distance
 from ..walls.wall_law import WallLaw
-
-if TYPE_CHECKING:
-    from ...geometry import Disk, Wall
 
 FEWEST_CELLS = 4
 # Scales at which the true disk is compared with its limit law, and the samples of each comparison.
@@ -97,7 +95,6 @@ def dichotomy(
     >>> dichotomy([geo.triangular_teeth(1.0), geo.flat()] * 3).verdict
     'does not converge'
     """
-    from ...geometry import Disk, Wall
 
     rng = generator(rng, 0)
     cells = sequence("cells", cells, Wall, "geo.flat()")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -13,11 +13,9 @@ from ...core.checks import Floats, finite_array, finite_number, frozen, positive
 from ...core.errors import InputError
 from ...core.estimates import Estimate, Summary
 from ...core.long_runs import reported
+from ...geometry import Wall
 from ..laws.law import Law
 from ..walls.wall_law import WallLaw
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 Objective = Callable[[Law, float], Estimate]
 

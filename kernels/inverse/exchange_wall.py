@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +12,14 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate
+from ...geometry import Arc, Segment, Wall, trace
+from ...geometry.curves.curve import Curve
+from ...geometry.tracing.tracing import Trace
 from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.deterministic import IntervalExchangeLaw
 from ..laws.law import Law, specular
 from .mirror_layout import THICKNESS, MirrorGroup, arranged, mirror_groups
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
-    from ...geometry.curves.curve import Curve
-    from ...geometry.tracing.tracing import Trace
 
 # The ceiling falls by this angle times the root of the opening: the flux below it is a 32nd of the opening.
 CEILING = 0.25
@@ -147,7 +144,6 @@ class ExchangeHollow(Summary):
         return Estimate(total, half + abs(fine - rough), "estimate", f"{theta.size} traced rays")
 
     def _traced(self, samples: int, rng: Rng) -> tuple[Floats, Trace]:
-        from ...geometry import trace
 
         number = whole_number("samples", samples, 2)
         source = generator(rng, 0)
@@ -266,7 +262,6 @@ def exchange_hollow(exchange: IntervalExchangeLaw, opening: float = 1e-3) -> Exc
 
 def _islands(group: MirrorGroup, factor: float, width: float) -> list[list[Curve]]:
     """The mirrors of a group as closed paths: the mirror, and its enlarged copy behind it."""
-    from ...geometry import Arc, Segment
 
     islands = []
     for which, (low, high) in enumerate(group.intervals):
@@ -288,7 +283,6 @@ def _islands(group: MirrorGroup, factor: float, width: float) -> list[list[Curve
 def _chamber(
     exchange: IntervalExchangeLaw, islands: list[list[Curve]], width: float, least_angle: float
 ) -> ExchangeHollow:
-    from ...geometry import Segment, Wall
 
     boxes = np.array([piece.box for island in islands for piece in island])
     far = float(np.abs(boxes[:, [0, 2]]).max())

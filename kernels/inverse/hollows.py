@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import AsperityError, InputError
+from ...geometry import Wall, flat, notched_angle
 from ..bases.polynomials import Legendre
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
 from ..walls.polygons import PolygonLaw
 from ..walls.wall_law import WallLaw
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 # A polygon that leaves more flux than this unresolved by MOST_BEAMS beams is not taken: a search meets thousands.
 MOST_BEAMS, RESOLVED = 3000, 1e-11
@@ -55,7 +52,6 @@ class UnitHollow:
 
         None if it is not one hollow, or does not keep to 0 <= x <= 1: others stand beside it.
         """
-        from ...geometry import Wall
 
         inner = np.asarray(vertices, dtype=np.float64).reshape(-1, 2)
         if np.any(np.abs(inner[:, 0] - 0.5) > 0.5):
@@ -106,7 +102,6 @@ class UnitHollow:
 
 def simple_hollows() -> list[UnitHollow]:
     """A flat top, and isosceles triangles and rectangles in steps."""
-    from ...geometry import flat
 
     slopes = np.tan(np.linspace(0.05, 1.5, 30))
     triangles = [UnitHollow.polygon([(0.5, -0.5 * slope)]) for slope in slopes]
@@ -117,7 +112,6 @@ def simple_hollows() -> list[UnitHollow]:
 
 def retroreflector() -> UnitHollow:
     """A notched angle, much nearer to a retroreflector than other polygons, with an error of its moments."""
-    from ...geometry import notched_angle
 
     return UnitHollow(notched_angle(NOTCHED_ANGLE, NOTCHES), traced=True)
 

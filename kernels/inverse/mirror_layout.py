@@ -6,17 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
+from ...geometry import Bezier
 from ..bases.measure import SINE
-
-if TYPE_CHECKING:
-    from ...geometry import Bezier
 
 # Rays and points of a mirror that are compared, and how far a beam stays from other mirrors, relative to their
 # distance from the focus. The thickness of mirrors is relative to that distance too.
@@ -363,7 +361,6 @@ def bezier_pieces(
     Pieces that turn by more than ``tolerance`` from the curve are halved. ``onto`` returns the points of the curve that
     belong to points near it.
     """
-    from ...geometry import Bezier
 
     def piece(low: float, high: float, halvings: int) -> list[Bezier]:
         (start, end), (before, after) = curve(np.array([low, high]))

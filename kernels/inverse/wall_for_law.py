@@ -24,7 +24,7 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.long_runs import reported
 from ...core.rounding import EPS
-from ...geometry import join_walls
+from ...geometry import Disk, Wall, draw_wall, join_walls
 from ...geometry.cells.miniature import wall_miniature
 from ..bases.measure import SINE
 from ..bases.polynomials import Legendre
@@ -48,7 +48,6 @@ from .hollows import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ...geometry import Disk, Wall
 
 # The search draws this many polygons at a time, with one vertex more every second time up to the most, ...
 DRAWN, MOST_VERTICES, ROUNDS = 60, 6, 14
@@ -134,7 +133,6 @@ class WallForLaw(Summary):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the wall."""
-        from ...geometry import draw_wall
 
         axes = draw_wall(self.wall, ax=ax)
         axes.set_title(f"{len(self.hollows)} hollows, defect {float(self.defect):.2g} in {self.moments} moments")
@@ -267,7 +265,6 @@ def collision_for(
     >>> float(found.defect) < 1e-10, found.wall.foreshorten(wanted.disk).closes
     (True, True)
     """
-    from ...geometry import Disk
 
     instance("collision", collision, CollisionLaw, "ker.CollisionLaw(law, disk)")
     felt = collision.disk if disk is None else disk
@@ -309,7 +306,6 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
 
 
 def _given(walls: Sequence[Wall]) -> list[UnitHollow]:
-    from ...geometry import Wall
 
     found = []
     for k, wall in enumerate(sequence("hollows", walls, Wall, "geo.focusing_arcs(1.0)")):

@@ -26,7 +26,7 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate, student_95
-from ...geometry import Wall
+from ...geometry import Wall, trace
 from ..bases.given import Vectorised, seed_by_name
 from ..bases.measure import SINE
 from ..bases.polynomials import Legendre
@@ -247,7 +247,6 @@ def displacements(wall: Wall, rays: int = 2**16, rng: Rng = None) -> Displacemen
     >>> float(ker.displacements(geo.triangular_teeth(0.7), 100, rng=0).exceeds(1.0))
     0.0
     """
-    from ...geometry import trace
 
     instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
     number = whole_number("rays", rays, 100)
@@ -381,8 +380,6 @@ def _cosine_integrals(ends: Floats, orders: int) -> Floats:
 def _means_of_rays(wall: Wall, orders: int, power: int, rng: np.random.Generator) -> tuple[Floats, float]:
     """The means over one scrambled Sobol sequence, and the fraction of rays that did not escape."""
     from scipy.stats.qmc import Sobol
-
-    from ...geometry import trace
 
     uniform = np.clip(Sobol(2, rng=rng).random_base2(power), 2.0**-54, 1.0 - 2.0**-53)
     s, theta = uniform[:, 0], SINE.quantile(uniform[:, 1])

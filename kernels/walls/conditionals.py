@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
 from ...geometry import Wall
+from ...geometry.cells.hollow_shape import distinct_hollows
 from ...geometry.itineraries.hollow import NO_LIMIT, HollowConditionals
+from ...geometry.tracing.tracing import trace
 from ..expectations.conditionals import Conditionals
 from ..laws.law import Law, entries
 
@@ -90,7 +92,6 @@ class WallConditionals:
     @cached_property
     def hollows(self) -> list[tuple[HollowConditionals, float]]:
         """One hollow of each shape, and the fraction of the period covered by all of this shape."""
-        from ...geometry.cells.hollow_shape import distinct_hollows
 
         wall, shapes = self.wall, [(0, 1.0)]
         if wall.closes:
@@ -182,7 +183,6 @@ def traced_reflection(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Float
 
     ``x`` in (0, 1) is the entry point as a fraction of the period. Never raises an AccuracyError.
     """
-    from ...geometry.tracing.tracing import trace
 
     x, theta = np.broadcast_arrays(*entries(x, theta))
     traced = trace(wall, x * wall.period, theta)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,16 +14,14 @@ from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.rounding import EPS
 from ...geometry import Wall
+from ...geometry.cells.hollow_shape import HollowShape, distinct_hollows
+from ...geometry.polygons.beams import Beams, beams_of
 from ..bases.angles import MOST_BREAKPOINTS, clipped_inside, mirrored_angle, mixed_arccos, without_extremal
 from ..expectations.conditionals import Conditionals
 from ..laws.branches import merged
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, entries
 from .conditionals import if_escaped, traced_reflection
-
-if TYPE_CHECKING:
-    from ...geometry.cells.hollow_shape import HollowShape
-    from ...geometry.polygons.beams import Beams
 
 BEAM_TOLERANCE, MOST_BEAMS = 1e-13, 200_000
 
@@ -102,7 +99,6 @@ class PolygonLaw(BranchLaw):
     @cached_property
     def _shapes(self) -> list[tuple[HollowShape, float]]:
         """The shapes of the hollows, and the widths of all hollows of each, as fractions of the period."""
-        from ...geometry.cells.hollow_shape import distinct_hollows
 
         wall = self.wall
         found = distinct_hollows(wall)
@@ -147,7 +143,6 @@ class PolygonLaw(BranchLaw):
             table = TriangularTeethLaw(shape.apex_angle).isometry_table()
             if table is not None:
                 return table
-        from ...geometry.polygons.beams import beams_of
 
         beams = beams_of(
             shape.vertices,

@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ...kernels import Bins
+from ...kernels import Basis, Bins, KernelMatrix, Law
 from ...kernels.bases.assembly import is_mirror_symmetric, reflection_matrix
 from .dense import ExtremalEigenvalues, Which, compressed, counted_from_above, extremal, symmetric_half, wanted
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-    from ...kernels import Basis, KernelMatrix, Law
 
     ParityBasis = tuple[csr_array[Any], csr_array[Any]]
 

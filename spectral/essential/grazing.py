@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, singledispatch
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ...geometry import trace
+from ...geometry import Bezier, Wall, trace
+from ...geometry.cells.cell import flat_tops, hollows_between
+from ...geometry.curves.curve import Curve
 from ...kernels import CircularArcLaw, Law, WallLaw
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.laws.law import entry_inside
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
-    from ...geometry.curves.curve import Curve
 
 # Grazing angles in units of the scale of the wall. At the smallest one the outgoing angle, with an error of some 1e-15,
 # has seven digits.
@@ -154,7 +151,6 @@ def raised(wall: Wall) -> Wall:
 
 def grazed(wall: Wall) -> Grazed:
     """The hollows of a wall whose sides are vertical or overhang where grazing rays meet them."""
-    from ...geometry.cells.cell import flat_tops, hollows_between
 
     highest = max((float(piece.box[3]) for loop in wall.islands for piece in loop), default=-np.inf)
     if wall.pieces[0].start[1] < 0.0 or highest >= 0.0:
@@ -180,7 +176,6 @@ def _is_plain(run: float) -> bool:
 
 def _direction(side: Curve) -> Floats:
     """The unit tangent at the start, or its limit for a Bezier curve with zero velocity there."""
-    from ...geometry import Bezier
 
     points = np.array(side.control_points if isinstance(side, Bezier) else ())
     ahead = [point for point in points[1:] - points[:1] if np.any(point)] if points.size else []

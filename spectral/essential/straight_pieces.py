@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.long_runs import progress_bar
+from ...geometry import Wall
 from ...kernels import WallLaw
 from .grazing import REMEMBERED
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 # Two rays with entry points this step apart leave at the same angle, to rounding, if all reflections are at straight
 # pieces. A curved piece changes the angle by the step over its radius, 1e-7 or more unless the piece is flat.

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import singledispatch
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...core.checks import Floats
+from ...geometry import Wall, focusing_arcs
+from ...geometry.curves.curve import Curve
 from ...kernels import CircularArcLaw, Law, PolygonLaw, WallLaw
 from ...kernels.bases.measure import gauss_on_intervals, gauss_rule
 from ...kernels.laws.law import Combination, SpecularFrame
 from ..essential.edge import EssentialEdge
 from .verdict import SpectralGap
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
-    from ...geometry.curves.curve import Curve
 
 # Largest slope, in radians, and limit on the curved pieces.
 STEEPEST, MOST_CURVED = 0.1, 64
@@ -263,7 +260,6 @@ def _(law: Combination) -> Slopes | None:
 
 @slopes_of.register(CircularArcLaw)
 def _(law: CircularArcLaw) -> Slopes | None:
-    from ...geometry import focusing_arcs
 
     return _slopes_of_wall(focusing_arcs(law.half_angle)) if law.half_angle <= STEEPEST else None
 

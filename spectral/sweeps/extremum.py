@@ -16,12 +16,11 @@ from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...core.tables import axes_or_new, verbatim
 from ...geometry import WALLS
-from .points import UNITS
+from .points import UNITS, Point, SweepRow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .points import Point, SweepRow
 
 # The best point is sought to this fraction of the interval between its neighbours, with half of the evaluations.
 CLOSE, SEARCH_SHARE = 1e-4, 0.5
