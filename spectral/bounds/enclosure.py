@@ -18,7 +18,7 @@ from ...kernels.bases.measure import SINE
 from ...kernels.laws.law import Composition, Power
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
-from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
+from ..eigenvalues.dense import Parity, extremal_by_parity, parity_basis
 from ..eigenvalues.spectra import Spectrum, check_reversible, matrix_spectrum
 from .contraction import refuse_unless_self_adjoint
 from .images import is_traced, suits_panels

@@ -17,7 +17,7 @@ from ...kernels import Law, Legendre, Panels
 from ...kernels.bases.assembly import one_blas_thread
 from ...kernels.bases.measure import SINE
 from ...kernels.expectations.angle_panels import KRONROD, NODES
-from ..eigenvalues.parity import Parity
+from ..eigenvalues.dense import Parity
 from .images import expectations, is_traced
 
 # Degree on each panel, for which Kronrod's rule is exact for products of two functions.

@@ -16,8 +16,7 @@ from ...core.tables import data_frame
 from ...kernels import Basis, Bins, KernelMatrix
 from ...kernels.sampling.counts import missed_fraction
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
-from .dense import ExtremalEigenvalues, compressed, end_values
-from .parity import Parity, extremal_by_parity, parity_basis
+from .dense import ExtremalEigenvalues, Parity, compressed, end_values, extremal_by_parity, parity_basis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

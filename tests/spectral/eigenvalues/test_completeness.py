@@ -9,8 +9,15 @@ from scipy.sparse import csr_array
 
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.spectral.eigenvalues.dense import Deflated, compressed, end_values, extremal, margin_below, norm_beyond
-from asperity.spectral.eigenvalues.parity import parity_basis
+from asperity.spectral.eigenvalues.dense import (
+    Deflated,
+    compressed,
+    end_values,
+    extremal,
+    margin_below,
+    norm_beyond,
+    parity_basis,
+)
 
 U = 2.0**-53
 RNG = np.random.default_rng(11)
