@@ -267,6 +267,7 @@ class Bins(Basis):
     """
 
     order: ClassVar[int] = 2
+    is_partition = True
 
     _edges: Floats
     _weights: Floats
@@ -281,10 +282,6 @@ class Bins(Basis):
         edges = _equal_edges(whole_number("bins", divisions, 1), measure) if equal else checked_edges(divisions)
         weights = frozen(measure.mass(edges[:-1], edges[1:]))
         self._set(_edges=frozen(edges), _weights=weights, _measure=measure, _equal=equal)
-
-    @property
-    def is_partition(self) -> bool:
-        return True
 
     @property
     def measure(self) -> AngularMeasure:

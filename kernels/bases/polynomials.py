@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, whole_number
+from ...core.checks import Floats, finite_array, frozen, whole_number
 from ...core.rounding import EPS
 from .basis import Basis
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
@@ -50,12 +50,10 @@ class Legendre(Basis):
     n: int
     weight: WeightName
 
+    is_polynomial = True
+
     def __init__(self, n: int, weight: WeightName = "sin") -> None:
         self._set(n=whole_number("n", n, 1), weight=measure_by_name(weight).name)
-
-    @property
-    def is_polynomial(self) -> bool:
-        return True
 
     @property
     def measure(self) -> AngularMeasure:
@@ -163,25 +161,11 @@ class Directions(Basis):
     [1.0, 1.732050807569, -3.518874256629]
     """
 
-    @property
-    def measure(self) -> AngularMeasure:
-        return SINE
-
-    @property
-    def size(self) -> int:
-        return 3
-
-    @property
-    def edges(self) -> Floats:
-        return np.array([0.0, np.pi])
-
-    @property
-    def nodes_per_interval(self) -> int:
-        return GAUSS_NODES
-
-    @property
-    def constant(self) -> Floats:
-        return np.array([1.0, 0.0, 0.0])
+    measure = SINE
+    size = 3
+    edges = frozen([0.0, np.pi])
+    nodes_per_interval = GAUSS_NODES
+    constant = frozen([1.0, 0.0, 0.0])
 
     def key(self) -> tuple[object, ...]:
         return ()

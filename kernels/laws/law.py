@@ -426,10 +426,7 @@ class BranchLaw(Law):
     """
 
     reversible = True
-
-    @property
-    def is_isometric(self) -> bool:
-        return True
+    is_isometric = True
 
     @abstractmethod
     def _branches(self, theta: Floats) -> tuple[Floats, Floats]: ...
