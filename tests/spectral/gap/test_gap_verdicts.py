@@ -27,6 +27,7 @@ EDGE_OF_SEMICIRCLE = 3 / 8 * np.log(9)
         TEETH.in_specular_frame(),
         ker.WallLaw(geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (0.5, -0.1), (1, 0)])),
         ker.InvolutionLaw(lambda theta: np.pi - theta),
+        ker.IntervalExchangeLaw(ker.discretise(ker.lambertian(), ker.Bins(4))),
         ker.specular(),
         ker.retroreflection(),
     ],
