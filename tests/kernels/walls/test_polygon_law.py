@@ -95,16 +95,16 @@ def test_probabilities_sum_to_one_and_are_linear_in_the_cotangent_between_kinks(
 def test_different_hollows_add_up_by_their_widths_and_equal_ones_are_computed_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from asperity.geometry.polygons import beams
+    from asperity.kernels.walls import polygons
 
     calls: list[int] = []
-    whole = beams.beams_of
+    whole = polygons.beams_of
 
     def counted(chain: np.ndarray, **limits: float) -> object:
         calls.append(len(chain))
         return whole(chain, **limits)
 
-    monkeypatch.setattr(beams, "beams_of", counted)
+    monkeypatch.setattr(polygons, "beams_of", counted)
     skew, mirrored = [(0.3, -0.5), (1.0, 0.0)], [(1.7, -0.5), (2.0, 0.0)]
     large, other = [(2.6, -1.0), (4.0, 0.0)], [(4.2, -0.9), (4.5, -0.1), (5.0, 0.0)]
     wall = geo.Wall.from_vertices([(0.0, 0.0), *skew, *mirrored, *large, *other, (6.0, 0.0)])
