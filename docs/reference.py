@@ -12,6 +12,7 @@ ROOMS = ("geometry", "kernels", "spectral")
 # By task: the name of its page, its title, and the folders whose public names it lists.
 TASKS = (
     ("walls", "Make a wall", ("geometry.walls", "geometry.cells", "geometry.curves")),
+    ("surfaces", "Make a surface that is rough in two directions", ("geometry.surfaces",)),
     ("rays", "Trace rays", ("geometry.tracing", "geometry.scene")),
     ("pictures", "Draw walls", ("geometry.plotting",)),
     ("laws", "Take and combine laws", ("kernels.laws", "kernels.hemisphere")),
@@ -44,6 +45,7 @@ RETURNED = {
     "geometry.Wall": "Curve TracePlan geometry.cells.cell.Hollow",
     "geometry.wall_from_text": "NamedWall",
     "geometry.trace": "Trace",
+    "geometry.Surface": "SurfaceTrace",
     "geometry.billiard_map": "BoundaryStates",
     "geometry.collide": "RigidCollision",
     "geometry.collide_cylinder": "CylinderCollision",

@@ -22,6 +22,7 @@ COLLISION, SPACE = ker.CollisionLaw(LAW, DISK), geo.ConfigurationSpace(TEETH, DI
 PROFILE, STRIP = geo.Profile([0.0, 1.0, 2.0], [0.0, -1.0, 0.5], "um"), geo.Container.strip()
 CIRCLE = geo.Container.circle()
 BUMPS = geo.SatelliteDisk(DISK, 9, 0.1)
+SURFACE = geo.Surface([[0.0, 0.3], [0.5, 0.1]], 0.5, "um")
 PAIR, GROOVES = ker.PairLaw(LAW, DISK), ker.HemisphereLaw(LAW)
 RECORD = ker.play(CIRCLE, ker.smooth(DISK), [0.5, 0.0], [0.0, 1.0, 0.0], 3)
 GAS = ker.play_gas(CIRCLE, PAIR, [[0.0, 0.0]], [[1.0, 0.0, 0.0]], 3, rng=0)
@@ -89,7 +90,7 @@ def methods_of(kind: type) -> set[tuple[type, str]]:
 OBJECTS: tuple[Any, ...] = (
     ARC, geo.Bezier([(0, 0), (0.5, -1), (1, 0)]), geo.Segment((0, 0), (1, 0)), TEETH, DISK, PROFILE, SPACE, BUMPS,
     MUSHROOMS, STRIP, CIRCLE, geo.InnerDisk(0.25, 0.1), geo.RollingCharts(np.pi / 30.0, 1.0),
-    geo.HeightCorrelation(0.1), geo.SelfAffine(0.5),
+    geo.HeightCorrelation(0.1), geo.SelfAffine(0.5), SURFACE,
     BINS, ker.Legendre(4), ker.Panels([0.0, 1.0, np.pi], 2), ker.TensorBasis((ker.Bins(2), MOMENTUM_BINS)), SINE,
     MATRIX, SAMPLED, LAW, ker.lambertian(), ker.specular(), TRIANGLES, ker.RectangularTeethLaw(1.0),
     ker.CircularArcLaw(1.2), ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.4), (0.6, -0.1), (1, 0)])),
@@ -154,6 +155,8 @@ ARGUMENTS: dict[str, Any] = {
     "PolygonalBody.position": [[3.0, 0.1]], "PolygonalBody.velocity": [[-1.0, 0.0]], "Displacements.scale": 1.0,
     "SpringWall.gas_temperature": 2.0, "Composition.first": LAW, "Composition.second": LAW,
     "Segment.vertices": TRIANGLE, "SpringWall.speed": [1.0, 2.0],
+    "Surface.points": [[0.3, 0.1]], "Surface.velocities": [[0.2, 0.1, -1.0]], "Surface.point": [0.3, 0.1],
+    "Surface.velocity": [0.2, 0.1, -1.0], "Surface.heights": [[0.0, 0.3], [0.5, 0.1]], "Surface.spacing": 0.5,
     "Panels.moments": np.ones((2, 2, 3)),
 }  # fmt: skip
 # Other arguments of single calls.
@@ -277,6 +280,7 @@ METHODS = (
     "Law.sample", "MatrixLaw.density", "MushroomGenerations.generation", "MushroomGenerations.trace",
     "MushroomGenerations.width", "NamedWall.build", "PairLaw.from_wall", "PairLaw.sample", "Panels.for_wall",
     "Profile.detrended", "Profile.in_unit", "RollingCharts.nearest", "RoughBody.sample", "SatelliteLaw.draw_limit",
+    "Surface.trace", "Surface.trajectory",
     "TriangularTeethLaw.breakpoints", "TriangularTeethLaw.branches", "TriangularTeethLaw.conditionals",
     "Wall.foreshorten", "Wall.from_profile", "Wall.from_vertices", "Wall.outline", "Wall.save", "Wall.scaled",
     "Wall.unforeshorten",
