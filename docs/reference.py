@@ -56,7 +56,7 @@ RETURNED = {
     "kernels.KernelMatrix": "Defect SymmetryDefect",
     "kernels.SINE": "AngularMeasure",
     "kernels.CollisionLaw": "VelocityLaw CollisionCombination",
-    "kernels.HemisphereLaw": "DirectionLaw HemisphereCombination AzimuthalBlock",
+    "kernels.HemisphereLaw": "DirectionLaw DirectionFactor HemisphereCombination AzimuthalBlock",
     "kernels.limit_study": "LimitStudy",
     "kernels.weak_limit": "WeakLimit",
     "kernels.play": "BilliardRecord Reflector",

@@ -99,7 +99,7 @@ OBJECTS: tuple[Any, ...] = (
     ker.LeastResistanceLaw(), 0.5 * LAW + 0.5 * ker.specular(), TRIANGLES @ ker.specular(), TRIANGLES**2,
     LAW.in_specular_frame(), LAW.conditionals(1.0), COLLISION, 0.5 * COLLISION + 0.5 * ker.smooth(DISK),
     ker.no_slip(DISK),
-    GROOVES, 0.5 * GROOVES + 0.5 * GROOVES @ GROOVES, ker.Zernike(2),
+    GROOVES, 0.5 * GROOVES + 0.5 * GROOVES @ GROOVES, ker.SurfaceLaw(SURFACE), ker.Zernike(2),
     ker.SatelliteLaw(TEETH, DISK, 0.01), PAIR, ROUGH, ker.PolygonalBody([TRIANGLE]), ALONG, ker.SpringWall(0.5, 1.0),
     ker.CollisionAlongWall(ALONG, DISK), RECORD, GAS, geo.WALLS["koch"], ker.displacements(TEETH, 200, rng=0),
     ker.exchange_hollow(HALVES, 0.05), spec.spectrum(LAW, 2, tolerance=0.1),
@@ -138,7 +138,7 @@ ARGUMENTS: dict[str, Any] = {
     "bins": 2, "bounds": [(0.5, 1.0)], "objective": "drag", "wanted": "max", "permutations": 19, "trajectories": 8,
     "events": 3, "normals": [0.0, 2.0, 4.0], "count": 4, "joined": True, "map": lambda theta: np.pi - theta,
     "symmetric": MATRIX.symmetric, "seam": "mirror", "most_hollows": 3, "smallest_opening": 0.01, "resolution": 0.1,
-    "width": 0.1, "within": 0.25, "collision": COLLISION, "divisions": 4, "inertia": 0.5, "reflector": TEETH,
+    "width": 0.1, "within": 0.25, "collision": COLLISION, "divisions": 4, "inertia": 0.5, "reflector": TEETH, "surface": SURFACE,
     "laws": ker.smooth(DISK),
     "ConfigurationSpace.height": -0.5, "ConfigurationSpace.position": POSITION[0], "Container.wall": [0],
     "ConfigurationSpace.velocity": VELOCITY[0], "BilliardRecord.direction": (1.0, 0.0), "Container.angle": 1.0,
@@ -149,6 +149,7 @@ ARGUMENTS: dict[str, Any] = {
     "PositionLaw.function": lambda x, theta: np.cos(theta), "ExchangeHollow.function": lambda a, b: a * b,
     "TensorBasis.function": lambda angle: angle[..., 0], "Zernike.function": lambda at: at[..., 0],
     "Zernike.angle": [0.5, 0.1], "HemisphereLaw.velocity": [[0.2, 0.1, -1.0]], "ExchangeHollow.number": 2,
+    "SurfaceLaw.velocity": [[0.2, 0.1, -1.0]],
     "HemisphereCombination.velocity": [[0.2, 0.1, -1.0]], "PairLaw.first": DISK, "PairLaw.second": DISK,
     "Wall.vertices": [(0, 0), (0.5, -1), (1, 0)], "SatelliteDisk.alpha": 0.1,
     "Container.position": [[0.3, 0.1]], "Container.velocity": [[0.2, -1.0]], "Container.length": [0.1],
@@ -234,7 +235,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 # They take other functions of the library, an array into which they write, or what other functions have checked.
 UNCALLED = {
-    "matrix_on", "entries", "on_disc", "reflected", "add_products", "attempt", "apply_to_states", "save", "draw",
+    "matrix_on", "entries", "on_zernike", "reflected", "add_products", "attempt", "apply_to_states", "save", "draw",
     "plot", "plot_eigenfunctions", "features", "Spectrum.at", "of_lists", "mixed", "followed_by",
     "sums", "fault",
     # of a piece, asked by walls, containers and tables

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import TypeAlias
 
 from ...core.checks import Value
@@ -20,11 +21,14 @@ Discretiser: TypeAlias = Callable[[Law, Basis], KernelMatrix]
 
 
 class SpatialLaw(Value, ABC):
-    """A law of several angles or of velocities in space, whose matrix is computed from those of laws of one angle."""
+    """A law of several angles or of velocities in space, whose matrix is computed in ways of its own."""
 
     @abstractmethod
-    def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
-        """The matrix in a basis; raises InputError for a basis of other functions."""
+    def matrix_on(self, basis: Basis, discretise: partial[KernelMatrix]) -> KernelMatrix:
+        """The matrix in a basis, from those of other laws or by the keywords of the call alone.
+
+        Raises InputError for a basis of other functions.
+        """
 
 
 class TensorLaw(SpatialLaw):

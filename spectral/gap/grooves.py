@@ -80,10 +80,10 @@ def _largest(
     """The largest eigenvalue of the matrix off the constants, and the error of the matrix as an operator."""
     top, wrong = -np.inf, 0.0
     for order in range(degree + 1) if invariant else (None,):
-        symmetric, error, _ = law.entries(degree, order, planar)
+        found = law.entries(degree, order, planar)
         # the constants come first
-        off = symmetric if order else symmetric[1:, 1:]
-        top, wrong = max(top, float(np.linalg.eigvalsh(off)[-1])), max(wrong, error)
+        off = found.symmetric if order else found.symmetric[1:, 1:]
+        top, wrong = max(top, float(np.linalg.eigvalsh(off)[-1])), max(wrong, found.error)
     return top, wrong
 
 
