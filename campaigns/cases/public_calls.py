@@ -237,7 +237,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
 UNCALLED = {
     "matrix_on", "entries", "on_zernike", "reflected", "add_products", "attempt", "apply_to_states", "save", "draw",
     "plot", "plot_eigenfunctions", "features", "Spectrum.at", "of_lists", "mixed", "followed_by",
-    "sums", "fault",
+    "sums", "fault", "map_powers", "wave_powers", "random_map",
     # of a piece, asked by walls, containers and tables
     "arrival", "curvature", "cut", "from_table", "goes_in_waves", "has_parts", "heights", "hull", "is_on", "joined",
     "largest_curvature", "length_to", "of_table", "parameter_of", "point_at_length", "row", "signed_area", "steps",
@@ -281,7 +281,7 @@ METHODS = (
     "Law.sample", "MatrixLaw.density", "MushroomGenerations.generation", "MushroomGenerations.trace",
     "MushroomGenerations.width", "NamedWall.build", "PairLaw.from_wall", "PairLaw.sample", "Panels.for_wall",
     "Profile.detrended", "Profile.in_unit", "RollingCharts.nearest", "RoughBody.sample", "SatelliteLaw.draw_limit",
-    "Surface.trace", "Surface.trajectory",
+    "Surface.random", "Surface.trace", "Surface.trajectory",
     "TriangularTeethLaw.breakpoints", "TriangularTeethLaw.branches", "TriangularTeethLaw.conditionals",
     "Wall.foreshorten", "Wall.from_profile", "Wall.from_vertices", "Wall.outline", "Wall.save", "Wall.scaled",
     "Wall.unforeshorten",

@@ -10,18 +10,35 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Value, check_memory, finite_array, frozen, instance, read_only, shaped, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    Value,
+    check_memory,
+    finite_array,
+    frozen,
+    generator,
+    instance,
+    positive_number,
+    read_only,
+    shaped,
+    shortened,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.estimates import html_table
 from ...core.files import ending_in, write_whole
 from ..tracing.threads import in_blocks, new_flag
 from ..tracing.tracing import MAX_COLLISIONS, StatusCounts
+from ..walls.random_heights import HeightSpectrum, random_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Largest height, spacing, and ratio of the two: squares of slopes stay far from the largest double.
 LARGEST = 1e100
+# Points of a map along an axis that has quarters, and of a random one.
+FEWEST, MOST_POINTS = 4, 2**15
 # Hits of a ray that a trajectory has at most.
 MOST_HITS = 10_000
 # Arrays of the size of the map that a surface needs: its heights, and those with the first row and column again.
@@ -312,6 +329,79 @@ class Surface(Value):
                 paths.append((path, bool(self.trace(one, along).escaped)))
         return draw_surface(self.heights, self.spacing, self.unit, paths, ax)
 
+    def quarters(self) -> tuple[Surface, Surface, Surface, Surface]:
+        """The quarters of a measured map, each made periodic by its mirror image, for the spread of any quantity.
+
+        Of a map that was mirrored the quarters are those of the part that was measured.
+
+        Raises
+        ------
+        InputError
+            If the map has fewer than four points along an axis.
+
+        Examples
+        --------
+        >>> steps = Surface(np.add.outer([0.0, 1.0, 3.0, 7.0], [0.0, 0.0, 0.0, 0.0]))
+        >>> [round(one.rms_slope, 12) for one in steps.quarters()]
+        [1.0, 1.0, 4.0, 4.0]
+        """
+        z = self.heights
+        if all(np.array_equal(one[1:], one[:0:-1]) for one in (z, z.T)):
+            z = z[: len(z) // 2 + 1, : z.shape[1] // 2 + 1]
+        n, m = z.shape
+        if min(n, m) < FEWEST:
+            raise InputError(f"heights: expected {FEWEST} points or more along each axis, got a map of {n} x {m}")
+        parts = (z[rows, columns] for rows in _halves(n) for columns in _halves(m))
+        return tuple(Surface(mirrored(part), self.spacing, self.unit) for part in parts)  # type: ignore[return-value]
+
+    @classmethod
+    def random(
+        cls,
+        spectrum: HeightSpectrum,
+        points: int | tuple[int, int],
+        *,
+        rms_slope: float | None = None,
+        rms_height: float | None = None,
+        period: float | tuple[float, float] = 1.0,
+        rng: Rng = None,
+    ) -> Surface:
+        """A surface of random Gaussian heights with an isotropic spectrum, periodic by construction.
+
+        Parameters
+        ----------
+        spectrum : HeightCorrelation, SelfAffine or callable
+            As of `random_wall`, of the distance in the plane. `SelfAffine` has the power q^(-2 - 2 H). A callable takes
+            wave numbers q = |(q_x, q_y)| as an array and returns the power spectral density C(q) in two dimensions; the
+            mean squared height is the sum of C(q)/(area of the period) over all waves.
+        points : int or (int, int)
+            Number of heights along x and y.
+        rms_slope, rms_height : float, optional
+            The root mean squared slope of the facets, or height on them about the mean, of which one is given: the
+            squares are expected values over all random surfaces, a single one deviates. With a callable both may be
+            left out.
+        period : float or (float, float)
+        rng : None, int or numpy.random.Generator
+
+        Raises
+        ------
+        InputError
+            If not one of ``rms_slope`` and ``rms_height`` is given, or a spectrum is negative somewhere or zero
+            everywhere.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> geo.Surface.random(geo.HeightCorrelation(0.1), 32, rms_slope=0.5, rng=1)
+        Surface(32 x 32, periods 1 x 1, rms slope 0.486)
+        """
+        counts, lengths = _pair("points", points), _pair("period", period)
+        sizes = [whole_number("points", one, 2, most=MOST_POINTS) for one in counts]
+        widths = [positive_number("period", one) for one in lengths]
+        heights = random_map(
+            spectrum, (sizes[0], sizes[1]), (widths[0], widths[1]), rms_slope, rms_height, generator(rng)
+        )
+        return cls(heights, [width / size for width, size in zip(widths, sizes, strict=True)])
+
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
         """Write the heights, the spacing and the unit as a file of numpy, from which `read_surface` restores them.
 
@@ -340,6 +430,26 @@ class Surface(Value):
             "more": ".trace(points, velocities), .plot(), .save(path), ker.SurfaceLaw(surface)",
         }  # fmt: skip
         return html_table(repr(self), lines)
+
+
+def mirrored(z: Floats) -> Floats:
+    """A map followed by its mirror image along both axes, without the first and last rows twice."""
+    z = np.concatenate([z, z[-2:0:-1]])
+    return np.concatenate([z, z[:, -2:0:-1]], axis=1)
+
+
+def _halves(count: int) -> tuple[slice, slice]:
+    """The two halves of an axis, which share the middle point of an odd number."""
+    return slice(0, (count + 1) // 2), slice(count // 2, count)
+
+
+def _pair(name: str, value: Any) -> tuple[Any, Any]:
+    """A number for both axes, or one for each."""
+    is_many = isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.ndim > 0)
+    found = tuple(value) if is_many else (value, value)
+    if len(found) != len("xy"):
+        raise InputError(f"{name}: expected one number or one for each axis, got {shortened(value)}")
+    return found
 
 
 def _common_shape(points: Floats, velocities: Floats) -> tuple[int, ...]:

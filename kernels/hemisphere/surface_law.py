@@ -79,7 +79,7 @@ class SurfaceLaw(DirectionFactor):
     mirror_symmetric: ClassVar[bool | None] = None
 
     def __post_init__(self) -> None:
-        instance("surface", self.surface, Surface, "geo.Surface(heights, spacing)")
+        instance("surface", self.surface, Surface, "geo.Surface([[0.0, 1.0]])")
         object.__setattr__(self, "orientation", checked_orientation(self.orientation))
 
     @property
