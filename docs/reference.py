@@ -78,7 +78,8 @@ RETURNED = {
     "spectral.channel_diffusivity": "ChannelDiffusivity",
     "spectral.laplacian_comparison": "LaplacianComparison",
     "spectral.mixing_time": "MixingTime",
-    "spectral.accommodation": "Accommodation spectral.consequences.grooves_accommodation.SpaceAccommodation",
+    "spectral.accommodation": "Accommodation spectral.consequences.grooves_accommodation.SpaceAccommodation "
+    "spectral.consequences.surface_accommodation.SurfaceAccommodation",
     "spectral.channel_paths": "ChannelPaths",
     "spectral.Spectrum": "SpectrumErrors",
     "spectral.hilbert_schmidt_norm": "HilbertSchmidtNorm",

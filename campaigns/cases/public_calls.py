@@ -237,7 +237,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
 UNCALLED = {
     "matrix_on", "entries", "on_zernike", "reflected", "add_products", "attempt", "apply_to_states", "save", "draw",
     "plot", "plot_eigenfunctions", "features", "Spectrum.at", "of_lists", "mixed", "followed_by",
-    "sums", "fault", "map_powers", "wave_powers", "random_map",
+    "sums", "fault", "exit_velocities", "map_powers", "wave_powers",
     # of a piece, asked by walls, containers and tables
     "arrival", "curvature", "cut", "from_table", "goes_in_waves", "has_parts", "heights", "hull", "is_on", "joined",
     "largest_curvature", "length_to", "of_table", "parameter_of", "point_at_length", "row", "signed_area", "steps",
@@ -247,7 +247,8 @@ UNCALLED = {
 UNREPLACED = {
     "engine", "client", "checkpoint", "key", "runner", "metadata", "counts", "replicates", "symmetrised",
     "reversible", "mirror_symmetric", "frame", "requested_tolerance", "unresolved", "norm_bound", "raw_defect",
-    "beyond", "cost", "incoming", "accommodation.incidence_deg", "study_wall.incidence_deg",
+    "beyond", "cost", "incoming", "accommodation.incidence_deg", "accommodation.azimuth_deg",
+    "study_wall.incidence_deg",
 }  # fmt: skip
 
 

@@ -96,11 +96,11 @@ class SurfaceLaw(DirectionFactor):
             radius, angle = np.sqrt(points[:, 2]), 2.0 * np.pi * points[:, 3]
             down = -np.sqrt(1.0 - points[:, 2])
             incoming = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), down])
-            return incoming, *self._outgoing(points[:, :2], incoming)
+            return incoming, *self.exit_velocities(points[:, :2], incoming)
 
         return reflect
 
-    def _outgoing(self, entry: Floats, incoming: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def exit_velocities(self, entry: Floats, incoming: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """Outgoing velocities of rays that enter at these fractions of the periods, and which escaped."""
         found = self.surface.trace(entry * self.surface.periods, incoming)
         return np.where(found.escaped[:, None], found.velocities, -incoming), found.escaped
@@ -109,7 +109,7 @@ class SurfaceLaw(DirectionFactor):
         angle: Any = self.orientation
         if isinstance(self.orientation, str):
             angle = rng.uniform(0.0, 2.0 * np.pi, len(incoming))
-        outgoing, _ = self._outgoing(rng.random((len(incoming), 2)), turned(incoming, -angle))
+        outgoing, _ = self.exit_velocities(rng.random((len(incoming), 2)), turned(incoming, -angle))
         return turned(outgoing, angle)
 
     def on_zernike(

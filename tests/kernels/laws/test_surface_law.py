@@ -172,8 +172,8 @@ def test_checkpoints_and_workers_leave_every_bit(tmp_path):
 
 def test_rays_that_do_not_escape_end_in_an_error():
     class Swallows(ker.SurfaceLaw):
-        def _outgoing(self, entry, incoming):
-            outgoing, escaped = super()._outgoing(entry, incoming)
+        def exit_velocities(self, entry, incoming):
+            outgoing, escaped = super().exit_velocities(entry, incoming)
             return outgoing, escaped & (entry[:, 0] > 0.01)
 
     with pytest.raises(AccuracyError, match=re.escape("of a surface that of surface.trace")):
