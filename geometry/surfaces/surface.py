@@ -153,6 +153,11 @@ class Surface(Value):
         x, y = (np.diff(self._padded, axis=axis) / self.spacing[axis] for axis in (0, 1))
         return x[:, :-1], y[:-1]
 
+    def facet_slopes(self) -> Floats:
+        """The slopes along x and y of all facets, shape (2, n, m, 2): those below the diagonals, then those above."""
+        x, y = self._slopes
+        return np.stack([np.stack([x, np.roll(y, -1, 0)], -1), np.stack([np.roll(x, -1, 1), y], -1)])
+
     @cached_property
     def rms_slope(self) -> float:
         """The root mean squared slope of the facets, by the area below them."""
@@ -168,10 +173,8 @@ class Surface(Value):
     @cached_property
     def area(self) -> float:
         """The area of the facets of one period."""
-        x, y = self._slopes
-        lower = np.sqrt(1.0 + x**2 + np.roll(y, -1, 0) ** 2)
-        upper = np.sqrt(1.0 + y**2 + np.roll(x, -1, 1) ** 2)
-        return float(0.5 * np.prod(self.spacing) * (lower.sum() + upper.sum()))
+        stretched = np.sqrt(1.0 + np.sum(self.facet_slopes() ** 2, axis=-1))
+        return float(0.5 * np.prod(self.spacing) * stretched.sum())
 
     @cached_property
     def _padded(self) -> Floats:

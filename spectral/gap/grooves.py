@@ -87,9 +87,9 @@ def _largest(
     return top, wrong
 
 
-def _at_least(law: HemisphereLaw, planar_gap: Callable[[Law], Estimate]) -> float:
-    """The planar gap less its error for grooves of random direction; 0 for those of a fixed one."""
-    if not isinstance(law.orientation, str):
+def _at_least(law: DirectionLaw, planar_gap: Callable[[Law], Estimate]) -> float:
+    """The planar gap less its error for grooves of random direction; 0 for those of a fixed one and for surfaces."""
+    if not isinstance(law, HemisphereLaw) or not isinstance(law.orientation, str):
         return 0.0
     found = planar_gap(law.specular)
     return max(found.value - found.error, 0.0)
