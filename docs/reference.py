@@ -98,6 +98,7 @@ STORY = (
     "a_gap_with_its_error",
     "a_proved_gap",
     "a_measured_profile",
+    "a_measured_surface",
     "a_disk",
     "a_granular_collision",
     "no_slip_billiards",

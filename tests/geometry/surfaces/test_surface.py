@@ -267,3 +267,18 @@ def test_the_plot_shows_the_map_and_the_ray():
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x", "y") and len(ax.lines) == 10
     assert ax.get_xlim()[1] - ax.get_xlim()[0] >= MAPS["noise"].periods[0]
     pyplot.close("all")
+
+
+def test_rays_along_a_facet_within_rounding_leave_it():
+    # a velocity along the facet below the highest point, but for some roundings of its descent
+    rng = np.random.default_rng(13)
+    for _ in range(40):
+        rough = geo.Surface(rng.standard_normal((5, 4)), tuple(rng.uniform(0.3, 3.0, 2)))
+        i, j = np.unravel_index(np.argmax(rough.heights), rough.heights.shape)
+        slope = rough.facet_slopes()[0, i, j]
+        across = np.array([1.0, 0.0]) + rng.random((200, 1)) * [0.0, 1.0] * np.divide(*rough.spacing[::-1])
+        descent = across @ slope
+        v = np.column_stack([across, descent * (1.0 + rng.integers(-3, 4, 200) * 2.0**-52)])[descent < 0.0]
+        if len(v):
+            found = rough.trace(np.multiply((i, j), rough.spacing), v)
+            assert found.escaped.all() and found.collisions.max() < 1000
