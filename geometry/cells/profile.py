@@ -205,7 +205,7 @@ def read_profile(
     """
     file = Path(path)
     columns = Columns(delimiter, "." if decimal is None else decimal, usecols, skiprows)
-    given, undefined = _pair_of_units(units), None if undefined is None else finite_number("undefined", undefined)
+    given, undefined = pair_of_units(units), None if undefined is None else finite_number("undefined", undefined)
     if quantity is not None:
         choice("quantity", quantity, get_args(Quantity))
     taken: dict[str, str] = {}
@@ -270,7 +270,8 @@ def _with_a_comma(text: str, columns: Columns) -> tuple[Floats, Floats, Header |
         return None
 
 
-def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
+def pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
+    """The units of lengths and of heights or slopes, or one of both."""
     if units is None:
         return None
     pair = (units, units) if isinstance(units, str) else units

@@ -18,7 +18,7 @@ from ...core.errors import InputError
 from ...core.files import regular_file, text_of
 from ..cells.columns import word_number
 from ..cells.measured import heights_of, metres, unit_ratio
-from ..cells.profile import instrument_scan
+from ..cells.profile import instrument_scan, pair_of_units
 from .surface import Surface, mirrored
 
 Tiling = Literal["mirror", "wrap"]
@@ -105,7 +105,7 @@ def read_surface(
     if tiling is not None:
         choice("tiling", tiling, get_args(Tiling))
     choice("spikes", spikes, get_args(Spikes))
-    order, pair = whole_number("degree", degree, 0), _pair_of_units(units)
+    order, pair = whole_number("degree", degree, 0), pair_of_units(units)
     if file.suffix.lower() == ".npz":
         return _restored(file)
     z, found, unit, periodic = _map_of(file, spacing is None)
@@ -125,7 +125,7 @@ def surface_of(heights: Floats, spacing: Any, *, degree: int, tiling: Tiling, sp
     """A measured patch as a surface; see `read_surface`."""
     if heights.ndim != 2 or heights.size == 0:
         raise InputError(f"heights: expected a map of two dimensions, got shape {heights.shape}")
-    lengths = np.array(Surface([[0.0]], spacing).spacing)
+    lengths = np.array(Surface(np.zeros((1, 1)), spacing).spacing)
     levelled = filled(_levelled(heights, degree), lengths)
     bad = spikes_of(levelled) & np.isfinite(heights)
     if bad.any():
@@ -166,7 +166,7 @@ def filled(z: Floats, spacing: Floats) -> Floats:
     missing = ~np.isfinite(z)
     if not missing.any():
         return z
-    rim, inside = np.argwhere(binary_dilation(missing, np.ones((3, 3))) & ~missing), np.argwhere(missing)
+    rim, inside = np.argwhere(binary_dilation(missing, np.ones((3, 3), dtype=bool)) & ~missing), np.argwhere(missing)
     values, whole = z[tuple(rim.T)], z.copy()
     found = np.full(len(inside), np.nan)
     # it fails if all points of the rim are on one line
@@ -263,15 +263,3 @@ def _restored(file: Path) -> Surface:
         raise InputError(f"{file}: {reason}") from reason
     except Exception as reason:  # of a damaged or foreign archive
         raise InputError(f"{file}: expected a surface as Surface.save writes it ({reason})") from reason
-
-
-def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
-    if units is None:
-        return None
-    try:
-        first, second = (units, units) if isinstance(units, str) else units
-        unit_ratio(second, first)
-        finite_number("units", metres(first))
-    except (AttributeError, TypeError, ValueError) as reason:
-        raise InputError(f"units: expected units of length, 'um' or ('um', 'nm'), got {units!r}") from reason
-    return first, second

@@ -135,8 +135,9 @@ class Surface(Value):
         object.__setattr__(self, "spacing", tuple(np.broadcast_to(given, 2).tolist()))
 
     def __eq__(self, other: object) -> bool:
-        same = isinstance(other, Surface) and self.spacing == other.spacing
-        return same and np.array_equal(self.heights, other.heights)  # type: ignore[union-attr]
+        if not isinstance(other, Surface):
+            return NotImplemented
+        return bool(self.spacing == other.spacing and np.array_equal(self.heights, other.heights))
 
     def __hash__(self) -> int:
         return hash((self.spacing, self.heights.shape, self.heights.tobytes()))
@@ -223,15 +224,9 @@ class Surface(Value):
         >>> flat.trace([[0.25, 0.5], [0.75, 0.5]], [3.0, 4.0, -2.0]).velocities.tolist()
         [[3.0, 4.0, 2.0], [3.0, 4.0, 2.0]]
         """
-        x, v = shaped("points", points, "...", 2), shaped("velocities", velocities, "...", 3)
-        shape = _common_shape(x, v)
+        shape, starts, incoming = _rays(points, velocities)
         most = whole_number("max_collisions", max_collisions, 0)
-        at, moving, collisions, status = self._traced(
-            np.broadcast_to(x, (*shape, 2)).reshape(-1, 2),
-            np.broadcast_to(v, (*shape, 3)).reshape(-1, 3),
-            most,
-            threads,
-        )
+        at, moving, collisions, status = self._traced(starts, incoming, most, threads)
         found = at.reshape(*shape, 2), moving.reshape(*shape, 3), collisions.reshape(shape), status.reshape(shape)
         return SurfaceTrace(*map(read_only, found))
 
@@ -284,11 +279,11 @@ class Surface(Value):
         >>> Surface([[0.0], [1.0]]).trajectory([1.5, 0.25], [0.0, 0.0, -1.0]).tolist()
         [[1.5, 0.25, 1.0], [1.5, 0.25, 0.5], [2.5, 0.25, 0.5], [2.5, 0.25, 1.0]]
         """
-        start, v = shaped("point", point, 2), shaped("velocity", velocity, 3)
-        _common_shape(start, v)
+        _, starts, incoming = _rays(shaped("point", point, 2), shaped("velocity", velocity, 3))
+        start = starts[0]
         limit = whole_number("max_collisions", max_collisions, 0, most=MOST_HITS)
         path = np.empty((limit + 1, 3))
-        at, _, collisions, status = self._traced(start[None], v[None], limit, 1, path)
+        at, _, collisions, status = self._traced(starts, incoming, limit, 1, path)
         squares = np.append(self.spacing, 1.0)
         base = np.append(start - np.mod(start / self.spacing, self.heights.shape) * self.spacing, 0.0)
         hits, top = path[1 : collisions[0] + 1] * squares + base, float(self.heights.max())
@@ -319,17 +314,10 @@ class Surface(Value):
         """
         from .pictures import draw_surface
 
-        paths = []
+        paths: list[tuple[Floats, bool]] = []
         if np.size(points) or np.size(velocities):
-            x, v = shaped("points", points, "...", 2), shaped("velocities", velocities, "...", 3)
-            shape = _common_shape(x, v)
-            for one, along in zip(
-                np.broadcast_to(x, (*shape, 2)).reshape(-1, 2),
-                np.broadcast_to(v, (*shape, 3)).reshape(-1, 3),
-                strict=True,
-            ):
-                path = self.trajectory(one, along)
-                paths.append((path, bool(self.trace(one, along).escaped)))
+            for x, v in zip(*_rays(points, velocities)[1:], strict=True):
+                paths.append((self.trajectory(x, v), bool(self.trace(x, v).escaped)))
         return draw_surface(self.heights, self.spacing, self.unit, paths, ax)
 
     def quarters(self) -> tuple[Surface, Surface, Surface, Surface]:
@@ -416,8 +404,10 @@ class Surface(Value):
             If the name promises another format than .npz, or the file cannot be written.
         """
         file = ending_in(".npz", path)
-        arrays = {"heights": self.heights, "spacing": np.array(self.spacing), "unit": np.array(self.unit)}
-        write_whole(file, lambda stream: np.savez(stream, **arrays), overwrite=overwrite)
+        spacing, unit = np.array(self.spacing), np.array(self.unit)
+        write_whole(
+            file, lambda stream: np.savez(stream, heights=self.heights, spacing=spacing, unit=unit), overwrite=overwrite
+        )
 
     def _facts(self) -> dict[str, str]:
         (n, m), (width, length) = self.heights.shape, self.periods
@@ -455,19 +445,20 @@ def _pair(name: str, value: Any) -> tuple[Any, Any]:
     return found
 
 
-def _common_shape(points: Floats, velocities: Floats) -> tuple[int, ...]:
-    """The shape of the rays; raises InputError if there is none, or a velocity does not come down."""
+def _rays(points: ArrayLike, velocities: ArrayLike) -> tuple[tuple[int, ...], Floats, Floats]:
+    """The shape of the rays, their entry points, shape (n, 2), and velocities, shape (n, 3), which must come down."""
+    x, v = shaped("points", points, "...", 2), shaped("velocities", velocities, "...", 3)
     try:
-        shape = np.broadcast_shapes(points.shape[:-1], velocities.shape[:-1])
+        shape = np.broadcast_shapes(x.shape[:-1], v.shape[:-1])
     except ValueError as reason:
         raise InputError(
-            f"points, velocities: expected leading axes that broadcast, got {points.shape} and {velocities.shape}; for "
-            "all pairs pass points[:, None]"
+            f"points, velocities: expected leading axes that broadcast, got {x.shape} and {v.shape}; for all pairs "
+            "pass points[:, None]"
         ) from reason
-    bad = np.argwhere(~(velocities[..., 2] < 0.0))
+    bad = np.argwhere(~(v[..., 2] < 0.0))
     if len(bad):
         raise InputError(
-            "velocities: expected incoming ones, with a negative third component, got "
-            f"{velocities[tuple(bad[0])].tolist()} at row {bad[0].tolist()} ({len(bad)} such)"
+            f"velocities: expected incoming ones, with a negative third component, got {v[tuple(bad[0])].tolist()} at "
+            f"row {bad[0].tolist()} ({len(bad)} such)"
         )
-    return shape
+    return shape, np.broadcast_to(x, (*shape, 2)).reshape(-1, 2), np.broadcast_to(v, (*shape, 3)).reshape(-1, 3)

@@ -210,7 +210,7 @@ class DirectionLaw(SpatialLaw):
         how = "error of the factors' matrices, and of a product what polynomials between its factors leave out"
         return AzimuthalBlock(whole, np.arange(m, degree + 1, 2), m, frobenius_error(found.error, found.kind, how))
 
-    def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
+    def matrix_on(self, basis: Basis, discretise: partial[KernelMatrix]) -> KernelMatrix:
         """The matrix in Zernike functions."""
         instance("basis", basis, Zernike, "ker.Zernike(8) for a law of directions")
         assert isinstance(basis, Zernike)
@@ -242,7 +242,7 @@ class DirectionLaw(SpatialLaw):
             total, errors = total + weight * product, errors + weight * wrong
         if self.reversible:
             total = 0.5 * (total + total.T)
-        return OnDisc(total, *errors.tolist(), "bound" if kinds == {"bound"} else "estimate")
+        return OnDisc(total, float(errors[0]), float(errors[1]), "bound" if kinds == {"bound"} else "estimate")
 
     def __matmul__(self, other: DirectionLaw) -> DirectionLaw:
         """This law, then the other."""

@@ -53,6 +53,7 @@ def in_space(
             "directions 1 - H.matrix(1, 1).symmetric[0, 0] is the tangential coefficient"
         )
     terms: list[list[tuple[float, Estimate]]] = [[], []]
+    found: tuple[Estimate, ...]
     for weight, (one,) in law.parts:
         if isinstance(one, SurfaceLaw):
             space = of_surface(one)

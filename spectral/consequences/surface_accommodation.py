@@ -84,18 +84,15 @@ def of_surface(
     """The coefficients of one surface, at incoming directions in degrees too."""
     directions = _directions(incidence, azimuth)
     means, errors = _to_tolerance(4, lambda points: _products(law, points), tolerance, MOST, rng)
-    (xx, yy, xy, tangential), normal = 4.0 * means[:4], 18.0 * means[4]
-    wide = 4.0 * errors[:4]
-    averages = [
-        Estimate(1.0 - one, wrong, "estimate", HOW)
-        for one, wrong in ((tangential, wide[3]), (normal, 18.0 * errors[4]))
-    ]
-    at = np.array([_at(law, *one, tolerance, rng) for one in np.radians(directions)]).reshape(-1, 3, 2)
-    (tangential_at, normal_at, sideways_at), wrong_at = at[..., 0].T, at[..., 1].T
+    (xx, yy, xy, along), wide = 4.0 * means[:4], 4.0 * errors[:4]
+    tangential = Estimate(1.0 - along, wide[3], "estimate", HOW)
+    normal = Estimate(1.0 - 18.0 * means[4], 18.0 * errors[4], "estimate", HOW)
+    each = [_at(law, float(zenith), float(turn), tolerance, rng) for zenith, turn in np.radians(directions)]
+    at, wrong_at = (np.array([[pair[k] for pair in one] for one in each]).reshape(-1, 3).T for k in (0, 1))
     return SurfaceAccommodation(
-        *averages, nearest_maxwell(*averages), frozen([[1.0 - xx, -xy], [-xy, 1.0 - yy]]),
-        frozen([[wide[0], wide[2]], [wide[2], wide[1]]]), *map(frozen, directions.T), frozen(tangential_at),
-        frozen(wrong_at[0]), frozen(normal_at), frozen(wrong_at[1]), frozen(sideways_at), frozen(wrong_at[2]),
+        tangential, normal, nearest_maxwell(tangential, normal), frozen([[1.0 - xx, -xy], [-xy, 1.0 - yy]]),
+        frozen([[wide[0], wide[2]], [wide[2], wide[1]]]), frozen(directions[:, 0]), frozen(directions[:, 1]),
+        frozen(at[0]), frozen(wrong_at[0]), frozen(at[1]), frozen(wrong_at[1]), frozen(at[2]), frozen(wrong_at[2]),
     )  # fmt: skip
 
 

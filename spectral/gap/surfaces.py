@@ -108,7 +108,7 @@ def _noise(parts: list[Floats], values: Floats, vectors: Floats, index: int) -> 
     beside = images - values[index] * vector
     square = float(np.sum((beside - beside.mean(axis=0)) ** 2)) / (len(parts) * (len(parts) - 1))
     distance = float(np.min(np.abs(np.delete(values, index) - values[index]), initial=np.inf))
-    return half + min(np.sqrt(square), square / max(distance, 1e-300))
+    return half + float(min(np.sqrt(square), square / max(distance, 1e-300)))
 
 
 def kept_speeds(law: SurfaceLaw, rng: np.random.Generator) -> tuple[float, float, bool]:

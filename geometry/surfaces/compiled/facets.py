@@ -41,12 +41,9 @@ def first_side(p, q, a, b):
 @inlined
 def moved(index, shift, step, count):
     """-> (index, shift): the next row or column of the map, and the sum of the periods that were crossed."""
-    index += step
-    if index == count:
-        return 0, shift + count
-    if index < 0:
-        return count - 1, shift - count
-    return index, shift
+    new = index + step
+    crossed = count if new == count else -count if new < 0 else 0
+    return new - crossed, shift + crossed
 
 
 @linked

@@ -86,6 +86,13 @@ def test_the_averages_are_entries_of_the_matrix():
     assert found.tangential.value == pytest.approx(0.5 * np.trace(found.tensor), abs=1e-12)
 
 
+def test_surfaces_pass_as_many_particles_through_a_tube_as_the_grooves_that_they_are():
+    surface, grooves = ker.SurfaceLaw(GROOVES), ker.HemisphereLaw(PROFILE)
+    for first, second in ((surface, grooves), (0.5 * surface + 0.5 * grooves, grooves)):
+        one, other = (spec.transmission(law, 2.0, "tube", tolerance=1e-2, rng=4) for law in (first, second))
+        assert abs(one.value - other.value) < one.error + other.error < 0.03
+
+
 def test_errors_of_95_percent_hold():
     law = ker.SurfaceLaw(NOISE)
     truth = spec.accommodation(law, tolerance=1e-9, rng=77)
