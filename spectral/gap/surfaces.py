@@ -9,6 +9,8 @@ essential range of p. Rays measure p. At a fixed orientation Zernike functions g
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...core.checks import Floats
@@ -103,12 +105,12 @@ def _noise(parts: list[Floats], values: Floats, vectors: Floats, index: int) -> 
     vector = vectors[:, index]
     images = np.array([part @ vector for part in parts])
     quotients = images @ vector
-    half = float(stdtrit(len(parts) - 1, 0.5 + 0.5 * LEVEL)) * float(np.std(quotients, ddof=1)) / np.sqrt(len(parts))
+    half = float(stdtrit(len(parts) - 1, 0.5 + 0.5 * LEVEL)) * float(np.std(quotients, ddof=1)) / math.sqrt(len(parts))
     # second order in the noise, but for eigenvalues as near as this
     beside = images - values[index] * vector
     square = float(np.sum((beside - beside.mean(axis=0)) ** 2)) / (len(parts) * (len(parts) - 1))
     distance = float(np.min(np.abs(np.delete(values, index) - values[index]), initial=np.inf))
-    return half + float(min(np.sqrt(square), square / max(distance, 1e-300)))
+    return half + min(math.sqrt(square), square / max(distance, 1e-300))
 
 
 def kept_speeds(law: SurfaceLaw, rng: np.random.Generator) -> tuple[float, float, bool]:
