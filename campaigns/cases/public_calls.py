@@ -196,6 +196,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     },
     "SatelliteDisk": {"size": 0.1, "angles": [0.0, 1.0, 3.0, 5.0]},
     "SatelliteLaw.draw_limit": {"samples": 4},
+    "Surface.random": {"points": 8},
     "TriangularTeethLaw": {"angle": 1.0},
     "Wall.from_profile": {"x": [0, 1]},
     "Wall.save": {"path": "wall.toml", "overwrite": True},
