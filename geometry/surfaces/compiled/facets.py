@@ -28,9 +28,7 @@ FAR, NEAR, DIAGONAL = 1, 2, 3
 @inlined
 def first_side(p, q, a, b):
     """-> (time, side): where a ray leaves its column; never for a vertical one. The sign tests keep divisors from 0."""
-    t, side = np.inf, FAR
-    if a > 0.0:
-        t = (1.0 - p) / a
+    t, side = (1.0 - p) / a if a > 0.0 else np.inf, FAR
     if b < 0.0 and -q / b < t:
         t, side = -q / b, NEAR
     if a < b and (p - q) / (b - a) < t:
@@ -97,8 +95,7 @@ def follow(heights, top, scale, ray, most, path):
                 j, shift_y = moved(j, shift_y, 1 if side == FAR else -1, columns)
             p, q = (q, 0.0) if side == FAR else (1.0, p)
         upper, own, a, b, mp, mq = not upper, False, b, a, mq, mp
-    if upper:
-        p, q, a, b = q, p, b, a
+    p, q, a, b = (q, p, b, a) if upper else (p, q, a, b)
     return p + i + shift_x, q + j + shift_y, a, b, c, bounces, outcome
 
 
