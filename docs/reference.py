@@ -12,6 +12,7 @@ ROOMS = ("geometry", "kernels", "spectral")
 # By task: the name of its page, its title, and the folders whose public names it lists.
 TASKS = (
     ("walls", "Make a wall", ("geometry.walls", "geometry.cells", "geometry.curves")),
+    ("surfaces", "Make a surface that is rough in two directions", ("geometry.surfaces",)),
     ("rays", "Trace rays", ("geometry.tracing", "geometry.scene")),
     ("pictures", "Draw walls", ("geometry.plotting",)),
     ("laws", "Take and combine laws", ("kernels.laws", "kernels.hemisphere")),
@@ -44,6 +45,7 @@ RETURNED = {
     "geometry.Wall": "Curve TracePlan geometry.cells.cell.Hollow",
     "geometry.wall_from_text": "NamedWall",
     "geometry.trace": "Trace",
+    "geometry.Surface": "SurfaceTrace",
     "geometry.billiard_map": "BoundaryStates",
     "geometry.collide": "RigidCollision",
     "geometry.collide_cylinder": "CylinderCollision",
@@ -54,7 +56,7 @@ RETURNED = {
     "kernels.KernelMatrix": "Defect SymmetryDefect",
     "kernels.SINE": "AngularMeasure",
     "kernels.CollisionLaw": "VelocityLaw CollisionCombination",
-    "kernels.HemisphereLaw": "DirectionLaw HemisphereCombination AzimuthalBlock",
+    "kernels.HemisphereLaw": "DirectionLaw DirectionFactor HemisphereCombination AzimuthalBlock",
     "kernels.limit_study": "LimitStudy",
     "kernels.weak_limit": "WeakLimit",
     "kernels.play": "BilliardRecord Reflector",
@@ -76,7 +78,8 @@ RETURNED = {
     "spectral.channel_diffusivity": "ChannelDiffusivity",
     "spectral.laplacian_comparison": "LaplacianComparison",
     "spectral.mixing_time": "MixingTime",
-    "spectral.accommodation": "Accommodation spectral.consequences.grooves_accommodation.SpaceAccommodation",
+    "spectral.accommodation": "Accommodation spectral.consequences.grooves_accommodation.SpaceAccommodation "
+    "spectral.consequences.surface_accommodation.SurfaceAccommodation",
     "spectral.channel_paths": "ChannelPaths",
     "spectral.Spectrum": "SpectrumErrors",
     "spectral.hilbert_schmidt_norm": "HilbertSchmidtNorm",
@@ -95,6 +98,7 @@ STORY = (
     "a_gap_with_its_error",
     "a_proved_gap",
     "a_measured_profile",
+    "a_measured_surface",
     "a_disk",
     "a_granular_collision",
     "no_slip_billiards",

@@ -3,6 +3,7 @@
 - Make a wall: WALLS, HeightCorrelation, SelfAffine, Wall, dispersing_arcs, double_parabola, elliptical_arcs, flat,
   focusing_arcs, join_walls, koch, load_wall, mushrooms, notched_angle, random_wall, rectangular_teeth,
   triangular_teeth, tube, wall_from_text, Profile, read_profile, Arc, Bezier, Segment.
+- Make a surface that is rough in two directions: Surface, read_surface.
 - Trace rays: MushroomGenerations, Status, billiard_map, nested_reflection, trace, trajectory.
 - Draw walls: draw_wall.
 - Collide disks: Disk, InnerDisk, RollingCharts, SatelliteDisk, ConfigurationSpace, DiskStatus, collide,
@@ -31,6 +32,8 @@ from .curves.segment import Segment
 from .disk.disk import Disk, InnerDisk, SatelliteDisk
 from .disk.satellites import RollingCharts
 from .plotting.walls import draw_wall
+from .surfaces.reading import read_surface
+from .surfaces.surface import Surface
 from .tables.container import Container
 from .tracing.boundary_map import billiard_map, nested_reflection
 from .tracing.generations import MushroomGenerations
@@ -73,6 +76,7 @@ __all__ = [
     "Segment",
     "SelfAffine",
     "Status",
+    "Surface",
     "Wall",
     "billiard_map",
     "collide",
@@ -96,6 +100,7 @@ __all__ = [
     "notched_angle",
     "random_wall",
     "read_profile",
+    "read_surface",
     "rectangular_teeth",
     "shadow",
     "symbolic",

@@ -32,6 +32,7 @@ from .distances.distances import retroreflection_distance as retroreflection_dis
 from .distances.transport import difference_test as difference_test
 from .expectations.conditionals import Conditionals as Conditionals
 from .hemisphere.hemisphere_law import HemisphereLaw as HemisphereLaw
+from .hemisphere.surface_law import SurfaceLaw as SurfaceLaw
 from .inverse.cell_sequences import dichotomy as dichotomy
 from .inverse.design import design_wall as design_wall
 from .inverse.exchange_wall import exchange_hollow as exchange_hollow

@@ -22,6 +22,7 @@ COLLISION, SPACE = ker.CollisionLaw(LAW, DISK), geo.ConfigurationSpace(TEETH, DI
 PROFILE, STRIP = geo.Profile([0.0, 1.0, 2.0], [0.0, -1.0, 0.5], "um"), geo.Container.strip()
 CIRCLE = geo.Container.circle()
 BUMPS = geo.SatelliteDisk(DISK, 9, 0.1)
+SURFACE = geo.Surface([[0.0, 0.3], [0.5, 0.1]], 0.5, "um")
 PAIR, GROOVES = ker.PairLaw(LAW, DISK), ker.HemisphereLaw(LAW)
 RECORD = ker.play(CIRCLE, ker.smooth(DISK), [0.5, 0.0], [0.0, 1.0, 0.0], 3)
 GAS = ker.play_gas(CIRCLE, PAIR, [[0.0, 0.0]], [[1.0, 0.0, 0.0]], 3, rng=0)
@@ -89,7 +90,7 @@ def methods_of(kind: type) -> set[tuple[type, str]]:
 OBJECTS: tuple[Any, ...] = (
     ARC, geo.Bezier([(0, 0), (0.5, -1), (1, 0)]), geo.Segment((0, 0), (1, 0)), TEETH, DISK, PROFILE, SPACE, BUMPS,
     MUSHROOMS, STRIP, CIRCLE, geo.InnerDisk(0.25, 0.1), geo.RollingCharts(np.pi / 30.0, 1.0),
-    geo.HeightCorrelation(0.1), geo.SelfAffine(0.5),
+    geo.HeightCorrelation(0.1), geo.SelfAffine(0.5), SURFACE,
     BINS, ker.Legendre(4), ker.Panels([0.0, 1.0, np.pi], 2), ker.TensorBasis((ker.Bins(2), MOMENTUM_BINS)), SINE,
     MATRIX, SAMPLED, LAW, ker.lambertian(), ker.specular(), TRIANGLES, ker.RectangularTeethLaw(1.0),
     ker.CircularArcLaw(1.2), ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.4), (0.6, -0.1), (1, 0)])),
@@ -98,7 +99,7 @@ OBJECTS: tuple[Any, ...] = (
     ker.LeastResistanceLaw(), 0.5 * LAW + 0.5 * ker.specular(), TRIANGLES @ ker.specular(), TRIANGLES**2,
     LAW.in_specular_frame(), LAW.conditionals(1.0), COLLISION, 0.5 * COLLISION + 0.5 * ker.smooth(DISK),
     ker.no_slip(DISK),
-    GROOVES, 0.5 * GROOVES + 0.5 * GROOVES @ GROOVES, ker.Zernike(2),
+    GROOVES, 0.5 * GROOVES + 0.5 * GROOVES @ GROOVES, ker.SurfaceLaw(SURFACE), ker.Zernike(2),
     ker.SatelliteLaw(TEETH, DISK, 0.01), PAIR, ROUGH, ker.PolygonalBody([TRIANGLE]), ALONG, ker.SpringWall(0.5, 1.0),
     ker.CollisionAlongWall(ALONG, DISK), RECORD, GAS, geo.WALLS["koch"], ker.displacements(TEETH, 200, rng=0),
     ker.exchange_hollow(HALVES, 0.05), spec.spectrum(LAW, 2, tolerance=0.1),
@@ -138,7 +139,7 @@ ARGUMENTS: dict[str, Any] = {
     "events": 3, "normals": [0.0, 2.0, 4.0], "count": 4, "joined": True, "map": lambda theta: np.pi - theta,
     "symmetric": MATRIX.symmetric, "seam": "mirror", "most_hollows": 3, "smallest_opening": 0.01, "resolution": 0.1,
     "width": 0.1, "within": 0.25, "collision": COLLISION, "divisions": 4, "inertia": 0.5, "reflector": TEETH,
-    "laws": ker.smooth(DISK),
+    "surface": SURFACE, "laws": ker.smooth(DISK),
     "ConfigurationSpace.height": -0.5, "ConfigurationSpace.position": POSITION[0], "Container.wall": [0],
     "ConfigurationSpace.velocity": VELOCITY[0], "BilliardRecord.direction": (1.0, 0.0), "Container.angle": 1.0,
     "RollingCharts.position": [0.1, 0.2], "RollingCharts.velocity": [0.1, -1.0, 0.2], "Container.last": [-1],
@@ -148,12 +149,15 @@ ARGUMENTS: dict[str, Any] = {
     "PositionLaw.function": lambda x, theta: np.cos(theta), "ExchangeHollow.function": lambda a, b: a * b,
     "TensorBasis.function": lambda angle: angle[..., 0], "Zernike.function": lambda at: at[..., 0],
     "Zernike.angle": [0.5, 0.1], "HemisphereLaw.velocity": [[0.2, 0.1, -1.0]], "ExchangeHollow.number": 2,
+    "SurfaceLaw.velocity": [[0.2, 0.1, -1.0]],
     "HemisphereCombination.velocity": [[0.2, 0.1, -1.0]], "PairLaw.first": DISK, "PairLaw.second": DISK,
     "Wall.vertices": [(0, 0), (0.5, -1), (1, 0)], "SatelliteDisk.alpha": 0.1,
     "Container.position": [[0.3, 0.1]], "Container.velocity": [[0.2, -1.0]], "Container.length": [0.1],
     "PolygonalBody.position": [[3.0, 0.1]], "PolygonalBody.velocity": [[-1.0, 0.0]], "Displacements.scale": 1.0,
     "SpringWall.gas_temperature": 2.0, "Composition.first": LAW, "Composition.second": LAW,
     "Segment.vertices": TRIANGLE, "SpringWall.speed": [1.0, 2.0],
+    "Surface.points": [[0.3, 0.1]], "Surface.velocities": [[0.2, 0.1, -1.0]], "Surface.point": [0.3, 0.1],
+    "Surface.velocity": [0.2, 0.1, -1.0], "Surface.heights": [[0.0, 0.3], [0.5, 0.1]], "Surface.spacing": 0.5,
     "Panels.moments": np.ones((2, 2, 3)),
 }  # fmt: skip
 # Other arguments of single calls.
@@ -192,6 +196,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     },
     "SatelliteDisk": {"size": 0.1, "angles": [0.0, 1.0, 3.0, 5.0]},
     "SatelliteLaw.draw_limit": {"samples": 4},
+    "Surface.random": {"points": 8},
     "TriangularTeethLaw": {"angle": 1.0},
     "Wall.from_profile": {"x": [0, 1]},
     "Wall.save": {"path": "wall.toml", "overwrite": True},
@@ -231,9 +236,9 @@ SPECIAL: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 # They take other functions of the library, an array into which they write, or what other functions have checked.
 UNCALLED = {
-    "matrix_on", "entries", "on_disc", "reflected", "add_products", "attempt", "apply_to_states", "save", "draw",
+    "matrix_on", "entries", "on_zernike", "reflected", "add_products", "attempt", "apply_to_states", "save", "draw",
     "plot", "plot_eigenfunctions", "features", "Spectrum.at", "of_lists", "mixed", "followed_by",
-    "sums", "fault",
+    "sums", "fault", "exit_velocities", "map_powers", "wave_powers",
     # of a piece, asked by walls, containers and tables
     "arrival", "curvature", "cut", "from_table", "goes_in_waves", "has_parts", "heights", "hull", "is_on", "joined",
     "largest_curvature", "length_to", "of_table", "parameter_of", "point_at_length", "row", "signed_area", "steps",
@@ -243,7 +248,8 @@ UNCALLED = {
 UNREPLACED = {
     "engine", "client", "checkpoint", "key", "runner", "metadata", "counts", "replicates", "symmetrised",
     "reversible", "mirror_symmetric", "frame", "requested_tolerance", "unresolved", "norm_bound", "raw_defect",
-    "beyond", "cost", "incoming", "accommodation.incidence_deg", "study_wall.incidence_deg",
+    "beyond", "cost", "incoming", "accommodation.incidence_deg", "accommodation.azimuth_deg",
+    "study_wall.incidence_deg",
 }  # fmt: skip
 
 
@@ -277,6 +283,7 @@ METHODS = (
     "Law.sample", "MatrixLaw.density", "MushroomGenerations.generation", "MushroomGenerations.trace",
     "MushroomGenerations.width", "NamedWall.build", "PairLaw.from_wall", "PairLaw.sample", "Panels.for_wall",
     "Profile.detrended", "Profile.in_unit", "RollingCharts.nearest", "RoughBody.sample", "SatelliteLaw.draw_limit",
+    "Surface.random", "Surface.trace", "Surface.trajectory",
     "TriangularTeethLaw.breakpoints", "TriangularTeethLaw.branches", "TriangularTeethLaw.conditionals",
     "Wall.foreshorten", "Wall.from_profile", "Wall.from_vertices", "Wall.outline", "Wall.save", "Wall.scaled",
     "Wall.unforeshorten",

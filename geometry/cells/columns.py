@@ -133,10 +133,10 @@ class Columns:
             if max(self.usecols) >= len(words):
                 raise ValueError
             x, height = (words[column] for column in self.usecols)
-        position = _number(x)
+        position = word_number(x)
         if math.isnan(position):
             raise ValueError
-        return position, _number(height)
+        return position, word_number(height)
 
     def _failure(self, text: str, words: str, is_map: bool) -> InputError:
         """A fault in a file of pairs, or a file of another kind."""
@@ -179,7 +179,7 @@ class Columns:
         if self.decimal == "," and re.search(r",(?!\d)", line):
             return None
         try:
-            return [_number(word) for word in self._words(line)]
+            return [word_number(word) for word in self._words(line)]
         except ValueError:
             return None
 
@@ -267,7 +267,7 @@ def _two_columns(table: Floats) -> tuple[int, int]:
     return x, table.shape[1] - 1 if table.shape[1] == 3 else x + 1
 
 
-def _number(word: str) -> float:
+def word_number(word: str) -> float:
     """A finite number, or NaN for a word that stands for none."""
     # the minus of typesetting, and the exponent of Fortran
     word = re.sub(r"(?<=[\d.])[dD](?=[+-]?\d+$)", "e", word.replace("−", "-"))
@@ -284,6 +284,6 @@ def _number(word: str) -> float:
 
 def _is_number(word: str) -> bool:
     try:
-        return not math.isnan(_number(word))
+        return not math.isnan(word_number(word))
     except ValueError:
         return False

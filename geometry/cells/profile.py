@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -205,7 +205,7 @@ def read_profile(
     """
     file = Path(path)
     columns = Columns(delimiter, "." if decimal is None else decimal, usecols, skiprows)
-    given, undefined = _pair_of_units(units), None if undefined is None else finite_number("undefined", undefined)
+    given, undefined = pair_of_units(units), None if undefined is None else finite_number("undefined", undefined)
     if quantity is not None:
         choice("quantity", quantity, get_args(Quantity))
     taken: dict[str, str] = {}
@@ -270,7 +270,8 @@ def _with_a_comma(text: str, columns: Columns) -> tuple[Floats, Floats, Header |
         return None
 
 
-def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
+def pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
+    """The units of lengths and of heights or slopes, or one of both."""
     if units is None:
         return None
     pair = (units, units) if isinstance(units, str) else units
@@ -316,29 +317,32 @@ def _profile(x: Floats, values: Floats, units: tuple[str, str] | None, slopes: b
 def _read_instrument(
     file: Path, row: int | None, given: tuple[str, str] | None, quantity: Quantity | None, why: str
 ) -> Profile:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            from SurfaceTopography import read_topography
-    except ImportError as reason:
-        raise InputError(
-            f"{file}: not two columns of numbers ({why}), and reading the formats of instruments needs the extra: "
-            "pip install 'asperity[profiles]'"
-        ) from reason
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            scan = read_topography(str(file))
-            heights = heights_of("height", scan.heights())
-            positions = scan.positions()
-            # that package converts heights to the unit of lengths
-            unit = str(scan.unit or "")
-    except Exception as reason:  # every reader of that package fails in its own way on a file it cannot read
-        first = (str(reason).splitlines() or [type(reason).__name__])[0]
-        raise InputError(f"{file}: SurfaceTopography cannot read it ({first})") from reason
+    scan, heights = instrument_scan(file, f"not two columns of numbers ({why})")
+    # that package converts heights to the unit of lengths
+    positions, unit = scan.positions(), str(scan.unit or "")
     if heights.ndim == 2:
         count = heights.shape[1]
         chosen = count // 2 if row is None else whole_number("row", row, 0, most=count - 1)
         heights, positions = heights[:, chosen], positions[0][:, chosen]
     header = Header("", (unit, unit), False) if metres(unit) else None
     return _profile(np.asarray(positions, dtype=np.float64), heights, *_meaning(header, given, quantity))
+
+
+def instrument_scan(file: Path, why: str) -> tuple[Any, Floats]:
+    """A line or map of SurfaceTopography, and its heights; ``why`` says why the file is nothing simpler."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            from SurfaceTopography import read_topography
+    except ImportError as reason:
+        raise InputError(
+            f"{file}: {why}, and reading the formats of instruments needs the extra: pip install 'asperity[profiles]'"
+        ) from reason
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            scan = read_topography(str(file))
+            return scan, heights_of("height", scan.heights())
+    except Exception as reason:  # every reader of that package fails in its own way on a file it cannot read
+        first = (str(reason).splitlines() or [type(reason).__name__])[0]
+        raise InputError(f"{file}: SurfaceTopography cannot read it ({first})") from reason

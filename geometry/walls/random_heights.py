@@ -1,4 +1,4 @@
-"""Random walls: periodic Gaussian heights with a given correlation function or power spectrum, by Fourier synthesis."""
+"""Random walls and maps: periodic Gaussian heights with a given correlation or power spectrum, by Fourier synthesis."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ FEWEST_POINTS, MOST_POINTS = 4, 2**20
 # Terms of the sum over all periods are left out once the periods span so many correlation lengths; exp(-40) is below
 # the rounding error of 1.
 SPAN = 40.0
+# Periods to either side of a map over which correlations are summed.
+MOST_IMAGES = 60
 # A power below zero that is smaller than this fraction of the largest is the rounding error of a discrete Fourier
 # transform of at most MOST_POINTS values.
 ROUNDING = 1024.0 * EPS
@@ -69,18 +71,37 @@ class HeightCorrelation:
     def powers(self, points: int, period: float) -> Floats:
         """The power of each frequency 0, ..., points//2 up to a factor: the transform of the correlations."""
         period = positive_number("period", period)
-        correlation = self.shape if callable(self.shape) else CORRELATIONS[self.shape]
         periods = int(np.ceil(SPAN * self.length / period))
         images = period * (np.arange(points) / points + np.arange(-periods, periods + 1)[:, None])
-        values = finite_array("shape", correlation(np.abs(images) / self.length))
-        if values.shape != images.shape:
-            raise InputError(f"shape: expected an array of {images.shape} for one of that shape, got {values.shape}")
-        found = np.fft.rfft(values.sum(axis=0)).real
-        least = int(np.argmin(found))
+        return self._checked(np.fft.rfft(self._values(np.abs(images)).sum(axis=0)).real)
+
+    def map_powers(self, points: tuple[int, int], periods: tuple[float, float]) -> Floats:
+        """The powers of all waves of a grid in the plane, in the order of numpy's transform, up to a factor."""
+        reach = [int(np.ceil(SPAN * self.length / period)) for period in periods]
+        if max(reach) > MOST_IMAGES:
+            most = MOST_IMAGES * min(periods) / SPAN
+            raise InputError(f"length: expected at most {most:g} for the period {min(periods):g}, got {self.length}")
+        total = np.zeros(points)
+        for image in np.ndindex(2 * reach[0] + 1, 2 * reach[1] + 1):
+            x, y = (period * (np.arange(count) / count + k - most)
+                    for k, most, count, period in zip(image, reach, points, periods, strict=True))  # fmt: skip
+            total += self._values(np.hypot(*np.ix_(x, y)))
+        return self._checked(np.fft.fft2(total).real)
+
+    def _values(self, distance: Floats) -> Floats:
+        correlation = self.shape if callable(self.shape) else CORRELATIONS[self.shape]
+        values = finite_array("shape", correlation(distance / self.length))
+        if values.shape != distance.shape:
+            raise InputError(f"shape: expected an array of {distance.shape} for one of that shape, got {values.shape}")
+        return values
+
+    @staticmethod
+    def _checked(found: Floats) -> Floats:
+        least = np.unravel_index(int(np.argmin(found)), found.shape)
         if found[least] < -ROUNDING * found.max():
             raise InputError(
                 f"shape: expected a correlation function, whose power spectrum is nowhere negative; at frequency "
-                f"{least}/period it is {found[least] / found.max():.2g} of its largest value"
+                f"{', '.join(map(str, least))}/period it is {found[least] / found.max():.2g} of its largest value"
             )
         return np.maximum(found, 0.0)
 
@@ -122,9 +143,12 @@ class SelfAffine:
     def powers(self, points: int, period: float) -> Floats:
         """The power of each frequency 0, ..., points//2 up to a factor."""
         period = positive_number("period", period)
-        wavelength = np.append(np.inf, period / np.arange(1, points // 2 + 1))
+        return self.wave_powers(np.append(np.inf, period / np.arange(1, points // 2 + 1)), period, 1)
+
+    def wave_powers(self, wavelength: Floats, period: float, dimension: int) -> Floats:
+        """The powers of waves of these lengths, on a line or a plane, up to a factor."""
         capped = np.minimum(wavelength, period if self.longest is None else self.longest)
-        powers = np.where(np.isinf(wavelength), 0.0, (capped / (2.0 * np.pi)) ** (1.0 + 2.0 * self.hurst))
+        powers = np.where(np.isinf(wavelength), 0.0, (capped / (2.0 * np.pi)) ** (dimension + 2.0 * self.hurst))
         return np.where(wavelength < (self.shortest or 0.0), 0.0, powers)
 
 
@@ -191,18 +215,10 @@ def random_wall(
     # a frequency and its negative; the highest one of an even number of points has no other
     modes = np.append(np.full((number - 1) // 2 + 1, 2.0), np.ones(1 - number % 2))
     squares = modes * powers / width
-    wanted = rms_height if rms_slope is None else rms_slope
-    if wanted is not None and (rms_slope is None or rms_height is None):
-        name, order = ("rms_height", 0) if rms_slope is None else ("rms_slope", 1)
-        size = number_between(name, wanted, 0.0, LARGEST_COORDINATE)
-        transfer = _mean_squares(wave, width / number, number, smooth, order)
-        powers = powers * size**2 / _positive_sum(squares * transfer)
-    elif rms_slope is not None or not callable(spectrum):
-        raise InputError(
-            f"rms_slope: expected one of rms_slope and rms_height, got rms_slope={rms_slope}, rms_height={rms_height}"
-        )
-    else:
-        _positive_sum(squares)
+    powers = powers * _factor(
+        lambda order: squares * (1.0 if order is None else _mean_squares(wave, width / number, number, smooth, order)),
+        rms_slope, rms_height, is_free=callable(spectrum),
+    )  # fmt: skip
     heights = _synthesised(powers, number, width, generator(rng))
     return _smooth_wall(heights, width) if smooth else _polygon(heights, width)
 
@@ -211,16 +227,72 @@ def _powers(spectrum: HeightSpectrum, points: int, period: float) -> Floats:
     """The checked powers of the frequencies 0, ..., points//2; that of the mean height is 0."""
     if isinstance(spectrum, (HeightCorrelation, SelfAffine)):
         return np.append(0.0, spectrum.powers(points, period)[1:])
+    wave: Floats = 2.0 * np.pi / period * np.arange(1, points // 2 + 1, dtype=np.float64)
+    return np.append(0.0, _given_powers(spectrum, wave))
+
+
+def _given_powers(spectrum: Callable[[Floats], Floats], wave: Floats) -> Floats:
+    """The checked powers of a function of wave numbers."""
     if not callable(spectrum):
         raise InputError(
             f"spectrum: expected HeightCorrelation(0.1), SelfAffine(0.8) or a function of wave numbers, "
             f"got {spectrum!r}"
         )
-    wave: Floats = 2.0 * np.pi / period * np.arange(1, points // 2 + 1, dtype=np.float64)
     found = finite_array("spectrum", spectrum(wave))
     if found.shape != wave.shape or np.any(found < 0.0):
         raise InputError(f"spectrum: expected {len(wave)} powers of at least 0, one for each wave number, got {found}")
-    return np.append(0.0, found)
+    return found
+
+
+def _factor(
+    squares: Callable[[int | None], Floats], rms_slope: float | None, rms_height: float | None, *, is_free: bool
+) -> float:
+    """What makes the wanted mean square of slopes (order 1) or heights (0) of powers; 1 where none is needed."""
+    wanted = rms_height if rms_slope is None else rms_slope
+    if wanted is not None and (rms_slope is None or rms_height is None):
+        name, order = ("rms_height", 0) if rms_slope is None else ("rms_slope", 1)
+        size = number_between(name, wanted, 0.0, LARGEST_COORDINATE)
+        return size**2 / _positive_sum(squares(order))
+    if rms_slope is not None or not is_free:
+        raise InputError(
+            f"rms_slope: expected one of rms_slope and rms_height, got rms_slope={rms_slope}, rms_height={rms_height}"
+        )
+    _positive_sum(squares(None))
+    return 1.0
+
+
+def random_map(
+    spectrum: HeightSpectrum,
+    points: tuple[int, int],
+    periods: tuple[float, float],
+    rms_slope: float | None,
+    rms_height: float | None,
+    rng: np.random.Generator,
+) -> Floats:
+    """Heights of a random surface; see `Surface.random`. White noise is filtered by the root of the powers."""
+    counts = zip(points, periods, strict=True)
+    x, y = np.ix_(*(2.0 * np.pi / period * np.fft.fftfreq(number, 1.0 / number) for number, period in counts))
+    wave = np.hypot(x, y)
+    if isinstance(spectrum, HeightCorrelation):
+        powers = spectrum.map_powers(points, periods)
+    elif isinstance(spectrum, SelfAffine):
+        with np.errstate(divide="ignore"):
+            powers = spectrum.wave_powers(2.0 * np.pi / wave, max(periods), 2)
+    else:
+        powers = np.zeros(points)
+        powers.ravel()[1:] = _given_powers(spectrum, wave.ravel()[1:])
+    powers[0, 0] = 0.0
+    dx, dy = (period / number for period, number in zip(periods, points, strict=True))
+    slopes = (2.0 * np.sin(0.5 * x * dx) / dx) ** 2 + (2.0 * np.sin(0.5 * y * dy) / dy) ** 2
+    # a facet has a third of the mean products of two corners beside a third of the mean square
+    levels = (3.0 + np.cos(x * dx) + np.cos(y * dy) + np.cos(x * dx + y * dy)) / 6.0
+    transfer = {None: 1.0, 0: levels, 1: slopes}
+    area = periods[0] * periods[1]
+    powers = powers * _factor(
+        lambda order: powers * transfer[order] / area, rms_slope, rms_height, is_free=callable(spectrum)
+    )
+    noise = np.fft.fft2(rng.standard_normal(points)) * np.sqrt(powers * powers.size / area)
+    return np.asarray(np.fft.ifft2(noise).real)
 
 
 def _positive_sum(squares: Floats) -> float:

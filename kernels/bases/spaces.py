@@ -197,6 +197,15 @@ class Zernike(BasisOfPoints):
         values = Vectorised(lambda _: function(points), scalar=True)(points[..., 0])
         return np.asarray(np.einsum("rpi,rp,r->i", self.evaluate(points), values, weight / (4.0 * number)))
 
+    def magnitudes(self) -> tuple[Floats, Floats]:
+        # |R_n^m| <= 1 = R_n^m(1), so that the sum of squares is largest on the rim: (n + 1)^2 of each degree
+        sizes = np.arange(1.0, self.degree + 2.0)
+        return np.array([np.sqrt(np.sum(sizes**2))]), np.array([np.inf])
+
+    def derivative_norm(self) -> float:
+        # the mean squared gradient of f_{n,m} is (n + 1)(n (n + 2) - m^2)
+        return float(np.sqrt(np.sum((self.degrees + 1.0) * (self.degrees * (self.degrees + 2.0) - self.orders**2))))
+
     def coarsened(self) -> tuple[Zernike, Floats] | None:
         if not self.degree:
             return None
@@ -217,13 +226,30 @@ def zernike_functions(points: Floats, degrees: NDArray[np.int64], orders: NDArra
 
     R_n^m(r) = r^m P_k^(0,m)(2 r^2 - 1) with k = (n - m)/2, and r^m e^(i m phi) = (x + i y)^m.
     """
-    from scipy.special import eval_jacobi
-
     order = np.abs(orders)
-    z = (points[..., 0] + 1j * points[..., 1])[..., None]
-    factors = np.broadcast_to(z, (*z.shape[:-1], int(order.max(initial=0)) + 1)).copy()
-    factors[..., 0] = 1.0
-    powers = np.cumprod(factors, axis=-1)
-    angular = np.where(orders < 0, powers.imag[..., order], powers.real[..., order])
-    radial = eval_jacobi((degrees - order) // 2, 0.0, order, 2.0 * np.abs(z) ** 2 - 1.0)
-    return np.asarray(np.sqrt((degrees + 1.0) * np.where(orders, 2.0, 1.0)) * radial * angular)
+    found = np.empty((*points.shape[:-1], degrees.size))
+    z = points[..., 0] + 1j * points[..., 1]
+    power, square = np.ones_like(z), points[..., 0] ** 2 + points[..., 1] ** 2
+    for m in range(int(order.max(initial=0)) + 1):
+        own = np.flatnonzero(order == m)
+        index = (degrees[own] - m) // 2
+        radial = jacobi_polynomials(square, m, int(index.max(initial=-1)) + 1)
+        for k, column in zip(index.tolist(), own.tolist(), strict=True):
+            angular = power.imag if orders[column] < 0 else power.real
+            found[..., column] = np.sqrt((degrees[column] + 1.0) * (2.0 if m else 1.0)) * radial[k] * angular
+        power = power * z
+    return found
+
+
+def jacobi_polynomials(square: Floats, order: int, count: int) -> Floats:
+    """Values P_k^(0,m)(2 r^2 - 1), k = 0, ..., count - 1, shape (count, ...), by their recurrence in k."""
+    x, m = 2.0 * square - 1.0, float(order)
+    found = np.ones((count, *np.shape(square)))
+    for k in range(1, count):
+        if k == 1:
+            found[1] = 0.5 * ((m + 2.0) * x - m)
+            continue
+        s = 2.0 * k + m
+        linear = (s - 1.0) * (s * (s - 2.0) * x - m * m) * found[k - 1]
+        found[k] = (linear - 2.0 * (k - 1.0) * (k + m - 1.0) * s * found[k - 2]) / (2.0 * k * (k + m) * (s - 2.0))
+    return found

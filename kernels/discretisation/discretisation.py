@@ -10,7 +10,7 @@ from typing import Unpack, get_args
 
 import numpy as np
 
-from ...core.checks import DOUBLE, Rng, check_memory, choice, finite_number, generator, instance, whole_number
+from ...core.checks import DOUBLE, Rng, check_memory, choice, generator, instance
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...core.long_runs import Engine, reported
@@ -23,18 +23,7 @@ from ..laws.law import Law
 from ..laws.matrix_law import MatrixLaw, finite_matrix
 from ..laws.structure import Rules, SpatialLaw, fold, holds_of_all
 from ..matrices.matrix import KernelMatrix
-from ..sampling.sobol import PARTS
-from .method import (
-    DEFAULT_SAMPLES,
-    MOST_SEGMENTS,
-    QUICK_SEGMENTS,
-    SAMPLING,
-    SEED_WITHOUT_RNG,
-    SEGMENTS_A_RAY,
-    Budget,
-    Method,
-    MethodName,
-)
+from .method import SEED_WITHOUT_RNG, Method, MethodName, checked_budget
 from .methods import METHODS, SAMPLED, matrix_by
 
 # Memory in which a matrix is computed, in matrices, and least time of an entry.
@@ -55,12 +44,12 @@ def discretise(
     r"""The Galerkin matrix <e_i, P e_j> of a law P in a basis of L^2(sin theta d theta).
 
     A law of angles (theta, psi), such as a `CollisionLaw`, takes a `TensorBasis` of a basis in theta and one in psi
-    with ``weight="sin2"``, and a `HemisphereLaw` takes `Zernike`. A law made of specular reflection and retroreflection
-    also takes a basis in psi alone, because both preserve sin(psi)^2 d psi as well.
+    with ``weight="sin2"``. A `HemisphereLaw` and a `SurfaceLaw` take `Zernike`. A law made of specular reflection and
+    retroreflection also takes a basis in psi alone, because both preserve sin(psi)^2 d psi as well.
 
     Parameters
     ----------
-    law : Law, CollisionLaw or HemisphereLaw
+    law : Law, CollisionLaw, HemisphereLaw or SurfaceLaw
         Any law; for a combination each term is computed by its best method.
     basis : Basis
         Bins, Legendre or Panels for theta; Zernike for tangential velocities.
@@ -87,8 +76,8 @@ def discretise(
         and rows of ``array`` sum to 1 only within the sampling error.
     checkpoint : path, optional
         A file in which the sums are stored every few seconds, for ``"monte-carlo"``, and for ``"qmc"`` of a law driven
-        by one uniform number. The same call with the same file continues the run; the file of other rays is refused,
-        and the message names the difference.
+        by one uniform number or of a `SurfaceLaw`. The same call with the same file continues the run; the file of
+        other rays is refused, and the message names the difference.
     key : str, optional
         A name of one's own for the computation, for a law whose content a checkpoint cannot compare; as of
         `asperity.spectral.sweep`.
@@ -170,17 +159,7 @@ def discretise(
         return _on_roll_angles(law, basis)
     check_memory("basis", f"computing the matrix in {basis!r}", MATRICES * basis.size**2)
     choice("method", method, (*get_args(MethodName), *(each.matrix.__name__ for each in (*METHODS, *SAMPLED))))
-    choice("symmetrise", symmetrise, (True, False))
-    if finite_number("tolerance", tolerance) < 0.0:
-        raise InputError(f"tolerance: expected a number of at least 0, got {tolerance!r}")
-    number = DEFAULT_SAMPLES if samples is None else whole_number("samples", samples, 2 * PARTS)
-    if symmetrise and not law.reversible:
-        raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
-    if engine and method not in SAMPLING:
-        raise InputError(f"method: checkpoint and client need 'monte-carlo' or 'qmc', got {method!r}")
-    # Quadrature requested by name may take some seconds.
-    segments = MOST_SEGMENTS if method == "quadrature" else min(QUICK_SEGMENTS, SEGMENTS_A_RAY * number)
-    budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)
+    budget = checked_budget(law, method, tolerance, samples, source, symmetrise=symmetrise, engine=engine)
     exact = finite_matrix(law, edges=basis.edges) if isinstance(basis, Bins) else None
     has_bins = method == "auto" and not holds_of_all(law, lambda part: not isinstance(part, MatrixLaw))
     entries = basis.size**2

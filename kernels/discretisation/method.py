@@ -8,7 +8,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ...core.checks import Floats, read_only
+from ...core.checks import Floats, choice, finite_number, read_only, whole_number
+from ...core.errors import InputError
 from ...core.estimates import ErrorKind
 from ...core.long_runs import Engine
 from ...core.rounding import EPS
@@ -61,6 +62,30 @@ class Budget:
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(SEED_WITHOUT_RNG))
     symmetrise: bool = False
     engine: Engine | None = None
+
+
+def checked_budget(
+    law: Any,
+    method: str,
+    tolerance: float,
+    samples: int | None,
+    rng: np.random.Generator,
+    *,
+    symmetrise: bool,
+    engine: Engine,
+) -> Budget:
+    """The budget of a call of `discretise`; raises InputError for what does not fit the law or the method."""
+    choice("symmetrise", symmetrise, (True, False))
+    if finite_number("tolerance", tolerance) < 0.0:
+        raise InputError(f"tolerance: expected a number of at least 0, got {tolerance!r}")
+    number = DEFAULT_SAMPLES if samples is None else whole_number("samples", samples, 2 * PARTS)
+    if symmetrise and not law.reversible:
+        raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
+    if engine and method not in SAMPLING:
+        raise InputError(f"method: checkpoint and client need 'monte-carlo' or 'qmc', got {method!r}")
+    # Quadrature requested by name may take some seconds.
+    segments = MOST_SEGMENTS if method == "quadrature" else min(QUICK_SEGMENTS, SEGMENTS_A_RAY * number)
+    return Budget(tolerance, number, segments, rng=rng, symmetrise=symmetrise, engine=engine or None)
 
 
 class Method(NamedTuple):

@@ -1,4 +1,4 @@
-"""The law of a wall with grooves on the half sphere of velocities, and sums and products of such laws."""
+"""Laws of velocities on the half sphere: of walls with grooves, and sums and products of laws of one wall."""
 
 from __future__ import annotations
 
@@ -7,12 +7,23 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, finite_number, foreign, frozen, generator, instance, shaped, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    finite_number,
+    foreign,
+    frozen,
+    generator,
+    instance,
+    read_only,
+    shaped,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.rounding import EPS
@@ -30,7 +41,8 @@ from ..matrices.matrix import KernelMatrix, frobenius_error
 # the degree leaves to the change from half of it.
 BETWEEN_FACTORS, CHANGE = 2, 3.0
 # Weight, and the laws applied one after the other.
-Term: TypeAlias = "tuple[float, tuple[HemisphereLaw, ...]]"
+Term: TypeAlias = "tuple[float, tuple[DirectionFactor, ...]]"
+Orientation: TypeAlias = float | Literal["random"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -40,7 +52,8 @@ class AzimuthalBlock(Summary):
     Attributes
     ----------
     symmetric : array of shape (k, k)
-        <f_{n,m}, P f_{n',m}>, symmetric if the law is reversible. Read-only.
+        <f_{n,m}, P f_{n',m}>, symmetric if the law is reversible; read-only. Of a surface it is complex, because one
+        that differs from its mirror image turns velocities to one side, and then Hermitian if the law is reversible.
     degrees : array of int, shape (k,)
         n = m, m + 2, ..., at most the degree asked for.
     order : int
@@ -49,14 +62,23 @@ class AzimuthalBlock(Summary):
         The error in the operator norm, in value and half width: no eigenvalue of a symmetric matrix is wrong by more.
     """
 
-    symmetric: Floats
+    symmetric: NDArray[Any]
     degrees: NDArray[np.int64]
     order: int
     error: Estimate
 
 
+class OnDisc(NamedTuple):
+    """A matrix in Zernike functions, and its error as an operator and in the Frobenius norm."""
+
+    symmetric: Floats
+    error: float
+    frobenius: float
+    kind: ErrorKind
+
+
 class DirectionLaw(SpatialLaw):
-    """A law of directions in three dimensions: a sum of products of laws of grooves.
+    """A law of directions in three dimensions: a sum of products of laws of grooves and of surfaces.
 
     Products are those of operators, ``first @ second``: after the first wall the particle crosses to the second with
     its tangential velocity unchanged, as in a channel. A sum such as ``0.3 * H1 + 0.7 * H2`` reflects each particle by
@@ -77,7 +99,7 @@ class DirectionLaw(SpatialLaw):
 
     @property
     def rotation_invariant(self) -> bool:
-        """Whether every groove has a random direction."""
+        """Whether all grooves and surfaces have random directions."""
         return all(law.orientation == "random" for _, laws in self.products() for law in laws)
 
     @property
@@ -88,11 +110,7 @@ class DirectionLaw(SpatialLaw):
         mirror image J P~ is symmetric.
         """
         palindromes = all(laws == laws[::-1] for _, laws in self.products())
-        known = all(
-            law.law.reversible if law.orientation == "random" else law.specular.reversible
-            for _, laws in self.products()
-            for law in laws
-        )
+        known = all(law.symmetric for _, laws in self.products() for law in laws)
         return True if palindromes and known else None
 
     @seed_by_name
@@ -125,7 +143,7 @@ class DirectionLaw(SpatialLaw):
         """
         incoming = shaped("velocity", velocity, "...", 3)
         bad = np.argwhere(~(incoming[..., 2] < 0.0))
-        if bad.size:
+        if len(bad):
             raise InputError(
                 "velocity: expected incoming ones, with a negative component along the outward normal, the third, got "
                 f"{incoming[tuple(bad[0])].tolist()} at row {bad[0].tolist()} ({len(bad)} such)"
@@ -151,17 +169,19 @@ class DirectionLaw(SpatialLaw):
         m : int
             The order, from 0 to the degree. The block of -m is the same.
         **discretisation
-            Keywords of `discretise` for the planar laws, such as ``tolerance``.
+            Keywords of `discretise` for the planar laws and the surfaces, such as ``tolerance``.
 
         Returns
         -------
         AzimuthalBlock
-            A real matrix. The largest eigenvalue off the constants is a lower bound of the law's, but for the error.
+            A real matrix, or a complex one of surfaces. The largest eigenvalue off the constants is a lower bound of
+            the law's, but for the error.
 
         Raises
         ------
         InputError
-            If a groove has a fixed direction, which couples different orders, or the order is above the degree.
+            If a groove or surface has a fixed direction, which couples different orders, or the order is above the
+            degree.
 
         Notes
         -----
@@ -180,48 +200,49 @@ class DirectionLaw(SpatialLaw):
         m = whole_number("m", m, 0, most=degree)
         if not self.rotation_invariant:
             raise InputError(
-                f"{self!r}: grooves of a fixed direction couple different orders; use "
-                f"ker.discretise(H, ker.Zernike({degree}))"
+                f"{self!r}: a fixed direction couples different orders; use ker.discretise(H, ker.Zernike({degree}))"
             )
-        symmetric, error, kind = self.entries(degree, m, partial(discretise, **discretisation))
-        cosines = slice(symmetric.shape[0] // 2, None) if m else slice(None)
-        how = "error of the planar matrix, and of a product what polynomials between its factors leave out"
-        return AzimuthalBlock(
-            frozen(symmetric[cosines, cosines]), np.arange(m, degree + 1, 2), m, frobenius_error(error, kind, how)
-        )
+        found = self.entries(degree, m, partial(discretise, **discretisation))
+        half = found.symmetric.shape[0] // 2 if m else 0
+        # of e^(i m phi): between cosines, and from cosines to sines where there is a sense of rotation
+        block, turning = found.symmetric[half:, half:], found.symmetric[half:, :half]
+        whole = read_only(block + 1j * turning) if turning.any() else frozen(block)
+        how = "error of the factors' matrices, and of a product what polynomials between its factors leave out"
+        return AzimuthalBlock(whole, np.arange(m, degree + 1, 2), m, frobenius_error(found.error, found.kind, how))
 
-    def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
+    def matrix_on(self, basis: Basis, discretise: partial[KernelMatrix]) -> KernelMatrix:
         """The matrix in Zernike functions."""
         instance("basis", basis, Zernike, "ker.Zernike(8) for a law of directions")
         assert isinstance(basis, Zernike)
-        symmetric, error, kind = self.entries(basis.degree, None, discretise)
-        most = max(_between(basis.degree, laws) for _, laws in self.products())
-        total = frobenius_error(math.sqrt(most + 1.0) * error, kind, "error of the planar matrix on the disc")
+        found = self.entries(basis.degree, None, discretise)
+        total = frobenius_error(found.frobenius, found.kind, "error of the factors' matrices on the disc")
         return KernelMatrix(
-            symmetric, basis, total, method="quadrature", law=repr(self), reversible=self.reversible, frame="specular"
-        )
+            found.symmetric, basis, total,
+            method="quadrature", law=repr(self), reversible=self.reversible, frame="specular",
+        )  # fmt: skip
 
-    def entries(self, degree: int, order: int | None, discretise: Discretiser) -> tuple[Floats, float, ErrorKind]:
-        """The matrix in functions of degrees up to ``degree``, of one order or all, and its error as an operator.
+    def entries(self, degree: int, order: int | None, discretise: Discretiser) -> OnDisc:
+        """The matrix in functions of degrees up to ``degree``, of one order or all.
 
         Those of one order are sines, then cosines, by degree.
         """
-        total, error, kinds = np.zeros(()), 0.0, set()
+        total, errors, kinds = np.zeros(()), np.zeros(2), set()
         for weight, laws in self.parts:
             most = _between(degree, laws)
             degrees, orders = _functions(most, order)
-            planar = [discretise(law.specular, Legendre(most + 1)) for law in laws]
-            found = [law.on_disc(one.symmetric, degrees, orders) for law, one in zip(laws, planar, strict=True)]
-            product = _product(found, degrees <= degree, np.ones(degrees.size, dtype=bool))
-            wrong = math.prod(1.0 + float(one.error) for one in planar) - 1.0 + degrees.size * EPS
+            each = [law.on_zernike(most, degrees, orders, discretise) for law in laws]
+            factors = [one.symmetric for one in each]
+            product = _product(factors, degrees <= degree, np.ones(degrees.size, dtype=bool))
+            # laws are contractions, so that in either norm the errors of factors add up
+            wrong = np.prod([(1.0 + one.error, 1.0 + one.frobenius) for one in each], axis=0) - 1.0 + degrees.size * EPS
             if len(laws) > 1:
-                coarser = _product(found, degrees <= degree, degrees <= max(degree, most // 2))
+                coarser = _product(factors, degrees <= degree, degrees <= max(degree, most // 2))
                 wrong += CHANGE * float(np.linalg.norm(product - coarser))
-            kinds |= {one.error.kind for one in planar} | ({"estimate"} if len(laws) > 1 else set())
-            total, error = total + weight * product, error + weight * wrong
+            kinds |= {one.kind for one in each} | ({"estimate"} if len(laws) > 1 else set())
+            total, errors = total + weight * product, errors + weight * wrong
         if self.reversible:
             total = 0.5 * (total + total.T)
-        return total, error, "bound" if kinds == {"bound"} else "estimate"
+        return OnDisc(total, float(errors[0]), float(errors[1]), "bound" if kinds == {"bound"} else "estimate")
 
     def __matmul__(self, other: DirectionLaw) -> DirectionLaw:
         """This law, then the other."""
@@ -244,8 +265,50 @@ class DirectionLaw(SpatialLaw):
         return HemisphereCombination(self.products() + other.products())
 
 
+class DirectionFactor(DirectionLaw):
+    """The law of one wall, of which `DirectionLaw` makes sums and products.
+
+    Attributes
+    ----------
+    orientation : float or "random"
+    """
+
+    orientation: Orientation
+
+    @property
+    @abstractmethod
+    def symmetric(self) -> bool | None:
+        """Whether the law itself is symmetric with respect to the cosine law; None if unknown."""
+
+    @abstractmethod
+    def on_zernike(
+        self, degree: int, degrees: NDArray[np.int64], orders: NDArray[np.int64], discretise: Discretiser
+    ) -> OnDisc:
+        """The matrix in Zernike functions of these degrees, at most ``degree``, and orders."""
+
+    @abstractmethod
+    def reflected(self, incoming: Floats, rng: np.random.Generator) -> Floats:
+        """`sample` for checked velocities of shape (n, 3)."""
+
+    def products(self) -> tuple[Term, ...]:
+        """The only term, the law itself."""
+        return ((1.0, (self,)),)
+
+
+def checked_orientation(orientation: Orientation) -> Orientation:
+    """An angle in radians or "random"; raises InputError for others, as for degrees."""
+    if isinstance(orientation, str):
+        if orientation != "random":
+            raise InputError(f"orientation: expected an angle in radians or 'random', got {orientation!r}")
+        return orientation
+    turn = finite_number("orientation", orientation)
+    if abs(turn) > 2.0 * np.pi:
+        raise InputError(f"orientation: expected an angle in radians, at most 2 pi, got {turn!r}")
+    return turn
+
+
 @dataclass(frozen=True, repr=False)
-class HemisphereLaw(DirectionLaw):
+class HemisphereLaw(DirectionFactor):
     r"""The law of velocities in space of a wall with grooves, whose cross section has a planar law.
 
     A groove keeps the component b of the velocity along it. Across, it acts by the planar law on the direction in the
@@ -286,34 +349,30 @@ class HemisphereLaw(DirectionLaw):
     """
 
     law: Law
-    orientation: float | Literal["random"] = "random"
+    orientation: Orientation = "random"
 
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.WallLaw(wall)")
         _ = self.law.parts  # raises InputError unless the weights of a combination make it a law
-        if isinstance(self.orientation, str):
-            if self.orientation != "random":
-                raise InputError(f"orientation: expected an angle in radians or 'random', got {self.orientation!r}")
-        else:
-            turn = finite_number("orientation", self.orientation)
-            if abs(turn) > 2.0 * np.pi:
-                raise InputError(f"orientation: expected an angle in radians, at most 2 pi, got {turn!r}")
-            self._set(orientation=turn)
-
-    def products(self) -> tuple[Term, ...]:
-        """The only term, the law itself."""
-        return ((1.0, (self,)),)
+        object.__setattr__(self, "orientation", checked_orientation(self.orientation))
 
     @property
     def specular(self) -> Law:
         """The planar law in the specular frame, the convention of the disc."""
         return in_frame(self.law, "specular")
 
-    def on_disc(self, planar: Floats, degrees: NDArray[np.int64], orders: NDArray[np.int64]) -> Floats:
-        """The matrix in Zernike functions, from that of the planar law in Legendre polynomials."""
-        if isinstance(self.orientation, str):
-            return matrix_of_average(planar, degrees, orders)
-        return matrix_of_grooves(planar, degrees, orders, self.orientation)
+    @property
+    def symmetric(self) -> bool | None:
+        return self.law.reversible if self.orientation == "random" else self.specular.reversible
+
+    def on_zernike(
+        self, degree: int, degrees: NDArray[np.int64], orders: NDArray[np.int64], discretise: Discretiser
+    ) -> OnDisc:
+        planar = discretise(self.specular, Legendre(degree + 1))
+        matrix = matrix_of_average if isinstance(self.orientation, str) else matrix_of_grooves
+        angle = () if isinstance(self.orientation, str) else (self.orientation,)
+        found, error = matrix(planar.symmetric, degrees, orders, *angle), float(planar.error)
+        return OnDisc(found, error, math.sqrt(degree + 1.0) * error, planar.error.kind)
 
     def reflected(self, incoming: Floats, rng: np.random.Generator) -> Floats:
         """`sample` for checked velocities of shape (n, 3)."""
@@ -338,11 +397,11 @@ class HemisphereLaw(DirectionLaw):
 
 @dataclass(frozen=True, repr=False)
 class HemisphereCombination(DirectionLaw):
-    """A weighted sum of products of laws of grooves; made by ``0.3 * H1 + 0.7 * H2`` and ``H1 @ H2``.
+    """A weighted sum of products of laws of walls; made by ``0.3 * H1 + 0.7 * H2`` and ``H1 @ H2``.
 
     Parameters
     ----------
-    terms : tuple of (float, tuple of HemisphereLaw)
+    terms : tuple of (float, tuple of DirectionFactor)
         Weights, and laws applied one after the other.
 
     Raises
@@ -374,7 +433,7 @@ class HemisphereCombination(DirectionLaw):
         return " + ".join(map("".join, zip(factors, products, strict=True)))
 
 
-def _between(degree: int, laws: Sequence[HemisphereLaw]) -> int:
+def _between(degree: int, laws: Sequence[DirectionLaw]) -> int:
     """The largest degree between the factors of a product."""
     return degree if len(laws) == 1 else BETWEEN_FACTORS * degree
 

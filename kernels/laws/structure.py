@@ -9,6 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, product
 from typing import Generic, TypeAlias, TypeVar
 
@@ -199,11 +200,14 @@ Discretiser: TypeAlias = Callable[[Law, Basis], KernelMatrix]
 
 
 class SpatialLaw(Value, ABC):
-    """A law of several angles or of velocities in space, whose matrix is computed from those of laws of one angle."""
+    """A law of several angles or of velocities in space, whose matrix is computed in ways of its own."""
 
     @abstractmethod
-    def matrix_on(self, basis: Basis, discretise: Discretiser) -> KernelMatrix:
-        """The matrix in a basis; raises InputError for a basis of other functions."""
+    def matrix_on(self, basis: Basis, discretise: partial[KernelMatrix]) -> KernelMatrix:
+        """The matrix in a basis, from those of other laws or by the keywords of the call alone.
+
+        Raises InputError for a basis of other functions.
+        """
 
 
 class TensorLaw(SpatialLaw):

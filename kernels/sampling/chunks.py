@@ -356,7 +356,7 @@ class RaySums:
         if fraction > UNRESOLVED_TOLERANCE:
             raise AccuracyError(
                 f"{self.law!r}: {fraction:.2g} of {used} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}; "
-                "geometry.trace(wall, x, theta).counts() says how they ended",
+                "geometry.trace(wall, x, theta).counts() says how they ended, of a surface that of surface.trace(x, v)",
                 fraction,
             )
         if self.basis.is_partition:

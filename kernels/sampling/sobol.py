@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from ..bases.angles import clipped_inside
 from ..bases.assembly import is_mirror_symmetric
 from ..bases.basis import Basis
 from ..bases.measure import SINE
-from ..laws.law import Law, entry_inside, outgoing_angles
+from ..laws.law import entry_inside, outgoing_angles
 from ..matrices.matrix import KernelMatrix
 from . import chunks
 from .chunks import Job, RaySums, count_long
@@ -38,7 +38,10 @@ class SobolRays(Job):
 
     Attributes
     ----------
-    shifts, beyond : ndarray of shape (PARTS, 2)
+    dimension : int
+        Numbers that determine a ray: of an entry point and an incoming angle two. Rays of other spaces override it and
+        `add_points`.
+    shifts, beyond : ndarray of shape (PARTS, dimension)
         Of the digits of each part, and of the digits beyond.
     seed : tuple of int
         Of the sequence, which tells it and the shifts from others.
@@ -49,6 +52,8 @@ class SobolRays(Job):
     rays_a_task : int
         Rounded to whole chunks.
     """
+
+    dimension: ClassVar[int] = 2
 
     shifts: NDArray[np.uint64]
     beyond: Floats
@@ -85,18 +90,22 @@ class SobolRays(Job):
         return 0
 
     def add_to(self, sums: RaySums, first: int, task: int) -> None:
-        reflect = self.law.random_map()
-        assert reflect is not None  # checked by the sampler
         low, high = self.range_of(task)
-        sequence = sobol_sequence(self.seed, low)
+        sequence = sobol_sequence(self.seed, low, self.dimension)
         for start in range(low, high, self.chunk):
             digits = (sequence.random(min(self.chunk, high - start)) * 2.0**SOBOL_BITS).astype(np.uint64)
             points = (digits ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS
-            x, u = np.moveaxis(points + self.beyond[:, None], -1, 0)
-            theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
-            outgoing, escaped = reflect(entry_inside(x), theta.copy())
-            sums.count_unresolved(escaped)
-            sums.add_rows(first, theta, outgoing_angles(outgoing, theta, self.law))
+            self.add_points(sums, first, points + self.beyond[:, None])
+
+    def add_points(self, sums: RaySums, first: int, points: Floats) -> None:
+        """Add the rays of points of the unit cube, shape (PARTS, rays, dimension), to the tables from ``first`` on."""
+        reflect = self.law.random_map()
+        assert reflect is not None  # checked by the sampler
+        x, u = np.moveaxis(points, -1, 0)
+        theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
+        outgoing, escaped = reflect(entry_inside(x), theta.copy())
+        sums.count_unresolved(escaped)
+        sums.add_rows(first, theta, outgoing_angles(outgoing, theta, self.law))
 
     def identity(self) -> dict[str, Any]:
         return {
@@ -105,11 +114,11 @@ class SobolRays(Job):
         }  # fmt: skip
 
 
-def sobol_sequence(seed: tuple[int, ...], start: int) -> Sobol:
-    """The scrambled sequence of a seed in two dimensions, of which ``start`` points are passed over."""
+def sobol_sequence(seed: tuple[int, ...], start: int, dimension: int = 2) -> Sobol:
+    """The scrambled sequence of a seed, of which ``start`` points are passed over."""
     from scipy.stats.qmc import Sobol
 
-    sequence = Sobol(2, bits=SOBOL_BITS, rng=np.random.default_rng(seed))
+    sequence = Sobol(dimension, bits=SOBOL_BITS, rng=np.random.default_rng(seed))
     return sequence.fast_forward(start) if start else sequence
 
 
@@ -123,7 +132,7 @@ def whole_sequences(samples: int) -> int:
 
 
 class SobolSampler:
-    """Sampler of rays of a law driven by one uniform number, with incoming angles from the invariant measure.
+    """Sampler of rays of a law driven by uniform numbers, with incoming angles from the invariant measure.
 
     The rays form eight parts of equal size. Each part is the same scrambled Sobol sequence with its own random digital
     shift, so it is a scrambled Sobol sequence. Given the sequence, the parts are independent and identically
@@ -136,24 +145,26 @@ class SobolSampler:
     law : Law
     basis : Basis
     rng : numpy.random.Generator
+    rays : type
+        Of the rays: `SobolRays` for laws of angles that one number drives.
 
     Raises
     ------
     InputError
-        If the law needs more randomness than one number.
+        If the law needs more randomness.
     """
 
-    def __init__(self, law: Law, basis: Basis, rng: np.random.Generator) -> None:
+    def __init__(self, law: Any, basis: Basis, rng: np.random.Generator, rays: type[SobolRays] = SobolRays) -> None:
         if law.random_map() is None:
             raise InputError(
                 f"method: {law!r} is not driven by a uniform number, so it has no 'qmc'; use 'monte-carlo'"
             )
-        self.sums = RaySums(law, basis, PARTS)
+        self.sums, self.rays = RaySums(law, basis, PARTS), rays
         self.halved = law.mirror_symmetric is True and is_mirror_symmetric(basis)
         self.seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
         source = np.random.default_rng(self.seed)
-        self.shifts = source.integers(0, 2**SOBOL_BITS, size=(PARTS, 2), dtype=np.uint64)
-        self.beyond = source.random((PARTS, 2)) * 2.0**-SOBOL_BITS
+        self.shifts = source.integers(0, 2**SOBOL_BITS, size=(PARTS, rays.dimension), dtype=np.uint64)
+        self.beyond = source.random((PARTS, rays.dimension)) * 2.0**-SOBOL_BITS
 
     def sampled(self, samples: int, *, symmetrise: bool, engine: Engine | None = None) -> KernelMatrix:
         """The matrix from at least ``samples`` rays, rounded up to 8 times a power of two; see `RaySums.matrix`.
@@ -173,7 +184,7 @@ class SobolSampler:
                 f"samples: a Sobol sequence has at most {most} rays, got {samples}; use method 'monte-carlo'"
             )
         if each > self.sums.each:
-            rays = SobolRays(
+            rays = self.rays(
                 self.sums.law, self.sums.basis, self.shifts, self.beyond, self.seed, self.halved,
                 self.sums.each, each,
             )  # fmt: skip

@@ -16,7 +16,7 @@ from ...core.estimates import NORMAL_95, RULE_OF_THREE, Estimate, student_95
 from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...kernels import KernelMatrix, Law, Legendre, discretise, specular
-from ...kernels.hemisphere.hemisphere_law import DirectionLaw, HemisphereCombination
+from ...kernels.hemisphere.hemisphere_law import DirectionLaw, HemisphereCombination, HemisphereLaw
 from ...kernels.laws.structure import sum_of_words, words_of
 from ...kernels.walls.rectangular import sum_rule
 from .channel import LARGEST, in_paper_frame, reflected
@@ -216,11 +216,13 @@ def _found(
 def _without_specular(law: Law | DirectionLaw) -> tuple[float, Any]:
     """The probability of reflections that are not known to be specular, and their law."""
     if isinstance(law, DirectionLaw):
-        found = [(weight, *_without_specular(in_paper_frame(laws[0].law)), laws) for weight, laws in law.parts]
-        terms = [
-            (weight, laws) if len(laws) > 1 else (weight * part, (replace(laws[0], law=rest),))
-            for weight, part, rest, laws in found
-        ]
+        terms = []
+        for weight, laws in law.parts:
+            if len(laws) > 1 or not isinstance(laws[0], HemisphereLaw):
+                terms.append((weight, laws))
+                continue
+            part, rest = _without_specular(in_paper_frame(laws[0].law))
+            terms.append((weight * part, (replace(laws[0], law=rest),)))
         total = math.fsum(weight for weight, _ in terms)
         return total, HemisphereCombination(tuple((weight / (total or 1.0), laws) for weight, laws in terms))
     words = words_of(law)

@@ -1,4 +1,4 @@
-"""Momentum accommodation in space of walls with grooves, from the planar coefficients of their cross sections."""
+"""Momentum accommodation in space of walls with grooves, from the planar coefficients, and of mixtures of walls."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
-from ...kernels import Law
+from ...kernels import HemisphereLaw, Law, SurfaceLaw
 from ...kernels.bases.polynomials import SINE_NORM
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 
@@ -21,17 +21,17 @@ WEIGHTS = 0.9, 0.1
 
 @dataclass(frozen=True, repr=False)
 class SpaceAccommodation(Summary):
-    r"""How far particles that a wall with grooves reflects forget the momentum with which they came.
+    r"""How far particles that a wall reflects forget the momentum with which they came.
 
-    Incoming velocities of speed 1 have the cosine law, and grooves of any direction the same means: of a drifting gas
+    Incoming velocities of speed 1 have the cosine law, and walls of any direction the same means: of a drifting gas
     averaged over the directions of the drift in the plane.
 
     Attributes
     ----------
     tangential : Estimate
-        1 - E<v_t, v_t'>/E|v_t|^2: half the planar coefficient, because grooves keep one of two components.
+        1 - E<v_t, v_t'>/E|v_t|^2. Of grooves it is half the planar coefficient: they keep one of two components.
     normal : Estimate
-        1 - Cov(-v_n, v_n')/Var v_n: the planar coefficient times 9 - 27 pi^2/32 = 0.6725...
+        1 - Cov(-v_n, v_n')/Var v_n. Of grooves it is the planar coefficient times 9 - 27 pi^2/32 = 0.6725...
     maxwell_fraction : Estimate
         The f in [0, 1] whose Maxwell law has the nearest mean reflected velocities: .9 tangential + .1 normal.
     """
@@ -41,21 +41,36 @@ class SpaceAccommodation(Summary):
     maxwell_fraction: Estimate
 
 
-def in_space(law: DirectionLaw, planar: Callable[[Law], tuple[Estimate, ...]]) -> SpaceAccommodation:
-    """The coefficients of a mixture of laws of grooves, from the planar tangential and normal ones of each."""
+def in_space(
+    law: DirectionLaw,
+    planar: Callable[[Law], tuple[Estimate, ...]],
+    of_surface: Callable[[SurfaceLaw], SpaceAccommodation],
+) -> SpaceAccommodation:
+    """The coefficients of a mixture, from those of its surfaces, and the planar ones of its grooves."""
     if any(len(laws) > 1 for _, laws in law.parts):
         raise InputError(
-            f"{law!r}: expected a law of one collision, a law of grooves or a mixture of such; of a product of random "
-            "grooves 1 - H.matrix(1, 1).symmetric[0, 0] is the tangential coefficient"
+            f"{law!r}: expected a law of one collision, a law of one wall or a mixture of such; of a product of random "
+            "directions 1 - H.matrix(1, 1).symmetric[0, 0] is the tangential coefficient"
         )
-    each = [(weight, planar(laws[0].law)) for weight, laws in law.parts]
-    tangential, normal = (
-        _combined([(ratio * weight, found[index]) for weight, found in each])
-        for index, ratio in enumerate((TANGENTIAL, NORMAL))
-    )
+    terms: list[list[tuple[float, Estimate]]] = [[], []]
+    found: tuple[Estimate, ...]
+    for weight, (one,) in law.parts:
+        if isinstance(one, SurfaceLaw):
+            space = of_surface(one)
+            found, ratios = (space.tangential, space.normal), (1.0, 1.0)
+        else:
+            assert isinstance(one, HemisphereLaw)
+            found, ratios = planar(one.law)[:2], (TANGENTIAL, NORMAL)
+        for term, ratio, each in zip(terms, ratios, found, strict=True):
+            term.append((ratio * weight, each))
+    tangential, normal = map(_combined, terms)
+    return SpaceAccommodation(tangential, normal, nearest_maxwell(tangential, normal))
+
+
+def nearest_maxwell(tangential: Estimate, normal: Estimate) -> Estimate:
+    """The fraction in [0, 1] of the Maxwell law with the nearest mean reflected velocities."""
     mean = _combined(list(zip(WEIGHTS, (tangential, normal), strict=True)))
-    cut = Estimate(min(max(mean.value, 0.0), 1.0), mean.error, mean.kind, mean.method)
-    return SpaceAccommodation(tangential, normal, cut)
+    return Estimate(min(max(mean.value, 0.0), 1.0), mean.error, mean.kind, mean.method)
 
 
 def _combined(terms: list[tuple[float, Estimate]]) -> Estimate:

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.estimates import FEW, NORMAL_95, ErrorKind, Estimate, Summary, with_error
 from ...core.long_runs import reported
 from ...core.rounding import EPS
-from ...kernels import SINE, Law, Panels, PolygonLaw, WallLaw, discretise
+from ...kernels import SINE, Law, Panels, PolygonLaw, SurfaceLaw, WallLaw, discretise
 from ...kernels.bases.basis import Basis
 from ...kernels.bases.measure import LARGEST_ANGLE, SMALLEST_ANGLE
 from ...kernels.bases.polynomials import MEAN_SINE, SINE_NORM, Directions
@@ -27,6 +27,7 @@ from ..bounds.operator_residuals import image_rule
 from ..gap.shallow import ROUNDING, Slopes, slopes_of
 from .channel import in_paper_frame
 from .grooves_accommodation import SpaceAccommodation, in_space
+from .surface_accommodation import SurfaceAccommodation, of_surface
 
 # cos(theta) and sin(theta) are polynomials of this degree on so many panels, to 1e-14.
 PANELS, DEGREE = 4, 10
@@ -135,6 +136,15 @@ def accommodation(
 ) -> Accommodation: ...
 @overload
 def accommodation(
+    law: SurfaceLaw,
+    tolerance: float = 1e-8,
+    theta: None = None,
+    rng: Rng = None,
+    incidence_deg: ArrayLike | None = None,
+    azimuth_deg: ArrayLike | None = None,
+) -> SurfaceAccommodation: ...
+@overload
+def accommodation(
     law: DirectionLaw, tolerance: float = 1e-8, theta: None = None, rng: Rng = None, incidence_deg: None = None
 ) -> SpaceAccommodation: ...
 @reported("accommodation")
@@ -144,14 +154,15 @@ def accommodation(
     theta: ArrayLike | None = None,
     rng: Rng = None,
     incidence_deg: ArrayLike | None = None,
+    azimuth_deg: ArrayLike | None = None,
 ) -> Accommodation | SpaceAccommodation:
     r"""Tangential and normal momentum accommodation coefficients, and the Maxwell fraction that fits a law best.
 
     Parameters
     ----------
-    law : Law or HemisphereLaw
+    law : Law, HemisphereLaw or SurfaceLaw
         In either convention; it is converted to the paper's. Of a law on the half sphere of velocities, or a mixture of
-        such, the averages in space are given.
+        such, the averages in space are given, and of a surface coefficients at incoming directions too.
     tolerance : float
         Wanted error of the law's matrix, and of each coefficient at an angle as a fraction of it; where the latter is
         missed, the result says so.
@@ -161,18 +172,22 @@ def accommodation(
         For laws that are traced or sampled; ``np.random.default_rng(0)`` by default, so that results repeat.
     incidence_deg : array_like, optional
         The angles in place of ``theta``, in degrees from the normal, in (-90, 90): theta is 90 degrees less this
-        angle. At 0 only the normal coefficient is defined.
+        angle. At 0 only the normal coefficient is defined. Of a surface in [0, 90), from the normal in space.
+    azimuth_deg : array_like, optional
+        Of a surface, angles of the incoming tangential velocities from the wall's x axis, in degrees; they broadcast
+        with ``incidence_deg``. 0 by default.
 
     Returns
     -------
-    Accommodation or SpaceAccommodation
+    Accommodation, SpaceAccommodation or SurfaceAccommodation
 
     Raises
     ------
     InputError
-        If angles are given for a law on the half sphere, or such a law is a product. If an angle is pi/2, where the
-        tangential momentum is 0, or one with sin(theta) = pi/4, where the normal momentum is the accommodated one: a
-        coefficient is a quotient of differences, and both are 0 there. Of angles in degrees, 0 is allowed.
+        If angles are given for a law on the half sphere but a surface's, or such a law is a product. If an angle is
+        pi/2, where the tangential momentum is 0, or one with sin(theta) = pi/4, where the normal momentum is the
+        accommodated one: a coefficient is a quotient of differences, and both are 0 there. Of angles in degrees, 0 is
+        allowed.
 
     Notes
     -----
@@ -224,14 +239,34 @@ def accommodation(
 
     >>> float(spec.accommodation(ker.HemisphereLaw(ker.lambertian())).tangential)
     0.5
+
+    An egg carton with slopes of 1/5, at normal incidence:
+
+    >>> from asperity import geometry as geo
+    >>> carton = ker.SurfaceLaw(geo.Surface([[0.0, 0.2], [0.2, 0.4]]))
+    >>> spec.accommodation(carton, 0.01, incidence_deg=0).normal_at.round(12).tolist()
+    [0.444444444444]
     """
     wanted = positive_number("tolerance", tolerance)
     if isinstance(law, DirectionLaw):
-        for name, given in (("theta", theta), ("incidence_deg", incidence_deg)):
+        source, is_surface = generator(rng, 0), isinstance(law, SurfaceLaw)
+        at = (
+            {"theta": theta}
+            if is_surface
+            else {"theta": theta, "incidence_deg": incidence_deg, "azimuth_deg": azimuth_deg}
+        )
+        for name, given in at.items():
             if given is not None:
                 raise InputError(f"{name}: expected none for {law!r}, of which the averages are given, got {given!r}")
-        source = generator(rng, 0)
-        return in_space(law, lambda one: _averaged(_parts(in_paper_frame(one), wanted, source)))
+        if isinstance(law, SurfaceLaw):
+            return of_surface(law, wanted, incidence_deg, azimuth_deg, source)
+        return in_space(
+            law,
+            lambda one: _averaged(_parts(in_paper_frame(one), wanted, source)),
+            lambda one: of_surface(one, wanted, None, None, source),
+        )
+    if azimuth_deg is not None:
+        raise InputError(f"azimuth_deg: expected none for {law!r}, a law in the plane, got {azimuth_deg!r}")
     midpoints = SINE.quantile((np.arange(DEFAULT_ANGLES) + 0.5) / DEFAULT_ANGLES)
     if incidence_deg is not None:
         if theta is not None:

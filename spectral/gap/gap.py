@@ -13,7 +13,7 @@ from ...core.errors import AccuracyError
 from ...core.estimates import with_error
 from ...core.long_runs import TIME_LIMIT, OutOfTime, reported, time_limited
 from ...core.rounding import EPS
-from ...kernels import CollisionLaw, KernelMatrix, Law
+from ...kernels import CollisionLaw, KernelMatrix, Law, SurfaceLaw
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.matrix_law import check_law, finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
@@ -30,6 +30,7 @@ from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
 from .refinement import EIGENVALUES, HOW, refined
 from .shallow import shallow_gap
+from .surfaces import gap_of_surface
 from .theorems import gap_by_theorem, gap_of_exact, split_gap
 from .verdict import SpectralGap, isolated, made_from
 
@@ -130,12 +131,13 @@ def spectral_gap(
 
     Parameters
     ----------
-    law : Law, CollisionLaw, HemisphereLaw or KernelMatrix
+    law : Law, CollisionLaw, HemisphereLaw, SurfaceLaw or KernelMatrix
         A law in its own convention; for a collision law its P~. The gap of a law on the half sphere of velocities is
-        computed in Zernike functions, and planar gaps bound it from below. A matrix is not refined: the error is then
-        an estimate of the distance from the gap of its law, and ``evidence`` has the gap of the matrix itself with its
-        error. They are the same for a law of finitely many states in bins that refine its own. An array of transition
-        probabilities is a law: ``MatrixLaw(array)``.
+        computed in Zernike functions, and planar gaps bound it from below. Of a surface at a fixed orientation, whose
+        law need not be reversible, an upper bound is known only: the interval begins at 0. A matrix is not refined: the
+        error is then an estimate of the distance from the gap of its law, and ``evidence`` has the gap of the matrix
+        itself with its error. They are the same for a law of finitely many states in bins that refine its own. An array
+        of transition probabilities is a law: ``MatrixLaw(array)``.
     tolerance : float
         Wanted error. If it is not reached with the largest basis and number of rays, ``error`` is larger.
     rng : None, int or numpy.random.Generator
@@ -185,11 +187,13 @@ def spectral_gap(
     seconds, rng = positive_number("time_limit", time_limit), generator(rng, 0)
     if isinstance(law, CollisionLaw):
         law = law.law
+    if isinstance(law, SurfaceLaw):
+        return gap_of_surface(law, tolerance, rng)
     if isinstance(law, DirectionLaw):
         return gap_of_grooves(law, tolerance, rng, lambda one: spectral_gap(one, PLANAR, rng, time_limit=seconds))
     if isinstance(law, KernelMatrix):
         return _of_matrix(law)
-    check_law("law", law, "a Law, a CollisionLaw, a HemisphereLaw or a KernelMatrix")
+    check_law("law", law, "a Law, a CollisionLaw, a HemisphereLaw, a SurfaceLaw or a KernelMatrix")
     other = self_adjoint_elsewhere(law)
     if other is not None:
         return _contraction(law, other, tolerance, rng, seconds)

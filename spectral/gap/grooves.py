@@ -80,16 +80,16 @@ def _largest(
     """The largest eigenvalue of the matrix off the constants, and the error of the matrix as an operator."""
     top, wrong = -np.inf, 0.0
     for order in range(degree + 1) if invariant else (None,):
-        symmetric, error, _ = law.entries(degree, order, planar)
+        found = law.entries(degree, order, planar)
         # the constants come first
-        off = symmetric if order else symmetric[1:, 1:]
-        top, wrong = max(top, float(np.linalg.eigvalsh(off)[-1])), max(wrong, error)
+        off = found.symmetric if order else found.symmetric[1:, 1:]
+        top, wrong = max(top, float(np.linalg.eigvalsh(off)[-1])), max(wrong, found.error)
     return top, wrong
 
 
-def _at_least(law: HemisphereLaw, planar_gap: Callable[[Law], Estimate]) -> float:
-    """The planar gap less its error for grooves of random direction; 0 for those of a fixed one."""
-    if not isinstance(law.orientation, str):
+def _at_least(law: DirectionLaw, planar_gap: Callable[[Law], Estimate]) -> float:
+    """The planar gap less its error for grooves of random direction; 0 for those of a fixed one and for surfaces."""
+    if not isinstance(law, HemisphereLaw) or not isinstance(law.orientation, str):
         return 0.0
     found = planar_gap(law.specular)
     return max(found.value - found.error, 0.0)

@@ -27,6 +27,7 @@ FLOORS = [
         "geometry.tracing.compiled",
         "geometry.tracing",
     ),
+    *("geometry.surfaces.compiled", "geometry.surfaces"),
     *("geometry.polygons.compiled", "geometry.polygons", "geometry.itineraries.compiled", "geometry.itineraries"),
     *("geometry.plotting", "geometry.collisions.compiled", "geometry.collisions", "geometry"),
     *(

@@ -129,6 +129,14 @@ def test_the_wall_has_the_wanted_moments(run):
     assert abs(names["difference"]).max() < 1e-10
 
 
+def test_a_measured_surface_is_levelled_and_its_quarters_differ(run):
+    names = run("a_measured_surface")
+    assert names["surface"].unit == "um" and names["surface"].rms_slope == pytest.approx(0.567, abs=0.002)
+    whole, quarters = names["found"].tangential, [float(one) for one in names["quarters"]]
+    assert whole.value == pytest.approx(0.476, abs=0.01) and max(quarters) - min(quarters) > 5 * whole.error
+    assert names["gap"].verdict == "isolated" and np.nansum(names["density"]) / 900 == pytest.approx(np.pi, rel=0.05)
+
+
 def test_sobol_sequences_beat_independent_rays(run):
     report = run("error_against_time")["report"]
     error = {row.method: row.error for row in report.rows}  # of the largest budget

@@ -38,8 +38,8 @@ PRIVATE = (
 # What is no result but is combined with others shows the expression or the constructor that makes it, in one line.
 EXPRESSIONS = {
     "AngularMeasure", "BranchLaw", "CollisionCombination", "Combination", "Composition", "Curve", "Defect",
-    "DirectionLaw", "DrivenLaw", "HemisphereCombination", "Hollow", "Power", "Reflector", "SpecularFrame",
-    "SymmetryDefect", "VelocityLaw",
+    "DirectionFactor", "DirectionLaw", "DrivenLaw", "HemisphereCombination", "Hollow", "Power", "Reflector",
+    "SpecularFrame", "SymmetryDefect", "VelocityLaw",
     # a constant of a theorem, the facts of a method: one line too
     "CollisionConstants", "MethodFacts", "Separation",
 }  # fmt: skip

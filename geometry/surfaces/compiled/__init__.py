@@ -1,0 +1,1 @@
+"""The compiled function that traces rays on height maps."""
