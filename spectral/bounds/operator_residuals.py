@@ -29,6 +29,8 @@ from .images import ROUNDED, expectations_of, is_traced
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
 # A panel must begin below pi/2 by more than this to belong to the left half.
 HALF_ROUNDING = 1e-12
+# Fraction of the squared residuals in marked panels.
+MARKED = 0.9
 # Default error of conditional expectations.
 MEAN_TOLERANCE = 1e-8
 # Where a law does not know all its breakpoints a jump may lie in any panel. The differences of two rules have this
@@ -56,12 +58,15 @@ class Residuals:
         ||P v_i - rho_i v_i||, with the error of the quadrature added.
     angles_used : int
         Number of incoming angles at which the law was applied.
+    marks : array
+        Ends of the panels with most of the squared residuals of the leading functions.
     """
 
     quotients: Floats
     quotient_errors: Floats
     norms: Floats
     angles_used: int
+    marks: Floats
 
     def split(self, number: int) -> tuple[Residuals, Residuals]:
         """The results for the first ``number`` functions, and for the others."""
@@ -69,7 +74,7 @@ class Residuals:
             (self.quotients[part], self.quotient_errors[part], self.norms[part])
             for part in (slice(None, number), slice(number, None))
         )
-        first, others = (Residuals(*arrays, self.angles_used) for arrays in both)
+        first, others = (Residuals(*arrays, self.angles_used, self.marks) for arrays in both)
         return first, others
 
 
@@ -124,9 +129,12 @@ def residuals(
     assert known is not None  # there are panels
     correction, square = known.total.sum(axis=0)
     correction_error, square_error = known.error + known.uncertainty.sum(axis=0)
+    squares = known.total[:, 1, :leading].sum(axis=1)
+    most = np.argsort(-squares)[: 1 + int(np.searchsorted(np.cumsum(-np.sort(-squares)), MARKED * squares.sum()))]
     return Residuals(
-        values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used
-    )
+        values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used,
+        np.append(known.low[most], known.high[most]),
+    )  # fmt: skip
 
 
 class _Integrals(NamedTuple):
@@ -152,9 +160,8 @@ class _Integrals(NamedTuple):
     @property
     def error(self) -> Floats:
         """The error of the sums, as that of `AnglePanels.total_error`."""
-        own = np.sum((self.errors - self.ends) ** 2, axis=0)
         joint = np.mean(self.nulls.sum(axis=0) ** 2, axis=0)
-        return np.asarray(np.sqrt(np.maximum(own, joint)) + self.ends.sum(axis=0))
+        return np.asarray(np.sqrt(np.maximum(np.sum(self.errors**2, axis=0), joint)))
 
 
 def _knows_breakpoints(law: Law) -> bool:
@@ -169,7 +176,7 @@ def _first_panels(law: Law, basis: Basis, error: float) -> tuple[Floats, Floats,
     The differences of two rules on the panels are to be multiplied by the margin.
     """
     # nearer to grazing the measure is less than the error
-    grazing = GRAZING_EDGES[GRAZING_EDGES**2 > error] if is_traced(law) else GRAZING_EDGES
+    grazing = GRAZING_EDGES[error < GRAZING_EDGES**2] if is_traced(law) else GRAZING_EDGES
     edges = [basis.edges, grazing, np.pi - grazing]
     for part in {part for word in words_of(law) or () for part in word}:
         if isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw):
