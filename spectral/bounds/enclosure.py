@@ -244,6 +244,7 @@ def enclosed_trial_space(
             law, basis, np.column_stack([vectors, space.following]), np.append(values, space.following_values),
             MOST_TRACED_ANGLES if is_traced(law) else MOST_EXACT_ANGLES,
             mirrored=space.mirrored, quotient_error=TRIAL_FRACTION * tolerance, leading=len(values),
+            expected=space.square,
         )  # fmt: skip
         found, after = both.split(len(values))
         next_value, finer = _reach(after, rank), np.union1d(space.finer, found.marks)

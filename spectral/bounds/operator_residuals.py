@@ -59,7 +59,7 @@ class Residuals:
     angles_used : int
         Number of incoming angles at which the law was applied.
     marks : array
-        Ends of the panels with most of the squared residuals of the leading functions.
+        Ends of panels with most of the squared residuals, if these are larger than expected.
     """
 
     quotients: Floats
@@ -80,7 +80,7 @@ class Residuals:
 
 def residuals(
     law: Law, basis: Basis, vectors: Floats, values: Floats, most_angles: int = MOST_ANGLES, *,
-    mirrored: bool = False, quotient_error: float = 0.0, leading: int | None = None,
+    mirrored: bool = False, quotient_error: float = 0.0, leading: int | None = None, expected: float = np.inf,
 ) -> Residuals:  # fmt: skip
     """Rayleigh quotients and residuals of the functions with the coefficients ``vectors``, shape (n, k).
 
@@ -90,7 +90,8 @@ def residuals(
     does what they do not see between the ends of a panel and the nodes: a law that hardly changes angles smooths the
     jumps of v over less than this distance.
     ``mirrored``: each function is even or odd, and the law is mirror-symmetric. Quotients are refined until their error
-    is below ``quotient_error``.
+    is below ``quotient_error``. Panels are marked where the ``leading`` functions together have more than twice the
+    squared residuals ``expected``.
     """
     rule = image_rule(law, basis, vectors)
 
@@ -130,7 +131,9 @@ def residuals(
     correction, square = known.total.sum(axis=0)
     correction_error, square_error = known.error + known.uncertainty.sum(axis=0)
     squares = known.total[:, 1, :leading].sum(axis=1)
-    most = np.argsort(-squares)[: 1 + int(np.searchsorted(np.cumsum(-np.sort(-squares)), MARKED * squares.sum()))]
+    order = np.argsort(-squares)
+    enough = 1 + int(np.searchsorted(np.cumsum(squares[order]), MARKED * squares.sum()))
+    most = order[: enough if squares.sum() > 2.0 * expected else 0]
     return Residuals(
         values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used,
         np.append(known.low[most], known.high[most]),

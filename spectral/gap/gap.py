@@ -79,10 +79,10 @@ def _of_density(law: DensityLaw, tolerance: float, edge: EssentialEdge, seconds:
 
 def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> Iterator[SpectralGap]:
     """Gaps of growing accuracy. The sequence does not depend on the tolerance if rays are traced."""
-    number, start = FEWEST, None
+    number, start, least = FEWEST, None, np.inf
     for wanted in TOLERANCES if is_traced(law) else (tolerance,):
         asked = wanted
-        while True:
+        while least > wanted:
             found = enclosed_trial_space(law, number, None, asked, rank, start)
             values = np.array([item.value for item in found.enclosures if item.index != 0])
             if edge.low > 0.0 and np.all(rank(values) <= edge.high):
@@ -90,9 +90,10 @@ def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> I
                 return
             start, gap = found.finer, _gap_of(law, found.enclosures, edge, rank)
             if gap is not None:
+                least = min(least, gap.error)
                 yield gap
             unknown = gap is None or gap.error > wanted / CLOSER
-            if (gap is not None and gap.error <= wanted) or (unknown and number == MOST):
+            if unknown and number == MOST:
                 break
             if unknown:
                 number += 1
