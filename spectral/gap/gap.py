@@ -148,8 +148,9 @@ def spectral_gap(
         Source of rays for traced laws; by default ``np.random.default_rng(0)``.
     time_limit : float
         Limit in seconds for the enclosures of a traced law, and half of it again for rays if these fail. It is counted
-        as seven to ten million ray segments or some 200,000 to a million rays a second, so that the result does not
-        depend on the machine. A longer limit continues the same enclosures, and never makes them worse.
+        as about a million rays with eight million segments, or some 200,000 to a million rays without quadrature, a
+        second, so that the result does not depend on the machine. A longer limit continues the same enclosures, and
+        never makes them worse.
 
     Returns
     -------
