@@ -3,8 +3,8 @@
 A case is a random wall of one to five pieces in one of the conventions: mixed pieces, Bezier pieces, arcs that touch,
 islands, mirror images, several hollows below flat tops, and smooth profiles of 20 points. The judges are the gap at a
 tenth of the least tolerance with a long time limit, and matrices of the textbook tracer's rays, in Legendre polynomials
-and in bins that become narrow at grazing, whose eigenvalues are lower bounds of those of the law. In the table each row is a tolerance; the outcomes count the gaps that reach it by the
-processor time that they take.
+and in bins that become narrow at grazing, whose eigenvalues are lower bounds of those of the law. In the table each row
+is a tolerance; the outcomes count the gaps that reach it by the processor time that they take.
 """
 
 from __future__ import annotations
