@@ -122,7 +122,7 @@ def residuals(
         affordable = max(most_angles - angles_used, 0) // (2 * len(POINTS))
         worst = np.argsort(-fraction)[:affordable]
         wide = known.high[worst] - known.low[worst] > NARROWEST
-        worst = worst[(fraction[worst] * np.sqrt(len(fraction)) > 1.0) & wide]
+        worst = worst[(fraction[worst] * len(fraction) ** (1.0 if len(rules) == 1 else 0.5) > 1.0) & wide]
         middle = 0.5 * (known.low[worst] + known.high[worst])
         low, high = np.append(known.low[worst], middle), np.append(middle, known.high[worst])
         if low.size:
@@ -162,7 +162,9 @@ class _Integrals(NamedTuple):
 
     @property
     def error(self) -> Floats:
-        """The error of the sums, as that of `AnglePanels.total_error`."""
+        """The error of the sums, for several null rules as that of `AnglePanels.total_error`, else their sum."""
+        if self.nulls.shape[1] == 1:
+            return np.asarray(self.errors.sum(axis=0))
         joint = np.mean(self.nulls.sum(axis=0) ** 2, axis=0)
         return np.asarray(np.sqrt(np.maximum(np.sum(self.errors**2, axis=0), joint)))
 
