@@ -33,8 +33,8 @@ MANY_CHANGES = 16
 SAMPLE_DISTANCE = 0.1
 # Critical angles per search, and the least width of their pieces as a fraction of the widest piece.
 MOST_CUTS, CUT_FRACTION = 6, 0.1
-# Nominal time of an incoming angle beside its ray segments, in seconds.
-ANGLE_TIME = 2e-4
+# Nominal times of an incoming angle and of a ray, in seconds, beside this fraction of that of its segments.
+ANGLE_TIME, RAY_TIME, SEGMENT_FRACTION = 2e-4, 3.5e-7, 0.55
 # Samples per incoming angle, at irregular positions, so that no symmetry of the wall hides a piece from all samples.
 FIRST_SAMPLES = 32
 GOLDEN = 0.6180339887498949
@@ -177,10 +177,11 @@ class HollowConditionals:
         seeds = [self._seeds(angle, width) for angle, width in zip(theta.tolist(), least.tolist(), strict=True)]
         rules = nested_rules(self.least_level)
         marched = compiled_result(lambda: marched_angles(theta, tolerances, self._setting, rules, seeds))
-        self.rays += sum(found.rays for found in marched)
+        rays = sum(found.rays for found in marched)
         segments = sum(found.segments for found in marched)
-        self.segments += segments
-        count_time(segments * self.scene.segment_time + len(theta) * ANGLE_TIME)
+        self.rays, self.segments = self.rays + rays, self.segments + segments
+        of_segments = SEGMENT_FRACTION * segments * self.scene.segment_time
+        count_time(of_segments + rays * RAY_TIME + len(theta) * ANGLE_TIME)
         found_conditionals = {}
         for angle, width, found in zip(theta.tolist(), least.tolist(), marched, strict=True):
             found_conditionals[angle] = Conditional(*found.nodes, found.error, found.unresolved)

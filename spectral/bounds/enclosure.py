@@ -244,9 +244,10 @@ def enclosed_trial_space(
             law, basis, np.column_stack([vectors, space.following]), np.append(values, space.following_values),
             MOST_TRACED_ANGLES if is_traced(law) else MOST_EXACT_ANGLES,
             mirrored=space.mirrored, quotient_error=TRIAL_FRACTION * tolerance, leading=len(values),
+            expected=space.square,
         )  # fmt: skip
         found, after = both.split(len(values))
-        next_value, finer = _reach(after, rank), space.finer
+        next_value, finer = _reach(after, rank), np.union1d(space.finer, found.marks)
     else:
         if basis is None:
             basis = Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
@@ -361,7 +362,7 @@ def _first_that_separates(
         if modulus[number - 1] - joint <= following[number - 1] and number > 1:
             # the next trial function overlaps: a multiple or unresolved eigenvalue
             continue
-        apart = rest_of_spectrum(law, listed, joint, float(following[number - 1]))
+        apart = rest_of_spectrum(law, listed, joint, float(following[number - 1]), rank is np.positive)
         if modulus[number - 1] - joint > apart.radius:
             return number, apart
         refused = apart if refused is None else refused

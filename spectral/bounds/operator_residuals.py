@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -15,7 +16,7 @@ from ...kernels import Basis, Bins, DensityLaw, Law, Panels
 from ...kernels.bases.assembly import mirror_refinement, reflection_matrix
 from ...kernels.bases.measure import SINE
 from ...kernels.discretisation.quadrature import GRAZING_EDGES
-from ...kernels.expectations.angle_panels import KRONROD, NODES, NULL_RULES
+from ...kernels.expectations.angle_panels import KRONROD, NODES, NULL_RULES, error_of_null_rules
 from ...kernels.expectations.conditionals import Means, weighted_means
 from ...kernels.laws.law import Composition, SpecularFrame, is_atomic, knows_errors
 from ...kernels.laws.structure import holds_of_all, law_of, words_of
@@ -26,6 +27,8 @@ from .images import expectations_of, is_traced
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
 # A panel must begin below pi/2 by more than this to belong to the left half.
 HALF_ROUNDING = 1e-12
+# Fraction of the squared residuals in marked panels.
+MARKED = 0.9
 # Default error of conditional expectations.
 MEAN_TOLERANCE = 1e-8
 # Where a law does not know all its breakpoints a jump may lie in any panel. The differences of two rules have this
@@ -53,12 +56,15 @@ class Residuals:
         ||P v_i - rho_i v_i||, with the error of the quadrature added.
     angles_used : int
         Number of incoming angles at which the law was applied.
+    marks : array
+        Ends of panels with most of the squared residuals, if these are larger than expected.
     """
 
     quotients: Floats
     quotient_errors: Floats
     norms: Floats
     angles_used: int
+    marks: Floats
 
     def split(self, number: int) -> tuple[Residuals, Residuals]:
         """The results for the first ``number`` functions, and for the others."""
@@ -66,13 +72,13 @@ class Residuals:
             (self.quotients[part], self.quotient_errors[part], self.norms[part])
             for part in (slice(None, number), slice(number, None))
         )
-        first, others = (Residuals(*arrays, self.angles_used) for arrays in both)
+        first, others = (Residuals(*arrays, self.angles_used, self.marks) for arrays in both)
         return first, others
 
 
 def residuals(
     law: Law, basis: Basis, vectors: Floats, values: Floats, most_angles: int = MOST_ANGLES, *,
-    mirrored: bool = False, quotient_error: float = 0.0, leading: int | None = None,
+    mirrored: bool = False, quotient_error: float = 0.0, leading: int | None = None, expected: float = np.inf,
 ) -> Residuals:  # fmt: skip
     """Rayleigh quotients and residuals of the functions with the coefficients ``vectors``, shape (n, k).
 
@@ -82,7 +88,8 @@ def residuals(
     does what they do not see between the ends of a panel and the nodes: a law that hardly changes angles smooths the
     jumps of v over less than this distance.
     ``mirrored``: each function is even or odd, and the law is mirror-symmetric. Quotients are refined until their error
-    is below ``quotient_error``.
+    is below ``quotient_error``. Panels are marked where the ``leading`` functions together have more than twice the
+    squared residuals ``expected``.
     """
     rule = image_rule(law, basis, vectors)
 
@@ -92,42 +99,72 @@ def residuals(
             raise AccuracyError("rows without a known error are no ground for an enclosure", float("nan"))
         return expansion(basis, vectors, theta), images, errors
 
-    low, high, margin = _first_panels(law, basis)
+    low, high, margin = _first_panels(law, basis, quotient_error)
     rules = NULL_RULES if margin > 1.0 else NULL_RULES[:1]
     if mirrored:
         inside = low < 0.5 * np.pi - HALF_ROUNDING
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
-    ends = np.zeros((2, 0))
-    # integrals, differences of the two rules, and effects of the errors of conditional expectations
-    total, error, uncertainty = (np.zeros((0, 2, len(values))) for _ in range(3))
+    known: _Integrals | None = None
     angles_used = 0
     while low.size:
-        fresh = _integrals(here_and_images, values, low, high, 2.0 if mirrored else 1.0, rules)
-        fresh[1][:] *= margin
+        fresh = _integrals(here_and_images, values, (low, high), 2.0 if mirrored else 1.0, margin * rules, margin)
         angles_used += low.size * len(POINTS)
-        ends = np.concatenate([ends, [low, high]], axis=1)
-        total, error, uncertainty = (
-            np.concatenate(both) for both in zip((total, error, uncertainty), fresh, strict=True)
-        )
-        square = total[:, 1].sum(axis=0)
+        known = fresh if known is None else _Integrals(*map(np.concatenate, zip(known, fresh, strict=True)))
+        square = known.total[:, 1].sum(axis=0)
         # a Kato-Temple bound adds about the square to the quotient, so the error of the quotient should be smaller
         least, rounding = np.array([[1.0], [FRACTION]]) * quotient_error, np.array([[4.0 * EPS], [(8.0 * EPS) ** 2]])
         wanted = np.maximum(FRACTION * square + rounding, least)
-        fraction = (error / wanted)[..., :leading].max(axis=(1, 2))
+        if np.all((known.error <= wanted)[:, :leading]):
+            break
+        fraction = (known.errors / wanted)[..., :leading].max(axis=(1, 2))
         affordable = max(most_angles - angles_used, 0) // (2 * len(POINTS))
         worst = np.argsort(-fraction)[:affordable]
-        worst = worst[(fraction[worst] * len(fraction) > 1.0) & (np.diff(ends[:, worst], axis=0)[0] > NARROWEST)]
-        if np.all((error.sum(axis=0) <= wanted)[:, :leading]):
-            break
-        middle = ends[:, worst].mean(axis=0)
-        low, high = np.append(ends[0, worst], middle), np.append(middle, ends[1, worst])
-        rest = np.setdiff1d(np.arange(len(fraction)), worst)
-        ends, total, error, uncertainty = ends[:, rest], total[rest], error[rest], uncertainty[rest]
-    correction, square = total.sum(axis=0)
-    correction_error, square_error = (error + uncertainty).sum(axis=0)
+        wide = known.high[worst] - known.low[worst] > NARROWEST
+        worst = worst[(fraction[worst] * len(fraction) ** (1.0 if len(rules) == 1 else 0.5) > 1.0) & wide]
+        middle = 0.5 * (known.low[worst] + known.high[worst])
+        low, high = np.append(known.low[worst], middle), np.append(middle, known.high[worst])
+        if low.size:
+            known = _Integrals(*(np.delete(part, worst, axis=0) for part in known))
+    assert known is not None  # there are panels
+    correction, square = known.total.sum(axis=0)
+    correction_error, square_error = known.error + known.uncertainty.sum(axis=0)
+    squares = known.total[:, 1, :leading].sum(axis=1)
+    order = np.argsort(-squares)
+    enough = 1 + int(np.searchsorted(np.cumsum(squares[order]), MARKED * squares.sum()))
+    most = order[: enough if squares.sum() > 2.0 * expected else 0]
     return Residuals(
-        values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used
-    )
+        values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used,
+        np.append(known.low[most], known.high[most]),
+    )  # fmt: skip
+
+
+class _Integrals(NamedTuple):
+    """Integrals of v (P v - rho v) and (P v - rho v)^2 over panels, which the first axis of every array runs over.
+
+    Null rules and what they do not see at the ends, both with the margin, tell the error; the uncertainty is the effect
+    of the errors of conditional expectations.
+    """
+
+    low: Floats
+    high: Floats
+    total: Floats
+    nulls: Floats
+    ends: Floats
+    uncertainty: Floats
+
+    @property
+    def errors(self) -> Floats:
+        """The error of each panel."""
+        squares = np.moveaxis(self.nulls, 1, 0) ** 2
+        return np.asarray((np.sqrt(squares[0]) if len(squares) == 1 else error_of_null_rules(squares)) + self.ends)
+
+    @property
+    def error(self) -> Floats:
+        """The error of the sums, for several null rules as that of `AnglePanels.total_error`, else their sum."""
+        if self.nulls.shape[1] == 1:
+            return np.asarray(self.errors.sum(axis=0))
+        joint = np.mean(self.nulls.sum(axis=0) ** 2, axis=0)
+        return np.asarray(np.sqrt(np.maximum(np.sum(self.errors**2, axis=0), joint)))
 
 
 def _knows_breakpoints(law: Law) -> bool:
@@ -136,12 +173,14 @@ def _knows_breakpoints(law: Law) -> bool:
     return smooth or bool(np.isfinite(law.breakpoints(1)[1]))
 
 
-def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats, float]:
+def _first_panels(law: Law, basis: Basis, error: float) -> tuple[Floats, Floats, float]:
     """Panels between the edges of the basis and near grazing, for densities also between their breakpoints; a margin.
 
     The differences of two rules on the panels are to be multiplied by the margin.
     """
-    edges = [basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES]
+    # nearer to grazing the measure is less than the error
+    grazing = GRAZING_EDGES[error < GRAZING_EDGES**2] if is_traced(law) else GRAZING_EDGES
+    edges = [basis.edges, grazing, np.pi - grazing]
     for part in {part for word in words_of(law) or () for part in word}:
         if isinstance(part, DensityLaw) and not part.is_lambertian:
             # the law is symmetric: where p(theta, .) has breakpoints, p(., theta') has them
@@ -157,14 +196,15 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats, float]:
 
 
 def _integrals(
-    function: Callable[[Floats], tuple[Floats, Floats, Floats]], values: Floats, low: Floats, high: Floats,
-    copies: float, rules: Floats,
-) -> tuple[Floats, Floats, Floats]:  # fmt: skip
-    """Integrals of v (P v - rho v) and (P v - rho v)^2 over each panel, their errors, and effects of those of means.
+    function: Callable[[Floats], tuple[Floats, Floats, Floats]], values: Floats, panels: tuple[Floats, Floats],
+    copies: float, rules: Floats, margin: float,
+) -> _Integrals:  # fmt: skip
+    """The integrals over each panel.
 
     The function gives v, P v, shape (angles, k), and the errors of P v. An error e of P v adds e v to the first
     integrand and 2 e (P v - rho v) + e^2 to the second.
     """
+    low, high = panels
     half = 0.5 * (high - low)
     angle = (0.5 * (low + high))[:, None] + half[:, None] * POINTS
     here, image, mean_error = function(angle.ravel())
@@ -175,12 +215,14 @@ def _integrals(
     uncertainties = np.stack([effect.reshape(shape) for effect in effects], axis=2)
     weight = copies * half[:, None, None, None] * SINE.density(angle)[..., None, None]
     at_nodes, at_ends = np.split(weight * parts, [len(NODES)], axis=1)
-    beyond = (1.0 - NODES.max()) * np.abs(at_ends - np.einsum("eq,pqjk->pejk", AT_ENDS, at_nodes)).sum(axis=1)
-    return (
+    beyond = np.abs(at_ends - np.einsum("eq,pqjk->pejk", AT_ENDS, at_nodes)).sum(axis=1)
+    return _Integrals(
+        low, high,
         np.einsum("q,pqjk->pjk", KRONROD, at_nodes),
-        np.sqrt(np.mean(np.einsum("nq,pqjk->npjk", rules, at_nodes) ** 2, axis=0)) + beyond,
+        np.einsum("nq,pqjk->pnjk", rules, at_nodes),
+        margin * (1.0 - NODES.max()) * beyond,
         np.einsum("q,pqjk->pjk", KRONROD, (weight * uncertainties)[:, : len(NODES)]),
-    )
+    )  # fmt: skip
 
 
 def image_rule(law: Law, basis: Basis, vectors: Floats) -> Means:

@@ -15,7 +15,8 @@ from ...kernels.laws.structure import Rules, fold
 from ..eigenvalues.dense import symmetric_half
 from ..essential.compact import compact_matrix
 from ..essential.edge import essential_edge
-from .oscillations import fast_top
+from .images import is_traced
+from .oscillations import fast_top, values_in_bins
 
 # For a law with eigenvalues g^l the power P^p is chosen with x = g^p near this value. Then the sum of the omitted
 # squares, x^(2 m)/(1 - x^2), is below the last listed square, x^(2 m - 2), and above rounding.
@@ -39,7 +40,7 @@ class Separation:
     reason: str
 
 
-def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) -> Separation:
+def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float, by_value: bool = False) -> Separation:
     """A bound of the spectrum beyond the listed eigenvalues.
 
     Parameters
@@ -51,6 +52,8 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
         Distance within which each listed value has its own eigenvalue.
     next_value : float
         Modulus plus residual of the next eigenvalue in the basis, for laws without a better bound.
+    by_value : bool
+        Whether the values listed are the largest ones, and the spectrum is bounded from above only.
     """
     found = _of_series(law, values, width) or _of_matrix(law, len(values))
     if found is not None:
@@ -68,6 +71,12 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
     fast = fast_top(law)
     if fast is not None and fast[0] > next_value:
         return Separation(1.0, "estimate", f"fast oscillations show spectrum near 1, how much is not known: {fast[1]}")
+    # rays see eigenfunctions in narrow intervals of angles, between the nodes of panels
+    above, below = values_in_bins(law) if is_traced(law) else (np.empty(0), np.empty(0))
+    seen = above if by_value else -np.sort(-np.append(above, below))
+    if np.any(seen[len(values) - 1 : len(values)] > next_value):
+        shown = f"rays show another eigenvalue, of at least {seen[len(values) - 1]:.3g}"
+        return Separation(1.0, "estimate", f"{shown}, between the nodes of the basis")
     reason = f"next eigenvalue in the basis, with its residual; essential part at most {edge.high:.3g}"
     return Separation(next_value, "estimate", reason)
 

@@ -63,6 +63,8 @@ class TrialSpace:
         Whether every function is even or odd under theta -> pi - theta.
     finer : array
         Edges of the panels of another level, up to pi/2 if ``mirrored``.
+    square : float
+        Sum of the squared residuals of ``vectors``, at the nodes of the panels.
     """
 
     basis: Panels
@@ -73,6 +75,7 @@ class TrialSpace:
     parities: tuple[Parity, ...]
     mirrored: bool
     finer: Floats
+    square: float
 
 
 def adapted_trial_space(
@@ -116,7 +119,7 @@ def _adapted(law: Law, k: int, tolerance: float, rank: Rank, start: Floats | Non
     whole = level.extended(vectors, parity)
     return TrialSpace(
         level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:],
-        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored, finer,
+        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored, finer, joint**2,
     )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ STEP, SAME_ANGLE = 1e-7, 1e-11
 # Outgoing angles closer than this belong to one isometry, or are one node of an orbit.
 SAME_NODE = 1e-8
 # Entry points per angle on the first levels and on the last ones, and bisections of changes on the last ones.
-POINTS, FINE_POINTS, HALVINGS = 256, 2048, 40
+POINTS, FINE_POINTS, HALVINGS = 256, 2048, 24
 # Number of initial angles, layers of an orbit, and limit on its nodes.
 ANGLES, LAYERS, MOST_NODES = 96, 6, 60
 # Search near the largest values: peaks, levels, levels with all entry points, angles per peak, ratio of spacings.
@@ -164,7 +164,7 @@ def _conditionals(
     row, entry = np.nonzero(np.abs(np.diff(labels, axis=1)) > 1)
     low, high = x[row, entry], x[row, entry + 1]
     if halved:
-        low, high = _changes(law, theta[row], low, high, labels[row, entry])
+        low, high = _changes(law, theta[row], low, high, labels[row, entry], labels[row, entry + 1])
     middle = 0.5 * (low + high)
     found = {}
     for k, (node, _) in enumerate(nodes):
@@ -182,11 +182,18 @@ def _labels(out: Floats) -> NDArray[np.int64]:
     return np.rint(np.nan_to_num(out, nan=-1.0) / SAME_NODE).astype(np.int64)
 
 
-def _changes(law: WallLaw, theta: Floats, low: Floats, high: Floats, label: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Intervals, bisected to rounding, that contain the first change of the label to the right of ``low``."""
-    for _ in range(HALVINGS):
+def _changes(
+    law: WallLaw, theta: Floats, low: Floats, high: Floats, before: NDArray[np.int64], after: NDArray[np.int64]
+) -> tuple[Floats, Floats]:
+    """Intervals, bisected to less than `ROUNDING`, that contain a change of the label that is ``before`` at ``low``.
+
+    A ray that meets a curved piece has the angle of an isometry with probability 0, so one ray tells a straight label.
+    """
+    curved = before == _labels(np.array([np.nan]))
+    known = np.where(curved, after, before)
+    for _ in range(HALVINGS if low.size else 0):
         middle = 0.5 * (low + high)
-        same = np.abs(_labels(_straight(law, middle, theta)) - label) <= 1
+        same = (np.abs(_labels(law.reflect_with_status(middle, theta)[0]) - known) <= 1) != curved
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     return low, high
 

@@ -167,6 +167,10 @@ def study(
                     click.echo(f"wrote      {path}", err=as_json)
 
 
+# Tolerances and time limits in seconds of the gaps that `asperity gap` prints before the one asked for.
+FIRST_GAPS = (1e-2, 2.0), (1e-4, 10.0)
+
+
 @main.command(epilog=WALL_HELP)
 @click.argument("wall")
 @click.option("--specular", is_flag=True, help="In Feres' convention, where specular reflection is the identity.")
@@ -190,6 +194,9 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, verbose: bool
 
     law = WallLaw(wall_from_text(wall))
     chosen = law.in_specular_frame() if specular else law
+    for rough, seconds in FIRST_GAPS:
+        if rough > tolerance and not as_json:
+            click.echo(f"so far: {quotation(spectral_gap(chosen, rough, time_limit=seconds))}", err=True)
     found = spectral_gap(chosen, tolerance)
     why = [found.method, *found.evidence] if verbose else []
     lines, plain = [quotation(found), *(f"  {line}" for line in why)], gap_as_dict(found)

@@ -139,6 +139,13 @@ def test_the_named_walls_are_listed_and_drawn_and_no_picture_is_overwritten(tmp_
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_gap_is_first_printed_with_fewer_digits():
+    found = run("gap", "dispersing-arcs", "--tolerance", "1e-5")
+    first, second, last = (*found.stderr.splitlines(), found.stdout)
+    assert first.startswith("so far: spectral gap 0.7") and second.startswith("so far: spectral gap 0.716")
+    assert last.startswith("spectral gap 0.71618") and "so far" not in run("gap", "dispersing-arcs", "--json").stderr
+
+
 @pytest.mark.parametrize(("wall", "words"), [("focusing-arc", "Did you mean focusing-arcs"), ("flat:angle", "=value")])
 @pytest.mark.parametrize("command", ["study", "gap"])
 def test_a_wall_that_is_none_is_refused_in_one_line(command, wall, words):

@@ -17,7 +17,7 @@ REST = Separation(0.25, "bound", "known")
 
 def measured(quotients, norms, errors=None) -> Residuals:
     errors = np.zeros(len(quotients)) if errors is None else np.asarray(errors, dtype=float)
-    return Residuals(np.asarray(quotients, dtype=float), errors, np.asarray(norms, dtype=float), 7)
+    return Residuals(np.asarray(quotients, dtype=float), errors, np.asarray(norms, dtype=float), 7, np.empty(0))
 
 
 def mixed(own: float, other: float, fraction: float = 0.01) -> tuple[float, float]:

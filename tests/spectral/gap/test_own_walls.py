@@ -14,6 +14,10 @@ from asperity import spectral as spec
 from asperity.core import long_runs
 from asperity.core.long_runs import time_limited
 from asperity.spectral.bounds.enclosure import enclosed_trial_space
+from asperity.spectral.bounds.operator_residuals import residuals
+from asperity.spectral.bounds.oscillations import values_in_bins
+from asperity.spectral.bounds.separation import rest_of_spectrum
+from asperity.spectral.bounds.trial_space import adapted_trial_space
 from asperity.spectral.eigenvalues.spectra import SpectrumErrors, matrix_spectrum
 from asperity.spectral.essential.edge import essential_edge
 from asperity.spectral.gap import refinement
@@ -131,3 +135,37 @@ def test_a_refinement_ends_with_the_level_of_least_error(monkeypatch):
         ker.henyey_greenstein(0.5), 1e-6, np.random.default_rng(0), 1.0, essential_edge(ker.henyey_greenstein(0.5))
     )
     assert found.finest.gap == pytest.approx(0.38) and found.error == pytest.approx(0.02 + 1.96e-4, abs=1e-6)
+
+
+# the wall's eigenfunctions are at grazing angles; the gap is .00537(8) by enclosures to 1e-4
+def test_a_rough_gap_does_not_overlook_grazing_eigenfunctions():
+    found = spec.spectral_gap(ker.WallLaw(bezier_wall(8)), 0.03)
+    assert abs(found.value - 0.00537) <= found.error + 1e-4
+
+
+def test_rays_in_bins_bound_eigenvalues_from_below():
+    """The arc of half angle .6 has .286691174546(10), and -.5378593."""
+    above, below = values_in_bins(ker.CircularArcLaw(0.6))
+    assert 0.24 < above[0] <= 0.2866912 and 0.5 < below[0] <= 0.5378594
+    assert np.all(np.diff(above) <= 0.0) and np.all(np.diff(below) <= 0.0)
+    assert values_in_bins(ker.WallLaw(bezier_wall(8)))[0][0] > 0.8
+
+
+def test_no_separation_where_rays_show_another_eigenvalue():
+    law = ker.WallLaw(bezier_wall(8))
+    left_out = rest_of_spectrum(law, np.ones(1), 0.0, 0.78)
+    assert left_out.radius == 1.0 and "rays show another eigenvalue" in left_out.reason
+    assert rest_of_spectrum(law, np.ones(1), 0.0, 0.996).radius == 0.996
+
+
+def test_the_next_panels_are_divided_where_residuals_are_larger_than_expected():
+    law = ker.WallLaw(bezier_wall(4))
+    space = adapted_trial_space(law, 2, 3e-3, np.positive)
+    marked, not_marked = (
+        residuals(law, space.basis, space.vectors, space.values, quotient_error=3e-3, expected=square).marks
+        for square in (0.0, np.inf)
+    )
+    assert not not_marked.size
+    found = enclosed_trial_space(law, 2, None, 1e-3, np.positive, space.finer)
+    assert marked.size and np.any((marked > 0.0) & (marked < np.pi) & ~np.isin(marked, space.basis.edges))
+    assert len(found.finer) > len(found.basis.edges)
