@@ -43,7 +43,7 @@ class SurfaceAccommodation(SpaceAccommodation):
         Directions at which coefficients were asked for, in degrees: the angle from the normal, and that of the
         incoming tangential velocity from the wall's x axis.
     tangential_at, normal_at, sideways_at : array of shape (n,)
-        1 - E v_t'.t/|v_t| with the direction t of the incoming tangential velocity, nan at normal incidence;
+        1 - E v_t'.t/v_t.t with the direction t of the incoming tangential velocity, nan at normal incidence;
         (v_n - E v_n')/(v_n - 2/3) with v_n > 0; and the mean outgoing velocity to the left of t, in units of the speed,
         which vanishes for surfaces with a mirror image among their turns only.
     tangential_errors, normal_errors, sideways_errors : array of shape (n,)
