@@ -362,8 +362,8 @@ class Surface(Value):
         ----------
         spectrum : HeightCorrelation, SelfAffine or callable
             As of `random_wall`, of the distance in the plane. `SelfAffine` has the power q^(-2 - 2 H). A callable takes
-            wave numbers q = (q_x^2 + q_y^2)^(1/2) as an array and returns the power spectral density C(q) in two dimensions; the
-            mean squared height is the sum of C(q)/(area of the period) over all waves.
+            wave numbers q = (q_x^2 + q_y^2)^(1/2) as an array and returns the power spectral density C(q) in two
+            dimensions; the mean squared height is the sum of C(q)/(area of the period) over all waves.
         points : int or (int, int)
             Number of heights along x and y.
         rms_slope, rms_height : float, optional
