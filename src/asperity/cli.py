@@ -194,9 +194,12 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, verbose: bool
 
     law = WallLaw(wall_from_text(wall))
     chosen = law.in_specular_frame() if specular else law
-    for rough, seconds in FIRST_GAPS:
-        if rough > tolerance and not as_json:
-            click.echo(f"so far: {quotation(spectral_gap(chosen, rough, time_limit=seconds))}", err=True)
+    for rough, seconds in FIRST_GAPS if not as_json else ():
+        if rough > tolerance:
+            found = spectral_gap(chosen, rough, time_limit=seconds)
+            if found.error <= tolerance:
+                break
+            click.echo(f"so far: {quotation(found)}", err=True)
     found = spectral_gap(chosen, tolerance)
     why = [found.method, *found.evidence] if verbose else []
     lines, plain = [quotation(found), *(f"  {line}" for line in why)], gap_as_dict(found)

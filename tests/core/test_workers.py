@@ -2,7 +2,9 @@
 
 import importlib
 import os
+import pickle
 import threading
+from dataclasses import dataclass
 
 import pytest
 
@@ -119,3 +121,18 @@ def test_modules_are_sent_by_value_only_while_something_is_packed(own):
     before = cloudpickle.list_registry_pickle_by_value()
     workers.by_value(own[0].quantity)
     assert cloudpickle.list_registry_pickle_by_value() == before
+
+
+def test_classes_can_be_derived_from_one_that_has_travelled():
+    @dataclass(frozen=True)
+    class Own:
+        part: bool | None = None
+
+    assert pickle.loads(workers.by_value(Own)) is Own
+
+    @dataclass(frozen=True)
+    class Derived(Own):
+        other: float = 0.0
+
+    # a copy of dataclasses.MISSING in the fields of Own would be the default
+    assert Derived().part is None

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copyreg
 import multiprocessing
 import os
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import MISSING
 from functools import lru_cache
 from importlib.machinery import ExtensionFileLoader
 from itertools import islice
@@ -40,6 +42,9 @@ STARTED_FROM_A_SCRIPT = (
     "client: each worker reads the script that starts it, and so would start workers again; put what is computed below "
     'the line `if __name__ == "__main__":`'
 )
+
+# The fields of a class that returns from a worker, or from pickling, must have the mark itself, not a copy of it.
+copyreg.pickle(type(MISSING), lambda _: "MISSING")
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
