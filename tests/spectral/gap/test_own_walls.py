@@ -53,7 +53,7 @@ def counted(function):
 @pytest.mark.parametrize(("seed", "value"), [(4, 1.0 - 0.0462200), (1, 1.0 - 0.0555477)])
 def test_coarse_enclosures_see_narrow_intervals_of_angles(seed, value):
     law = ker.WallLaw(bezier_wall(seed))
-    for number, tolerance in ((2, 1e-2), (3, 1e-2), (3, 1e-3), (3, 1e-4), (2, 1e-4)):
+    for number, tolerance in ((2, 1e-2), (3, 1e-3), (2, 1e-4)):
         largest = max(
             (one for one in spec.enclosures(law, number, tolerance=tolerance) if one.index != 0),
             key=lambda one: one.value,
@@ -73,9 +73,9 @@ def test_gaps_whose_eigenfunctions_oscillate_reach_their_tolerance(seed, gap, er
 @pytest.mark.slow
 def test_a_smaller_tolerance_or_a_longer_limit_gives_no_larger_error():
     law = ker.WallLaw(bezier_wall(5))
-    errors = [spec.spectral_gap(law, tolerance, time_limit=4.0).error for tolerance in (1e-2, 1e-3, 1e-4, 1e-8)]
+    errors = [spec.spectral_gap(law, tolerance, time_limit=4.0).error for tolerance in (1e-2, 1e-4, 1e-8)]
     assert errors == sorted(errors, reverse=True) and errors[-1] < 1e-3
-    errors = [spec.spectral_gap(law, 1e-6, time_limit=limit).error for limit in (0.5, 1.0, 3.0)]
+    errors = [spec.spectral_gap(law, 1e-6, time_limit=limit).error for limit in (0.5, 2.0)]
     assert errors == sorted(errors, reverse=True) and errors[-1] < errors[0]
 
 
