@@ -131,8 +131,7 @@ class Surface(Value):
                 f"the spacing {self.spacing!r}"
             )
         instance("unit", self.unit, str, "'µm'")
-        object.__setattr__(self, "heights", frozen(heights))
-        object.__setattr__(self, "spacing", tuple(np.broadcast_to(given, 2).tolist()))
+        self._set(heights=frozen(heights), spacing=tuple(np.broadcast_to(given, 2).tolist()))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Surface):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
 from typing import NamedTuple
@@ -15,6 +15,7 @@ from ...core.estimates import ErrorKind, Estimate
 from ...core.long_runs import progress_bar, slices
 from ...core.rounding import EPS
 from ..bases.angles import cell_among
+from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..bases.partitions import Bins, Panels
 from ..discretisation.discretisation import discretise
@@ -83,32 +84,33 @@ class _Side(NamedTuple):
         panel, values = basis.local(angle)
         power = ((angle - cell_middles(edges)[panel]) / DIAGONAL)[:, None] ** np.arange(3)
         table = (weight[:, None, None] * power[:, :, None] * values[:, None, :]).reshape(size, -1, 3, 3).sum(axis=1)
-        total, error, certain = np.zeros((size, 3, size, 3)), 0.0, True
-        for (share, term), rays in zip(self.terms, self.drawn, strict=True):
-            if rays is not None:
-                total += share * _counted(rays, edges)
-                certain = False
-                continue
-            found = discretise(term.law, basis, tolerance=tolerance)
+
+        def of_matrix(found: KernelMatrix) -> Floats:
             symmetric = found.symmetric.reshape(size, 3, size, 3)
-            total += share * np.einsum("ika,iajb,jlb->ikjl", table, symmetric, table, optimize=True)
-            error += share * float(found.error)
-            certain &= found.error.kind == "bound"
-        return total, error, certain
+            return np.asarray(np.einsum("ika,iajb,jlb->ikjl", table, symmetric, table, optimize=True))
+
+        return self._summed(basis, of_matrix, lambda rays: _counted(rays, edges), tolerance)
 
     def masses(self, edges: Floats, tolerance: float) -> tuple[Floats, float, bool]:
         """The masses of cells, a bound of the mass that is wrong in them, and whether it is one for certain."""
-        total, error, certain = np.zeros((edges.size - 1, edges.size - 1)), 0.0, True
+        return self._summed(
+            Bins(edges), lambda found: found.flux, lambda rays: _counted(rays, edges)[:, 0, :, 0], tolerance
+        )
+
+    def _summed(
+        self, basis: Basis, of_matrix: Callable[[KernelMatrix], Floats],
+        of_rays: Callable[[tuple[Floats, Floats]], Floats], tolerance: float,
+    ) -> tuple[Floats, float, bool]:  # fmt: skip
+        """The sum over the terms of tables of their matrices or rays, the error, and whether it is a bound."""
+        total, error, certain = np.zeros(()), 0.0, True
         for (share, term), rays in zip(self.terms, self.drawn, strict=True):
             if rays is not None:
-                total += share * _counted(rays, edges)[:, 0, :, 0]
-                certain = False
+                total, certain = total + share * of_rays(rays), False
                 continue
-            found = discretise(term.law, Bins(edges), tolerance=tolerance)
-            total += share * found.flux
-            error += share * float(found.error)
+            found = discretise(term.law, basis, tolerance=tolerance)
+            total, error = total + share * of_matrix(found), error + share * float(found.error)
             certain &= found.error.kind == "bound"
-        return total, error, certain
+        return np.asarray(total), error, certain
 
 
 def joint_law_distance(first: Law, second: Law, order: float, tolerance: float) -> Estimate:

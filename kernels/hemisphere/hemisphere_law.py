@@ -354,7 +354,7 @@ class HemisphereLaw(DirectionFactor):
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.WallLaw(wall)")
         _ = self.law.parts  # raises InputError unless the weights of a combination make it a law
-        object.__setattr__(self, "orientation", checked_orientation(self.orientation))
+        self._set(orientation=checked_orientation(self.orientation))
 
     @property
     def specular(self) -> Law:

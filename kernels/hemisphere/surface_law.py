@@ -80,7 +80,7 @@ class SurfaceLaw(DirectionFactor):
 
     def __post_init__(self) -> None:
         instance("surface", self.surface, Surface, "geo.Surface([[0.0, 1.0]])")
-        object.__setattr__(self, "orientation", checked_orientation(self.orientation))
+        self._set(orientation=checked_orientation(self.orientation))
 
     @property
     def symmetric(self) -> bool | None:

@@ -93,9 +93,8 @@ class SobolRays(Job):
         low, high = self.range_of(task)
         sequence = sobol_sequence(self.seed, low, self.dimension)
         for start in range(low, high, self.chunk):
-            digits = (sequence.random(min(self.chunk, high - start)) * 2.0**SOBOL_BITS).astype(np.uint64)
-            points = (digits ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS
-            self.add_points(sums, first, points + self.beyond[:, None])
+            points = shifted_points(sequence, min(self.chunk, high - start), self.shifts, self.beyond)
+            self.add_points(sums, first, points)
 
     def add_points(self, sums: RaySums, first: int, points: Floats) -> None:
         """Add the rays of points of the unit cube, shape (PARTS, rays, dimension), to the tables from ``first`` on."""
@@ -120,6 +119,19 @@ def sobol_sequence(seed: tuple[int, ...], start: int, dimension: int = 2) -> Sob
 
     sequence = Sobol(dimension, bits=SOBOL_BITS, rng=np.random.default_rng(seed))
     return sequence.fast_forward(start) if start else sequence
+
+
+def random_shifts(seed: tuple[int, ...], dimension: int) -> tuple[NDArray[np.uint64], Floats]:
+    """The shifts of the digits of each part, and of the digits beyond, shape (PARTS, dimension) each."""
+    source = np.random.default_rng(seed)
+    shifts = source.integers(0, 2**SOBOL_BITS, size=(PARTS, dimension), dtype=np.uint64)
+    return shifts, source.random((PARTS, dimension)) * 2.0**-SOBOL_BITS
+
+
+def shifted_points(sequence: Sobol, number: int, shifts: NDArray[np.uint64], beyond: Floats) -> Floats:
+    """The next points of a sequence in each part, shape (PARTS, number, dimension)."""
+    digits = (sequence.random(number) * 2.0**SOBOL_BITS).astype(np.uint64)
+    return np.asarray((digits ^ shifts[:, None]) * 2.0**-SOBOL_BITS + beyond[:, None])
 
 
 def whole_sequences(samples: int) -> int:
@@ -162,9 +174,7 @@ class SobolSampler:
         self.sums, self.rays = RaySums(law, basis, PARTS), rays
         self.halved = law.mirror_symmetric is True and is_mirror_symmetric(basis)
         self.seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
-        source = np.random.default_rng(self.seed)
-        self.shifts = source.integers(0, 2**SOBOL_BITS, size=(PARTS, rays.dimension), dtype=np.uint64)
-        self.beyond = source.random((PARTS, rays.dimension)) * 2.0**-SOBOL_BITS
+        self.shifts, self.beyond = random_shifts(self.seed, rays.dimension)
 
     def sampled(self, samples: int, *, symmetrise: bool, engine: Engine | None = None) -> KernelMatrix:
         """The matrix from at least ``samples`` rays, rounded up to 8 times a power of two; see `RaySums.matrix`.

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
-from ...core.estimates import FEW, LEVEL, Estimate, with_error
+from ...core.estimates import FEW, Estimate, student_95, with_error
 from ...kernels import SurfaceLaw
 from ...kernels.hemisphere.surface_law import turned
-from ...kernels.sampling.sobol import PARTS, SOBOL_BITS, sobol_sequence
+from ...kernels.sampling.sobol import PARTS, random_shifts, shifted_points, sobol_sequence
 from ...kernels.walls.conditionals import UNRESOLVED_TOLERANCE
 from .grooves_accommodation import SpaceAccommodation, nearest_maxwell
 
@@ -187,17 +187,11 @@ def _means(
     dimension: int, values: Callable[[Floats], Floats], each: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """Means over eight shifted Sobol sequences, with half widths of 95 % by Student's distribution."""
-    from scipy.special import stdtrit
-
     seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
-    source, sequence = np.random.default_rng(seed), sobol_sequence(seed, 0, dimension)
-    shifts = source.integers(0, 2**SOBOL_BITS, size=(PARTS, dimension), dtype=np.uint64)
-    beyond = source.random((PARTS, dimension)) * 2.0**-SOBOL_BITS
+    sequence, shifts = sobol_sequence(seed, 0, dimension), random_shifts(seed, dimension)
     sums: list[Floats] = []
     for start in range(0, each, CHUNK):
-        digits = (sequence.random(min(CHUNK, each - start)) * 2.0**SOBOL_BITS).astype(np.uint64)
-        points = ((digits ^ shift) * 2.0**-SOBOL_BITS + rest for shift, rest in zip(shifts, beyond, strict=True))
+        points = shifted_points(sequence, min(CHUNK, each - start), *shifts)
         sums.append(np.array([values(part).sum(axis=0) for part in points]))
     parts = np.sum(sums, axis=0) / each
-    quantile = float(stdtrit(PARTS - 1, 0.5 + 0.5 * LEVEL))
-    return parts.mean(axis=0), quantile * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
+    return parts.mean(axis=0), student_95(PARTS) * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)

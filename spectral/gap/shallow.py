@@ -260,7 +260,6 @@ def _(law: Combination) -> Slopes | None:
 
 @slopes_of.register(CircularArcLaw)
 def _(law: CircularArcLaw) -> Slopes | None:
-
     return _slopes_of_wall(focusing_arcs(law.half_angle)) if law.half_angle <= STEEPEST else None
 
 

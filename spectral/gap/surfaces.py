@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.estimates import LEVEL, with_error
+from ...core.estimates import student_95, with_error
 from ...kernels import SurfaceLaw, Zernike, discretise
 from ...kernels.matrices.matrix import KernelMatrix
 from ..eigenvalues.spectra import ONE_MATRIX, Verdict
@@ -100,12 +100,10 @@ def _top(matrix: KernelMatrix, degree: int) -> tuple[float, float]:
 
 def _noise(parts: list[Floats], values: Floats, vectors: Floats, index: int) -> float:
     """The error of an eigenvalue of the mean of several matrices: of its Rayleigh quotients, and the bias."""
-    from scipy.special import stdtrit
-
     vector = vectors[:, index]
     images = np.array([part @ vector for part in parts])
     quotients = images @ vector
-    half = float(stdtrit(len(parts) - 1, 0.5 + 0.5 * LEVEL)) * float(np.std(quotients, ddof=1)) / math.sqrt(len(parts))
+    half = student_95(len(parts)) * float(np.std(quotients, ddof=1)) / math.sqrt(len(parts))
     # second order in the noise, but for eigenvalues as near as this
     beside = images - values[index] * vector
     square = float(np.sum((beside - beside.mean(axis=0)) ** 2)) / (len(parts) * (len(parts) - 1))
