@@ -1,5 +1,6 @@
 """What tests share: every wall, law, basis and matrix as a fixture; a test that takes ``wall`` runs on all of them."""
 
+import gc
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
@@ -14,6 +15,12 @@ from wall_shapes import CLOSED, OPEN
 
 # Made once, by what makes it.
 made = cache(lambda make: make())
+
+
+def pytest_collection_finish():
+    """Spares collections of garbage the modules and tests, a second each time: some tests count milliseconds."""
+    gc.collect()
+    gc.freeze()
 
 
 # ---- walls -------------------------------------------------------------------------------------------------------
