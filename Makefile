@@ -9,6 +9,9 @@ PY := $(VENV)/bin/python
 RUN := $(VENV)/.installed
 DEV := $(VENV)/.installed-dev
 
+# Bytecode is kept: each of the hundreds of processes that tests start would compile the sources again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help study test test-all test-lowest test-newest check format-check lint types docs bench build format clean distclean
 

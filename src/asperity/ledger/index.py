@@ -142,6 +142,8 @@ def page_of(entries: Sequence[Entry]) -> str:
                 parts += [f"({entry.id})=\n**{entry.id}** ({_source(entry)}; {entry.kind}) {entry.statement}"]
                 parts += [f"*{name}*\n\n$$\n{latex}\n$$" for name, latex in _formulas(entry)]
                 parts.append(entry.reason)
+                if entry.check is not None:
+                    parts.append(f"Checked in `{entry.check.__module__}`.")
     return "\n\n".join(parts) + "\n"
 
 
