@@ -239,14 +239,14 @@ def _cut_at_touching(piece: Curve, level: float, limit: float) -> list[Curve]:
     if piece.end < piece.start:
         # in one direction of the two, so that coincident faces stay coincident
         return [part.reversed() for part in reversed(_cut_at_touching(piece.reversed(), level, limit))]
-    if not piece.is_straight:
-        for top in piece.turning_points(1):
-            x, y = (float(v) for v in piece.point(top))
-            if TOUCH_MARGIN < top < 1.0 - TOUCH_MARGIN and y >= level - limit:
-                before, after = piece.split(top)
-                first, rest = before.pinned(piece.start, (x, level)), after.pinned((x, level), piece.end)
-                return [first, *_cut_at_touching(rest, level, limit)]
-    return [piece]
+    parts, rest, done = [], piece, 0.0
+    for top in [] if piece.is_straight else piece.turning_points(1):
+        x, y = (float(v) for v in piece.point(top))
+        if TOUCH_MARGIN < top < 1.0 - TOUCH_MARGIN and y >= level - limit:
+            before, rest = rest.split((top - done) / (1.0 - done))
+            parts.append(before.pinned(before.start, (x, level)))
+            rest, done = rest.pinned((x, level), piece.end), top
+    return [*parts, rest]
 
 
 def _signed_area(pieces: Pieces, size: Floats) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -25,6 +25,7 @@ from ..curves.curve import LARGEST_COORDINATE, Curve
 from ..curves.segment import Segment
 from ..disk.disk import Disk
 from ..scene.scene import Scene, TracePlan, plan_of, scene_of
+from .formula import pieces_of_function
 
 
 @dataclass(frozen=True, repr=False, init=False)
@@ -187,6 +188,60 @@ class Wall(Cell):
         elif height is not None:
             raise InputError("height: a Profile has its heights; leave it out")
         return cls.from_vertices(vertices_of_profile(x, seam), x.unit)
+
+    @classmethod
+    def from_function(
+        cls,
+        height: Callable[[Floats], Floats],
+        period: float = 1.0,
+        tolerance: float = 1e-9,
+        breakpoints: ArrayLike = (),
+        unit: str = "",
+    ) -> Self:
+        r"""Return the wall y = f(x), made of segments and Bezier pieces within a tolerance of it.
+
+        Parameters
+        ----------
+        height : callable
+            The function f on [0, period], of arrays, in the unit of ``period``; it may have any level, and is moved so
+            that its highest point is at y = 0. It is periodic, so f(0) and f(period) may differ by a vertical step only.
+        period : float
+            Greater than 0.
+        tolerance : float
+            From 1e-11 to 0.01, in periods.
+        breakpoints : array_like, shape (n,)
+            Positions at which f or its first two derivatives jump; 0 and the period are breakpoints.
+        unit : str
+            Of lengths, for the axes of pictures.
+
+        Returns
+        -------
+        Wall
+            On each piece, of width h, the height differs from f by at most ``tolerance * period``, the slope from f'
+            by 10 times this over h, and the curvature by 100 times this over h^2. Intervals on which f is linear are
+            segments, and where f jumps there are vertical segments.
+
+        Raises
+        ------
+        WallError
+            If a height is not finite, or f is not smooth between breakpoints; the message names the place.
+
+        Notes
+        -----
+        Cubic curves with the slopes of f at their ends, and the two handles that fit best, approximate heights in order
+        6. The function is seen at 1024 points of a period, and at more where it bends: breakpoints at both sides of
+        a narrower detail make it seen.
+
+        Examples
+        --------
+        >>> tooth = Wall.from_function(lambda x: -np.abs(x - 0.25), breakpoints=[0.25])
+        >>> tooth.vertices.tolist()
+        [[0.0, -0.25], [0.25, 0.0], [1.0, -0.75], [1.0, -0.25]]
+        >>> Wall.from_function(lambda x: 0.1 * np.cos(2 * np.pi * x)).depth
+        0.2
+        """
+        width = positive_number("period", period)
+        return cls(pieces_of_function(height, width, tolerance, breakpoints), width, unit=unit)
 
     @cached_property
     def is_mirror_symmetric(self) -> bool:

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, finite_number, positive_number
 from ...core.estimates import Estimate, Summary, student_95
+from ...core.given import Vectorised
 from ...core.long_runs import TIME_LIMIT, reported, slices
 from ...geometry.scene.scene import SEGMENT_TIME
 from ..bases.basis import Basis
-from ..bases.given import Vectorised
 from ..bases.measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE, gauss_rule
 from ..bases.partitions import Panels
 from ..bases.polynomials import Directions

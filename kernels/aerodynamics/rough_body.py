@@ -25,10 +25,10 @@ from ...core.checks import (
 )
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
+from ...core.given import Vectorised
 from ...core.rounding import EPS
 from ..bases.angles import bisected
 from ..bases.basis import AngleFunction
-from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.density import split_panels
 from ..laws.law import Law, check_paper_frame

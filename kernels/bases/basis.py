@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Value, finite_array, frozen, instance, is_of_package, shaped, whole_number
 from ...core.errors import AsperityError, InputError
+from ...core.given import Vectorised
 from .angles import cell_among
-from .given import Vectorised
 from .measure import AngularMeasure, gauss_rule
 
 Frame = Literal["paper", "specular"]

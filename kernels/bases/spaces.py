@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, sequence, shaped, whole_number
 from ...core.errors import InputError
+from ...core.given import Vectorised
 from .basis import Basis, BasisOfPoints
-from .given import Vectorised
 
 
 def _kron(parts: Sequence[Floats]) -> Floats:

@@ -13,10 +13,10 @@ from ...core.checkpoints import Stored
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, instance, shaped, shortened, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Summary
+from ...core.given import seed_by_name
 from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...geometry import Container, Disk
 from ...geometry.tables.boundary import FlightStatus, Touch
-from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
 from ..collisions.satellite_law import SatelliteLaw
 from ..laws.law import Law, outcomes_of

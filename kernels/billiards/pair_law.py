@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, common_shape, instance, positive_number, shaped
 from ...core.errors import InputError
+from ...core.given import seed_by_name
 from ...geometry import Disk, Wall
-from ..bases.given import seed_by_name
 from ..collisions.collision_law import CollisionLaw
 from ..laws.law import Law, specular
 

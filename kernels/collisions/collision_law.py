@@ -28,12 +28,12 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import Estimate, html_table
+from ...core.given import Vectorised, seed_by_name
 from ...geometry import Disk, Wall
 from ...geometry.collisions.rigid import checked_states
 from ..bases.angles import clipped_inside
 from ..bases.assembly import reflection_matrix
 from ..bases.basis import Basis
-from ..bases.given import Vectorised, seed_by_name
 from ..bases.polynomials import Legendre
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law, as_weight, check_paper_frame, outcomes_of, retroreflection, specular

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, finite_array, generator, shaped, whole_number
 from ...core.errors import AccuracyError, InputError
+from ...core.given import seed_by_name
 from ...core.tables import axes_or_new
 from ...geometry import Disk, Wall, collide, trace
 from ...geometry.collisions.configuration_space import ConfigurationSpace
-from ..bases.given import seed_by_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, angles, numbers, positive_number, shaped, whole_number
 from ...core.errors import InputError
 from ...core.estimates import shown, text_of
+from ...core.given import Vectorised
 from ...core.long_runs import NUMBERS_AT_ONCE
 from ...core.rounding import EPS
 from ..bases.angles import cell_among, clipped_inside, joined_lists
 from ..bases.basis import AngleFunction, Basis, checked_basis
-from ..bases.given import Vectorised
 from ..bases.measure import gauss_on_intervals, gauss_rule
 from ..bases.partitions import Panels
 from ..bases.polynomials import legendre_moments

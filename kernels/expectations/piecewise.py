@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.given import Vectorised
 from ..bases.angles import cell_among
 from ..bases.basis import AngleFunction
-from ..bases.given import Vectorised
 from ..bases.measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE
 
 # Chebyshev points at which functions are examined, the size of the coefficients that count, and the highest degree.

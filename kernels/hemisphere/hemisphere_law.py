@@ -26,10 +26,10 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
+from ...core.given import seed_by_name
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
-from ..bases.given import seed_by_name
 from ..bases.polynomials import Legendre
 from ..bases.spaces import Zernike, zernike_functions
 from ..discretisation.discretisation import discretise

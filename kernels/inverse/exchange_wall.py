@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate
+from ...core.given import Vectorised
 from ...geometry import Arc, Segment, Wall, trace
 from ...geometry.curves.curve import Curve
 from ...geometry.tracing.tracing import Trace
-from ..bases.given import Vectorised
 from ..bases.measure import SINE
 from ..laws.deterministic import IntervalExchangeLaw
 from ..laws.law import Law, specular

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, common_shape, finite_array, frozen, number_between
 from ...core.errors import AccuracyError, InputError
+from ...core.given import Vectorised
 from ...core.long_runs import NUMBERS_AT_ONCE, slices
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
-from ..bases.given import Vectorised
 from ..bases.measure import SINE, gauss_rule
 from ..expectations.conditionals import Conditionals, gauss_nodes, stiffness_between
 from .law import Combination, Law, specular

@@ -34,11 +34,11 @@ from ...core.checks import (
 )
 from ...core.errors import AccuracyError, AsperityError, InputError
 from ...core.estimates import html_table
+from ...core.given import Vectorised, seed_by_name
 from ...core.long_runs import OutOfTime
 from ...core.rounding import EPS
 from ..bases.angles import cell_among, clipped_inside, mirrored_angle
 from ..bases.basis import AngleFunction, Frame
-from ..bases.given import Vectorised, seed_by_name
 from ..expectations.conditionals import Conditionals
 from ..expectations.piecewise import INTERVALS_OF_MEANS, MOST_OF_MEANS, SEEN, Piecewise
 from .branches import MOST_BRANCHES, chained, chained_breakpoints, joined, merged

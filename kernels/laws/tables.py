@@ -16,10 +16,10 @@ from ...core.checks import Floats, Rng, angles, check_memory, frozen, generator,
 from ...core.errors import InputError
 from ...core.estimates import Summary
 from ...core.files import write_whole
+from ...core.given import seed_by_name
 from ...core.long_runs import slices
 from ...core.tables import needed, numbers_as_csv
 from ..bases.basis import Frame
-from ..bases.given import seed_by_name
 from ..bases.measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE
 from ..expectations.conditionals import Conditionals, Distributions
 

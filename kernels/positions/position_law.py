@@ -26,8 +26,8 @@ from ...core.checks import (
 )
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, Summary, fraction_estimate, student_95
+from ...core.given import Vectorised, seed_by_name
 from ...geometry import Wall, trace
-from ..bases.given import Vectorised, seed_by_name
 from ..bases.measure import SINE
 from ..bases.polynomials import Legendre
 from ..discretisation.discretisation import discretise

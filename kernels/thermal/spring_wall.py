@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, generator, number_between, positive_number, shaped, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import NORMAL_95, Estimate
+from ...core.given import seed_by_name
 from ...core.rounding import EPS
-from ..bases.given import seed_by_name
 from ..matrices.defects import SymmetryDefect, defect_of_pairs
 
 # A contact is found when the distance of plate and particle is this many roundings of the size of the motion.

@@ -10,8 +10,8 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from ...core.checks import Floats, numbers
-from ...core.errors import AsperityError, InputError
+from .checks import Floats, numbers
+from .errors import AsperityError, InputError
 
 P = ParamSpec("P")
 T = TypeVar("T")
