@@ -97,6 +97,7 @@ STORY = (
     "a_wall_and_its_law",
     "a_gap_with_its_error",
     "a_proved_gap",
+    "a_wall_from_a_formula",
     "a_measured_profile",
     "a_measured_surface",
     "a_disk",

@@ -2,7 +2,7 @@
 
 - Make a wall: WALLS, HeightCorrelation, SelfAffine, Wall, dispersing_arcs, double_parabola, elliptical_arcs, flat,
   focusing_arcs, join_walls, koch, load_wall, mushrooms, notched_angle, random_wall, rectangular_teeth,
-  triangular_teeth, tube, wall_from_text, Profile, read_profile, Arc, Bezier, Segment.
+  sinusoid, triangular_teeth, tube, wall_from_text, Profile, read_profile, Arc, Bezier, Segment.
 - Make a surface that is rough in two directions: Surface, read_surface.
 - Trace rays: MushroomGenerations, Status, billiard_map, nested_reflection, trace, trajectory.
 - Draw walls: draw_wall.
@@ -50,6 +50,7 @@ from .walls.named import (
     koch,
     notched_angle,
     rectangular_teeth,
+    sinusoid,
     triangular_teeth,
     tube,
 )
@@ -103,6 +104,7 @@ __all__ = [
     "read_surface",
     "rectangular_teeth",
     "shadow",
+    "sinusoid",
     "symbolic",
     "trace",
     "trajectory",

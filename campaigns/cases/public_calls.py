@@ -198,6 +198,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "SatelliteLaw.draw_limit": {"samples": 4},
     "Surface.random": {"points": 8},
     "TriangularTeethLaw": {"angle": 1.0},
+    "Wall.from_function": {"height": abs, "tolerance": 1e-3},
     "Wall.from_profile": {"x": [0, 1]},
     "Wall.save": {"path": "wall.toml", "overwrite": True},
     "WorkMethod": {"order": None},
@@ -285,8 +286,8 @@ METHODS = (
     "Profile.detrended", "Profile.in_unit", "RollingCharts.nearest", "RoughBody.sample", "SatelliteLaw.draw_limit",
     "Surface.random", "Surface.trace", "Surface.trajectory",
     "TriangularTeethLaw.breakpoints", "TriangularTeethLaw.branches", "TriangularTeethLaw.conditionals",
-    "Wall.foreshorten", "Wall.from_profile", "Wall.from_vertices", "Wall.outline", "Wall.save", "Wall.scaled",
-    "Wall.unforeshorten",
+    "Wall.foreshorten", "Wall.from_function", "Wall.from_profile", "Wall.from_vertices", "Wall.outline", "Wall.save",
+    "Wall.scaled", "Wall.unforeshorten",
 )  # fmt: skip
 
 

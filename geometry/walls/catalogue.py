@@ -26,6 +26,7 @@ from .named import (
     focusing_arcs,
     koch,
     rectangular_teeth,
+    sinusoid,
     triangular_teeth,
 )
 from .wall import Wall, load_wall
@@ -67,6 +68,7 @@ _ENTRIES = (
     _entry(dispersing_arcs, "circular bumps that meet in corners"),
     _entry(elliptical_arcs, "arcs that the disk feels as circular", _elliptical),
     _entry(double_parabola, "Plakhov's parabolas: nearly retroreflecting"),
+    _entry(sinusoid, "a cosine, from its tops down by the amplitude"),
     _entry(mushrooms, "semicircular caps on straight stems"),
     _entry(koch, "Koch's curve turned downwards"),
 )

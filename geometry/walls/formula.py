@@ -20,8 +20,8 @@ from ..curves.segment import Segment
 
 # Tolerances; below the least, slopes of doubles would not be known.
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-11, 0.01
-# Degree of the polynomials that stand for the function, and their shortest interval, in periods.
-DEGREE, NARROWEST = 16, 2.0**-16
+# Chebyshev nodes of the polynomials that stand for the function, from 1 to -1, and their shortest interval, in periods.
+NODES, NARROWEST = np.cos(np.pi * (np.arange(17) + 0.5) / 17), 2.0**-16
 # Tolerance of the polynomials: their slopes are taken for those of the function.
 RESOLVED = 1e-2
 # The function is compared at so many points of an interval at least, and at so many in a period.
@@ -51,9 +51,7 @@ def pieces_of_function(
     parts = [part for low, high in pairwise(edges) for part in _smooth_parts(given, low, high, period, step)]
     slopes = _slopes(parts, mirrored, step)
     pieces = [
-        curve
-        for part, ends in zip(parts, slopes, strict=True)
-        for curve in _fitted(part, part.domain, ends, step)
+        curve for part, ends in zip(parts, slopes, strict=True) for curve in _fitted(part, part.domain, ends, step)
     ]
     if mirrored:
         pieces += [piece.stretched(-1.0, 1.0).moved(period, 0.0).reversed() for piece in reversed(pieces)]
@@ -78,15 +76,20 @@ def _is_mirrored(height: Vectorised, edges: list[float], step: float) -> bool:
 
 def _smooth_parts(height: Vectorised, low: float, high: float, period: float, step: float) -> list[Chebyshev]:
     """Polynomials that are the function on intervals side by side."""
+    from scipy.fft import dct
+
     if high - low < NARROWEST * period:
         raise WallError(
-            f"height: expected a function with a continuous slope and curvature between its breakpoints, but it has "
-            f"none near x = {low:.6g}; pass the places of jumps as breakpoints, and make an Arc where it is vertical"
+            f"height: expected slopes and curvatures that are continuous between breakpoints, but near x = {low:.4g} "
+            "they are not; pass the places of jumps as breakpoints, and make an Arc where the wall is vertical"
         )
     middle = 0.5 * (low + high)
     level = _values(height, np.array([middle]))
-    # without the level, the rounding errors are those of the differences
-    found = level[0] + Chebyshev.interpolate(lambda x: _values(height, x) - level, DEGREE, [low, high])
+    # without the level, the rounding errors are those of the differences; the transform rounds less than `interpolate`
+    values = _values(height, middle + 0.5 * (high - low) * NODES) - level
+    coefficients = dct(values) / len(NODES)
+    coefficients[0] = 0.5 * coefficients[0] + level[0]
+    found = Chebyshev(coefficients, [low, high])
     number = max(LEAST_POINTS, int(POINTS * (high - low) / period))
     x = low + (np.arange(number) + 0.5) * (high - low) / number
     if np.all(np.abs(found(x) - _values(height, x)) <= RESOLVED * step):

@@ -188,6 +188,28 @@ def double_parabola() -> Wall:
     return Wall([Bezier(left), Bezier(right)])
 
 
+def sinusoid(amplitude: float = 0.2) -> Wall:
+    """Return the wall y = -amplitude (1 - cos 2 pi x)/2, within 1e-9, by `Wall.from_function`.
+
+    Parameters
+    ----------
+    amplitude : float
+        The depth, greater than 0 and at most 100; half of it multiplies the cosine.
+
+    Raises
+    ------
+    InputError
+        If the amplitude is outside (0, 100].
+
+    Examples
+    --------
+    >>> sinusoid(0.5).depth
+    0.5
+    """
+    depth = number_between("amplitude", amplitude, 0.0, 100.0, closed="high")
+    return Wall.from_function(lambda x: -depth * np.sin(np.pi * x) ** 2)
+
+
 def koch(generations: int = 4) -> Wall:
     """Return the Koch curve pointing downwards, a wall of 4^generations segments.
 

@@ -203,8 +203,8 @@ class Wall(Cell):
         Parameters
         ----------
         height : callable
-            The function f on [0, period], of arrays, in the unit of ``period``; it may have any level, and is moved so
-            that its highest point is at y = 0. It is periodic, so f(0) and f(period) may differ by a vertical step only.
+            The function f on [0, period], of arrays, in the unit of ``period``. The wall is moved so that its highest
+            point is at y = 0. If f(0) and f(period) differ, there is a vertical step.
         period : float
             Greater than 0.
         tolerance : float

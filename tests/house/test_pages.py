@@ -144,6 +144,13 @@ def test_sobol_sequences_beat_independent_rays(run):
 
 
 @pytest.mark.slow
+def test_a_wall_of_a_formula_has_so_many_pieces_and_the_largest_gap_between(run):
+    found = run("a_wall_from_a_formula")
+    gaps = [row.value for row in found["table"].rows]
+    assert len(found["wall"].pieces) == 28 and len(found["ramps"].pieces) == 3
+    assert min(gaps[1:3]) > max(gaps[0], gaps[3]) + 0.05
+
+
 @pytest.mark.parametrize("name", ["knudsen_diffusion", "two_laws_compared", "a_sweep", "a_gas_channel", "a_tube"])
 def test_the_slower_examples_agree_with_what_is_known(run, name):
     names = run(name)

@@ -39,6 +39,13 @@ REMEDIES = {
         lambda: asperity.verify((Z + 1) ** 2 == Z**2 + 2 * Z + 1),
         lambda: (asperity.verify(Z * Z, Z**2), asperity.verify(sp.Eq((Z + 1) ** 2, Z**2 + 2 * Z + 1))),
     ),
+    "pass the places of jumps as breakpoints, and make an Arc": (
+        lambda: geo.Wall.from_function(lambda x: np.where(x < 0.3, 0.0, x - 0.3)),
+        lambda: (
+            geo.Wall.from_function(lambda x: np.where(x < 0.3, 0.0, x - 0.3), breakpoints=[0.3]),
+            geo.Wall([geo.Arc((0.5, 0.0), 0.5, np.pi, 2 * np.pi)]),
+        ),
+    ),
     "use Profile.interpolated()": (
         lambda: geo.Wall.from_profile([0, 1, 2], [0, np.nan, 0.5]),
         lambda: geo.Wall.from_profile(geo.Profile([0, 1, 2], [0, np.nan, 0.5]).interpolated()),

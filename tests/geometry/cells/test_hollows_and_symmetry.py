@@ -182,3 +182,10 @@ def test_every_profile_makes_a_closed_wall(rows, seam, unit):
     whole = 2 * length if seam == "mirror" else length + abs(height[-1] - height[0])
     assert wall.arc_length == pytest.approx(whole, rel=1e-13)
     assert wall.flat_top + sum(h.width for h in wall.hollows) == pytest.approx(wall.period, rel=1e-13)
+
+
+def test_a_curve_with_its_top_next_to_its_end_is_cut_once():
+    # the handle before the end is above it by rounding
+    curve = geo.Bezier([(0.0, -0.0238), (0.01, -0.0082), (0.02, 3.3290416e-09), (0.03, -1e-15)])
+    wall = geo.Wall([geo.Segment((0, 0), (0, -0.0238)), curve, geo.Segment((0.03, -1e-15), (1, 0))])
+    assert len(wall.pieces) <= 4 and wall.depth == 0.0238
