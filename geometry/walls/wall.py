@@ -234,9 +234,9 @@ class Wall(Cell):
 
         Examples
         --------
-        >>> tooth = Wall.from_function(lambda x: -np.abs(x - 0.25), breakpoints=[0.25])
+        >>> tooth = Wall.from_function(lambda x: -np.abs(x - 0.5), breakpoints=[0.5])
         >>> tooth.vertices.tolist()
-        [[0.0, -0.25], [0.25, 0.0], [1.0, -0.75], [1.0, -0.25]]
+        [[0.0, -0.5], [0.5, 0.0], [1.0, -0.5]]
         >>> Wall.from_function(lambda x: 0.1 * np.cos(2 * np.pi * x)).depth
         0.2
         """
