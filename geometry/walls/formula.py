@@ -50,9 +50,12 @@ def pieces_of_function(
         edges = [edge for edge in edges if edge < 0.5 * period] + [0.5 * period]
     parts = [part for low, high in pairwise(edges) for part in _smooth_parts(given, low, high, period, step)]
     slopes = _slopes(parts, mirrored, step)
-    pieces = [
-        curve for part, ends in zip(parts, slopes, strict=True) for curve in _fitted(part, part.domain, ends, step)
-    ]
+    pieces: list[Curve] = []
+    for part, ends in zip(parts, slopes, strict=True):
+        # the function's own values, but for jumps
+        own, y = given(part.domain), part(part.domain)
+        y = np.where(np.abs(own - y) <= RESOLVED * step, own, y)
+        pieces += _fitted(part, part.domain, y, ends, step)
     if mirrored:
         pieces += [piece.stretched(-1.0, 1.0).moved(period, 0.0).reversed() for piece in reversed(pieces)]
     return _joined(pieces, step)
@@ -112,19 +115,19 @@ def _slopes(parts: list[Chebyshev], mirrored: bool, step: float) -> Floats:
     return slopes
 
 
-def _fitted(height: Chebyshev, x: Floats, slopes: Floats, step: float) -> list[Curve]:
+def _fitted(height: Chebyshev, x: Floats, y: Floats, slopes: Floats, step: float) -> list[Curve]:
     """Pieces that are near a polynomial: the segment, or the Bezier curve with its slopes at the ends, or halves."""
-    y, width = height(x), float(np.ptp(x))
+    width = float(np.ptp(x))
     if np.ptp(height.deriv()(x[0] + COMPARED * width)) * width <= RESOLVED * step:
         return [Segment((x[0], y[0]), (x[1], y[1]))]
     curve = _with_handles(height, x, y, slopes)
     if curve is not None and _is_near(curve, height, width, step):
         return [curve]
     middle = x.mean()
-    slope = height.deriv()(middle)
+    here, slope = height(middle), height.deriv()(middle)
     return [
-        *_fitted(height, np.array([x[0], middle]), np.array([slopes[0], slope]), step),
-        *_fitted(height, np.array([middle, x[1]]), np.array([slope, slopes[1]]), step),
+        *_fitted(height, np.array([x[0], middle]), np.array([y[0], here]), np.array([slopes[0], slope]), step),
+        *_fitted(height, np.array([middle, x[1]]), np.array([here, y[1]]), np.array([slope, slopes[1]]), step),
     ]
 
 
