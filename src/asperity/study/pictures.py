@@ -183,7 +183,7 @@ def gallery() -> Figure:
     for ax, entry in zip(axes, entries, strict=False):
         draw_wall(entry.build(), ax=ax)
         parameters = ", ".join(f"{key}={value:g}" for key, value in entry.defaults.items())
-        ax.set_title("\n".join([entry.name, *textwrap.wrap(parameters, 46)]), fontsize=9)
+        ax.set_title("\n".join([entry.name, *textwrap.wrap(parameters, 40)]), fontsize=9)
         ax.set(xlabel="", ylabel="")
         ax.tick_params(labelsize=8)
         ax.locator_params(axis="both", nbins=5)
