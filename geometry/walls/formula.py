@@ -147,7 +147,7 @@ def _with_handles(height: Chebyshev, x: Floats, y: Floats, slope: Floats) -> Bez
     third = (x[1] - x[0]) / 3.0
     found = least_squares(distance, [third, third], x_scale=third, method="lm", xtol=1e-14, ftol=1e-14)
     # so that x grows along the curve
-    return Bezier(control_points(found.x)) if np.all(found.x > 0.0) and found.x.sum() < 3.0 * third else None
+    return Bezier(list(control_points(found.x))) if np.all(found.x > 0.0) and found.x.sum() < 3.0 * third else None
 
 
 def _is_near(curve: Bezier, height: Chebyshev, width: float, step: float) -> bool:
