@@ -146,6 +146,23 @@ def test_the_wheel_holds_the_package_and_nothing_else(distributions):
     assert {name for name in names if not name.startswith(metadata)} == source_files()
 
 
+def test_a_checkout_without_links_installs_the_same_files(tmp_path):
+    ignore = shutil.ignore_patterns("__pycache__", "*.egg-info")
+    for name in ("src", "geometry", "kernels", "spectral"):
+        shutil.copytree(ROOT / name, tmp_path / name, symlinks=True, ignore=ignore)
+    for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tmp_path)
+    for room in ("geometry", "kernels", "spectral"):
+        link = tmp_path / "src" / "asperity" / room
+        link.unlink()
+        # what git writes where it makes no links
+        link.write_text(f"../../{room}")
+    done = ended("setup.py", "-q", "build_py", "--build-lib", "built", cwd=tmp_path, env=dict(os.environ))
+    assert done.returncode == 0, done.stdout + done.stderr
+    built = tmp_path / "built"
+    assert {path.relative_to(built).as_posix() for path in built.rglob("*") if path.is_file()} == source_files()
+
+
 def test_the_sdist_carries_tests_pages_and_the_rooms_as_real_files(distributions):
     sdist, _ = distributions
     with tarfile.open(sdist) as archive:
