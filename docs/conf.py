@@ -138,7 +138,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 # by the names in the source, not by the unions behind them
-autodoc_type_aliases = {name: name for name in ("ArrayLike", "Floats", "Rng", "ErrorKind")}
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "Floats", "Rng", "ErrorKind", "Answer")}
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 88
 napoleon_google_docstring = False
