@@ -59,7 +59,7 @@ def plates(law: ker.Law, collisions: int) -> Callable[[Axes], None]:
     """A disk between two plates."""
 
     def draw(ax: Axes) -> None:
-        disk = geo.Disk(mass=1.0, inertia=0.5)
+        disk = geo.Disk(mass=1.0, inertia_ratio=0.5)
         start = disk.from_angles(0.9, 1.3)
         record = ker.play(geo.Container.strip(), ker.CollisionLaw(law, disk), [0.0, 0.0], start, collisions, 3)
         x, y = record.position[:, 0].T

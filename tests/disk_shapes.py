@@ -59,19 +59,19 @@ def gear(teeth=40, depth=0.08):
 
 
 # ---- pairs -------------------------------------------------------------------------------------------------------
-PAIR, RADII = (geo.Disk(1.0, 0.15), geo.Disk(2.0, 0.7)), (1.0, 1.5)
-VELOCITY = np.array([[-1.6, -1.0, 0.2], [0.1, 0.3, -0.4]])
+PAIR = geo.Disk(1.0, 0.15), geo.Disk.from_inertia(2.0, 0.7, 1.5)
+VELOCITY = np.array([[-1.6, -1.0, 0.2], [0.1, 0.3, -0.6]])
 UNEQUAL = geo.SatelliteDisk(
     geo.Disk(), 5, [0.1, 0.25, 0.05, 0.3, 0.15], [1.0, 0.9, 1.1, 0.8, 1.0], [0.1, 1.0, 2.9, 4.0, 5.5]
 )
-TOOTHED = geo.SatelliteDisk(geo.Disk(2.0, 0.7), 12, 0.02, [1.5, 1.1] * 6, joined=True)
+TOOTHED = geo.SatelliteDisk(geo.Disk.from_inertia(2.0, 0.7, 1.5), 12, 0.02, [1.5, 1.1] * 6, joined=True)
 
 
 def bodies(count):
     """Two disks with equal spacing, so that the difference of two satellites has this spacing too."""
     spacing = 2.0 * math.pi / count
-    first = geo.SatelliteDisk(PAIR[0], count, 0.5 * spacing, RADII[0])
-    return first, geo.SatelliteDisk(PAIR[1], 3 * count // 2, 0.25 * spacing, RADII[1])
+    first = geo.SatelliteDisk(PAIR[0], count, 0.5 * spacing)
+    return first, geo.SatelliteDisk(PAIR[1], 3 * count // 2, 0.25 * spacing)
 
 
 def starts(first, second, n, seed=0):

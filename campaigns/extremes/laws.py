@@ -26,7 +26,7 @@ SPECTRA = {
 
 def judge_masses(ratio: float) -> Iterator[Judged]:
     """Conservation of energy and rolling momentum, both in the kinetic metric, in sampled collisions."""
-    disk = geo.Disk(mass=ratio, inertia=1.0)
+    disk = geo.Disk(ratio, 1.0 / ratio)
     rng = np.random.default_rng(4)
     psi, theta = np.arccos(rng.uniform(-1.0, 1.0, (2, RAYS)))
     incoming = -np.asarray(disk.from_angles(theta, psi))

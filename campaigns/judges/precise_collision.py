@@ -26,7 +26,7 @@ class PreciseCollision:
 
     def __init__(self, disk, wall, scale, spacing, position, velocity):
         self.period, self.scale, self.spacing = mpf(wall.period), mpf(scale), mpf(spacing)
-        self.masses = [mpf(disk.mass), mpf(disk.mass), mpf(disk.inertia)]
+        self.masses = [mpf(disk.mass), mpf(disk.mass), mpf(disk.rim_mass)]
         self.x, self.alpha, self.height = mpf(position[0]) / self.scale, mpf(position[1]), mpf(0)
         self.v = [mpf(v) for v in velocity]
         self.contacts, self.steps, self.pieces = 0, 0, []

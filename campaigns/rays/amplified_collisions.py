@@ -67,7 +67,7 @@ def judge(case: FallingDisk) -> Iterator[Judged]:
         found = [mpf(float(a)) - mpf(float(b)) for a, b in zip(hit.position[0], case.position, strict=True)]
         found += map(mpf, map(float, hit.velocity[0]))
         apart = np.array([float(a - b) for a, b in zip(found, end, strict=True)])
-    speeds = math.sqrt(float(disk.inner(case.velocity, case.velocity))) / np.sqrt([disk.mass, disk.mass, disk.inertia])
+    speeds = math.sqrt(float(disk.inner(case.velocity, case.velocity))) / np.sqrt([disk.mass, disk.mass, disk.rim_mass])
     error = float(np.abs(np.concatenate([apart[:2], apart[2:] / speeds])).max())
     if hit.status[0] == geo.DiskStatus.AMPLIFIED:
         yield Judged(kind, outcome="amplified" if error > ACCURACY else "amplified needlessly")

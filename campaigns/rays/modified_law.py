@@ -34,7 +34,7 @@ WALLS = {
     "focusing arcs": geo.focusing_arcs(1.0),
     "dispersing arcs": geo.dispersing_arcs(1.0),
 }
-DISK = geo.Disk(mass=1.0, inertia=0.6)
+DISK = geo.Disk(mass=1.0, inertia_ratio=0.6)
 # Each scale is a hundredth of the one before; the distance must halve at least, and be small at last.
 SCALES, HALVED, LAST_DISTANCE = (1e-2, 1e-4, 1e-6), 0.5, 0.02
 STATES, BLOCKS = 2000, 20
@@ -81,7 +81,7 @@ def judge(case: tuple[str, np.random.Generator]) -> Iterator[Judged]:
         by_position, by_velocity = _slopes(wall, scale, spacing, out.position[inside], -out.velocity[inside])
         rise = np.minimum(-velocity[inside, 1], out.velocity[inside, 1])
         steps = by_position * spacing / rise * (back.contacts + 2.0) + (1.0 + by_velocity) * (back.contacts + 1.0)
-        bound = 2.0 * ROUNDING / math.sqrt(DISK.inertia) * steps
+        bound = 2.0 * ROUNDING / math.sqrt(DISK.rim_mass) * steps
         worst = int(np.argmax(defect / bound))
         yield Judged(f"{name}, involution at {scale:g}", float(bound[worst]), float(defect[worst]), fault=fault)
 

@@ -22,7 +22,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.kernels.billiards.gas import GasRecord
 
-DISK = geo.Disk(mass=1.0, inertia=0.5)
+DISK = geo.Disk(mass=1.0, inertia_ratio=0.5)
 TABLES = {
     "circle": geo.Container.circle(1.0), "stadium": geo.Container.stadium(2.0, 1.0),
     "Sinai table": geo.Container.sinai(2.0, 0.5),

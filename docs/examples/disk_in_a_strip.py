@@ -35,7 +35,7 @@ def main(disks: int = 20, collisions: int = 1000) -> dict[str, float]:
     rng = np.random.default_rng(0)
     found = {}
     for ratio in RATIOS:
-        widths = strip_widths(geo.Disk(ratio, 1.0), None, disks, collisions, rng)
+        widths = strip_widths(geo.Disk(ratio, 1.0 / ratio), None, disks, collisions, rng)
         found[f"m/J = {ratio:.4g}, greatest width/bound"] = float(widths.max())
         found[f"m/J = {ratio:.4g}, least width/bound"] = float(widths.min())
     disk = geo.Disk(1.0, 0.5)
@@ -52,7 +52,7 @@ def strip_widths(
     velocity = disk.from_angles(rng.uniform(0.3, 2.8, disks), rng.uniform(0.3, 2.8, disks))
     walls = no_slip(disk) if law is None else law
     record = ker.play(geo.Container.strip(), walls, np.zeros((disks, 2)), velocity, collisions, rng)
-    bound = np.sqrt(1.0 / (disk.mass * velocity[:, 1] ** 2) - 1.0) * math.sqrt(1.0 + disk.mass / disk.inertia)
+    bound = np.sqrt(1.0 / (disk.mass * velocity[:, 1] ** 2) - 1.0) * math.sqrt(1.0 + disk.mass / disk.rim_mass)
     return np.asarray(record.extent() / bound)
 
 

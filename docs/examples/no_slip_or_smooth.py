@@ -20,7 +20,7 @@ from asperity import kernels as ker
 
 def main(depths: tuple[float, ...] = (0.25, 0.5, 1.0, 4.0), theta: float = 1.0) -> dict[float, float]:
     """Probability of the no-slip matrix at the angle ``theta``, for each ratio height/width of the teeth."""
-    disk = geo.Disk(mass=1.0, inertia=0.5)
+    disk = geo.Disk(mass=1.0, inertia_ratio=0.5)
     no_slip = ker.no_slip_matrix(disk)
     found = {}
     for ratio in depths:

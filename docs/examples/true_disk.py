@@ -32,7 +32,7 @@ def main(
     found = {}
     wall = geo.triangular_teeth(1.2)
     for ratio in ratios:
-        disk = geo.Disk(mass=ratio, inertia=1.0)
+        disk = geo.Disk(ratio, 1.0 / ratio)
         study = ker.limit_study(disk, wall, scales, np.random.default_rng(0), samples=samples)
         foreshortened = correlation(wall.foreshorten(disk))
         found[f"m/J = {ratio:g}"] = {

@@ -15,7 +15,7 @@ from asperity import kernels as ker
 # %%
 # A uniform disk of radius 1 and mass 1, and the wall that it meets.
 
-disk = geo.Disk(mass=1.0, inertia=0.5)
+disk = geo.Disk(mass=1.0, inertia_ratio=0.5)
 wall = geo.focusing_arcs(half_angle=1.2)
 K = ker.CollisionLaw.from_wall(wall, disk)
 

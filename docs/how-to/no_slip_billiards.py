@@ -17,7 +17,7 @@ from asperity import kernels as ker
 # No-slip plates send every particle back where it came from: the law of retroreflection. The rough plates have the law
 # of a wall of arcs.
 
-disk = geo.Disk(mass=1.0, inertia=0.5)
+disk = geo.Disk(mass=1.0, inertia_ratio=0.5)
 plates = {
     "no-slip plates": ker.CollisionLaw(ker.retroreflection(), disk),
     "rough plates": ker.CollisionLaw.from_wall(geo.focusing_arcs(half_angle=1.2), disk),
@@ -30,7 +30,7 @@ plates = {
 
 rng = np.random.default_rng(0)
 velocity = disk.from_angles(rng.uniform(0.5, 2.6, 8), rng.uniform(0.5, 2.6, 8))
-bound = np.sqrt((1 / (disk.mass * velocity[:, 1] ** 2) - 1) * (1 + disk.mass / disk.inertia))
+bound = np.sqrt((1 / (disk.mass * velocity[:, 1] ** 2) - 1) * (1 + disk.mass / disk.rim_mass))
 
 fig, axes = plt.subplots(2, 1, sharex=True, layout="constrained")
 ratio = {}

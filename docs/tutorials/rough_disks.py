@@ -26,7 +26,7 @@ from asperity import spectral as spec
 
 radius, density, length = 5e-3, 7800.0, 10e-3  # m, kg/m^3, m
 mass = density * np.pi * radius**2 * length  # kg
-disk = geo.Disk(mass, inertia=0.5 * mass)  # kg, kg
+disk = geo.Disk(mass, inertia_ratio=0.5, radius=radius)  # kg, no unit, m
 print(f"mass {1e3 * mass:.2f} g, inertia {0.5 * mass * radius**2:.3g} kg m^2")
 
 # %%
@@ -86,7 +86,7 @@ spin, energy = {}, disk.inner(incoming, incoming)
 fig, ax = plt.subplots(layout="constrained")
 for (name, law), style in zip(laws.items(), ("o-", "s--", "^:"), strict=True):
     after = law.sample(incoming, rng=1)
-    spin[name] = (disk.inertia * after[..., 2] ** 2 / energy).mean(axis=1)
+    spin[name] = (disk.rim_mass * after[..., 2] ** 2 / energy).mean(axis=1)
     ax.plot(degrees, spin[name], style, label=name)
 ax.set(xlabel="angle of impact (degrees from the normal)", ylabel="part of the energy in the spin", ylim=(0, None))
 ax.legend()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, instance, number_between, positive_number, shaped
+from ...core.checks import Floats, finite_array, number_between, positive_number, shaped
 from ...core.errors import InputError
 from ...core.tables import axes_or_new
 from ..disk import rolling
@@ -22,7 +22,7 @@ from ..walls.wall import Wall
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-from .rigid import collide
+from .rigid import check_kinds, collide
 
 MOST_CONTACTS = 200
 
@@ -142,8 +142,7 @@ class ConfigurationSpace:
     spacing: float
 
     def __init__(self, wall: Wall, disk: Disk, scale: float, spacing: float | None = None) -> None:
-        instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
-        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        check_kinds(disk, wall)
         eps = positive_number("scale", scale)
         spacing = Satellites.around(eps, eps * wall.depth, spacing).spacing
         for name, value in (("wall", wall), ("disk", disk), ("scale", eps), ("spacing", spacing)):
@@ -257,7 +256,7 @@ class ConfigurationSpace:
         """
         k = shaped("wall_normal", wall_normal, "...", 2)
         angle = finite_array("alpha", alpha) + finite_array("number", number) * self.spacing
-        n = contact_normal(self.disk.mass, self.disk.inertia, (k[..., 0], k[..., 1]), angle)
+        n = contact_normal(self.disk.mass, self.disk.rim_mass, (k[..., 0], k[..., 1]), angle)
         return np.stack(np.broadcast_arrays(*n), axis=-1)
 
     def draw_collision(self, position: ArrayLike, velocity: ArrayLike, ax: Axes | None = None) -> Axes:

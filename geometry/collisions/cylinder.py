@@ -65,6 +65,7 @@ def collide_cylinder(
     Parameters
     ----------
     disk : Disk
+        Of radius 1, as in `collide`.
     wall : Wall
     scale : float
         eps, greater than 0: the wall's unit of length, in units of the disk's radius.
@@ -90,7 +91,7 @@ def collide_cylinder(
     --------
     >>> from asperity import geometry as geo
     >>> notch = geo.Wall.from_vertices([(0, 0), (0, -0.5), (1, -0.5), (1, 0)])
-    >>> disk = geo.Disk(mass=1.0, inertia=1.0)
+    >>> disk = geo.Disk(mass=1.0, inertia_ratio=1.0)
     >>> out = geo.collide_cylinder(disk, notch, 1.0, [[0.25, 0.25]], [[0.0, -2.0, 0.0]])
     >>> out.position.tolist(), out.velocity.tolist(), out.time.tolist()
     ([[0.25, 0.25]], [[0.0, 2.0, 0.0]], [0.5])
@@ -175,7 +176,7 @@ def collide_modified(
 
     >>> from asperity import geometry as geo
     >>> notch = geo.Wall.from_vertices([(0, 0), (0, -0.5), (1, -0.5), (1, 0)])
-    >>> disk = geo.Disk(mass=1.0, inertia=1.0)
+    >>> disk = geo.Disk(mass=1.0, inertia_ratio=1.0)
     >>> out = collide_modified(disk, notch, 0.001, [[0.00025, 0.0]], [[0.0, -2.0, 0.0]], spacing=np.pi / 32)
     >>> out.position.tolist(), out.velocity.tolist(), out.inside.tolist()
     ([[0.00025, 0.0]], [[0.0, 2.0, 0.0]], [True])
@@ -188,7 +189,7 @@ def collide_modified(
     back = true.escaped
     out = np.array(true.position)
     out[back] = _straightened(charts, true.position[back], -true.velocity[back])
-    floor = np.sin(0.5 * charts.spacing) / np.sqrt(disk.inertia)
+    floor = np.sin(0.5 * charts.spacing) / np.sqrt(disk.rim_mass)
     inside = back & space.is_single(at[:, 1]) & space.is_single(out[:, 1])
     for w in (moving, true.velocity):
         inside = inside & (np.abs(w[:, 1]) > floor * np.sqrt(disk.inner(w, w)))

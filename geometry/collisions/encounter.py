@@ -19,7 +19,7 @@ from ...core.rounding import EPS
 from ..disk.disk import Disk, Features, SatelliteDisk
 from ..tracing.tracing import Status
 from ..walls.wall import Wall
-from .rigid import DiskResults, RigidCollision, checked_states, marked, results_for
+from .rigid import DiskResults, RigidCollision, check_kinds, checked_states, marked, results_for
 
 MAX_CONTACTS, MAX_STEPS = 1000, 100_000
 # Distance at which bodies touch, relative to the size of the region. Positions have some rounding errors.
@@ -230,6 +230,7 @@ def collide_rim(
     Parameters
     ----------
     body : SatelliteDisk
+        With a disk of radius 1, as in `collide`.
     wall : Wall
         Polygonal, without islands, with its highest points at height 0. Others can be replaced by
         ``Wall.from_vertices(wall.outline(tolerance))``.
@@ -269,7 +270,7 @@ def collide_rim(
     ([[0.0, 1.0, 0.0]], [1])
     """
     instance("body", body, SatelliteDisk, "geo.SatelliteDisk(geo.Disk(), 100, 0.05)")
-    instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
+    check_kinds(body.disk, wall)
     eps = number_between("scale", scale, 0.0, LARGEST_SCALE)
     if not wall.is_polygonal or wall.islands or wall.origin[1] != 0.0:
         raise InputError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ class PairCollision(DiskCounts):
     Attributes
     ----------
     position, velocity : arrays of shape (n, 2, 3)
-        (x1, x2, alpha) and (v1, v2, omega) of the first and of the second disk, at the last contact; the initial ones
+        (x1, x2, alpha) and (v1, v2, r omega) of the first and of the second disk, at the last contact; the initial ones
         if there was none.
     time : array of shape (n,)
         The time of the last contact.
@@ -60,7 +60,7 @@ def collide_pair(
     position : array_like, shape (n, 2, 3)
         (x1, x2, alpha) of both disks, which must not touch.
     velocity : array_like, shape (n, 2, 3)
-        (v1, v2, omega) of both disks.
+        (v1, v2, r omega) of both disks.
     max_contacts : int
         Pairs with more contacts end with ``DiskStatus.BOUNCE_LIMIT``.
 
@@ -98,13 +98,18 @@ def collide_pair(
     if not (first.joined or second.joined or first.sizes.max() + second.sizes.max() > 0.0):
         raise InputError("first, second: expected satellites of size greater than 0 on one disk; points do not touch")
     whole_number("max_contacts", max_contacts, 1)
-    at, moving = finite_array("position", position).copy(), finite_array("velocity", velocity).copy()
+    at, moving = finite_array("position", position), finite_array("velocity", velocity)
     if at.ndim != 3 or at.shape[1:] != (2, 3) or moving.shape != at.shape:
         raise InputError(f"position, velocity: expected two arrays of shape (n, 2, 3), got {at.shape}, {moving.shape}")
+    # lengths in radii of the first disk, and angular velocities
+    unit, lengths, spins = first.disk.radius, np.ones(3), np.ones((2, 3))
+    first, second = _in_units(first, unit), _in_units(second, unit)
+    lengths[:2], spins[1, 2] = unit, second.disk.radius
+    at, moving = at / lengths, moving / spins
     states = at.reshape(-1, 6).copy(), moving.reshape(-1, 6).copy()
     results = [_encounter(first, second, x, w).run(max_contacts) for x, w in zip(at, moving, strict=True)]
-    time, contacts, status = (np.array([result[k] for result in results]) for k in range(3))
-    arrays = (at, moving, time.astype(np.float64), contacts.astype(np.int64), status.astype(np.uint8))
+    columns = zip(range(3), (np.float64, np.int64, np.uint8), strict=True)
+    time, contacts, status = (np.array([result[k] for result in results], kind) for k, kind in columns)
 
     def again(rows: NDArray[np.intp], x: Floats, w: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         x, w, escaped = x.reshape(-1, 2, 3), w.reshape(-1, 2, 3), np.zeros(len(rows), dtype=bool)
@@ -117,10 +122,15 @@ def collide_pair(
 
     spacing, ends = max(first.spacing, second.spacing), (at.reshape(-1, 6), moving.reshape(-1, 6))
     masses = np.array([m for body in (first, second) for m in (body.disk.mass, body.disk.mass, body.disk.inertia)])
-    ratio = max(body.disk.mass / body.disk.inertia for body in (first, second))
+    ratio = max(1.0 / body.disk.inertia_ratio for body in (first, second))
     uncertain = contacts >= fewest_contacts(spacing * (1.0 + largest_bend_of(first, second)), ratio)
-    mark_amplified(again, states, ends, arrays[-1], uncertain, (spacing, masses))
-    return PairCollision(*map(read_only, arrays))
+    mark_amplified(again, states, ends, status, uncertain, (spacing, masses))
+    return PairCollision(*map(read_only, (at * lengths, moving * spins, unit * time, contacts, status)))
+
+
+def _in_units(body: SatelliteDisk, unit: float) -> SatelliteDisk:
+    disk = replace(body.disk, radius=body.disk.radius / unit)
+    return replace(body, disk=disk, size=body.sizes / unit, radius=body.radii / unit)
 
 
 class _TwoRims:
@@ -165,12 +175,14 @@ def _encounter(first: SatelliteDisk, second: SatelliteDisk, position: Floats, ve
     # rims with edges must not even be within the reach of their tips, where points may be between edges
     least = sum(body.largest if body.joined else float(body.radii.max()) for body in (first, second))
     if apart < least:
-        raise InputError(f"position: expected disks whose rims do not cross, got centres at distance {apart:.6g}")
+        raise InputError(f"position: expected rims that do not cross, got centres {apart:.6g} radii of the first apart")
     encounter = _between(first, second, position, velocity)
     around = encounter.around
     one, two = around.near(position)
     between = (position[0, :2] - position[1, :2]) + one.arms[:, np.newaxis] - two.arms[np.newaxis, :]
     gaps = np.hypot(between[..., 0], between[..., 1]) - one.sizes[:, np.newaxis] - two.sizes[np.newaxis, :]
     if gaps.size and gaps.min() < -TOUCHING * around.span:
-        raise InputError(f"position: expected disks that do not touch, got satellites {-gaps.min():.3g} too close")
+        raise InputError(
+            f"position: expected rims that do not touch, got overlaps of {-gaps.min():.3g} radii of the first"
+        )
     return encounter

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -102,6 +102,7 @@ def collide(
     Parameters
     ----------
     disk : Disk
+        Of radius 1: lengths and times are in units of the radius.
     wall : Wall
     scale : float
         eps, greater than 0: the period is ``scale * wall.period`` in units of the disk's radius.
@@ -165,8 +166,8 @@ def collide_ring(
 
     states = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
-    ground, total = ground_of(wall.scene), disk.mass + disk.inertia
-    masses = disk.mass / total, disk.inertia / total
+    ground, total = ground_of(wall.scene), disk.mass + disk.rim_mass
+    masses = disk.mass / total, disk.rim_mass / total
 
     def collided(at: Floats, moving: Floats) -> DiskResults:
         start, results = at_the_tops(wall, ring.scale, at, moving), results_for(len(at))
@@ -191,8 +192,8 @@ def marked(
 
     ``bend`` is that of `fewest_contacts`; ``sizes`` are those of x1 and alpha for rounding errors.
     """
-    results, masses = collided(*states), np.array([disk.mass, disk.mass, disk.inertia])
-    uncertain = results.contacts >= fewest_contacts(bend, disk.mass / disk.inertia)
+    results, masses = collided(*states), np.array([disk.mass, disk.mass, disk.rim_mass])
+    uncertain = results.contacts >= fewest_contacts(bend, disk.mass / disk.rim_mass)
 
     def again(rows: NDArray[np.intp], at: Floats, moving: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         moving[:, 1] = np.minimum(moving[:, 1], 0.5 * states[1][rows, 1])
@@ -229,9 +230,19 @@ def from_the_tops(
 
 
 def check_kinds(disk: Disk, wall: Wall) -> None:
-    """Raise an InputError unless ``disk`` is a Disk and ``wall`` a Wall."""
-    instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+    """Raise an InputError unless ``disk`` is a Disk of radius 1 and ``wall`` a Wall."""
+    if in_radii(disk) != disk:
+        raise InputError(
+            "disk: expected radius 1, because lengths and times are in units of the radius, got radius "
+            f"{disk.radius!r}; pass {in_radii(disk)!r}, and divide x1 by the radius"
+        )
     instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
+
+
+def in_radii(disk: Disk) -> Disk:
+    """Return the disk in units of its radius; InputError if it is no Disk."""
+    instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
+    return replace(disk, radius=1.0)
 
 
 def checked_states(position: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:

@@ -71,8 +71,8 @@ class CollisionConstants:
     @classmethod
     def of(cls, disk: Disk) -> CollisionConstants:
         """Return the constants of a disk."""
-        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
-        velocity = 24.0 * math.sqrt(5.0 * (1.0 + disk.mass / disk.inertia))
+        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
+        velocity = 24.0 * math.sqrt(5.0 * (1.0 + disk.mass / disk.rim_mass))
         return cls(velocity, 1.0 + 2.4 + velocity)
 
 
@@ -329,8 +329,8 @@ class _Pair:
         self.disk, self.scale = disk, self.space.scale
         self.w = velocity / math.sqrt(float(disk.inner(velocity, velocity)))
         self.rolled = float(disk.rolling_momentum(self.w))
-        self.fastest = math.sqrt(1.0 / disk.mass + 1.0 / disk.inertia)
-        self.most_spin = disk.inertia**-0.5
+        self.fastest = math.sqrt(1.0 / disk.mass + 1.0 / disk.rim_mass)
+        self.most_spin = disk.rim_mass**-0.5
         residual = float(self.space.charts.residual(start[1]))
         # the largest angle so far; the contact begins above the tops
         self.angle = abs(residual)
@@ -361,7 +361,7 @@ class _Pair:
 
     def whole_velocity(self, u: Floats) -> Floats:
         """Return (v1, v2, omega) of the contact's velocity; the rolling momentum is kept."""
-        spin = (self.rolled + self.disk.mass * u[0]) / (self.disk.mass + self.disk.inertia)
+        spin = (self.rolled + self.disk.mass * u[0]) / (self.disk.mass + self.disk.rim_mass)
         return np.array([u[0] - spin, u[1], spin])
 
     def follow(self) -> Shadow:
@@ -405,7 +405,7 @@ class _Pair:
             self.angle += self.scale * self.most_spin * (flight.time + flight.late + before)
             self._check_angle(0.5 * self.space.spacing - self.space.gap_radius)
             leaving, turned = self._departure(flight, piece)
-            inertia_ratio = math.sqrt(self.disk.mass / self.disk.inertia)
+            inertia_ratio = math.sqrt(self.disk.mass / self.disk.rim_mass)
             difference += 2.0 * math.hypot(turned, inertia_ratio * (turned + self.angle))
             apart, before = flight.reach + self.fastest * flight.late, flight.late
         self._check_exit(apart, before, difference, float(radii[-1]), leaving)
@@ -419,7 +419,7 @@ class _Pair:
         if rate <= 0.0:
             raise _Refused("a contact is too shallow")
         # the distance from the piece is at least rate t - bend (U t)^2 - swing t^2/2
-        swing = self.scale / self.disk.inertia
+        swing = self.scale / self.disk.rim_mass
         time = 0.99 * 2.0 * rate / (2.0 * bend * self.fastest**2 + swing)
         if bend > 0.0:
             time = min(time, BENT / (bend * self.fastest))

@@ -8,7 +8,7 @@ is the body of a true collision. `InnerDisk` is D_0 inside the satellites, which
 from __future__ import annotations
 
 import math
-from dataclasses import InitVar, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -81,22 +81,36 @@ def contact_normal(mass: Any, inertia: Any, wall_normal: Any, turn: Any, xp: Any
 
 @dataclass(frozen=True)
 class Disk:
-    """A disk of radius 1, free to move and rotate, with velocities w = (v1, v2, omega).
+    """A disk, free to move and rotate, with velocities w = (v1, v2, r omega).
+
+    All three velocities have one unit: the third one is the velocity of the rim that is due to the spin. The angular
+    velocity is omega = ``w[..., 2] / disk.radius``. Masses, lengths and times may have any consistent units, such as
+    those of SI. The laws of collisions depend on the radius nowhere else.
 
     Parameters
     ----------
     mass : float
         m, greater than 0.
-    inertia : float
-        J, the moment of inertia about the centre, greater than 0. A uniform disk has J = m/2 and a ring J = m;
-        J > m is accepted, although no real disk of radius 1 has such an inertia.
+    inertia_ratio : float
+        J/(m r^2), a number without unit, greater than 0: 1/2 for a uniform disk, 1 for a ring. More than 1 is accepted,
+        although no real disk has it.
     radius : float
-        1, the unit of lengths. A disk of radius R moves as Disk(m, J / R^2), with R omega in place of omega.
+        r, greater than 0. It matters for distances and angles only.
+    inertia : None
+        Refused, with the ratio to write; `from_inertia` takes a moment of inertia with its radius.
+
+    Attributes
+    ----------
+    inertia : float
+        J = ``inertia_ratio`` m r^2, the moment of inertia about the centre.
+    rim_mass : float
+        J/r^2, which takes the place of J in formulas with r omega. The pages of theory and the paper have r = 1, and
+        write J.
 
     Raises
     ------
     InputError
-        If a parameter is not a finite number greater than 0, or the radius is not 1.
+        If a parameter is not a finite number greater than 0, J or J/r^2 is not, or ``inertia`` is given.
 
     Notes
     -----
@@ -105,49 +119,83 @@ class Disk:
 
     Examples
     --------
-    >>> disk = Disk(mass=1.0, inertia=1 / 3)
+    >>> disk = Disk(mass=1.0, inertia_ratio=1 / 3)
     >>> disk.foreshortening
     0.5
     >>> disk.rolling_momentum((1.0, 0.0, 3.0))
     array(0.)
+    >>> Disk(mass=4.0, radius=0.5).inertia
+    0.5
     """
 
-    mass: float = 1.0
-    inertia: float = 0.5
-    radius: InitVar[float] = 1.0
+    mass: float
+    inertia_ratio: float
+    radius: float
 
-    def __post_init__(self, radius: float) -> None:
-        object.__setattr__(self, "mass", positive_number("mass", self.mass))
-        object.__setattr__(self, "inertia", positive_number("inertia", self.inertia))
-        if positive_number("radius", radius) != 1.0:
+    def __init__(
+        self, mass: float = 1.0, inertia_ratio: float = 0.5, radius: float = 1.0, *, inertia: float | None = None
+    ) -> None:
+        for name, value in (("mass", mass), ("inertia_ratio", inertia_ratio), ("radius", radius)):
+            object.__setattr__(self, name, positive_number(name, value))
+        if inertia is not None:
+            known = Disk.from_inertia(self.mass, inertia, self.radius)
             raise InputError(
-                f"radius: expected 1, the unit of lengths, got {radius!r}; a disk of radius R moves as "
-                f"Disk(mass={self.mass!r}, inertia={self.inertia / float(radius) / float(radius)!r}), whose inertia is "
-                "J / R**2, with R * omega in place of omega"
+                f"inertia: expected inertia_ratio, which is J / (mass * radius**2), got inertia={inertia!r}; write "
+                f"{known!r} if the radius is {known.radius!r}, or pass another radius to "
+                f"geo.Disk.from_inertia({known.mass!r}, {inertia!r}, radius)"
             )
+        positive_number("mass * inertia_ratio", self.rim_mass)
+        positive_number("mass * inertia_ratio * radius**2", self.inertia)
+
+    @classmethod
+    def from_inertia(cls, mass: float, inertia: float, radius: float) -> Disk:
+        """Return the disk with a moment of inertia about its centre, in the units of mass times radius squared.
+
+        Raises
+        ------
+        InputError
+            If a parameter, or the ratio, is not a finite number greater than 0.
+
+        Examples
+        --------
+        >>> Disk.from_inertia(mass=4.0, inertia=0.5, radius=0.5)
+        Disk(mass=4.0, inertia_ratio=0.5, radius=0.5)
+        """
+        parts = (("mass", mass), ("inertia", inertia), ("radius", radius))
+        m, j, r = (positive_number(name, value) for name, value in parts)
+        return cls(m, j / m / r / r, r)
+
+    @property
+    def rim_mass(self) -> float:
+        return self.mass * self.inertia_ratio
+
+    @property
+    def inertia(self) -> float:
+        return self.rim_mass * self.radius * self.radius
 
     @property
     def foreshortening(self) -> float:
-        """kappa = (1 + m/J)^(-1/2) < 1: the factor by which the disk's rotation compresses a wall along x."""
-        return float(foreshortening(self.mass, self.inertia))
+        """kappa = (1 + m/J)^(-1/2) < 1, with r = 1: the factor by which the rotation compresses a wall along x."""
+        return float(foreshortening(1.0, self.inertia_ratio))
 
     @property
     def frame(self) -> Floats:
         """The frame: rows chi_perp, e2^ and chi, orthonormal for ``inner``; shape (3, 3), read-only.
 
-        chi_perp = (1/m + 1/J)^(-1/2) (1/m, 0, 1/J), e2^ = m^(-1/2) (0, 1, 0), chi = (m + J)^(-1/2) (-1, 0, 1).
+        chi_perp = (1/m + 1/J)^(-1/2) (1/m, 0, 1/J), e2^ = m^(-1/2) (0, 1, 0), chi = (m + J)^(-1/2) (-1, 0, 1),
+        with r = 1.
         """
-        return frozen(frame_rows(self.mass, self.inertia))
+        return frozen(frame_rows(self.mass, self.rim_mass))
 
     def inner(self, w: ArrayLike, w2: ArrayLike) -> Floats:
         """Return the kinetic-energy inner products of velocities of shape (..., 3), broadcast."""
         products = _velocities("w", w) * _velocities("w2", w2)
-        return np.asarray(self.mass * (products[..., 0] + products[..., 1]) + self.inertia * products[..., 2])
+        return np.asarray(self.mass * (products[..., 0] + products[..., 1]) + self.rim_mass * products[..., 2])
 
     def rolling_momentum(self, w: ArrayLike) -> Floats:
-        """Return -m v1 + J omega, invariant in every collision; shape (...) for velocities of shape (..., 3)."""
+        """Return -m v1 + J omega/r, invariant in every collision; shape (...) for velocities of shape (..., 3)."""
         velocity = _velocities("w", w)
-        return np.asarray(-self.mass * velocity[..., 0] + self.inertia * velocity[..., 2])
+        return np.asarray(-self.mass * velocity[..., 0] + self.rim_mass * velocity[..., 2])
 
     def to_angles(self, w: ArrayLike) -> tuple[Floats, Floats]:
         """Return the angles (theta, psi) of velocities, which do not depend on the speed.
@@ -155,7 +203,7 @@ class Disk:
         Parameters
         ----------
         w : array_like, shape (..., 3)
-            Velocities (v1, v2, omega) with v2 > 0. For an incoming velocity pass minus the velocity.
+            Velocities (v1, v2, r omega) with v2 > 0. For an incoming velocity pass minus the velocity.
 
         Returns
         -------
@@ -181,14 +229,14 @@ class Disk:
                 f"w: expected velocities with v2 > 0, got v2 = {float(velocity[where][1])!r}{index_text}; "
                 "pass minus the velocity of an incoming disk"
             )
-        across = (velocity[..., 0] + velocity[..., 2]) / math.sqrt(1.0 / self.mass + 1.0 / self.inertia)
+        across = (velocity[..., 0] + velocity[..., 2]) / math.sqrt(1.0 / self.mass + 1.0 / self.rim_mass)
         upward = math.sqrt(self.mass) * velocity[..., 1]
-        rolling = self.rolling_momentum(velocity) / math.sqrt(self.mass + self.inertia)
+        rolling = self.rolling_momentum(velocity) / math.sqrt(self.mass + self.rim_mass)
         # two arctangents are accurate at grazing angles and at the poles, where arccos loses half of the digits
         return np.arctan2(upward, across), np.arctan2(np.hypot(upward, across), rolling)
 
     def from_angles(self, theta: ArrayLike, psi: ArrayLike, speed: ArrayLike = 1.0) -> Floats:
-        """Return velocities (v1, v2, omega) with the given angles.
+        """Return velocities (v1, v2, r omega) with the given angles.
 
         Parameters
         ----------
@@ -224,7 +272,7 @@ class Disk:
 def _velocities(name: str, w: ArrayLike) -> Floats:
     array = finite_array(name, w)
     if array.ndim == 0 or array.shape[-1] != 3:
-        raise InputError(f"{name}: expected velocities (v1, v2, omega) of shape (..., 3), got shape {array.shape}")
+        raise InputError(f"{name}: expected velocities (v1, v2, r omega) of shape (..., 3), got shape {array.shape}")
     return array
 
 
@@ -253,13 +301,13 @@ class SatelliteDisk(Value):
     Parameters
     ----------
     disk : Disk
-        Mass and inertia.
+        Masses, and the radius that its spin r omega refers to.
     count : int
         Number of satellites, at least 3.
     size : float or array_like, shape (count,)
         The radii of the satellites; 0 for points. Arcs on the rim are satellites that overlap.
     radius : float or array_like, shape (count,)
-        The distances of the satellites' centres from the centre of the disk.
+        The distances of the satellites' centres from the centre of the disk, by default its radius.
     angles : array_like, shape (count,), optional
         Satellite k is at the angle alpha + ``angles[k]``, increasing in [0, 2 pi); by default 2 pi k/count.
     joined : bool
@@ -287,7 +335,7 @@ class SatelliteDisk(Value):
     disk: Disk
     count: int
     size: ArrayLike
-    radius: ArrayLike = 1.0
+    radius: ArrayLike | None = None
     angles: ArrayLike | None = None
     joined: bool = False
 
@@ -296,6 +344,8 @@ class SatelliteDisk(Value):
         instance("joined", self.joined, bool, "True")
         n = whole_number("count", self.count, FEWEST)
         object.__setattr__(self, "count", n)
+        if self.radius is None:
+            object.__setattr__(self, "radius", self.disk.radius)
         for name, least in (("size", 0.0), ("radius", np.finfo(float).tiny)):
             value: ArrayLike = getattr(self, name)
             if not np.iterable(value):

@@ -6,7 +6,7 @@ import difflib
 import inspect
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from os.path import isfile
 from pathlib import Path
 from types import MappingProxyType
@@ -46,16 +46,17 @@ class NamedWall(Summary):
         return self.constructor(**{**self.defaults, **parameters})
 
 
-def _elliptical(half_angle: float, mass: float, inertia: float) -> Wall:
-    return elliptical_arcs(half_angle, Disk(mass, inertia))
+def _elliptical(half_angle: float, inertia_ratio: float) -> Wall:
+    return elliptical_arcs(half_angle, Disk(inertia_ratio=inertia_ratio))
 
 
 def _entry(function: Callable[..., Wall], summary: str, constructor: Callable[..., Wall] | None = None) -> NamedWall:
-    """The entry of a function with its defaults; ``constructor`` takes the numbers of a disk in its place."""
+    """The entry of a function with its defaults; ``constructor`` takes the ratio of a disk in its place."""
     defaults: dict[str, float | int] = {}
     for parameter in inspect.signature(function).parameters.values():
         value = parameter.default
-        defaults |= asdict(value) if isinstance(value, Disk) else {parameter.name: value}
+        of_disk = isinstance(value, Disk)
+        defaults |= {"inertia_ratio": value.inertia_ratio} if of_disk else {parameter.name: value}
     name = function.__name__.replace("_", "-")
     return NamedWall(name, constructor or function, MappingProxyType(defaults), summary)
 

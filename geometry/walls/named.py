@@ -151,7 +151,7 @@ def elliptical_arcs(half_angle: float = 1.2, disk: Disk = UNIFORM_DISK) -> Wall:
     half_angle : float
         xi in (0, pi/2], radians.
     disk : Disk
-        The disk for which the wall acts as circular arcs; by default the uniform disk, mass 1 and inertia 1/2.
+        The disk for which the wall acts as circular arcs, by default a uniform one; only its ratio of inertia matters.
 
     Raises
     ------
@@ -164,11 +164,11 @@ def elliptical_arcs(half_angle: float = 1.2, disk: Disk = UNIFORM_DISK) -> Wall:
 
     Examples
     --------
-    >>> disk = Disk(mass=1.0, inertia=0.5)
+    >>> disk = Disk(mass=1.0, inertia_ratio=0.5)
     >>> elliptical_arcs(0.9, disk).foreshorten(disk).pieces[0].is_circular
     True
     """
-    instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+    instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
     return focusing_arcs(half_angle).unforeshorten(disk)
 
 

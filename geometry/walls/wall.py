@@ -277,12 +277,12 @@ class Wall(Cell):
         >>> Wall.from_vertices([(0, 0), (0.5, -0.25), (1, 0)]).foreshorten(Disk(1.0, 1 / 3)).depth
         0.5
         """
-        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
         return self._image(1.0, 1.0 / disk.foreshortening, self.period)
 
     def unforeshorten(self, disk: Disk) -> Self:
         """Return the wall whose foreshortened wall is this one: y multiplied by ``disk.foreshortening``."""
-        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
         return self._image(1.0, disk.foreshortening, self.period)
 
     def _repr_html_(self) -> str:

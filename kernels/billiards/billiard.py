@@ -37,7 +37,7 @@ class Reflector(Protocol):
     def disk(self) -> Disk: ...
 
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
-        """Outgoing (v1, v2, omega) with v2 > 0, of equal energy, for incoming ones with v2 < 0; the wall is below."""
+        """Outgoing (v1, v2, r omega) with v2 > 0, of equal energy, for incoming ones with v2 < 0; the wall is below."""
         ...
 
 
@@ -65,7 +65,7 @@ def play(
     position : array_like, shape (n, 2) or (2,)
         Initial centres, inside the container.
     velocity : array_like, shape (n, 3) or (3,)
-        Initial (v1, v2, omega). One position is repeated for many velocities, and the other way round.
+        Initial (v1, v2, r omega). One position is repeated for many velocities, and the other way round.
     collisions : int
         Number of collisions per disk.
     rng : None, int or numpy.random.Generator
@@ -176,7 +176,7 @@ class _Disks:
                 found = np.all(np.isfinite(after), axis=1)
                 status[here[~found]] = FlightStatus.UNREFLECTED
                 here, step = here[found], step[found]
-                time[here], angle[here] = time[here] + step, angle[here] + moving[here, 2] * step
+                time[here], angle[here] = time[here] + step, angle[here] + moving[here, 2] * (step / law.disk.radius)
                 located[here], moving[here], last[here] = point.position[found], after[found], k
                 made[here] += 1
             states.append(tuple(map(np.copy, state)))
@@ -218,7 +218,7 @@ def _starts(container: Container, position: ArrayLike, velocity: ArrayLike) -> t
         raise InputError(f"position: expected shape (n, 2) or (2,), got {np.shape(position)}")
     n = len(located) if len(located) != 1 or moving.ndim != 2 else len(moving)
     if moving.ndim not in (1, 2) or moving.shape[-1] != 3 or (moving.ndim == 2 and len(moving) not in (1, n)):
-        raise InputError(f"velocity: expected shape ({n}, 3) for (v1, v2, omega), got {moving.shape}")
+        raise InputError(f"velocity: expected shape ({n}, 3) for (v1, v2, r omega), got {moving.shape}")
     check_inside(container, located)
     return np.broadcast_to(located, (n, 2)).copy(), np.broadcast_to(moving, (n, 3)).copy()
 
@@ -244,7 +244,7 @@ def reflected(point: Touch, law: Reflector, moving: Floats, rng: np.random.Gener
     if wrong.any():
         k = int(np.argmax(wrong))
         raise InputError(
-            f"laws: expected velocities (v1, v2, omega) with v2 > 0 and the energy {0.5 * before[k]:.10g} of the "
+            f"laws: expected velocities (v1, v2, r omega) with v2 > 0 and the energy {0.5 * before[k]:.10g} of the "
             f"incoming {incoming[k].tolist()}, got {outgoing[k].tolist()} of energy {0.5 * after[k]:.10g} from "
             f"{shortened(law)} at {point.position[k].tolist()}; the wall is below in these coordinates"
         )

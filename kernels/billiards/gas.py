@@ -49,12 +49,12 @@ class GasRecord(BilliardRecord):
     @property
     def radius(self) -> float:
         """The radius of the disks."""
-        return self.pair.radii[0]
+        return self.disk.radius
 
     @property
     def rotational_energy(self) -> Floats:
         """The energy of all spins, J omega^2/2, shape (events + 1,)."""
-        return np.asarray(0.5 * self.disk.inertia * np.sum(self.velocity[..., 2] ** 2, axis=1))
+        return np.asarray(0.5 * self.disk.rim_mass * np.sum(self.velocity[..., 2] ** 2, axis=1))
 
     def rotational_fraction(self, burn_in: float = BURN_IN) -> Estimate:
         """Estimate the fraction of the energy in rotation, as a mean over time; 1/3 in equipartition.
@@ -120,11 +120,11 @@ def play_gas(
     container : Container
         The region of the centres.
     pair : PairLaw
-        The law of collisions between disks, of two equal disks with equal radii.
+        The law of collisions between disks, of two equal disks.
     position : array_like, shape (n, 2)
-        Initial centres, inside the container, at least two radii apart.
+        Initial centres, inside the container, at least two radii of the disks apart.
     velocity : array_like, shape (n, 3)
-        Initial (v1, v2, omega).
+        Initial (v1, v2, r omega).
     events : int
         Number of collisions, with walls and of pairs. Each costs some n operations on arrays.
     walls : Reflector or sequence of Reflector, optional
@@ -164,13 +164,13 @@ def play_gas(
     """
     instance("pair", pair, PairLaw, "ker.PairLaw(ker.retroreflection(), geo.Disk())")
     disk, other = pair.disks
-    if disk != other or pair.radii[0] != pair.radii[1]:
-        raise InputError("pair: expected the law of two equal disks with equal radii")
+    if disk != other:
+        raise InputError("pair: expected the law of two equal disks")
     whole_number("events", events, 1)
     laws = laws_of_walls(container, smooth(disk) if walls is None else walls)
     if laws[0].disk != disk:
         raise InputError("walls: expected laws of the disk of the pair")
-    located, moving = _start(container, position, velocity, 2.0 * pair.radii[0])
+    located, moving = _start(container, position, velocity, 2.0 * disk.radius)
     check_memory("events", "the record", 10 * events * len(located))
     rng = generator(rng)
     gas = _Gas(container, pair, laws, located, moving)
@@ -230,7 +230,7 @@ class _Gas:
         self.walls[disks] = self.now + flight
         for k in disks:
             times = self.now + meeting_times(
-                self.position - self.position[k], self.velocity - self.velocity[k], 2.0 * self.pair.radii[0]
+                self.position - self.position[k], self.velocity - self.velocity[k], 2.0 * self.pair.first.radius
             )
             times[k] = np.inf
             self.pairs[k], self.pairs[:, k] = times, times
@@ -248,7 +248,7 @@ class _Gas:
             return False
         step = max(then - self.now, 0.0)
         self.position += self.velocity[:, :2] * step
-        self.angle += self.velocity[:, 2] * step
+        self.angle += self.velocity[:, 2] * (step / self.pair.first.radius)
         self.now = then
         self.wall[:], self.partner[:] = -1, -1
         if hits_wall:

@@ -76,7 +76,7 @@ def lyapunov_exponent(
 
     Notes
     -----
-    At a collision with a wall of curvature k the velocity u = (v1, v2, omega) becomes A u, where A is the velocity
+    At a collision with a wall of curvature k the velocity u = (v1, v2, r omega) becomes A u, where A is the velocity
     matrix rotated into the direction of the tangent. Perturbations change by
 
         dq' = dq + (v - v') dt,   du' = A du + k ds (Z A - A Z) u,   dt = -(dq.n)/(v.n),   ds = (dq + v dt).t,
@@ -243,5 +243,5 @@ def equilibrium_starts(
         along, spin = rng.uniform(-1.0, 1.0, count), np.zeros(count)
         up = np.sqrt((1.0 - along) * (1.0 + along))
     plane = along[:, None] * tangent + up[:, None] * normal
-    omega = spin * math.sqrt(disk.mass / disk.inertia)
-    return position, np.concatenate([plane, omega[:, None]], axis=1), wall
+    rim = spin / math.sqrt(disk.inertia_ratio)
+    return position, np.concatenate([plane, rim[:, None]], axis=1), wall

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, common_shape, instance, positive_number, shaped
+from ...core.checks import Floats, Rng, common_shape, instance, shaped
 from ...core.errors import InputError
 from ...core.given import seed_by_name
 from ...geometry import Disk, Wall
@@ -22,24 +22,23 @@ UNIT_TOLERANCE = 1e-9
 class PairLaw:
     r"""The law of the collision of two rough disks with each other.
 
-    The pair behaves like one disk at a fixed wall. With radii a1, a2, the *reduced disk* has mass
-    (1/m1 + 1/m2)^(-1) and inertia (a1^2/J1 + a2^2/J2)^(-1). Its velocity is the relative velocity of the centres and
-    the sum a1 omega1 + a2 omega2; the tangent is seen with the second disk below. The roughness sees the reduced disk's
-    foreshortening. The collision conserves the momentum, the angular momentum about any point, and the energy.
+    The pair behaves like one disk at a fixed wall. The *reduced disk* has mass (1/m1 + 1/m2)^(-1) and, with
+    M = J/r^2 = ``rim_mass``, the mass (1/M1 + 1/M2)^(-1) at its rim. Its velocity is the relative velocity of the
+    centres and the sum r1 omega1 + r2 omega2; the tangent is seen with the second disk below. The roughness sees the
+    reduced disk's foreshortening. The collision conserves the momentum, the angular momentum about any point, and the
+    energy.
 
     Parameters
     ----------
     law : Law
         P~, the law of the *foreshortened* roughness of both rims; `from_wall` foreshortens.
     first, second : Disk
-        Masses and inertias; ``second`` is by default equal to ``first``.
-    radii : (float, float)
-        The radii a1 and a2.
+        The disks; ``second`` is by default equal to ``first``. The law does not depend on their radii.
 
     Raises
     ------
     InputError
-        If an argument is of another kind, or a radius is not positive.
+        If an argument is of another kind.
 
     Notes
     -----
@@ -60,29 +59,24 @@ class PairLaw:
     law: Law
     first: Disk
     second: Disk | None = None
-    radii: tuple[float, float] = (1.0, 1.0)
 
     def __post_init__(self) -> None:
-        instance("first", self.first, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        instance("first", self.first, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
         if self.second is None:
             object.__setattr__(self, "second", self.first)
-        instance("second", self.second, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
-        radii = shaped("radii", self.radii, 2)
-        object.__setattr__(self, "radii", tuple(positive_number("radii", radius) for radius in radii))
+        instance("second", self.second, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
         # refuses what is no law of angles, and other frames
         _ = self.reduced_law
 
     @classmethod
-    def from_wall(
-        cls, wall: Wall, first: Disk, second: Disk | None = None, radii: tuple[float, float] = (1.0, 1.0)
-    ) -> PairLaw:
+    def from_wall(cls, wall: Wall, first: Disk, second: Disk | None = None) -> PairLaw:
         """Return the law of a pair whose relative roughness is a wall: the law of the foreshortened wall.
 
         Source: Rudzis 2022, section 1.3.7, for the reduced disk.
         """
         instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
-        reduced = cls(specular(), first, second, radii).reduced_disk
-        return cls(CollisionLaw.from_wall(wall, reduced).law, first, second, radii)
+        reduced = cls(specular(), first, second).reduced_disk
+        return cls(CollisionLaw.from_wall(wall, reduced).law, first, second)
 
     @property
     def disks(self) -> tuple[Disk, Disk]:
@@ -91,12 +85,10 @@ class PairLaw:
 
     @property
     def reduced_disk(self) -> Disk:
-        """The disk at a fixed wall that behaves like the pair."""
-        (one, two), (a1, a2) = self.disks, self.radii
-        turning = a1 * (a1 / one.inertia) + a2 * (a2 / two.inertia)
-        if turning == 0.0:
-            raise InputError(f"radii: expected some whose square over the inertia is a float, got {self.radii}")
-        return Disk(1.0 / (1.0 / one.mass + 1.0 / two.mass), 1.0 / turning)
+        """The disk of radius 1 at a fixed wall that behaves like the pair."""
+        one, two = self.disks
+        mass = 1.0 / (1.0 / one.mass + 1.0 / two.mass)
+        return Disk(mass, 1.0 / (mass / one.rim_mass + mass / two.rim_mass))
 
     @property
     def reduced_law(self) -> CollisionLaw:
@@ -114,7 +106,7 @@ class PairLaw:
         normal : array_like, shape (..., 2)
             Unit vectors from the second to the first centre.
         first_velocity, second_velocity : array_like, shape (..., 3)
-            (v1, v2, omega) of both disks in fixed axes, approaching each other.
+            (v1, v2, r omega) of both disks in fixed axes, approaching each other.
         rng : None, int or numpy.random.Generator
 
         Returns
@@ -129,10 +121,8 @@ class PairLaw:
         up, one, two = self._checked(normal, first_velocity, second_velocity)
         along = np.stack([up[..., 1], -up[..., 0]], axis=-1)
         relative = one[..., :2] - two[..., :2]
-        (a1, a2), (disk1, disk2) = self.radii, self.disks
-        before = np.stack(
-            [np.sum(relative * along, -1), np.sum(relative * up, -1), a1 * one[..., 2] + a2 * two[..., 2]], axis=-1
-        )
+        disk1, disk2 = self.disks
+        before = np.stack([np.sum(relative * along, -1), np.sum(relative * up, -1), one[..., 2] + two[..., 2]], axis=-1)
         if not np.all(before[..., 1] < 0.0):
             raise InputError("velocities: expected disks that approach each other along the normal; check its sign")
         mass = self.reduced_disk.mass
@@ -140,8 +130,8 @@ class PairLaw:
         impulse = change[..., :1] * along + change[..., 1:] * up
         spun = change[..., :1]
         return (
-            one + np.concatenate([impulse / disk1.mass, a1 * spun / disk1.inertia], axis=-1),
-            two + np.concatenate([-impulse / disk2.mass, a2 * spun / disk2.inertia], axis=-1),
+            one + np.concatenate([impulse / disk1.mass, spun / disk1.rim_mass], axis=-1),
+            two + np.concatenate([-impulse / disk2.mass, spun / disk2.rim_mass], axis=-1),
         )
 
     @staticmethod

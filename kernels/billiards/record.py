@@ -47,7 +47,7 @@ class BilliardRecord(Summary):
     angle : array, shape (steps + 1, n)
         Angle of rotation since the start, radians, not reduced modulo 2 pi.
     velocity : array, shape (steps + 1, n, 3)
-        (v1, v2, omega) after the collision.
+        (v1, v2, r omega) after the collision.
     wall : array of int, shape (steps + 1, n)
         Index of the wall, -1 at the start.
     collisions : array of int, shape (n,)
@@ -173,7 +173,7 @@ class BilliardRecord(Summary):
         else:
             norm = np.sqrt(2.0 * self.energy[1:][met])
             first[met] = np.sqrt(self.disk.mass) * along[met] / norm
-            second[met] = np.sqrt(self.disk.inertia) * velocity[met][:, 2] / norm
+            second[met] = np.sqrt(self.disk.rim_mass) * velocity[met][:, 2] / norm
         return first, second
 
     def draw_phase_portrait(self, coordinates: Coordinates = "boundary", ax: Axes | None = None) -> Axes:

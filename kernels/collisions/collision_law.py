@@ -88,14 +88,14 @@ class VelocityLaw(TensorLaw):
         Parameters
         ----------
         velocity : array_like of shape (..., 3)
-            Incoming (v1, v2, omega) with v2 < 0.
+            Incoming (v1, v2, r omega) with v2 < 0.
         rng : None, int or numpy.random.Generator
 
         Returns
         -------
         array of shape (..., 3)
-            Outgoing (v1, v2, omega) with v2 > 0, of the same kinetic energy and rolling momentum. A term without flip,
-            as in ``K @ K``, reverses the rolling momentum: it keeps that of minus the incoming velocity.
+            Outgoing (v1, v2, r omega) with v2 > 0, of the same kinetic energy and rolling momentum. A term without
+            flip, as in ``K @ K``, reverses the rolling momentum: it keeps that of minus the incoming velocity.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class VelocityLaw(TensorLaw):
         position : array_like, shape (n, 2)
             (x1, alpha) at x2 = 0, as in `geometry.collide`: coordinates of y.
         velocity : array_like, shape (n, 3)
-            Incoming (v1, v2, omega) with v2 < 0.
+            Incoming (v1, v2, r omega) with v2 < 0.
         rng : None, int or numpy.random.Generator
 
         Returns
@@ -229,7 +229,7 @@ class VelocityLaw(TensorLaw):
         -------
         list of (probability, matrix)
             Probability of shape ``theta.shape``, matrix of shape ``theta.shape + (3, 3)``. Each matrix maps the
-            incoming (v1, v2, omega) to the outgoing one. Branches with probability 0 everywhere are omitted.
+            incoming (v1, v2, r omega) to the outgoing one. Branches with probability 0 everywhere are omitted.
 
         Raises
         ------
@@ -353,7 +353,7 @@ class CollisionLaw(VelocityLaw):
 
     K maps *minus* the incoming velocity, w = cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi, to the
     outgoing velocity. It maps theta by P~ and psi to pi - psi, and leaves the position unchanged. It conserves the
-    kinetic energy and the rolling momentum -m v1 + J omega, and is symmetric with respect to
+    kinetic energy and the rolling momentum -m v1 + J omega/r, and is symmetric with respect to
     Lambda^2 = sin(theta) sin(psi)^2 d theta d psi. Because of the minus sign, K composed with itself is not the law of
     the next collision.
 
@@ -369,7 +369,7 @@ class CollisionLaw(VelocityLaw):
     --------
     >>> import numpy as np
     >>> from asperity import geometry as geo, kernels as ker
-    >>> K = ker.CollisionLaw(ker.retroreflection(), geo.Disk(mass=1.0, inertia=0.5))
+    >>> K = ker.CollisionLaw(ker.retroreflection(), geo.Disk(mass=1.0, inertia_ratio=0.5))
     >>> K.sample([[1.0, -1.0, 0.0]], np.random.default_rng(0)).round(12).tolist()
     [[0.333333333333, 1.0, -1.333333333333]]
 
@@ -385,7 +385,7 @@ class CollisionLaw(VelocityLaw):
     def __post_init__(self) -> None:
         check_paper_frame("law", self.law, "ker.WallLaw(wall.foreshorten(disk))")
         _ = self.law.parts  # raises InputError unless the weights of a combination make it a law
-        instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
 
     @classmethod
     def from_wall(cls, wall: Wall, disk: Disk) -> CollisionLaw:
@@ -426,9 +426,9 @@ class CollisionCombination(VelocityLaw):
     >>> disk = geo.Disk()
     >>> smooth, rough = ker.CollisionLaw(ker.specular(), disk), ker.CollisionLaw(ker.retroreflection(), disk)
     >>> 0.5 * smooth + 0.5 * rough
-    CollisionLaw(law=0.5*specular() + 0.5*retroreflection(), disk=Disk(mass=1.0, inertia=0.5))
+    CollisionLaw(law=0.5*specular() + 0.5*retroreflection(), disk=Disk(mass=1.0, inertia_ratio=0.5, radius=1.0))
     >>> smooth @ rough
-    CollisionCombination(terms=((1.0, specular(), False),), disk=Disk(mass=1.0, inertia=0.5))
+    CollisionCombination(terms=((1.0, specular(), False),), disk=Disk(mass=1.0, inertia_ratio=0.5, radius=1.0))
     >>> float((smooth @ smooth).apply(lambda theta, psi: psi, 1.0, 0.25))
     0.25
     """
@@ -437,7 +437,7 @@ class CollisionCombination(VelocityLaw):
     disk: Disk
 
     def __post_init__(self) -> None:
-        instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
         if not isinstance(self.terms, tuple) or not all(isinstance(t, tuple) and len(t) == 3 for t in self.terms):
             raise InputError(f"terms: expected tuples (weight, law, flip), got {shortened(self.terms)}")
         if not self.terms or len({bool(flip) for _, _, flip in self.terms}) < len(self.terms):
@@ -493,7 +493,7 @@ def _with_psi(function: VelocityFunction, psi: Floats, theta: Floats) -> Floats:
 
 
 def no_slip(disk: Disk) -> CollisionLaw:
-    """The no-slip collision law, K of retroreflection: it reverses v2 and the slip v1 + omega.
+    """The no-slip collision law, K of retroreflection: it reverses v2 and the slip v1 + r omega.
 
     Source: Rudzis 2022, eq. 2.25; its velocity matrix is `no_slip_matrix`.
 

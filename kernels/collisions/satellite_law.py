@@ -15,6 +15,7 @@ from ...core.given import seed_by_name
 from ...core.tables import axes_or_new
 from ...geometry import Disk, Wall, collide, trace
 from ...geometry.collisions.configuration_space import ConfigurationSpace
+from ...geometry.collisions.rigid import in_radii
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,8 +63,8 @@ class SatelliteLaw:
     spacing: float | None = None
 
     def __post_init__(self) -> None:
-
-        object.__setattr__(self, "spacing", ConfigurationSpace(self.wall, self.disk, self.scale, self.spacing).spacing)
+        space = ConfigurationSpace(self.wall, in_radii(self.disk), self.scale, self.spacing)
+        object.__setattr__(self, "spacing", space.spacing)
 
     @seed_by_name
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
@@ -90,11 +91,12 @@ class SatelliteLaw:
 
         assert self.spacing is not None
         out, rest = np.full(moving.shape, np.nan), np.arange(len(moving))
+        disk = in_radii(self.disk)
         for _ in range(MOST_DRAWS):
             if not len(rest):
                 break
             position = rng.random((len(rest), 2)) * [self.scale * self.wall.period, self.spacing]
-            hit = collide(self.disk, self.wall, self.scale, position, moving[rest], self.spacing)
+            hit = collide(disk, self.wall, self.scale, position, moving[rest], self.spacing)
             out[rest[hit.escaped]] = hit.velocity[hit.escaped]
             rest = rest[~hit.escaped]
         return out

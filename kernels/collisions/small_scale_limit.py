@@ -32,6 +32,7 @@ from ...core.rounding import EPS
 from ...core.tables import data_frame
 from ...geometry import Disk, Wall, collide, collide_cylinder, collide_modified, trace
 from ...geometry.collisions.configuration_space import ConfigurationSpace
+from ...geometry.collisions.rigid import in_radii
 
 # A slope with an error needs three points.
 FEWEST_SCALES = 3
@@ -216,6 +217,7 @@ def limit_study(
     whole_number("repetitions", repetitions, 2)
     # a part takes a thousand bytes, packed
     check_memory("repetitions", "all repetitions", 128 * len(eps) * repetitions)
+    disk = in_radii(disk)
     spaces = [ConfigurationSpace(wall, disk, float(e), None if spacing is None else spacing(float(e))) for e in eps]
     if limit is not None:
         instance("limit", limit, Wall, "geo.triangular_teeth(0.7)")

@@ -27,6 +27,7 @@ from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...geometry import Disk, Wall, collide, collide_cylinder, trace
 from ...geometry.collisions.configuration_space import ConfigurationSpace
+from ...geometry.collisions.rigid import in_radii
 from ..bases.measure import SINE, SINE_SQUARED
 from .collision_law import StateFunction
 
@@ -117,8 +118,9 @@ def weak_limit(
     scales : array_like, shape (n,)
         Values of eps, at least 2^-42 ``window``/``wall.period``.
     pairs : dict of (f, g), optional
-        Continuous functions of states, vectorised: f(y, theta, psi), with y = (x1, alpha) of shape (n, 2). By default
-        f = g = cos(pi x1/2)^2 cos(pi alpha/2)^2 h for x1 and alpha in (-1, 1), with four functions h of the angles.
+        Continuous functions of states, vectorised: f(y, theta, psi), with y = (x1, alpha) of shape (n, 2) and x1 in
+        radii of the disk. By default f = g = cos(pi x1/2)^2 cos(pi alpha/2)^2 h for x1 and alpha in (-1, 1), with four
+        functions h of the angles.
     rng : None, int or numpy.random.Generator
     window : float
         g is taken as 0 where abs(x1) or abs(alpha) exceeds ``window``.
@@ -161,6 +163,7 @@ def weak_limit(
     whole_number("repetitions", repetitions, 2)
     tested = PAIRS if pairs is None else _checked(pairs)
     source = generator(rng)
+    disk = in_radii(disk)
     spaces = [ConfigurationSpace(wall, disk, float(e)) for e in eps]
     least = EPS * window / (FINEST * wall.period)
     if eps.min() < least:

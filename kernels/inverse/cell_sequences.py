@@ -66,7 +66,7 @@ def dichotomy(
     cells : sequence of Wall
         At least 4, each of segments and arcs.
     disk : Disk, optional
-        By default the uniform disk, mass 1 and inertia 1/2.
+        By default the uniform disk.
     tolerance : float
         Laws closer than this count as one.
     scales : sequence of float

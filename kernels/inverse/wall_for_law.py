@@ -268,7 +268,7 @@ def collision_for(
 
     instance("collision", collision, CollisionLaw, "ker.CollisionLaw(law, disk)")
     felt = collision.disk if disk is None else disk
-    instance("disk", felt, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+    instance("disk", felt, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
     found = wall_for(collision.law, moments, tolerance, **search)
     return replace(found, wall=found.wall.unforeshorten(felt), disk=felt)
 

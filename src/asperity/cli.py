@@ -11,15 +11,18 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import partial, wraps
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from . import __version__
 from .core.errors import INTERRUPTED, AccuracyError, AsperityError, FileExistsRefusal, InputError
+
+if TYPE_CHECKING:
+    from .geometry import Disk
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile. This is mirrored to make it periodic, or repeated with
@@ -62,6 +65,35 @@ JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of the random generator.")
 
 
+def with_disk(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a disk, and pass a Disk or, if none is given, None."""
+
+    @click.option("--mass", type=float, help="Mass m of a disk that collides with the wall, by default 1.")
+    @click.option("--inertia-ratio", type=float, help="J/(m r^2) of the disk, by default 0.5: a uniform disk.")
+    @click.option("--radius", type=float, help="Radius r of the disk, by default 1. No law depends on it.")
+    @click.option("--inertia", type=float, help="Moment of inertia J, with --radius, in place of the ratio.")
+    @wraps(command)
+    def run(
+        mass: float | None, inertia_ratio: float | None, radius: float | None, inertia: float | None, **options: Any
+    ) -> None:
+        from .geometry import Disk
+
+        given = {"mass": mass, "inertia_ratio": inertia_ratio, "radius": radius}
+        given = {name: value for name, value in given.items() if value is not None}
+        disk = Disk(**given) if given else None
+        if inertia is not None:
+            if inertia_ratio is not None:
+                raise click.UsageError("--inertia and --inertia-ratio say the same; give one of them")
+            disk = Disk.from_inertia(1.0 if mass is None else mass, inertia, 1.0 if radius is None else radius)
+            if radius is None:
+                raise click.UsageError(
+                    f"--inertia needs --radius; if that is 1, write --inertia-ratio {disk.inertia_ratio!r}"
+                )
+        command(disk=disk, **options)
+
+    return run
+
+
 # Incoming angles and probabilities of a table of a law.
 TABLE_SIZE = 64, 65
 
@@ -83,7 +115,7 @@ def main() -> None:
     Examples:
       asperity walls
       asperity study focusing-arcs --out study
-      asperity study triangular-teeth:angle=0.7 --mass 2 --inertia 1 --json
+      asperity study triangular-teeth:angle=0.7 --inertia-ratio 0.5 --json
       asperity study my-wall.toml --out my-study
       asperity gap dispersing-arcs:curvature=0.333333 --specular
       asperity sweep focusing-arcs --over half_angle=0.2:1.5:50 --out arcs
@@ -99,10 +131,7 @@ def main() -> None:
 
 @main.command(epilog=WALL_HELP)
 @click.argument("wall")
-@click.option(
-    "--mass", type=float, help="Mass m of the disk, by default 1. The summary begins with a disk that is given."
-)
-@click.option("--inertia", type=float, help="Moment of inertia J, by default 0.5: a uniform disk of mass 1.")
+@with_disk
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for pictures, matrix and JSON; made if missing.")
 @click.option("--tolerance", default=1e-3, help="Error asked of gaps, and of matrices for every bin.")
 @click.option("--bins", default=128, help="Number of equal-measure bins of the matrix.")
@@ -118,20 +147,20 @@ def main() -> None:
 )
 @click.option("--table", type=NEW_FILE, help="Also write a table of the law for other codes, .csv, .npz or .h5.")
 def study(
-    wall: str, mass: float | None, inertia: float | None, seed: int, out: Path | None, force: bool, picture_format: str,
-    dpi: float, as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, **asked: Any,
+    wall: str, disk: Disk | None, seed: int, out: Path | None, force: bool, picture_format: str, dpi: float,
+    as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, **asked: Any,
 ) -> None:  # fmt: skip
     """Study WALL: law, symmetry, spectrum, gap, and the collision law of a disk.
 
     \b
     Examples:
       asperity study focusing-arcs:half_angle=0.9 --out study
-      asperity study profile.txt --mass 1 --inertia 0.5 --json
+      asperity study profile.txt --inertia-ratio 0.5 --json
       asperity study triangular-teeth --incidence 0,30,60 --table law.csv
     """
     from .core.files import removed_on_failure
     from .core.long_runs import QUIET
-    from .geometry import Disk, wall_from_text
+    from .geometry import wall_from_text
     from .kernels import WallLaw
     from .study import prepare_folder, study_wall
 
@@ -139,8 +168,6 @@ def study(
         raise click.UsageError("--quiet prints nothing; leave --json and --verbose out")
     if quiet:
         os.environ[QUIET] = "1"
-    given = {name: value for name, value in (("mass", mass), ("inertia", inertia)) if value is not None}
-    disk = Disk(**given) if given else None
     found_wall = wall_from_text(wall)
     # what may be refused comes before the work
     degrees = None if incidence is None else numbers_of(incidence)
@@ -390,15 +417,14 @@ def explore(wall: str, port: int, no_browser: bool, out: Path | None) -> None:
 @click.option("--moments", default=10, help="Meet <e_l, P e_m> for all l, m below this number.")
 @click.option("--tolerance", default=1e-10, help="Defect asked for.")
 @click.option("--hollows", type=click.IntRange(min=1), help="At most this many hollows, with a larger defect.")
-@click.option("--mass", type=float, help="Unforeshorten the wall for a disk of this mass ...")
-@click.option("--inertia", type=float, help="... and this moment of inertia.")
+@with_disk
 @SEED
 @VERBOSE
 @click.option("--out", type=NEW_FILE, help="Write the wall into this TOML file.")
 @click.option("--force", is_flag=True, help="Replace the file if it exists.")
 def realise(
-    law: str, moments: int, tolerance: float, hollows: int | None, mass: float | None, inertia: float | None,
-    seed: int, verbose: bool, out: Path | None, force: bool,
+    law: str, moments: int, tolerance: float, hollows: int | None, disk: Disk | None, seed: int, verbose: bool,
+    out: Path | None, force: bool,
 ) -> None:  # fmt: skip
     """Find a wall whose reflection law has the moments of LAW, or on which a disk collides by it.
 
@@ -408,20 +434,16 @@ def realise(
     \b
     Examples:
       asperity realise lambertian --out lambert.toml
-      asperity realise maxwell:0.5 --mass 1 --inertia 0.5 --out wall.toml
+      asperity realise maxwell:0.5 --inertia-ratio 0.5 --out wall.toml
     """
     from .core.files import check_writable
-    from .geometry import Disk
     from .kernels import wall_for
     from .kernels.inverse.named_laws import law_from_text
 
-    if (mass is None) != (inertia is None):
-        raise click.UsageError("--mass and --inertia belong together; give both or none")
     if out is not None:
         check_writable(out)
         if out.exists() and not force:
             raise FileExistsRefusal(f"{out} exists; use another name or --force to replace it")
-    disk = None if mass is None or inertia is None else Disk(mass, inertia)
     found = wall_for(law_from_text(law), moments, tolerance, rng=seed, most_hollows=hollows)
     wall = found.wall if disk is None else found.wall.unforeshorten(disk)
     click.echo(

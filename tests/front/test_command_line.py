@@ -81,13 +81,21 @@ def test_force_replaces_an_earlier_study_and_json_goes_alone_to_standard_output(
 
 
 def test_mass_and_inertia_reach_the_disk():
-    options = ("study", "flat", "--bins", 8, "--mass", 2, "--inertia", 0.25)
-    assert run(*options).stdout.splitlines()[1].startswith("disk       mass 2, inertia 0.25: ")
+    options = ("study", "flat", "--bins", 8, "--mass", 2, "--inertia-ratio", 0.125)
+    assert run(*options).stdout.splitlines()[1].startswith("disk       mass 2, inertia ratio 0.125, radius 1: ")
     assert "disk" not in run(*options[:4]).stdout
-    printed = json.loads(run(*options, "--json").stdout)
-    collision = printed["collision"]
-    assert (collision["mass"], collision["inertia"]) == (2.0, 0.25)
-    assert collision["foreshortening"] == pytest.approx(1 / 3, rel=1e-15)
+    # J = 1 of a disk of radius 2
+    for given in (options, (*options[:6], "--inertia", 1, "--radius", 2)):
+        collision = json.loads(run(*given, "--json").stdout)["collision"]
+        assert (collision["mass"], collision["inertia_ratio"]) == (2.0, 0.125)
+        assert collision["foreshortening"] == pytest.approx(1 / 3, rel=1e-15)
+
+
+@pytest.mark.parametrize("command", [("study", "flat"), ("realise", "lambertian")])
+def test_an_inertia_needs_its_radius_and_no_ratio(command):
+    alone = run(*command, "--mass", 2, "--inertia", 0.25)
+    assert alone.exit_code == 2 and "if that is 1, write --inertia-ratio 0.125" in " ".join(alone.output.split())
+    assert run(*command, "--inertia", 1, "--radius", 1, "--inertia-ratio", 1).exit_code == 2
 
 
 def test_a_study_repeats_with_its_seed_and_changes_with_another():
@@ -154,10 +162,10 @@ def test_a_wall_that_is_none_is_refused_in_one_line(command, wall, words):
 
 @pytest.mark.parametrize(
     ("option", "value"),
-    [("--mass", -1), ("--mass", 0), ("--mass", "nan"), ("--inertia", "inf"), ("--tolerance", 0), ("--bins", 0)],
+    [("--mass", -1), ("--mass", 0), ("--mass", "nan"), ("--inertia", "inf"), ("--inertia-ratio", 0), ("--radius", -1), ("--tolerance", 0), ("--bins", 0)],
 )
 def test_a_number_out_of_range_is_refused_by_its_name(option, value):
-    assert option.lstrip("-") in refused("study", "flat", option, value)
+    assert option.lstrip("-").replace("-", "_") in refused("study", "flat", option, value)
 
 
 @pytest.mark.parametrize("place", ["file/folder", "file"])
@@ -209,12 +217,11 @@ def test_the_module_runs_as_a_program(tmp_path):
 
 def test_a_wall_is_realised_for_a_law_and_written(tmp_path):
     path = tmp_path / "wall.toml"
-    result = run("realise", "maxwell:0.5", "--moments", "3", "--mass", "1", "--inertia", "0.5", "--out", str(path))
+    result = run("realise", "maxwell:0.5", "--moments", "3", "--inertia-ratio", "0.5", "--out", str(path))
     assert result.exit_code == 0 and "defect" in result.output and path.exists()
     assert run("realise", "lambertian", "--out", str(path)).exit_code == 1
     assert "expected lambertian" in run("realise", "lambert").output
     assert "a number after" in run("realise", "maxwell:half").output
-    assert run("realise", "lambertian", "--mass", "1").exit_code == 2
 
 
 def test_quiet_prints_nothing_and_writes_the_files(tmp_path):

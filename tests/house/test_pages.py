@@ -96,7 +96,7 @@ def test_grains_conserve_energy_and_momentum_and_slide_if_smooth_and_roll_back_i
 
     def energy(*velocities):
         return sum(
-            disk.mass * (v[..., 0] ** 2 + v[..., 1] ** 2) + disk.inertia * v[..., 2] ** 2
+            disk.mass * (v[..., 0] ** 2 + v[..., 1] ** 2) + disk.rim_mass * v[..., 2] ** 2
             for disk, v in zip(disks, velocities, strict=True)
         )
 

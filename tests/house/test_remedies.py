@@ -74,7 +74,14 @@ REMEDIES = {
         lambda: LAW.apply(lambda x: np.floor(2000.0 * x), 1.0),
         lambda: LAW.apply(lambda x: np.floor(2000.0 * x), 1.0, edges=np.arange(1.0, 6284.0) / 2000.0),
     ),
-    "moves as Disk(mass=": (lambda: geo.Disk(2.0, 1.0, radius=2.0), lambda: geo.Disk(mass=2.0, inertia=0.25)),
+    "and divide x1 by the radius": (
+        lambda: geo.collide(geo.Disk(radius=2.0), WALL, 1e-3, [[2.0, 0.0]], [[0.0, -1.0, 0.0]]),
+        lambda: geo.collide(geo.Disk(1.0, 0.5, 1.0), WALL, 1e-3, [[1.0, 0.0]], [[0.0, -1.0, 0.0]]),
+    ),
+    "geo.Disk.from_inertia(": (
+        lambda: geo.Disk(2.0, inertia=4.0, radius=2.0),
+        lambda: geo.Disk.from_inertia(2.0, 4.0, 2.0),
+    ),
     "pass the period or complete the path": (
         lambda: geo.Wall([geo.Segment((0, 0), (2, 0))]),
         lambda: geo.Wall([geo.Segment((0, 0), (2, 0))], 2.0),

@@ -54,10 +54,12 @@ def test_teeth_keep_the_energy_and_go_back_when_reversed(name):
 
 def totals(pair, position, velocity):
     """Momentum, angular momentum about the origin, and energy."""
-    mass, inertia = (np.array([getattr(body.disk, name) for body in pair]) for name in ("mass", "inertia"))
+    names = ("mass", "inertia", "radius")
+    mass, inertia, radius = (np.array([getattr(body.disk, name) for body in pair]) for name in names)
+    spin = velocity[..., 2] / radius
     orbit = position[..., 0] * velocity[..., 1] - position[..., 1] * velocity[..., 0]
-    energy = np.sum(mass * np.sum(velocity[..., :2] ** 2, axis=-1) + inertia * velocity[..., 2] ** 2, axis=1)
-    momentum, turning = mass[:, None] * velocity[..., :2], mass * orbit + inertia * velocity[..., 2]
+    energy = np.sum(mass * np.sum(velocity[..., :2] ** 2, axis=-1) + inertia * spin**2, axis=1)
+    momentum, turning = mass[:, None] * velocity[..., :2], mass * orbit + inertia * spin
     return np.sum(momentum, axis=1), np.sum(turning, axis=1), energy
 
 
@@ -77,6 +79,7 @@ def test_pairs_keep_energy_momentum_and_angular_momentum_and_go_back_when_revers
         totals(pair, there.position, there.velocity), totals(pair, position, velocity), strict=True
     ):
         np.testing.assert_allclose(kept, before, atol=1e-12)
-    back = geo.collide_pair(*pair, there.position + 2.0 * there.velocity, -there.velocity)
+    turning = np.array([[1.0, 1.0, body.disk.radius] for body in pair])
+    back = geo.collide_pair(*pair, there.position + 2.0 * there.velocity / turning, -there.velocity)
     np.testing.assert_array_equal(back.contacts, there.contacts)
     np.testing.assert_allclose(-back.velocity, velocity, atol=1e-8)

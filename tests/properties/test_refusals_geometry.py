@@ -133,7 +133,7 @@ def study(scales=(0.01,), **changed):
 
 
 DISKS = [
-    (lambda: geo.Disk(mass=0.0), "mass"), (lambda: geo.Disk(inertia=-1.0), "inertia"),
+    (lambda: geo.Disk(mass=0.0), "mass"), (lambda: geo.Disk(inertia_ratio=-1.0), "inertia_ratio"),
     (lambda: geo.Disk(mass=nan), "mass"),
     (lambda: DISK.to_angles([(1.0, 1.0, 0.0), (1.0, 0.0, 0.0)]), r"got v2 = 0\.0 at index \(1,\);"),
     (lambda: DISK.to_angles((1.0, -1.0, 0.0)), r"v2 > 0, got v2 = -1\.0;"),

@@ -307,7 +307,7 @@ REFUSED = {
         (lambda: paths().variance_rate(), "bent channel"),
         (lambda: paths(bend=3.0).limit_variance(), "straight channel"),
         (lambda: ker.play_gas(ROOM, PAIR, [[1, 1], [1, 2]], np.zeros((2, 3)), 1), "2 apart, got disks 0 and 1"),
-        (lambda: ker.play_gas(ROOM, ker.PairLaw(MIRROR, geo.Disk(1.0, 0.3), geo.Disk(2.5, 4.0), (0.7, 1.9)), SEATS,
+        (lambda: ker.play_gas(ROOM, ker.PairLaw(MIRROR, geo.Disk(), geo.Disk(radius=2.0)), SEATS,
                               np.zeros((2, 3)), 1), "two equal disks"),
         (lambda: ker.play_gas(ROOM, PAIR, SEATS, np.zeros((2, 3)), 1, MIRROR), "law of angles"),
         (lambda: ker.play_gas(ROOM, PAIR, SEATS, np.zeros((2, 3)), 1, ker.smooth(geo.Disk(2.0))), "disk of the pair"),

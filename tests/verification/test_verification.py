@@ -539,7 +539,7 @@ def test_matrices_are_compared_entry_by_entry():
 
 
 def test_the_symbols_of_the_disk_are_those_of_its_numbers():
-    disk = geo.Disk(mass=2.0, inertia=0.7)
+    disk = geo.Disk(mass=2.0, inertia_ratio=0.35)
     point = {sym.m: 2.0, sym.J: 0.7, sym.theta: 1.1, sym.psi: 0.4}
     assert np.allclose(np.array(sym.frame.subs(point), dtype=float), disk.frame)
     assert np.allclose(np.array(sym.G.subs(point), dtype=float)[:, 0], disk.from_angles(1.1, 0.4))

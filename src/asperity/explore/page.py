@@ -28,7 +28,7 @@ GRACE = 0.4
 # Ranges of the sliders of the named walls.
 RANGES = {
     "angle": (0.05, 3.0), "height_to_width": (0.05, 6.0), "half_angle": (0.05, 1.55), "curvature": (0.02, 1.98),
-    "mass": (0.1, 5.0), "inertia": (0.05, 5.0), "stem_to_cap": (0.02, 0.95), "stem_aspect": (0.0, 3.0),
+    "mass": (0.1, 5.0), "inertia_ratio": (0.05, 5.0), "stem_to_cap": (0.02, 0.95), "stem_aspect": (0.0, 3.0),
     "generations": (1, 4),
 }  # fmt: skip
 DRAWN = "a polygon of your own"
@@ -102,7 +102,8 @@ class Page:
         self.sliders = pn.Column(margin=0, **STRETCH)
         self.parameters: dict[str, Any] = {}
         self.mass = _slider("mass of the disk", *RANGES["mass"], self.question.disk.mass)
-        self.inertia = _slider("inertia of the disk", *RANGES["inertia"], self.question.disk.inertia)
+        ratio = self.question.disk.inertia_ratio
+        self.inertia_ratio = _slider("inertia ratio J/(m r²) of the disk", *RANGES["inertia_ratio"], ratio)
         self.convention = pn.widgets.RadioButtonGroup(
             name="Convention", options=CONVENTIONS, value="paper", orientation="vertical", **STRETCH
         )
@@ -115,7 +116,7 @@ class Page:
         self.choice.param.watch(lambda _: self._wall_chosen(), "value")
         self.file.param.watch(lambda _: self._file_sent(), "value")
         self.options.param.watch(lambda _: self._open_file(), "value")
-        for widget in (self.mass, self.inertia, self.convention, self.foreshortened):
+        for widget in (self.mass, self.inertia_ratio, self.convention, self.foreshortened):
             widget.param.watch(lambda _: self._ask_again(), "value")
 
     def _make_saving(self) -> None:
@@ -149,7 +150,7 @@ class Page:
         figures = (self.wall_figure, self.kernel, self.spectrum, self.collision)
         panes = [pn.pane.Bokeh(figure.plot, margin=4, **STRETCH) for figure in figures]
         controls = pn.Column(
-            self.choice, self.sliders, self.mass, self.inertia, self.foreshortened, self.convention, self.options,
+            self.choice, self.sliders, self.mass, self.inertia_ratio, self.foreshortened, self.convention, self.options,
             self.file, self.save, self.study, self.take, self.saved, styles={"flex": "1 1 240px", "min-width": "240px"},
             margin=4,
         )  # fmt: skip
@@ -244,7 +245,7 @@ class Page:
     def ask(self, wall: Wall | Callable[[], Wall], name: str, *, of_catalogue: bool = False) -> None:
         """Begin to make a wall and its answers in another process; the last wall stays until they come."""
         try:
-            disk = Disk(float(self.mass.value), float(self.inertia.value))
+            disk = Disk(float(self.mass.value), float(self.inertia_ratio.value))
         except AsperityError as reason:
             self._refuse(str(reason))
             return
@@ -373,7 +374,7 @@ class Page:
         """End the computations, and let go of the widgets."""
         self._background.drop()
         self._saving.drop()
-        _forget([self.mass, self.inertia, *self.parameters.values()])
+        _forget([self.mass, self.inertia_ratio, *self.parameters.values()])
 
 
 def _slider(name: str, low: float, high: float, value: float) -> Any:

@@ -28,7 +28,7 @@ def outgoing_velocity(disk: Disk, wall: Wall, position: Any, velocity: Any, scal
     limit, the cylinder, where it is at (x1 + alpha, x2). NaN after MOST_BOUNCES bounces.
     """
     position, velocity = np.array(position, dtype=float), np.array(velocity, dtype=float)
-    weights = np.array([disk.mass, disk.mass, disk.inertia])
+    weights = np.array([disk.mass, disk.mass, disk.rim_mass])
     for _ in range(MOST_BOUNCES):
         times = [_time_to(*ends, position, velocity, scale) for ends in pairwise(wall.vertices)]
         if min(times) == math.inf:

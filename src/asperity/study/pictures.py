@@ -135,10 +135,10 @@ def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:
     below.set_ylabel("probability per bin")
     below.set_xlabel("outgoing v1 (radius / time)")
     spin = above.secondary_xaxis(
-        "top", functions=(lambda v1: (rolling + disk.mass * v1) / disk.inertia,
-                          lambda omega: (disk.inertia * omega - rolling) / disk.mass),
+        "top", functions=(lambda v1: (rolling + disk.mass * v1) / disk.rim_mass,
+                          lambda spin: (disk.rim_mass * spin - rolling) / disk.mass),
     )  # fmt: skip
-    spin.set_xlabel("outgoing spin omega (rad / time)", fontsize=9)
+    spin.set_xlabel("outgoing r omega (radius / time)", fontsize=9)
     spin.tick_params(labelsize=9)
 
 

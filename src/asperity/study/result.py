@@ -230,8 +230,8 @@ def report_of(study: StudyResult, by_angle: bool, verbose: bool) -> str:
     }
     of_disk = {
         "disk": [
-            f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
-            "as deep"
+            f"mass {disk.mass:g}, inertia ratio {disk.inertia_ratio:g}, radius {disk.radius:g}: feels the wall "
+            f"{1.0 / disk.foreshortening:.4g} times as deep"
         ],
         "collision": _gap_lines(study, "collision_gap", "gap of that wall ")
         + [f"law of that wall {line}" for line in _matrix_lines(study.collision_matrix)],
@@ -422,8 +422,9 @@ def study_as_dict(study: StudyResult) -> dict[str, Any]:
         },
         "enclosures": study.enclosures and enclosures_as_list(study.enclosures),
         "collision": {
-            "mass": disk.mass, "inertia": disk.inertia, "foreshortening": disk.foreshortening,
-            "law": _matrix(study.collision_matrix), "gap": gaps[2], **study.conservation,
+            "mass": disk.mass, "inertia_ratio": disk.inertia_ratio, "radius": disk.radius,
+            "foreshortening": disk.foreshortening, "law": _matrix(study.collision_matrix), "gap": gaps[2],
+            **study.conservation,
         },
         "consequences": study.consequences.as_dict(),
         "accommodation": study.accommodation and _accommodation(study.accommodation),

@@ -138,7 +138,7 @@ def study_wall(
     name : str
         What the wall is called in summaries and titles.
     disk : Disk, optional
-        By default the uniform disk, mass 1 and inertia 1/2. The summary begins with a disk that is given.
+        By default the uniform disk. The summary begins with a disk that is given.
     tolerance : float
         Error asked of the gaps and of the matrices; what was reached is reported.
     bins : int
@@ -301,7 +301,7 @@ def _conservation(collision: CollisionLaw, rng: np.random.Generator) -> dict[str
     disk = collision.disk
     outgoing = collision.sample(velocity, rng)
     energy = disk.inner(velocity, velocity)
-    scale = np.sqrt((disk.mass + disk.inertia) * energy)
+    scale = np.sqrt((disk.mass + disk.rim_mass) * energy)
     return {
         "energy_defect": float(np.max(np.abs(disk.inner(outgoing, outgoing) / energy - 1.0))),
         "rolling_momentum_defect": float(

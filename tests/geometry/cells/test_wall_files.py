@@ -31,8 +31,8 @@ def test_walls_are_found_by_name_and_parameters():
     assert geo.wall_from_text("focusing-arcs:half_angle=0.9") == geo.focusing_arcs(0.9)
     assert geo.wall_from_text("Focusing_Arcs: half-angle = 0.9") == geo.focusing_arcs(0.9)
     assert geo.wall_from_text("mushrooms:stem_to_cap=.3,stem_aspect=1,generations=2") == geo.mushrooms(0.3, 1.0, 2)
-    elliptical = geo.wall_from_text("elliptical-arcs:half_angle=0.5,mass=2,inertia=0.7")
-    assert elliptical == geo.elliptical_arcs(0.5, geo.Disk(2.0, 0.7))
+    elliptical = geo.wall_from_text("elliptical-arcs:half_angle=0.5,inertia_ratio=0.35")
+    assert elliptical == geo.elliptical_arcs(0.5, geo.Disk(2.0, 0.35))
 
 
 def test_walls_are_found_by_file(tmp_path, monkeypatch):

@@ -137,7 +137,7 @@ def test_the_gap_radius_is_where_the_second_satellite_is_as_high_as_the_wall_is_
 
 def test_the_normal_is_the_kinetic_gradient_of_the_satellites_distance():
     rng = np.random.default_rng(8)
-    for disk in (geo.Disk(1.0, 1.0), geo.Disk(2.0, 0.3)):
+    for disk in (geo.Disk(1.0, 1.0), geo.Disk(2.0, 0.15)):
         space = geo.ConfigurationSpace(geo.triangular_teeth(1.2), disk, scale=0.01)
         beta, alpha, number = rng.uniform(-3, 3, 200), rng.uniform(-3, 3, 200), rng.integers(0, 60, 200)
         k = np.stack([np.sin(beta), np.cos(beta)], axis=-1)
@@ -148,7 +148,7 @@ def test_the_normal_is_the_kinetic_gradient_of_the_satellites_distance():
             return (k[:, 0] * s1 + k[:, 1] * s2,)
 
         gradient = complex_steps(distance, [0 * alpha, 0 * alpha, alpha])[:, 0]
-        raised = gradient / [disk.mass, disk.mass, disk.inertia]
+        raised = gradient / [disk.mass, disk.mass, disk.rim_mass]
         expected = raised / np.sqrt(disk.inner(raised, raised))[:, np.newaxis]
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
         # tangent to M are the turning about the satellite and the sliding of the satellite along the wall
@@ -173,7 +173,7 @@ def test_the_default_spacing_is_the_least_that_keeps_a_third_satellite_off(scale
 
 
 def test_a_collision_with_the_flat_wall_is_a_reflection_at_the_normal():
-    disk, scale, count = geo.Disk(1.3, 0.4), 0.01, 3000
+    disk, scale, count = geo.Disk(1.3, 0.4 / 1.3), 0.01, 3000
     space = geo.ConfigurationSpace(geo.flat(), disk, scale)
     rng = np.random.default_rng(11)
     w = rng.normal(size=(count, 3)) * [1.0, 1.0, 0.2]

@@ -14,7 +14,7 @@ RATIOS = (0.1, 1.0, 2.0, 10.0)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("name", [*(name for name in WALLS if name != "islands"), "waves"])
 def test_the_cylinder_is_the_foreshortened_billiard_times_a_free_motion(name, ratio):
-    disk, wall, scale = geo.Disk(ratio, 1.0), {**WALLS, **BEZIERS}[name], 1e-3
+    disk, wall, scale = geo.Disk(ratio, 1.0 / ratio), {**WALLS, **BEZIERS}[name], 1e-3
     position, velocity = states(wall, scale, 400, disk=disk)
     out = geo.collide_cylinder(disk, wall, scale, position, velocity)
     theta, psi = disk.to_angles(-velocity)

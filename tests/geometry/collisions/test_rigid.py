@@ -104,8 +104,8 @@ def test_a_flat_wall_reflects_in_closed_form():
     a, v2, omega = 0.01, -1.0, 1e-9
     out = geo.collide(DISK, geo.flat(), 1e-3, [[0.0, a]], [[0.3, v2, omega]])
     sine = math.sin(a)
-    impulse = -2 * (v2 + omega * sine) / (1 / DISK.mass + sine**2 / DISK.inertia)
-    expected = [0.3, v2 + impulse / DISK.mass, omega + impulse * sine / DISK.inertia]
+    impulse = -2 * (v2 + omega * sine) / (1 / DISK.mass + sine**2 / DISK.rim_mass)
+    expected = [0.3, v2 + impulse / DISK.mass, omega + impulse * sine / DISK.rim_mass]
     np.testing.assert_allclose(out.velocity[0], expected, rtol=1e-9)
     assert out.contacts.tolist() == [1]
 

@@ -11,10 +11,10 @@ from shapely import Polygon
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from disk_shapes import PAIR, RADII, TOOTHED, UNEQUAL, VELOCITY, bodies, gear, starts
+from disk_shapes import PAIR, TOOTHED, UNEQUAL, VELOCITY, bodies, gear, starts
 
 DISK = geo.Disk(1.0, 0.5)
-EQUAL = geo.SatelliteDisk(geo.Disk(1.0, 0.15), 5, 0.15), geo.SatelliteDisk(geo.Disk(2.0, 0.7), 7, 0.1, 1.5)
+EQUAL = geo.SatelliteDisk(PAIR[0], 5, 0.15), geo.SatelliteDisk(PAIR[1], 7, 0.1)
 WALLS = {"triangular": geo.triangular_teeth(1.2), "rectangular": geo.rectangular_teeth(0.8), "flat": geo.flat()}
 
 
@@ -76,7 +76,7 @@ def dense_gap(first, second, position, velocity, time):
     """The least distance of two toothed disks or rims of round satellites, over all points and edges."""
     outlines = []
     for k, body in enumerate((first, second)):
-        x, y, turn = position[k] + velocity[k] * time
+        x, y, turn = position[k] + velocity[k] * time / [1.0, 1.0, body.disk.radius]
         outlines.append((body.arms(turn) + np.array([x, y]), body.sizes, body.joined))
     found = []
     for (points, sizes, _), (others, widths, joined) in (outlines, outlines[::-1]):
@@ -131,8 +131,8 @@ def test_close_satellites_collide_like_the_law_of_the_pair_and_distant_ones_do_n
     distant, close = (
         geo.collide_pair(*bodies(count), *starts(*bodies(count), n, 3)).velocity[:, 0] for count in (12, 600)
     )
-    limit = ker.PairLaw.from_wall(wall, *PAIR, RADII)
-    other = ker.PairLaw(ker.WallLaw(wall), *PAIR, RADII)
+    limit = ker.PairLaw.from_wall(wall, *PAIR)
+    other = ker.PairLaw(ker.WallLaw(wall), *PAIR)
     rng = np.random.default_rng(4)
     one, two = (np.tile(v, (20_000, 1)) for v in VELOCITY)
     wanted = limit.sample([0.0, 1.0], one, two, rng)[0]

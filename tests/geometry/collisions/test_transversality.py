@@ -9,7 +9,7 @@ from asperity import geometry as geo
 from asperity.geometry.collisions.transversality import CollisionConstants
 from disk_shapes import states
 
-DISKS = geo.Disk(1.0, 0.5), geo.Disk(2.0, 0.3)
+DISKS = geo.Disk(1.0, 0.5), geo.Disk(2.0, 0.15)
 WALLS = {
     "flat": geo.flat(), "triangular": geo.triangular_teeth(1.2), "rectangular": geo.rectangular_teeth(0.8),
     "focusing": geo.focusing_arcs(1.2), "dispersing": geo.dispersing_arcs(1.0), "elliptical":
@@ -133,7 +133,7 @@ def test_the_constants_of_the_paper_are_larger_than_the_bounds():
             tested += 1
     assert tested > 5
     assert constants.state - constants.velocity == pytest.approx(3.4) and constants.state < 80.0
-    light = CollisionConstants.of(geo.Disk(2.0, 0.5))
+    light = CollisionConstants.of(geo.Disk(2.0, 0.25))
     assert light.velocity / constants.velocity == pytest.approx(math.sqrt(2.5))
 
 

@@ -88,7 +88,7 @@ def test_elliptical_arcs_foreshorten_to_circular_arcs(ratio, xi):
 
 @pytest.mark.parametrize("xi", [0.3, 1.2])
 def test_elliptical_arcs_are_the_corrected_tooth_function(xi):
-    disk = geo.Disk(1.3, 0.4)
+    disk = geo.Disk(1.3, 0.4 / 1.3)
     wall = geo.elliptical_arcs(xi, disk)
     x, y = wall.pieces[0].point(np.linspace(0.01, 0.99, 40)).T
     kappa = (1 + 1.3 / 0.4) ** -0.5

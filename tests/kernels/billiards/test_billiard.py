@@ -25,7 +25,7 @@ def smooth(disk):
 
 def in_a_strip(ratio, steps, n=20):
     """A no-slip strip: record, and widths as fractions of l sqrt(1 + m/J) where l = sqrt(1/v2^2 - 1)."""
-    disk, rng = geo.Disk(ratio, 1.0), np.random.default_rng(0)
+    disk, rng = geo.Disk(ratio, 1.0 / ratio), np.random.default_rng(0)
     velocity = disk.from_angles(rng.uniform(0.3, 2.8, n), rng.uniform(0.3, 2.8, n))
     record = ker.play(geo.Container.strip(), no_slip(disk), np.zeros((n, 2)), velocity, steps, rng)
     normal = math.sqrt(disk.mass) * velocity[:, 1]
@@ -61,7 +61,7 @@ def test_bounded_orbits_of_the_no_slip_wedge_are_periodic_at_rational_angles(rat
     # (J - m cos(opening))/(m + J); where that angle is 2 pi/q, velocities return after 2 q collisions, and positions
     # too
     opening = math.acos((1 - (1 + ratio) * math.cos(2 * math.pi / q)) / ratio)
-    disk, rng, n = geo.Disk(ratio, 1.0), np.random.default_rng(1), 150
+    disk, rng, n = geo.Disk(ratio, 1.0 / ratio), np.random.default_rng(1), 150
     start = np.tile([math.cos(opening / 2), math.sin(opening / 2)], (n, 1))
     velocity = disk.from_angles(rng.uniform(0.1, 3, n), rng.uniform(0.1, 3, n))
     record = ker.play(geo.Container.wedge(opening), no_slip(disk), start, velocity, 200, rng)

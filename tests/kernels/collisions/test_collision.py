@@ -22,7 +22,7 @@ def velocities(n, rng):
 
 @given(mass=positive, inertia=positive)
 def test_k_of_specular_is_the_smooth_matrix_and_of_retroreflection_the_no_slip_matrix(mass, inertia):
-    disk = geo.Disk(mass, inertia)
+    disk = geo.Disk.from_inertia(mass, inertia, 1.0)
     rng = np.random.default_rng(RNG)
     velocity = velocities(8, rng)
     for law, matrix in ((ker.specular(), ker.smooth_matrix(disk)), (ker.retroreflection(), ker.no_slip_matrix(disk))):
@@ -38,7 +38,7 @@ def test_k_of_specular_is_the_smooth_matrix_and_of_retroreflection_the_no_slip_m
 
 @given(mass=positive, inertia=positive)
 def test_no_slip_is_twice_the_projection_on_chi_minus_one(mass, inertia):
-    disk = geo.Disk(mass, inertia)
+    disk = geo.Disk.from_inertia(mass, inertia, 1.0)
     chi = np.array([-1.0, 0.0, 1.0]) / np.sqrt(mass + inertia)
     expected = 2.0 * np.outer(chi, chi * [mass, mass, inertia]) - np.eye(3)
     assert np.allclose(ker.no_slip_matrix(disk), expected, rtol=1e-9, atol=1e-12 * np.max(np.abs(expected)))
@@ -53,8 +53,8 @@ def test_branches_of_polygons_are_isometries_that_conserve(wall):
     """S2.28 in the original coordinates: every matrix keeps the metric and the covector -m v1 + J omega."""
     disk = geo.Disk(1.0, 0.5)
     K = ker.CollisionLaw.from_wall(wall, disk)
-    metric = np.diag([disk.mass, disk.mass, disk.inertia])
-    rolling = np.array([-disk.mass, 0.0, disk.inertia])
+    metric = np.diag([disk.mass, disk.mass, disk.rim_mass])
+    rolling = np.array([-disk.mass, 0.0, disk.rim_mass])
     for theta in (0.2, 0.9, 1.5, 2.6):
         branches = K.branches(theta)
         assert sum(p for p, _ in branches) == pytest.approx(1.0, abs=1e-14)

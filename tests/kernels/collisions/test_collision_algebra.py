@@ -9,7 +9,7 @@ from asperity import kernels as ker
 from asperity.kernels.collisions.collision_law import CollisionCombination
 
 RNG = 20_260_318
-DISK = geo.Disk(1.3, 0.4)
+DISK = geo.Disk(1.3, 0.4 / 1.3)
 TEETH = ker.CollisionLaw(ker.TriangularTeethLaw(0.9), DISK)
 DIFFUSE = ker.CollisionLaw(ker.lambertian(), DISK)
 SMOOTH = ker.CollisionLaw(ker.specular(), DISK)

@@ -497,7 +497,7 @@ SMOOTH, NO_SLIP = ker.smooth(DISK), ker.no_slip(DISK)
 def test_collision_laws_that_both_flip_psi_have_the_distance_of_their_laws_of_theta(kind, order):
     """Also of disks with other masses: angles are compared. Smooth and no-slip outcomes are |pi - 2 theta| apart."""
     rough = ker.CollisionLaw(ker.maxwell(0.5), DISK)
-    pairs = (SMOOTH, NO_SLIP), (SMOOTH, ker.no_slip(geo.Disk(3.0, 3.0))), (rough, SMOOTH)
+    pairs = (SMOOTH, NO_SLIP), (SMOOTH, ker.no_slip(geo.Disk(3.0, 1.0))), (rough, SMOOTH)
     for first, second in pairs[1:2] if kind == "joint" else pairs:
         found = ker.distance(first, second, order, kind, tolerance=1e-2)
         assert found == ker.distance(first.law, second.law, order, kind, tolerance=1e-2)

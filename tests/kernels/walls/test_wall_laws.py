@@ -45,7 +45,7 @@ def test_walls_with_a_closed_form_are_recognised_by_their_shape() -> None:
 @pytest.mark.parametrize("ratio", [0.1, 2.6, 10.0])
 def test_foreshortened_teeth_have_the_corrected_parameters(ratio: float) -> None:
     """r~ = (1 + m/J)^(1/2) r (S2.18, corrected) and psi~ = 2 arctan((1 + m/J)^(-1/2) tan(psi/2)) (S2.21)."""
-    disk, stretch = geo.Disk(mass=ratio, inertia=1.0), math.sqrt(1.0 + ratio)
+    disk, stretch = geo.Disk(ratio, 1.0 / ratio), math.sqrt(1.0 + ratio)
     rectangles = only_part(geo.rectangular_teeth(0.8).foreshorten(disk))
     assert isinstance(rectangles, ker.RectangularTeethLaw)
     assert rectangles.height_to_width == pytest.approx(stretch * 0.8, rel=1e-14)

@@ -381,8 +381,8 @@ def limit_of_the_disk(factor: Code) -> Verdict:
     """
     rng = generator()
     verdicts = []
-    for disk in (Disk(2.0, 1.0), Disk(0.5, 2.0)):
-        kappa = factor(disk.mass, disk.inertia)
+    for disk in (Disk(2.0, 0.5), Disk(0.5, 4.0)):
+        kappa = factor(disk.mass, disk.rim_mass)
         wall, felt = (Wall.from_vertices([(0, 0), (0.5 * k, -DEPTH), (k, 0)]) for k in (1.0, kappa))
         theta, psi = rng.uniform(0.3, np.pi - 0.3, RAYS), rng.uniform(0.6, np.pi - 0.6, RAYS)
         x = rng.uniform(0, 1, RAYS)
