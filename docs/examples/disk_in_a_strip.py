@@ -52,7 +52,7 @@ def strip_widths(
     velocity = disk.from_angles(rng.uniform(0.3, 2.8, disks), rng.uniform(0.3, 2.8, disks))
     walls = no_slip(disk) if law is None else law
     record = ker.play(geo.Container.strip(), walls, np.zeros((disks, 2)), velocity, collisions, rng)
-    bound = np.sqrt(1.0 / (disk.mass * velocity[:, 1] ** 2) - 1.0) * math.sqrt(1.0 + disk.mass / disk.rim_mass)
+    bound = np.sqrt(1.0 / (disk.mass * velocity[:, 1] ** 2) - 1.0) * math.sqrt(1.0 + 1.0 / disk.inertia_ratio)
     return np.asarray(record.extent() / bound)
 
 

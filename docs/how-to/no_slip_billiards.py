@@ -30,7 +30,7 @@ plates = {
 
 rng = np.random.default_rng(0)
 velocity = disk.from_angles(rng.uniform(0.5, 2.6, 8), rng.uniform(0.5, 2.6, 8))
-bound = np.sqrt((1 / (disk.mass * velocity[:, 1] ** 2) - 1) * (1 + disk.mass / disk.rim_mass))
+bound = np.sqrt((1 / (disk.mass * velocity[:, 1] ** 2) - 1) * (1 + 1.0 / disk.inertia_ratio))
 
 fig, axes = plt.subplots(2, 1, sharex=True, layout="constrained")
 ratio = {}

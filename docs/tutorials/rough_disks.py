@@ -20,14 +20,14 @@ from asperity import spectral as spec
 # %%
 # The disk and the plate
 # ----------------------
-# A steel rod, 10 mm long, with a radius of 5 mm, moves in the plane of its section, in SI units. The library's disk has
-# the radius 1, so we pass :math:`J/a^2` as its inertia, in kg. Then its spin stands for :math:`a\omega`, the velocity
-# of the rim in m/s, and energies are in joules.
+# A steel rod, 10 mm long, with a radius of 5 mm, moves in the plane of its section, in SI units. Its laws depend on
+# :math:`J/(m r^2)`, which is 1/2 for a uniform disk. Velocities are those of the centre and that of the rim by the spin,
+# :math:`r\omega`, all in m/s, and energies are in joules.
 
 radius, density, length = 5e-3, 7800.0, 10e-3  # m, kg/m^3, m
 mass = density * np.pi * radius**2 * length  # kg
 disk = geo.Disk(mass, inertia_ratio=0.5, radius=radius)  # kg, no unit, m
-print(f"mass {1e3 * mass:.2f} g, inertia {0.5 * mass * radius**2:.3g} kg m^2")
+print(f"mass {1e3 * mass:.2f} g, inertia {disk.inertia:.3g} kg m^2")
 
 # %%
 # The roughness is fine: bumps much smaller than the disk. Only its shape counts, not its size. Here a plate has round
@@ -171,7 +171,7 @@ number, events = 24, 2000
 places = np.stack(np.meshgrid(np.arange(2.0, 18.0, 3.0), np.arange(2.0, 12.0, 3.0)), axis=-1).reshape(-1, 2)
 rng = np.random.default_rng(0)
 velocity = np.column_stack([rng.standard_normal((number, 2)), np.zeros(number)])
-room = geo.Container.polygon([(0.5, 0.5), (18.5, 0.5), (18.5, 12.5), (0.5, 12.5)])  # of the centres
+room = geo.Container.polygon(radius * np.array([(0.5, 0.5), (18.5, 0.5), (18.5, 12.5), (0.5, 12.5)]))  # of the centres
 rims = {
     "round bumps, K = 1": pair,
     "flatter bumps, K = 1/3": ker.PairLaw.from_wall(geo.dispersing_arcs(1 / 3), disk),
@@ -180,7 +180,7 @@ rims = {
 fig, ax = plt.subplots(layout="constrained")
 gases = {}
 for name, rim in rims.items():
-    gases[name] = gas = ker.play_gas(room, rim, places, velocity, events, rng=1)
+    gases[name] = gas = ker.play_gas(room, rim, radius * places, velocity, events, rng=1)
     hits = np.cumsum(np.sum(gas.partner >= 0, axis=1)) / number
     part = gas.rotational_energy / gas.energy.sum(axis=1)
     ax.plot(hits, part, linewidth=1.0, label=name)

@@ -193,7 +193,7 @@ def marked(
     ``bend`` is that of `fewest_contacts`; ``sizes`` are those of x1 and alpha for rounding errors.
     """
     results, masses = collided(*states), np.array([disk.mass, disk.mass, disk.rim_mass])
-    uncertain = results.contacts >= fewest_contacts(bend, disk.mass / disk.rim_mass)
+    uncertain = results.contacts >= fewest_contacts(bend, 1.0 / disk.inertia_ratio)
 
     def again(rows: NDArray[np.intp], at: Floats, moving: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         moving[:, 1] = np.minimum(moving[:, 1], 0.5 * states[1][rows, 1])

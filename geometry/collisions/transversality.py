@@ -72,7 +72,7 @@ class CollisionConstants:
     def of(cls, disk: Disk) -> CollisionConstants:
         """Return the constants of a disk."""
         instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
-        velocity = 24.0 * math.sqrt(5.0 * (1.0 + disk.mass / disk.rim_mass))
+        velocity = 24.0 * math.sqrt(5.0 * (1.0 + 1.0 / disk.inertia_ratio))
         return cls(velocity, 1.0 + 2.4 + velocity)
 
 
@@ -405,8 +405,8 @@ class _Pair:
             self.angle += self.scale * self.most_spin * (flight.time + flight.late + before)
             self._check_angle(0.5 * self.space.spacing - self.space.gap_radius)
             leaving, turned = self._departure(flight, piece)
-            inertia_ratio = math.sqrt(self.disk.mass / self.disk.rim_mass)
-            difference += 2.0 * math.hypot(turned, inertia_ratio * (turned + self.angle))
+            steeper = self.disk.inertia_ratio**-0.5
+            difference += 2.0 * math.hypot(turned, steeper * (turned + self.angle))
             apart, before = flight.reach + self.fastest * flight.late, flight.late
         self._check_exit(apart, before, difference, float(radii[-1]), leaving)
         return difference

@@ -162,7 +162,16 @@ def test_a_wall_that_is_none_is_refused_in_one_line(command, wall, words):
 
 @pytest.mark.parametrize(
     ("option", "value"),
-    [("--mass", -1), ("--mass", 0), ("--mass", "nan"), ("--inertia", "inf"), ("--inertia-ratio", 0), ("--radius", -1), ("--tolerance", 0), ("--bins", 0)],
+    [
+        ("--mass", -1),
+        ("--mass", 0),
+        ("--mass", "nan"),
+        ("--inertia", "inf"),
+        ("--inertia-ratio", 0),
+        ("--radius", -1),
+        ("--tolerance", 0),
+        ("--bins", 0),
+    ],
 )
 def test_a_number_out_of_range_is_refused_by_its_name(option, value):
     assert option.lstrip("-").replace("-", "_") in refused("study", "flat", option, value)

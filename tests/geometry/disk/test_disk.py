@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asperity import geometry as geo
+from asperity.errors import InputError
 from asperity.geometry.disk.disk import branch_block, contact_normal, direction
 
 EPS = np.finfo(float).eps
@@ -120,3 +121,30 @@ def test_the_normal_of_a_contact_measures_the_speed_of_the_satellite_along_the_n
     speeds = np.append(wall_normal, wall_normal @ [np.cos(turn), np.sin(turn)])
     ratio = metric * normal / speeds
     assert ratio[0] > 0.0 and ratio == pytest.approx(np.full(3, ratio[0]), rel=1e-14)
+
+
+def test_a_disk_knows_its_inertia_in_its_own_units():
+    # a steel disk of 5 mm in SI units, and the same one in mm and g
+    si, small = geo.Disk(0.0061, 0.5, 5e-3), geo.Disk(6.1, 0.5, 5.0)
+    assert si.inertia == pytest.approx(0.5 * 0.0061 * 5e-3**2, rel=4 * EPS)
+    assert si.rim_mass == 0.5 * 0.0061 and small.inertia == pytest.approx(1e9 * si.inertia, rel=4 * EPS)
+    again = geo.Disk.from_inertia(si.mass, si.inertia, si.radius)
+    assert again.inertia_ratio == pytest.approx(0.5, rel=4 * EPS)
+    # whatever the mass, the default is a uniform disk
+    assert geo.Disk(4.0).inertia == 2.0 and geo.Disk(mass=4.0, radius=3.0).inertia == 18.0
+
+
+def test_an_inertia_is_refused_with_the_ratio_to_write():
+    with pytest.raises(InputError, match=r"write Disk\(mass=4\.0, inertia_ratio=0\.5, radius=0\.5\)"):
+        geo.Disk(4.0, radius=0.5, inertia=0.5)
+    with pytest.raises(InputError, match=r"inertia_ratio=0\.5, radius=1\.0\) if the radius is 1\.0, or pass another"):
+        geo.Disk(mass=2.0, inertia=1.0)
+    for name in ("mass", "inertia", "radius"):
+        with pytest.raises(InputError, match=f"^{name}"):
+            geo.Disk.from_inertia(**{"mass": 1.0, "inertia": 1.0, "radius": 1.0, name: 0.0})
+    with pytest.raises(TypeError, match="inertia"):
+        geo.Disk.from_inertia(1.0)
+    with pytest.raises(InputError, match=r"^mass \* inertia_ratio"):
+        geo.Disk(1e200, 1e200)
+    with pytest.raises(InputError, match=r"^mass \* inertia_ratio \* radius"):
+        geo.Disk(1e200, 1.0, 1e100)
