@@ -21,8 +21,8 @@ from asperity import spectral as spec
 # The disk and the plate
 # ----------------------
 # A steel rod, 10 mm long, with a radius of 5 mm, moves in the plane of its section, in SI units. Its laws depend on
-# :math:`J/(m r^2)`, which is 1/2 for a uniform disk. Velocities are those of the centre and that of the rim by the spin,
-# :math:`r\omega`, all in m/s, and energies are in joules.
+# :math:`J/(m r^2)`, which is 1/2 for a uniform disk. Velocities are those of the centre and, for the spin, that of the
+# rim, :math:`r\omega`, all in m/s, and energies are in joules.
 
 radius, density, length = 5e-3, 7800.0, 10e-3  # m, kg/m^3, m
 mass = density * np.pi * radius**2 * length  # kg
