@@ -175,7 +175,9 @@ def _encounter(first: SatelliteDisk, second: SatelliteDisk, position: Floats, ve
     # rims with edges must not even be within the reach of their tips, where points may be between edges
     least = sum(body.largest if body.joined else float(body.radii.max()) for body in (first, second))
     if apart < least:
-        raise InputError(f"position: expected rims that do not cross, got centres {apart:.6g} radii of the first apart")
+        raise InputError(
+            f"position: expected disks whose rims do not cross, got centres {apart:.6g} radii of the first apart"
+        )
     encounter = _between(first, second, position, velocity)
     around = encounter.around
     one, two = around.near(position)
@@ -183,6 +185,6 @@ def _encounter(first: SatelliteDisk, second: SatelliteDisk, position: Floats, ve
     gaps = np.hypot(between[..., 0], between[..., 1]) - one.sizes[:, np.newaxis] - two.sizes[np.newaxis, :]
     if gaps.size and gaps.min() < -TOUCHING * around.span:
         raise InputError(
-            f"position: expected rims that do not touch, got overlaps of {-gaps.min():.3g} radii of the first"
+            f"position: expected disks that do not touch, got overlaps of {-gaps.min():.3g} radii of the first"
         )
     return encounter

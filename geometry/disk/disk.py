@@ -340,7 +340,7 @@ class SatelliteDisk(Value):
     joined: bool = False
 
     def __post_init__(self) -> None:
-        instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia_ratio=0.5)")
         instance("joined", self.joined, bool, "True")
         n = whole_number("count", self.count, FEWEST)
         object.__setattr__(self, "count", n)
