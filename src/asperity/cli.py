@@ -78,8 +78,8 @@ def with_disk(command: Callable[..., None]) -> Callable[..., None]:
     ) -> None:
         from .geometry import Disk
 
-        given = {"mass": mass, "inertia_ratio": inertia_ratio, "radius": radius}
-        given = {name: value for name, value in given.items() if value is not None}
+        named = (("mass", mass), ("inertia_ratio", inertia_ratio), ("radius", radius))
+        given = {name: value for name, value in named if value is not None}
         disk = Disk(**given) if given else None
         if inertia is not None:
             if inertia_ratio is not None:
