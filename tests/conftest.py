@@ -17,10 +17,12 @@ from wall_shapes import CLOSED, OPEN
 made = cache(lambda make: make())
 
 
-def pytest_collection_finish():
-    """Spares collections of garbage the modules and tests, a second each time: some tests count milliseconds."""
-    gc.collect()
-    gc.freeze()
+@pytest.fixture
+def uncollected():
+    """No collection of garbage: one takes over a second, as all tests and their modules are in memory."""
+    gc.disable()
+    yield
+    gc.enable()
 
 
 # ---- walls -------------------------------------------------------------------------------------------------------

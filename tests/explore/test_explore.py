@@ -305,6 +305,7 @@ def profile_of_60_megabytes():
     return b"".join(b"%d %.9f\n" % (k, -((k * 7919) % 1000) / 1000) for k in range(3_200_000))
 
 
+@pytest.mark.usefixtures("uncollected")
 def test_a_file_of_60_megabytes_is_read_in_a_process_that_is_ended_and_its_copy_removed(page, monkeypatch):
     content = profile_of_60_megabytes()
     assert len(content) > 55e6
@@ -349,6 +350,7 @@ def test_a_refused_file_is_read_again_when_its_options_change_or_it_is_sent_agai
     waited(page, lambda: page.question.name == "koch" and not page._awaited)
 
 
+@pytest.mark.usefixtures("uncollected")
 def test_vertices_and_numbers_beyond_the_limits_are_refused_before_any_work(page):
     x = np.linspace(0.0, 1.0, 100_000)
     vertices = {"x": x.tolist(), "y": (-x * (1.0 - x)).tolist()}

@@ -195,6 +195,7 @@ def test_a_bezier_piece_with_a_far_control_point_takes_little_memory(control):
         geo.Wall([geo.Bezier([(0, 0), (0.5, control), (0.6, -1), (1, 0)])])
 
 
+@pytest.mark.usefixtures("uncollected")
 @pytest.mark.parametrize("key", ["a." * 20000 + "x = 1", "[" + "a . " * 20000 + "x]"])
 def test_a_key_of_many_parts_is_refused_at_once(tmp_path, key):
     file = wall_file(tmp_path, key)

@@ -158,6 +158,7 @@ DOORS = {
 }
 
 
+@pytest.mark.usefixtures("uncollected")
 @pytest.mark.parametrize("door", DOORS)
 def test_hostile_texts_are_refused_or_taken_for_what_they_spell(door, tmp_path, monkeypatch):
     (tmp_path / f"{CANARY}.py").write_text("open('executed', 'w')\n")

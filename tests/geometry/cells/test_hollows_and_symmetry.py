@@ -107,6 +107,7 @@ def test_profiles_of_repeated_heights_have_the_axes_that_a_comparison_of_all_sta
                 assert wall.is_mirror_symmetric == any(axes), (points, levels, seam)
 
 
+@pytest.mark.usefixtures("uncollected")
 def test_one_changed_height_among_many_repeated_ones_takes_the_axis_away():
     height = np.random.default_rng(9).integers(2, size=10_000) / 8.0
     wall = Wall.from_profile(np.arange(10_000), height)
