@@ -56,7 +56,8 @@ RETURNED = {
     "kernels.KernelMatrix": "Defect SymmetryDefect",
     "kernels.SINE": "AngularMeasure",
     "kernels.CollisionLaw": "VelocityLaw CollisionCombination",
-    "kernels.HemisphereLaw": "DirectionLaw DirectionFactor HemisphereCombination AzimuthalBlock",
+    "kernels.HemisphereLaw": "DirectionLaw DirectionFactor HemisphereCombination AzimuthalBlock "
+    "kernels.hemisphere.direction_tables.DirectionTable",
     "kernels.limit_study": "LimitStudy",
     "kernels.weak_limit": "WeakLimit",
     "kernels.play": "BilliardRecord Reflector",

@@ -121,6 +121,7 @@ ARGUMENTS: dict[str, Any] = {
     "neck": 0.1,
     "unfollowed": 0.0, "distance": 0.1, "scale": 0.01, "largest": 4, "temperature": 1.0, "left": 0.0, "right": 1.0,
     "intervals": 2, "walls": [TEETH], "repeats": 1, "container": CIRCLE, "n_in": 3, "n_out": 3, "centre": [0.0, 0.0],
+    "n_azimuth": 3, "n_turn": 3,
     "normal": [0.0, 1.0], "scales": [0.01], "first_velocity": [0.0, -1.0, 0.0], "second_velocity": [0.0, 0.0, 0.0],
     "coordinates": "velocity", "frames": 3, "duration": 1.0, "side": 2.0, "curves": CIRCLE.curves,
     "m": 1, "generations": 1, "height": [0, 1], "height_to_width": 1.0, "curvature": 1.0, "stem_to_cap": 0.2,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -47,9 +48,53 @@ Sampler: TypeAlias = Callable[[Floats, np.random.Generator], Floats]
 Parts: TypeAlias = Sequence[tuple[float, WithAtoms]]
 
 
+class SavedTable(Summary):
+    """A table that other codes read from a file."""
+
+    @abstractmethod
+    def _header(self) -> list[str]:
+        """The comments of a .csv."""
+
+    @abstractmethod
+    def _rows(self) -> Floats:
+        """The numbers of a .csv."""
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """Write a file for other codes: .csv, or .npz or .h5 (extra ``hdf5``), with all attributes by their names.
+
+        In a .csv comments begin with #; they say what the rows and columns of numbers are. An existing file is
+        replaced only with ``overwrite``, when all is written.
+        """
+        target = Path(path)
+        if target.suffix.lower() == ".csv":
+            write_whole(target, numbers_as_csv(self._header(), self._rows().tolist()), overwrite=overwrite)
+        elif target.suffix.lower() == ".npz":
+            write_whole(target, lambda stream: np.savez_compressed(stream, **self._content()), overwrite=overwrite)
+        elif target.suffix.lower() == ".h5":
+            library = needed("h5py", "save", "hdf5")
+            write_whole(target, lambda stream: self._write_hdf5(library, stream), overwrite=overwrite)
+        else:
+            raise InputError(f"path: expected a name that ends in .csv, .npz or .h5, got {shortened(str(path))}")
+        return target
+
+    def _content(self) -> dict[str, Any]:
+        """All attributes by their names, and the header."""
+        content = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+        return {**content, "header": "\n".join(self._header())}
+
+    def _write_hdf5(self, library: Any, stream: IO[bytes]) -> None:
+        """Write arrays as data sets in radians, other attributes as those of the file."""
+        with library.File(stream, "w") as file:
+            for name, value in self._content().items():
+                (file if isinstance(value, np.ndarray) else file.attrs)[name] = value
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Table(Summary):
+class Table(SavedTable):
     """The inverse distribution functions of a law on a grid, for other codes to interpolate.
+
+    The first row of numbers of a .csv has 0 and the probabilities; each other row has an incoming angle and its
+    quantiles.
 
     Attributes
     ----------
@@ -100,36 +145,9 @@ class Table(Summary):
         source, incoming = generator(rng), angles("theta", theta)
         return self._at(incoming, source.random(incoming.shape))
 
-    def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """Write a file for other codes: .csv, or .npz or .h5 (extra ``hdf5``), with all attributes by their names.
-
-        In a .csv comments begin with #. The first row of numbers has 0 and the probabilities; each other row has an
-        incoming angle and its quantiles. An existing file is replaced only with ``overwrite``, when all is written.
-        """
-        target = Path(path)
-        if target.suffix.lower() == ".csv":
-            corner = np.concatenate(([0.0], self.probability))
-            rows = np.vstack([corner, np.column_stack([self.theta, self.quantile])])
-            write_whole(target, numbers_as_csv(self._header(), rows.tolist()), overwrite=overwrite)
-        elif target.suffix.lower() == ".npz":
-            write_whole(target, lambda stream: np.savez_compressed(stream, **self._content()), overwrite=overwrite)
-        elif target.suffix.lower() == ".h5":
-            library = needed("h5py", "save", "hdf5")
-            write_whole(target, lambda stream: self._write_hdf5(library, stream), overwrite=overwrite)
-        else:
-            raise InputError(f"path: expected a name that ends in .csv, .npz or .h5, got {shortened(str(path))}")
-        return target
-
-    def _content(self) -> dict[str, Any]:
-        """All attributes by their names, and the header."""
-        content = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {**content, "header": "\n".join(self._header())}
-
-    def _write_hdf5(self, library: Any, stream: IO[bytes]) -> None:
-        """Write arrays as data sets in radians, other attributes as those of the file."""
-        with library.File(stream, "w") as file:
-            for name, value in self._content().items():
-                (file if isinstance(value, np.ndarray) else file.attrs)[name] = value
+    def _rows(self) -> Floats:
+        corner = np.concatenate(([0.0], self.probability))
+        return np.vstack([corner, np.column_stack([self.theta, self.quantile])])
 
     def _header(self) -> list[str]:
         n_in, n_out = self.quantile.shape
