@@ -187,6 +187,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "NamedWall.build": {"generations": 1},
     "Panels": {"edges": [0.0, 1.0, np.pi]},
     "PolygonLaw": {"tolerance": 1e-10},
+    "DirectionLaw.plot": {"velocity": VELOCITY[0]},
     "PositionLaw": {"edges": [0.0, 1.0], "laws": [LAW]},
     "PositionLaw.at": {"x": 0.3},
     "Profile": {"x": [0, 1], "unit": "um"},

@@ -63,18 +63,7 @@ print("tangential, of the quarters:", *quarters)
 # Molecules that come at 60 degrees, and the tangential velocities with which they leave, which are even on the disc
 # where all is forgotten. The ring marks mirror reflection.
 
-v = np.array([np.sin(np.pi / 3), 0.0, -np.cos(np.pi / 3)])
-outgoing = law.sample(np.tile(v, (200_000, 1)), rng=2)
-fig, ax = plt.subplots(layout="constrained")
-edges = np.linspace(-1.0, 1.0, 61)
-density = np.histogram2d(*outgoing[:, :2].T, bins=edges)[0] / len(outgoing) / (2.0 / 60.0) ** 2 * np.pi
-centres = 0.5 * (edges[1:] + edges[:-1])
-density[np.hypot(*np.meshgrid(centres, centres)) > 1.0] = np.nan
-picture = ax.imshow(density.T, origin="lower", extent=(-1, 1, -1, 1), cmap="viridis", vmin=0.0)
-ax.plot(*v[:2], "o", mfc="none", mec="white", markersize=9, mew=2)
-ax.set_xlabel("$v_x$")
-ax.set_ylabel("$v_y$")
-fig.colorbar(picture, label="density over that of the cosine law")
+ax = law.plot([np.sin(np.pi / 3), 0.0, -np.cos(np.pi / 3)])
 plt.show()
 
 # %%

@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,25 +21,35 @@ from ...core.checks import (
     generator,
     instance,
     read_only,
+    shaped,
     whole_number,
 )
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.given import seed_by_name
 from ...core.rounding import EPS
+from ...core.tables import axes_or_new
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.polynomials import Legendre
 from ..bases.spaces import Zernike, zernike_functions
 from ..discretisation.discretisation import discretise
+from ..discretisation.method import SEED_WITHOUT_RNG
 from ..laws.law import Law, as_weight, drawn_terms, in_frame, used_terms
 from ..laws.structure import Discretiser, SpatialLaw
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from .direction_tables import DirectionTable, incoming_velocities, tabulated
+from ..matrices.output import COLOUR_POWER
+from .direction_tables import DirectionTable, directions, incoming_velocities, polar, tabulated
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Ratio of the largest degree between the factors of a product to that of the matrix, and of the error that the limit on
 # the degree leaves to the change from half of it.
 BETWEEN_FACTORS, CHANGE = 2, 3.0
+# Rays of a picture, and its cells of equal area by radius and by azimuth.
+SHOWN_RAYS, RINGS, SECTORS = 200_000, 20, 60
+TICKS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 # Weight, and the laws applied one after the other.
 Term: TypeAlias = "tuple[float, tuple[DirectionFactor, ...]]"
 Orientation: TypeAlias = float | Literal["random"]
@@ -193,6 +203,41 @@ class DirectionLaw(SpatialLaw):
         """
         sizes = n_in, n_out, n_azimuth, n_turn
         return tabulated(self.sample, self.rotation_invariant, repr(self), sizes, tolerance, rng)
+
+    def plot(self, velocity: ArrayLike, ax: Axes | None = None, *, rng: Rng = None) -> Axes:
+        """Draw the density of outgoing velocities on the disc of the tangential ones, for one incoming velocity.
+
+        Parameters
+        ----------
+        velocity : array_like, shape (3,)
+            In any unit, with a negative third component.
+        ax : matplotlib Axes, optional
+            By default the axes of a new figure.
+        rng : None, int or numpy.random.Generator
+            ``np.random.default_rng(0)`` by default, so that a picture repeats.
+
+        Returns
+        -------
+        matplotlib Axes
+            The density, by 200,000 rays in cells of equal area, is 1 of the cosine law. A ring marks specular
+            reflection; dotted circles have 30 and 60 degrees with the normal.
+
+        Raises
+        ------
+        InputError
+            If the shape is wrong, a number is not finite or the third component is not negative.
+
+        Examples
+        --------
+        >>> from asperity import kernels as ker
+        >>> ax = ker.HemisphereLaw(ker.lambertian()).plot([1.0, 0.0, -1.0])
+        >>> float(ax.collections[0].get_array().mean().round(12))
+        1.0
+        """
+        _, square, turn = polar(incoming_velocities(shaped("velocity", velocity, 3)))
+        incoming = directions(square, turn) * [1.0, 1.0, -1.0]
+        outgoing = self.sample(np.tile(incoming, (SHOWN_RAYS, 1)), generator(rng, SEED_WITHOUT_RNG))
+        return draw_on_disc(outgoing, incoming, axes_or_new(ax))
 
     def matrix(self, degree: int, m: int, **discretisation: Any) -> AzimuthalBlock:
         r"""The block of azimuthal order m in the functions f_{n,m} = sqrt(n + 1) R_n^m(r) e^{i m phi}.
@@ -489,6 +534,23 @@ def _product(factors: Sequence[Floats], ends: NDArray[np.bool_], between: NDArra
     for number, factor in enumerate(factors):
         product = (product * between if number else product) @ factor
     return product[:, ends]
+
+
+def draw_on_disc(outgoing: Floats, incoming: Floats, ax: Axes) -> Axes:
+    """Draw the density of the tangential parts of velocities of speed 1, over that of the cosine law."""
+    from matplotlib.colors import PowerNorm
+
+    (x, y, _), bins, ends = outgoing.T, (RINGS, SECTORS), ((0.0, 1.0), (-np.pi, np.pi))
+    counts, squares, angles = np.histogram2d(x * x + y * y, np.arctan2(y, x), bins, ends)
+    density, radius = counts * (counts.size / len(outgoing)), np.sqrt(squares)[:, None]
+    norm = PowerNorm(COLOUR_POWER, vmin=0.0, vmax=density.max())
+    cells = ax.pcolormesh(radius * np.cos(angles), radius * np.sin(angles), density, norm=norm, rasterized=True)
+    ax.plot(*incoming[:2], "o", mfc="none", mec="white", markersize=9, mew=2)
+    for circle in (0.5, np.sqrt(0.75)):
+        ax.plot(circle * np.cos(angles), circle * np.sin(angles), ":", color="white", linewidth=0.8)
+    ax.set(aspect="equal", xlabel="$v_x$ / speed", ylabel="$v_y$ / speed", xticks=TICKS, yticks=TICKS)
+    ax.figure.colorbar(cells, ax=ax, label="density over that of the cosine law")
+    return ax
 
 
 Indices = NDArray[np.int64]

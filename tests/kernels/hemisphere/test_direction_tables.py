@@ -1,4 +1,4 @@
-"""Tables of laws of directions: their draws beside those of the law, their errors and their files."""
+"""Tables of laws of directions beside draws of the law, their errors and files, and pictures of directions."""
 
 import re
 from pathlib import Path
@@ -146,3 +146,16 @@ def test_sizes_and_tolerances_out_of_range_are_refused(arguments, words):
     table = LAWS["plateaus"].table(2, 2, 2, tolerance=0.3)
     with pytest.raises(InputError, match="negative component along the outward normal"):
         table.sample([0.0, 0.0, 1.0])
+
+
+def test_a_picture_has_the_density_over_that_of_the_cosine_law_at_the_tangential_velocity():
+    from matplotlib.figure import Figure
+
+    ax = Figure().subplots()
+    assert ker.HemisphereLaw(ker.specular()).plot([3.0, 0.3, -2.0], ax) is ax
+    (cells,) = ax.collections
+    density, corners = cells.get_array(), cells.get_coordinates()
+    assert density.max() == density.size == density.sum()
+    i, j = np.argwhere(density > 0)[0]
+    own, v = corners[i : i + 2, j : j + 2].reshape(-1, 2), np.array([3.0, 0.3]) / np.linalg.norm([3.0, 0.3, -2.0])
+    assert (own.min(axis=0) < v).all() and (v < own.max(axis=0)).all()
