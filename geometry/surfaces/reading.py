@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
@@ -19,6 +19,7 @@ from ...core.files import regular_file, text_of
 from ..cells.columns import word_number
 from ..cells.measured import heights_of, metres, unit_ratio
 from ..cells.profile import instrument_scan, pair_of_units
+from ..walls.catalogue import PROFILE_PARAMETERS, file_and_parameters, values_of
 from .surface import Surface, mirrored
 
 Tiling = Literal["mirror", "wrap"]
@@ -30,6 +31,10 @@ Spikes = Literal["keep", "fill"]
 ABOVE_ALL, ABOVE_NEAR, FEW = 12.0, 3.0, 0.01
 # Standard deviation of a normal distribution over the median of its absolute values.
 NORMAL = 1.4826
+# How parameters of `read_surface` are read from texts.
+MAP_PARAMETERS: dict[str, Callable[[str], Any]] = {
+    "degree": int, "tiling": str, "spikes": str, "undefined": float, "units": PROFILE_PARAMETERS["units"],
+}  # fmt: skip
 # Fraction of heights that must be defined.
 LEAST_DEFINED = 0.5
 
@@ -119,6 +124,20 @@ def read_surface(
         return surface_of(z, apart, degree=order, tiling=chosen, spikes=spikes, unit=unit)
     except InputError as reason:
         raise InputError(f"{file}: {reason}") from reason
+
+
+def surface_from_text(text: str, spacing: float | Sequence[float] | None) -> Surface:
+    """The surface of a map's file, whose name parameters of `read_surface` may follow: ``map.txt:units=um/nm``.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, `read_surface` refuses it, or a parameter is unknown.
+    """
+    found = file_and_parameters(text)
+    if found is None:
+        raise InputError(f"{text!r} is no file; expected a height map")
+    return read_surface(found[0], spacing, **values_of(*found, MAP_PARAMETERS, "a map"))
 
 
 def surface_of(heights: Floats, spacing: Any, *, degree: int, tiling: Tiling, spikes: Spikes, unit: str) -> Surface:

@@ -102,19 +102,25 @@ def wall_from_text(text: str) -> Wall:
     2.0
     """
     instance("text", text, str, "'focusing-arcs'")
-    if isfile(text):
-        return _wall_from_file(Path(text), {})
     name, _, tail = text.partition(":")
     entry = WALLS.get(name.strip().lower().replace("_", "-"))
-    if entry is not None:
+    if entry is not None and not isfile(text):
         return entry.build(**{key: _value(entry, key, value) for key, value in _parameters(text, tail).items()})
-    for split in (found.start() for found in re.finditer(":", text)):
-        # the name of a file may have colons too
-        if isfile(text[:split]):
-            return _wall_from_file(Path(text[:split]), _parameters(text, text[split + 1 :]))
+    found = file_and_parameters(text)
+    if found is not None:
+        return _wall_from_file(*found)
     near = difflib.get_close_matches(name, WALLS, n=3)
     guess = f" Did you mean {' or '.join(near)}?" if near else ""
     raise InputError(f"{name!r} is neither a named wall nor a file.{guess} Named walls: {', '.join(WALLS)}")
+
+
+def file_and_parameters(text: str) -> tuple[Path, dict[str, str]] | None:
+    """The file that a text names, with the parameters behind a colon; None if there is no such file."""
+    # the name of a file may have colons too
+    for split in (len(text), *(found.start() for found in re.finditer(":", text))):
+        if isfile(text[:split]):
+            return Path(text[:split]), _parameters(text, text[split + 1 :])
+    return None
 
 
 def _parameters(text: str, tail: str) -> dict[str, str]:
@@ -148,7 +154,7 @@ def _wall_from_file(file: Path, parameters: Mapping[str, str]) -> Wall:
         if parameters:
             raise InputError(f"{file}: unknown parameter {next(iter(parameters))!r}; a wall file takes none")
         return load_wall(file)
-    chosen = {key: _profile_value(file, key, value) for key, value in parameters.items()}
+    chosen = values_of(file, parameters, PROFILE_PARAMETERS, "a profile")
     seam, sort, interpolate, detrend = (chosen.pop(key, None) for key in PREPARATIONS)
     profile = read_profile(file, **chosen)
     try:
@@ -160,16 +166,19 @@ def _wall_from_file(file: Path, parameters: Mapping[str, str]) -> Wall:
         raise type(reason)(f"{file}: {reason}") from reason
 
 
-def _profile_value(file: Path, key: str, value: str) -> Any:
-    """The value of a parameter of a profile, from its text."""
-    reader = PROFILE_PARAMETERS.get(key)
-    if reader is None:
-        known = ", ".join(PROFILE_PARAMETERS)
-        raise InputError(f"{file}: unknown parameter {key!r}; a profile takes {known}")
-    try:
-        return reader(value)
-    except (ValueError, KeyError) as reason:
-        raise InputError(f"{file}, parameter {key}: cannot read {value!r}") from reason
+def values_of(
+    file: Path, parameters: Mapping[str, str], readers: Mapping[str, Callable[[str], Any]], what: str
+) -> dict[str, Any]:
+    """The values of the parameters of a file, from their texts."""
+    values = {}
+    for key, text in parameters.items():
+        if key not in readers:
+            raise InputError(f"{file}: unknown parameter {key!r}; {what} takes {', '.join(readers)}")
+        try:
+            values[key] = readers[key](text)
+        except (ValueError, KeyError) as reason:
+            raise InputError(f"{file}, parameter {key}: cannot read {text!r}") from reason
+    return values
 
 
 def _flag(text: str) -> bool:

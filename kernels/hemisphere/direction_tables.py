@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -127,29 +127,28 @@ class DirectionTable(SavedTable):
 
 
 def tabulated(
-    sample: Sampler, is_isotropic: bool, law: str, sizes: tuple[int, int, int, int], tolerance: float, rng: Rng
+    sample: Sampler, is_isotropic: bool, law: str, sizes: Sequence[int], tolerance: float, rng: Rng
 ) -> DirectionTable:
     """The table of a law, compared with rays at intermediate incoming velocities."""
-    n_in, n_out, n_azimuth, n_turn = (
-        whole_number(name, size, 2) for name, size in zip(("n_in", "n_out", "n_azimuth", "n_turn"), sizes, strict=True)
-    )
+    names = ("n_in", "n_out", "n_azimuth", "n_turn")
+    n_in, n_out, n_azimuth, turns = (whole_number(*one, 2) for one in zip(names, sizes, strict=True))
     wanted, source = number_between("tolerance", tolerance, LEAST_TOLERANCE, 1.0), generator(rng, SEED_WITHOUT_RNG)
-    n_turn, slices = 1 if is_isotropic else n_turn, n_out - 1
-    number = n_in * n_turn
+    n_turn, slices = 1 if is_isotropic else turns, n_out - 1
     # the distance of n distribution functions of N rays exceeds sqrt(log(2 n/q)/(2 N)) with probability q at most
-    each = math.ceil(math.log(40.0 * number) / (2.0 * wanted**2 * slices))
-    chance = math.sqrt(math.log(40.0 * number) / (2.0 * each * slices))
-    of_slices = math.sqrt(math.log(40.0 * number * slices) / (2.0 * each))
-    check_memory("n_in, n_out, n_azimuth, n_turn", "the table", 2 * number * slices * n_azimuth)
-    check_memory("tolerance", "the rays of one incoming velocity", 24 * each * slices)
+    each = math.ceil(math.log(40.0 * n_in * n_turn) / (2.0 * wanted**2 * slices))
+    chance, of_slices = (
+        math.sqrt(math.log(40.0 * n_in * n_turn * more) / (2.0 * rays))
+        for more, rays in ((1, each * slices), (slices, each))
+    )
+    check_memory(", ".join(names), "the table", 2 * n_in * n_turn * slices * n_azimuth)
     square, turn = (np.arange(n_in) + 0.5) / n_in, np.arange(n_turn) * (2.0 * np.pi / n_turn)
     probability, second = np.linspace(0.0, 1.0, n_out), np.linspace(0.0, 1.0, n_azimuth)
     quantile, azimuth = np.empty((n_in, n_turn, n_out)), np.empty((n_in, n_turn, slices, n_azimuth))
     for i, t in np.ndindex(n_in, n_turn):
-        found, angle = _drawn(sample, square[i], turn[t], slices, each, source)
+        found, angle = _drawn(sample, float(square[i]), float(turn[t]), slices, each, source)
         quantile[i, t], azimuth[i, t] = np.quantile(found, probability), np.quantile(angle, second, axis=1).T
-    arrays = map(frozen, (square, turn, probability, second, quantile, azimuth))
-    unchecked = DirectionTable(*arrays, 0.0, chance, min(of_slices, 1.0), wanted, law)
+    one, other, p, q, squares, azimuths = map(frozen, (square, turn, probability, second, quantile, azimuth))
+    unchecked = DirectionTable(one, other, p, q, squares, azimuths, 0.0, chance, min(of_slices, 1.0), wanted, law)
     # the middle between neighbours, and the outer half cells
     between, p = np.concatenate(([0.25], np.arange(1, n_in), [n_in - 0.25])) / n_in, np.arange(slices * each) + 0.5
     distance = np.empty(n_in + 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -64,17 +65,18 @@ class SurfaceAccommodation(SpaceAccommodation):
     _more = ".tensor, .tensor_errors, .tangential_at, .normal_at, .sideways_at"
 
     def _facts(self) -> dict[str, object]:
-        found = dict(super()._facts())
-        for k in range(min(self.incidence_deg.size, FEW)):
-            words = [
-                with_error(float(values[k]), float(errors[k])) if np.isfinite(errors[k]) else "not defined"
-                for values, errors in (
-                    (self.tangential_at, self.tangential_errors), (self.normal_at, self.normal_errors),
-                    (self.sideways_at, self.sideways_errors),
-                )
-            ]  # fmt: skip
-            where = f"at {self.incidence_deg[k]:.6g}, {self.azimuth_deg[k]:.6g} degrees"
-            found[where] = f"tangential {words[0]}, normal {words[1]}, sideways {words[2]}"
+        return {**super()._facts(), **dict(islice(self.by_angle().items(), FEW))}
+
+    def by_angle(self) -> dict[str, str]:
+        """The coefficients in words, by the angle from the normal and the azimuth."""
+        names, found = ("tangential", "normal", "sideways"), {}
+        for zenith, azimuth, *pairs in zip(
+            self.incidence_deg, self.azimuth_deg, *(
+                zip(getattr(self, f"{name}_at"), getattr(self, f"{name}_errors"), strict=True) for name in names
+            ), strict=True,
+        ):  # fmt: skip
+            words = [with_error(*map(float, one)) if np.isfinite(one[1]) else "not defined" for one in pairs]
+            found[f"at {zenith:.6g}, {azimuth:.6g} degrees"] = ", ".join(map(" ".join, zip(names, words, strict=True)))
         return found
 
 

@@ -94,16 +94,26 @@ def with_disk(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-# Incoming angles and probabilities of a table of a law.
-TABLE_SIZE = 64, 65
+# Incoming angles and probabilities of a table of a law, of a wall and of a height map.
+TABLE_SIZE, MAP_TABLE_SIZE = (64, 65), (16, 17, 17)
 
 
-def numbers_of(text: str) -> list[float]:
-    """The numbers of a text such as 0,30,60."""
+def numbers_of(option: str, what: str, text: str) -> list[float]:
+    """The numbers of an option such as 0,30,60."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError as reason:
-        raise InputError(f"--incidence: expected degrees joined by commas, such as 0,30,60, got {text!r}") from reason
+        raise InputError(f"--{option}: expected {what} joined by commas, such as 0,30,60, got {text!r}") from reason
+
+
+def surface_law_of(text: str, spacing: str | None, orientation: str | None) -> Any:
+    """The law of a height map, from options of the command line."""
+    from .geometry.surfaces.reading import surface_from_text
+    from .kernels import SurfaceLaw
+
+    apart = None if spacing is None else numbers_of("spacing", "one or two distances", spacing)
+    turn: Any = "random" if orientation in (None, "random") else numbers_of("orientation", "an angle", orientation)[0]
+    return SurfaceLaw(surface_from_text(text, apart[0] if apart and len(apart) == 1 else apart), turn)
 
 
 @click.group(cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
@@ -146,41 +156,58 @@ def main() -> None:
     "--incidence", help="Also print the accommodation of momentum: degrees from the normal, joined by commas."
 )
 @click.option("--table", type=NEW_FILE, help="Also write a table of the law for other codes, .csv, .npz or .h5.")
+@click.option("--spacing", help="WALL is a height map with points at this distance, or DX,DY.")
+@click.option("--orientation", help="WALL is a height map, of random orientation or turned by this angle in radians.")
 def study(
     wall: str, disk: Disk | None, seed: int, out: Path | None, force: bool, picture_format: str, dpi: float,
-    as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, **asked: Any,
+    as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, spacing: str | None,
+    orientation: str | None, **asked: Any,
 ) -> None:  # fmt: skip
     """Study WALL: law, symmetry, spectrum, gap, and the collision law of a disk.
+
+    With --spacing or --orientation WALL is a file with a height map, of what is rough in two directions; its name may
+    be followed by units=um/nm, degree=2, tiling=wrap, spikes=fill, undefined=-9999. Of it the law in space, the
+    accommodation of momentum and the gap are found.
 
     \b
     Examples:
       asperity study focusing-arcs:half_angle=0.9 --out study
       asperity study profile.txt --inertia-ratio 0.5 --json
       asperity study triangular-teeth --incidence 0,30,60 --table law.csv
+      asperity study map.txt:units=um/nm --spacing 0.5 --out study
     """
     from .core.files import removed_on_failure
     from .core.long_runs import QUIET
     from .geometry import wall_from_text
     from .kernels import WallLaw
-    from .study import prepare_folder, study_wall
+    from .study import PICTURES, SavedStudy, SurfaceStudy, picture_names, prepare_folder, study_surface, study_wall
 
     if quiet and (as_json or verbose):
         raise click.UsageError("--quiet prints nothing; leave --json and --verbose out")
     if quiet:
         os.environ[QUIET] = "1"
-    found_wall = wall_from_text(wall)
+    is_map = spacing is not None or orientation is not None
+    if is_map and disk is not None:
+        raise click.UsageError("a disk collides with a wall; leave its options out with a height map")
+    found: Any = surface_law_of(wall, spacing, orientation) if is_map else WallLaw(wall_from_text(wall))
     # what may be refused comes before the work
-    degrees = None if incidence is None else numbers_of(incidence)
+    degrees = None if incidence is None else numbers_of("incidence", "degrees", incidence)
     if table is not None:
-        written = WallLaw(found_wall).table(*TABLE_SIZE)
+        written = found.table(*(MAP_TABLE_SIZE if is_map else TABLE_SIZE))
         written.save(table, overwrite=force)
     with removed_on_failure(out):
         if out is not None:
             # refuse before the work, not after it
-            prepare_folder(out, overwrite=force, picture_format=picture_format)
+            names = picture_names(picture_format, SurfaceStudy.pictures if is_map else PICTURES)
+            prepare_folder(out, names, overwrite=force)
         file, *how = wall.partition(":")
         name = "".join((Path(file).name, *how))
-        report = study_wall(found_wall, name, disk, rng=seed, progress=not quiet, incidence_deg=degrees, **asked)
+        asked |= {"rng": seed, "progress": not quiet, "incidence_deg": degrees}
+        if is_map:
+            asked.pop("bins")
+        report: SavedStudy = (
+            study_surface(found, name, **asked) if is_map else study_wall(found.wall, name, disk, **asked)
+        )
         if not quiet:
             text = report.to_json() if as_json else report.summary(verbose=verbose, by_angle=degrees is not None)
             click.echo(text)

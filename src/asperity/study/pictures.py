@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -38,23 +38,26 @@ GALLERY_COLUMNS = 3
 SMOOTH, NO_SLIP = "#0072B2", "#D55E00"
 
 
-def save_pictures(study: StudyResult, paths: Sequence[Path], dpi: float = RESOLUTION) -> list[Path]:
-    """Write wall, kernel, spectrum and collision, in this order; returns the paths of those that could be drawn."""
-    from matplotlib.figure import Figure
+# What draws on axes, with width and height of the picture in inches.
+Drawings: TypeAlias = Sequence[tuple[Callable[[Any], object], tuple[float, float]]]
 
-    drawings: tuple[tuple[Callable[..., object], tuple[float, float]], ...] = (
-        (draw_study_wall, (7.0, 5.0)), (_draw_kernel, (6.4, 5.0)), (_draw_spectrum, (7.0, 5.0)),
-        (draw_outgoing_velocities, (7.0, 6.0)),
+
+def drawings_of(study: StudyResult) -> Drawings:
+    """Wall, kernel, spectrum and collision."""
+    return (
+        (partial(draw_study_wall, study), (7.0, 5.0)), (partial(_draw_kernel, study), (6.4, 5.0)),
+        (partial(_draw_spectrum, study), (7.0, 5.0)), (partial(_draw_collision, study), (7.0, 6.0)),
     )  # fmt: skip
 
+
+def save_pictures(drawings: Drawings, paths: Sequence[Path], dpi: float = RESOLUTION) -> list[Path]:
+    """Write the pictures; returns the paths of those that could be drawn."""
+    from matplotlib.figure import Figure
+
     def write(path: Path, draw: Callable[..., object], size: tuple[float, float], stream: IO[bytes]) -> None:
-        if draw is draw_outgoing_velocities:
-            figure, box = Figure(figsize=size, layout="constrained"), None
-            draw(study.collision, figure)
-        else:
-            figure, box = Figure(figsize=size), "tight"
-            draw(study, figure.subplots())
-        figure.savefig(stream, dpi=dpi, format=path.suffix[1:], bbox_inches=box)
+        figure = Figure(figsize=size)
+        draw(figure.subplots())
+        figure.savefig(stream, dpi=dpi, format=path.suffix[1:], bbox_inches="tight")
 
     return [
         path for path, drawing in zip(paths, drawings, strict=True) if draw_whole(path, partial(write, path, *drawing))
@@ -101,6 +104,13 @@ def _draw_spectrum(study: StudyResult, ax: Axes) -> None:
         study.spectrum.plot(ax)
     else:
         draw_spectrum(study.spectrum, study.gap, ax)
+
+
+def _draw_collision(study: StudyResult, ax: Axes) -> None:
+    figure: Any = ax.figure
+    figure.clear()
+    figure.set_layout_engine("constrained")
+    draw_outgoing_velocities(study.collision, figure)
 
 
 def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:

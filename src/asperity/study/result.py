@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.checks import Floats
 from ..core.errors import AsperityError
 from ..core.estimates import NORMAL_95, Estimate, Summary, estimate_as_dict, finite, with_error
 from ..core.rounding import EPS
@@ -42,6 +43,13 @@ class TracerCheck(Summary):
     counts: Mapping[str, int]
     mean_collisions: Estimate
     expected_collisions: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "rays": dict(self.counts), "mean_collisions": estimate_as_dict(self.mean_collisions),
+            "kac": self.expected_collisions, "z_score": self.z_score,
+        }  # fmt: skip
 
     @property
     def z_score(self) -> float:
@@ -233,8 +241,8 @@ def report_of(study: StudyResult, by_angle: bool, verbose: bool) -> str:
             f"mass {disk.mass:g}, inertia ratio {disk.inertia_ratio:g}, radius {disk.radius:g}: feels the wall "
             f"{1.0 / disk.foreshortening:.4g} times as deep"
         ],
-        "collision": _gap_lines(study, "collision_gap", "gap of that wall ")
-        + [f"law of that wall {line}" for line in _matrix_lines(study.collision_matrix)],
+        "collision": gap_lines(study, "collision_gap", "gap of that wall ")
+        + [f"law of that wall {line}" for line in matrix_lines(study.collision_matrix)],
         "conserved": [
             f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
             f"{study.conservation['rolling_momentum_defect']:.0e}"
@@ -244,16 +252,21 @@ def report_of(study: StudyResult, by_angle: bool, verbose: bool) -> str:
     blocks |= of_disk if study.disk_given else {}
     blocks |= _momentum_lines(study) if of_profile or by_angle or verbose else {}
     blocks |= {
-        "rays": _ray_lines(study.tracer),
-        "law": _matrix_lines(study.matrix),
-        "gap": _gap_lines(study, "gap"),
-        "": _gap_lines(study, "specular_gap"),
+        "rays": ray_lines(study.tracer),
+        "law": matrix_lines(study.matrix),
+        "gap": gap_lines(study, "gap"),
+        "": gap_lines(study, "specular_gap"),
     }
     blocks |= {"spectrum": _spectrum_lines(study), "enclosed": _enclosed_lines(study)} if verbose else {}
     blocks |= {"relaxation": _relaxation_lines(found), "diffusion": _diffusion_lines(found)}
     blocks |= of_disk if verbose or not (study.disk_given or of_profile) else {}
+    return blocks_as_text(blocks, verbose, study.accommodation if by_angle else None)
+
+
+def blocks_as_text(blocks: Mapping[str, list[str]], verbose: bool, by_angle: Any) -> str:
+    """Facts with their titles, with ``verbose`` the lines below each too, and accommodation at angles if given."""
     shown = {title: lines if verbose else [_short(lines[0])] for title, lines in blocks.items()}
-    shown |= {"by angle": _at_angles(study.accommodation)} if by_angle else {}
+    shown |= {"by angle": [f"{angle}: {words}" for angle, words in by_angle.by_angle().items()]} if by_angle else {}
     return "\n".join(
         f"{'' if number else title:11s}{line}" for title, lines in shown.items() for number, line in enumerate(lines)
     )
@@ -280,11 +293,8 @@ def _momentum_lines(study: StudyResult) -> dict[str, list[str]]:
     }
 
 
-def _at_angles(found: Accommodation | None) -> list[str]:
-    return [] if found is None else [f"{angle}: {words}" for angle, words in found.by_angle().items()]
-
-
-def _ray_lines(tracer: TracerCheck | None) -> list[str]:
+def ray_lines(tracer: TracerCheck | None) -> list[str]:
+    """How the rays of a sample ended, beside Kac's formula."""
     if tracer is None:
         return ["not tested: the wall is flat or open"]
     total, escaped = sum(tracer.counts.values()), tracer.counts.get("escaped", 0)
@@ -306,7 +316,8 @@ def _ray_lines(tracer: TracerCheck | None) -> list[str]:
     return lines
 
 
-def _matrix_lines(matrix: KernelMatrix) -> list[str]:
+def matrix_lines(matrix: KernelMatrix) -> list[str]:
+    """A matrix with its error and its symmetry."""
     symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
     missed = f", tolerance {matrix.requested_tolerance:g} NOT met" if matrix.tolerance_met is False else ""
     rays = f", {matrix.samples} rays" if matrix.samples else ""
@@ -317,7 +328,8 @@ def _matrix_lines(matrix: KernelMatrix) -> list[str]:
     ]
 
 
-def _gap_lines(study: StudyResult, which: str, name: str = "") -> list[str]:
+def gap_lines(study: Any, which: str, name: str = "") -> list[str]:
+    """A gap of a study, or why it is missing."""
     gap: SpectralGap | None = getattr(study, which)
     if gap is None:
         return [f"refused: {study.refusals[which]}"]
@@ -390,10 +402,16 @@ def counted(number: int, word: str) -> str:
 def _accommodation(found: Accommodation) -> dict[str, Any]:
     """Plain values; a coefficient that is not defined is None."""
     averages = {name: estimate_as_dict(getattr(found, name)) for name in AVERAGES}
-    columns = found.incidence_deg, found.tangential_at, found.tangential_errors, found.normal_at, found.normal_errors
-    names = "incidence_deg", "tangential", "tangential_error", "normal", "normal_error"
-    rows = [dict(zip(names, map(finite, row), strict=True)) for row in np.transpose(columns).tolist()]
-    return {**averages, "at": rows, "kind_at": found.kind_at}
+    columns = {
+        "incidence_deg": found.incidence_deg, "tangential": found.tangential_at,
+        "tangential_error": found.tangential_errors, "normal": found.normal_at, "normal_error": found.normal_errors,
+    }  # fmt: skip
+    return {**averages, "at": rows_of(columns), "kind_at": found.kind_at}
+
+
+def rows_of(columns: Mapping[str, Floats]) -> list[dict[str, Any]]:
+    """Arrays by name as rows of plain values; what is infinite or not defined is None."""
+    return [dict(zip(columns, map(finite, row), strict=True)) for row in np.transpose(list(columns.values())).tolist()]
 
 
 def study_as_dict(study: StudyResult) -> dict[str, Any]:
@@ -408,11 +426,8 @@ def study_as_dict(study: StudyResult) -> dict[str, Any]:
             "pieces": len(wall.pieces), "hollows": len(wall.hollows), "islands": len(wall.islands),
             "closes": wall.closes, "polygonal": wall.is_polygonal, "mirror_symmetric": wall.is_mirror_symmetric,
         },
-        "tracer": None if study.tracer is None else {
-            "rays": dict(study.tracer.counts), "mean_collisions": estimate_as_dict(study.tracer.mean_collisions),
-            "kac": study.tracer.expected_collisions, "z_score": study.tracer.z_score,
-        },
-        "law": _matrix(study.matrix),
+        "tracer": study.tracer and study.tracer.as_dict(),
+        "law": matrix_as_dict(study.matrix),
         "gap": {"paper": gaps[0], "specular": gaps[1]},
         "eigenvalues": None if found is None else {
             "convention": found.convention, "basis": repr(found.basis), "method": found.estimates()[0].method,
@@ -423,7 +438,7 @@ def study_as_dict(study: StudyResult) -> dict[str, Any]:
         "enclosures": study.enclosures and enclosures_as_list(study.enclosures),
         "collision": {
             "mass": disk.mass, "inertia_ratio": disk.inertia_ratio, "radius": disk.radius,
-            "foreshortening": disk.foreshortening, "law": _matrix(study.collision_matrix), "gap": gaps[2],
+            "foreshortening": disk.foreshortening, "law": matrix_as_dict(study.collision_matrix), "gap": gaps[2],
             **study.conservation,
         },
         "consequences": study.consequences.as_dict(),
@@ -453,7 +468,8 @@ def enclosures_as_list(found: Enclosures) -> list[dict[str, Any]]:
     return [{**asdict(item), "method": found.method, "convention": found.convention} for item in found]
 
 
-def _matrix(matrix: KernelMatrix) -> dict[str, Any]:
+def matrix_as_dict(matrix: KernelMatrix) -> dict[str, Any]:
+    """What is known of a matrix as plain values, ready for JSON."""
     symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
     return {
         "basis": repr(matrix.basis), "method": matrix.method, "samples": matrix.samples,

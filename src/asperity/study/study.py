@@ -5,23 +5,25 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.checks import Rng, choice, generator, instance, positive_number
 from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
-from ..core.estimates import NORMAL_95, Estimate
+from ..core.estimates import NORMAL_95, Estimate, Summary
 from ..core.files import moved_when_complete
 from ..core.long_runs import progress_bar
 from ..geometry import Disk, Wall, trace
 from ..geometry.cells.miniature import wall_miniature
+from ..geometry.tracing.tracing import StatusCounts
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
 from ..kernels.bases.measure import SINE
 from ..spectral import SpectralGap, Spectrum, accommodation, enclosures, spectral_gap, spectrum
@@ -29,7 +31,7 @@ from ..spectral.bounds.enclosure import Enclosures
 from ..spectral.consequences.momentum_accommodation import from_degrees
 from ..spectral.gap.law_spectrum import with_gap
 from ..spectral.gap.methods import law_eigenvalues
-from .pictures import RESOLUTION, save_pictures
+from .pictures import RESOLUTION, Drawings, drawings_of, save_pictures
 from .result import StudyResult, TracerCheck, consequences_of, report_of, study_as_dict
 
 BINS = 128
@@ -50,38 +52,35 @@ DATA = ("kernel.npz", "study.json")
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, repr=False)
-class Study(StudyResult):
-    """Everything that `study_wall` found; ``summary()`` is text, ``to_json()`` a string, ``save`` writes files.
+class SavedStudy(Summary):
+    """A study that is shown as text and written as JSON, with a matrix and pictures."""
 
-    The attributes are those of `StudyResult`.
-    """
+    pictures: ClassVar[tuple[str, ...]]
+    matrix: KernelMatrix
 
+    @abstractmethod
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""
-        return study_as_dict(self)
+        """Plain numbers and strings, ready for JSON."""
 
-    def to_json(self) -> str:
-        """The study as JSON."""
-        return json.dumps(self.as_dict(), indent=2, allow_nan=False)
-
+    @abstractmethod
     def summary(self, *, verbose: bool = False, by_angle: bool = False) -> str:
-        """The study as some ten short lines; with ``verbose`` also methods, spectrum, enclosures and evidence.
+        """The study as some lines of text."""
 
-        With ``by_angle`` also the accommodation of momentum at each angle.
-        """
-        return report_of(self, by_angle, verbose)
+    @abstractmethod
+    def _drawings(self) -> Drawings:
+        """What draws the pictures, and their sizes."""
 
     _more = ".summary(verbose=True), .refusals, .to_json(), .save(folder)"
 
     def _headline(self) -> str:
-        return f"of {self.name}"
+        return f"of {self.name}"  # type: ignore[attr-defined]
 
     def _facts(self) -> dict[str, object]:
         return {line[:11].strip() or "gap, specular": line[11:] for line in self.summary().splitlines()}
 
-    def _picture(self) -> str:
-        return wall_miniature(self.wall)
+    def to_json(self) -> str:
+        """The study as JSON."""
+        return json.dumps(self.as_dict(), indent=2, allow_nan=False)
 
     def save(
         self, folder: str | Path, *, overwrite: bool = False, picture_format: str = "png", dpi: float = RESOLUTION
@@ -108,15 +107,45 @@ class Study(StudyResult):
             If the folder cannot be made or written.
         """
         positive_number("dpi", dpi)
-        target = prepare_folder(folder, overwrite=overwrite, picture_format=picture_format)
-        pictures = picture_names(picture_format)
+        names = picture_names(picture_format, self.pictures)
+        target = prepare_folder(folder, names, overwrite=overwrite)
         try:
             with moved_when_complete(target) as beside:
                 self.matrix.save(beside / DATA[0])
                 (beside / DATA[1]).write_text(self.to_json() + "\n", encoding="utf-8")
         except OSError as reason:
             raise InputError(f"{target}: cannot write there ({reason}); choose another folder") from reason
-        return [*save_pictures(self, [target / name for name in pictures], dpi), *(target / name for name in DATA)]
+        return [
+            *save_pictures(self._drawings(), [target / name for name in names], dpi),
+            *(target / name for name in DATA),
+        ]
+
+
+@dataclass(frozen=True, repr=False)
+class Study(StudyResult, SavedStudy):
+    """Everything that `study_wall` found; ``summary()`` is text, ``to_json()`` a string, ``save`` writes files.
+
+    The attributes are those of `StudyResult`.
+    """
+
+    pictures = PICTURES
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""
+        return study_as_dict(self)
+
+    def summary(self, *, verbose: bool = False, by_angle: bool = False) -> str:
+        """The study as some ten short lines; with ``verbose`` also methods, spectrum, enclosures and evidence.
+
+        With ``by_angle`` also the accommodation of momentum at each angle.
+        """
+        return report_of(self, by_angle, verbose)
+
+    def _picture(self) -> str:
+        return wall_miniature(self.wall)
+
+    def _drawings(self) -> Drawings:
+        return drawings_of(self)
 
 
 def study_wall(
@@ -210,15 +239,15 @@ def study_wall(
     )  # fmt: skip
 
 
-def picture_names(picture_format: str) -> tuple[str, ...]:
+def picture_names(picture_format: str, pictures: Sequence[str] = PICTURES) -> list[str]:
     """The names of the pictures of a study in a format, which is checked."""
     choice("picture_format", picture_format, FORMATS)
-    return tuple(f"{Path(name).stem}.{picture_format}" for name in PICTURES)
+    return [f"{Path(name).stem}.{picture_format}" for name in pictures]
 
 
-def prepare_folder(folder: str | Path, *, overwrite: bool, picture_format: str = "png") -> Path:
+def prepare_folder(folder: str | Path, pictures: Sequence[str], *, overwrite: bool) -> Path:
     """Make the output folder, and refuse it where a file of an earlier study would be lost."""
-    target, names = Path(folder), (*picture_names(picture_format), *DATA)
+    target, names = Path(folder), (*pictures, *DATA)
     try:
         existing = [name for name in names if os.path.exists(target / name)]
         if overwrite or not existing:
@@ -286,12 +315,17 @@ def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
     lefts, widths = np.array([(hollow.left, hollow.width) for hollow in wall.hollows]).T
     which = rng.choice(len(widths), CHECK_RAYS, p=widths / widths.sum())
     ray = trace(wall, lefts[which] + widths[which] * rng.random(CHECK_RAYS), SINE.sample(CHECK_RAYS, rng))
-    boundary = wall.arc_length - wall.flat_top
+    return tracer_check(ray, float((wall.arc_length - wall.flat_top) / widths.sum()))
+
+
+def tracer_check(ray: StatusCounts, expected: float) -> TracerCheck:
+    """The counts of rays of the invariant measure, beside the mean number of collisions that Kac's formula expects."""
+    number = ray.collisions  # type: ignore[attr-defined]
     mean = Estimate(
-        float(np.mean(ray.collisions)), NORMAL_95 * float(np.std(ray.collisions, ddof=1) / np.sqrt(CHECK_RAYS)),
-        "estimate", f"spread of {CHECK_RAYS} rays",
+        float(np.mean(number)), NORMAL_95 * float(np.std(number, ddof=1) / np.sqrt(number.size)), "estimate",
+        f"spread of {number.size} rays",
     )  # fmt: skip
-    return TracerCheck(MappingProxyType(ray.counts()), mean, float(boundary / widths.sum()))
+    return TracerCheck(MappingProxyType(ray.counts()), mean, expected)
 
 
 def _conservation(collision: CollisionLaw, rng: np.random.Generator) -> dict[str, float]:
