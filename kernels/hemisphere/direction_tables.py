@@ -146,7 +146,8 @@ def tabulated(
     quantile, azimuth = np.empty((n_in, n_turn, n_out)), np.empty((n_in, n_turn, slices, n_azimuth))
     for i, t in np.ndindex(n_in, n_turn):
         found, angle = _drawn(sample, float(square[i]), float(turn[t]), slices, each, source)
-        quantile[i, t], azimuth[i, t] = np.quantile(found, probability), np.quantile(angle, second, axis=1).T
+        quantile[i, t] = _nodes(found.ravel(), n_out)
+        azimuth[i, t] = _nodes(np.sort(angle, axis=1), n_azimuth)
     one, other, p, q, squares, azimuths = map(frozen, (square, turn, probability, second, quantile, azimuth))
     unchecked = DirectionTable(one, other, p, q, squares, azimuths, 0.0, chance, min(of_slices, 1.0), wanted, law)
     # the middle between neighbours, and the outer half cells
@@ -170,6 +171,15 @@ def _drawn(
     # equal ones stay in the order of the rays, which is random
     order = np.argsort(found.round(12), kind="stable").reshape(slices, each)
     return found[order], (azimuth[order] - turn - FIRST) % (2.0 * np.pi) + FIRST
+
+
+def _nodes(sorted_values: Floats, count: int) -> Floats:
+    """Quantiles along the last axis, and at the ends what keeps the mean of the first and of the last interval."""
+    nodes = np.moveaxis(np.quantile(sorted_values, np.linspace(0.0, 1.0, count), axis=-1), 0, -1)
+    part = max(round(sorted_values.shape[-1] / (count - 1)), 1)
+    nodes[..., 0] = 2.0 * sorted_values[..., :part].mean(axis=-1) - nodes[..., 1]
+    nodes[..., -1] = 2.0 * sorted_values[..., -part:].mean(axis=-1) - nodes[..., -2]
+    return nodes
 
 
 def directions(square: Floats, azimuth: Floats) -> Floats:
