@@ -13,14 +13,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, choice, finite_number, shaped, whole_number
+from ...core.checks import Floats, check_memory, choice, finite_number, shaped, whole_number
 from ...core.errors import InputError
 from ...core.files import regular_file, text_of
 from ..cells.columns import word_number
 from ..cells.measured import heights_of, metres, unit_ratio
 from ..cells.profile import instrument_scan, pair_of_units
 from ..walls.catalogue import PROFILE_PARAMETERS, file_and_parameters, values_of
-from .surface import Surface, mirrored
+from .surface import COPIES, Surface, mirrored
 
 Tiling = Literal["mirror", "wrap"]
 Spikes = Literal["keep", "fill"]
@@ -35,6 +35,8 @@ NORMAL = 1.4826
 MAP_PARAMETERS: dict[str, Callable[[str], Any]] = {
     "degree": int, "tiling": str, "spikes": str, "undefined": float, "units": PROFILE_PARAMETERS["units"],
 }  # fmt: skip
+# Arrays of the size of the map in memory at a time, by measurement: for each term of the fit, and when it is mirrored.
+COPIES_OF_TERM, MIRRORED_COPIES = 2, 10
 # Fraction of heights that must be defined.
 LEAST_DEFINED = 0.5
 
@@ -144,6 +146,9 @@ def surface_of(heights: Floats, spacing: Any, *, degree: int, tiling: Tiling, sp
     """A measured patch as a surface; see `read_surface`."""
     if heights.ndim != 2 or heights.size == 0:
         raise InputError(f"heights: expected a map of two dimensions, got shape {heights.shape}")
+    terms = (degree + 1) * (degree + 2) // 2
+    copies = max(COPIES_OF_TERM * terms + 1, MIRRORED_COPIES * (tiling == "mirror"))
+    check_memory("heights", f"what makes a surface of a map of {heights.size} heights", copies * heights.size)
     lengths = np.array(Surface(np.zeros((1, 1)), spacing).spacing)
     levelled = filled(_levelled(heights, degree), lengths)
     bad = spikes_of(levelled) & np.isfinite(heights)
@@ -244,7 +249,10 @@ def _scan_of(file: Path, why: str) -> tuple[Floats, ArrayLike, str, bool]:
 
 def _array_of(file: Path) -> Floats:
     try:
-        return heights_of("heights", np.load(file, allow_pickle=False))
+        # not in memory yet
+        stored = np.load(file, mmap_mode="r", allow_pickle=False)
+        check_memory("heights", f"a map of {stored.size} heights", COPIES * stored.size)
+        return heights_of("heights", stored)
     except InputError as reason:
         raise InputError(f"{file}: {reason}") from reason
     except Exception as reason:  # of a damaged file, and of arrays of objects

@@ -41,8 +41,8 @@ LARGEST = 1e100
 FEWEST, MOST_POINTS = 4, 2**15
 # Hits of a ray that a trajectory has at most.
 MOST_HITS = 10_000
-# Arrays of the size of the map that a surface needs: its heights, and those with the first row and column again.
-COPIES = 2
+# Arrays of the size of the map in memory at a time, by measurement: of a surface and its slopes, and of a random one.
+COPIES, RANDOM_COPIES = 4, 10
 
 
 @dataclass(frozen=True, repr=False)
@@ -387,6 +387,7 @@ class Surface(Value):
         counts, lengths = _pair("points", points), _pair("period", period)
         sizes = [whole_number("points", one, 2, most=MOST_POINTS) for one in counts]
         widths = [positive_number("period", one) for one in lengths]
+        check_memory("points", "a random map", RANDOM_COPIES * sizes[0] * sizes[1])
         heights = random_map(
             spectrum, (sizes[0], sizes[1]), (widths[0], widths[1]), rms_slope, rms_height, generator(rng)
         )

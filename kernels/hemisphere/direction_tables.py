@@ -21,8 +21,8 @@ from ..laws.tables import SavedTable
 LEAST_SQUARE = 1e-300
 # Azimuths begin here, so that many velocities near 0 or pi are not on both sides of the end.
 FIRST = -0.5 * np.pi
-# Tolerances that need fewer than 2e8 rays for each incoming velocity.
-LEAST_TOLERANCE = 2e-4
+# Tolerances that need fewer than 1e7 rays for each incoming velocity.
+LEAST_TOLERANCE = 1e-3
 # Outgoing velocities of a law for incoming ones.
 Sampler: TypeAlias = Callable[[Floats, np.random.Generator], Floats]
 

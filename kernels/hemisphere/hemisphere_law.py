@@ -176,7 +176,7 @@ class DirectionLaw(SpatialLaw):
         n_turn : int
             Number of incoming azimuths, at least 2, of a law that is not rotation-invariant; any other has one.
         tolerance : float
-            Error of the distribution functions of the outgoing angle with the normal, from 2e-4: the number of rays of
+            Error of the distribution functions of the outgoing angle with the normal, from 1e-3: the number of rays of
             each incoming velocity is log(40 n_in n_turn)/(2 tolerance^2) at least.
         rng : None, int or numpy.random.Generator
             ``np.random.default_rng(0)`` by default, so that a table repeats.
@@ -190,7 +190,7 @@ class DirectionLaw(SpatialLaw):
         Raises
         ------
         InputError
-            If a number is not a whole one of at least 2, or the tolerance is not in [2e-4, 1).
+            If a number is not a whole one of at least 2, or the tolerance is not in (1e-3, 1).
 
         Examples
         --------

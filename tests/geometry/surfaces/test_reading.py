@@ -176,6 +176,18 @@ def z_score(values, expected):
     return (values.mean() - expected) / (values.std(ddof=1) / np.sqrt(len(values)))
 
 
+def test_the_memory_of_large_maps_is_announced_before_it_is_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr("asperity.core.checks.memory_left", lambda: 2**28)
+    for name, size in (("large", 4000), ("small", 1500)):
+        np.lib.format.open_memmap(tmp_path / f"{name}.npy", "w+", np.uint8, (size, size)).flush()
+    with pytest.raises(InputError, match=r"heights: a map of 16000000 heights takes 0.51 GB of memory"):
+        geo.read_surface(tmp_path / "large.npy", 1.0)
+    with pytest.raises(InputError, match=r"heights: what makes a surface of a map of 2250000 heights takes 0.77 GB"):
+        geo.read_surface(tmp_path / "small.npy", 1.0, degree=5)
+    with pytest.raises(InputError, match=r"points: a random map takes 1.3 GB of memory"):
+        geo.Surface.random(geo.HeightCorrelation(0.1), 2**12, rms_slope=1.0)
+
+
 @pytest.mark.parametrize("shape", ["gaussian", "exponential"])
 def test_random_heights_have_the_given_correlations_in_every_direction(shape):
     length, period, points = 0.3, (2.0, 3.0), (16, 24)

@@ -143,7 +143,7 @@ def test_the_sampler_on_the_page_draws_what_the_library_draws(tmp_path, monkeypa
         ((1, 3, 3), "n_in: expected a whole number of at least 2, got 1"),
         ((2, 3, 1), "n_azimuth: expected a whole number of at least 2, got 1"),
         ((2, 3, 3, {"n_turn": 1}), "n_turn: expected a whole number of at least 2, got 1"),
-        ((2, 3, 3, {"tolerance": 1e-5}), r"tolerance: expected a number in \(0.0002, 1\), got 1e-05"),
+        ((2, 3, 3, {"tolerance": 1e-5}), r"tolerance: expected a number in \(0.001, 1\), got 1e-05"),
         ((100_000, 1000, 1000), "the table takes 1.6e\\+03 GB of memory"),
     ],
 )
