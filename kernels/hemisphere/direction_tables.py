@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, check_memory, frozen, generator, number_between, shaped, whole_number
 from ...core.errors import InputError
-from ..bases.given import seed_by_name
+from ...core.given import seed_by_name
 from ..discretisation.method import SEED_WITHOUT_RNG
 from ..laws.tables import SavedTable
 
@@ -59,8 +59,7 @@ class DirectionTable(SavedTable):
         noise, and it bounds the difference of mean values of any function with the Lipschitz constant 1.
     distribution_error : float
         Half width of 95 % of the distribution functions of the square, at all incoming velocities of the grid together.
-    azimuth_error : float
-        The same of the distribution functions of the azimuth in all slices.
+        Those of the azimuth in a slice come from fewer rays, which ``error`` contains.
     tolerance : float
         The distribution error that was asked for.
     law : str
@@ -74,7 +73,6 @@ class DirectionTable(SavedTable):
     azimuth: Floats
     error: float
     distribution_error: float
-    azimuth_error: float
     tolerance: float
     law: str
 
@@ -88,11 +86,11 @@ class DirectionTable(SavedTable):
 
     def _at(self, square: Floats, turn: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
         """Square and azimuth at two probabilities, linear in each number but the slice."""
-        (n_in, n_turn, n_out), n_azimuth = self.quantile.shape, self.azimuth_probability.size
+        n_in, n_turn, slices, n_azimuth = self.azimuth.shape
         row, column = square * n_in - 0.5, turn * (n_turn / (2.0 * np.pi)) % n_turn
         i, t = np.clip(row.astype(np.intp), 0, n_in - 2), column.astype(np.intp)
-        p, q = first * (n_out - 1), second * (n_azimuth - 1)
-        j, k = np.minimum(p.astype(np.intp), n_out - 2), np.minimum(q.astype(np.intp), n_azimuth - 2)
+        p, q = first * slices, second * (n_azimuth - 1)
+        j, k = np.minimum(p.astype(np.intp), slices - 1), np.minimum(q.astype(np.intp), n_azimuth - 2)
         found = np.zeros((2, *np.broadcast_shapes(i.shape, j.shape)))
         for one, part in ((i, 1.0 - (row - i)), (i + 1, row - i)):
             for other, weight in ((t, 1.0 - (column - t)), (t + 1, column - t)):
@@ -103,26 +101,22 @@ class DirectionTable(SavedTable):
         return np.clip(found[0], LEAST_SQUARE, 1.0), found[1]
 
     def _rows(self) -> Floats:
-        (n_in, n_turn, n_out), n_azimuth = self.quantile.shape, self.azimuth_probability.size
-        shape = n_in, n_turn, n_out - 1
         grid = self.square[:, None, None], self.turn[:, None], self.quantile[..., :-1], self.quantile[..., 1:]
         rows = np.concatenate([np.stack(np.broadcast_arrays(*grid), axis=-1), self.azimuth], axis=-1)
         head = np.concatenate((np.zeros(4), self.azimuth_probability))
-        return np.vstack([head, rows.reshape(math.prod(shape), 4 + n_azimuth)])
+        return np.vstack([head, rows.reshape(-1, head.size)])
 
     def _header(self) -> list[str]:
-        n_in, n_turn, n_out = self.quantile.shape
-        n_azimuth = self.azimuth_probability.size
+        n_in, n_turn, slices, n_azimuth = self.azimuth.shape
         return [
             f"asperity table of directions 1: outgoing by incoming velocity of the law {json.dumps(self.law)}",
             "v_n^2: square of the component along the normal, of velocities of speed 1; azimuth: angle of (v_x, v_y) "
             "with the x axis in radians, of the outgoing less that of the incoming velocity; 0 is specular reflection",
-            f"rows: v_n^2 = (i + 1/2) / {n_in}, azimuths 2 pi t / {n_turn}, slices j = 0 .. {n_out - 2}",
-            f"columns: incoming v_n^2, incoming azimuth, outgoing v_n^2 at p = j / {n_out - 1} and at (j + 1) / "
-            f"{n_out - 1}, then quantiles of the azimuth for q = k / {n_azimuth - 1}; first row: 0, 0, 0, 0, then q",
+            f"rows: v_n^2 = (i + 1/2) / {n_in}, azimuths 2 pi t / {n_turn}, slices j = 0 .. {slices - 1}",
+            f"columns: incoming v_n^2, incoming azimuth, outgoing v_n^2 at p = j / {slices} and at (j + 1) / {slices}, "
+            f"then quantiles of the azimuth for q = k / {n_azimuth - 1}; first row: 0, 0, 0, 0, then q",
             f"error of interpolation, mean distance of velocities of speed 1, estimated: {self.error:.3g}",
-            f"error of the distribution functions, 95 %: {self.distribution_error:.3g} of v_n^2, "
-            f"{self.azimuth_error:.3g} of the azimuth in a slice",
+            f"error of the distribution functions of v_n^2, 95 %: {self.distribution_error:.3g}",
         ]
 
 
@@ -136,10 +130,7 @@ def tabulated(
     n_turn, slices = 1 if is_isotropic else turns, n_out - 1
     # the distance of n distribution functions of N rays exceeds sqrt(log(2 n/q)/(2 N)) with probability q at most
     each = math.ceil(math.log(40.0 * n_in * n_turn) / (2.0 * wanted**2 * slices))
-    chance, of_slices = (
-        math.sqrt(math.log(40.0 * n_in * n_turn * more) / (2.0 * rays))
-        for more, rays in ((1, each * slices), (slices, each))
-    )
+    chance = math.sqrt(math.log(40.0 * n_in * n_turn) / (2.0 * each * slices))
     check_memory(", ".join(names), "the table", 2 * n_in * n_turn * slices * n_azimuth)
     square, turn = (np.arange(n_in) + 0.5) / n_in, np.arange(n_turn) * (2.0 * np.pi / n_turn)
     probability, second = np.linspace(0.0, 1.0, n_out), np.linspace(0.0, 1.0, n_azimuth)
@@ -148,8 +139,8 @@ def tabulated(
         found, angle = _drawn(sample, float(square[i]), float(turn[t]), slices, each, source)
         quantile[i, t] = _nodes(found.ravel(), n_out)
         azimuth[i, t] = _nodes(np.sort(angle, axis=1), n_azimuth)
-    one, other, p, q, squares, azimuths = map(frozen, (square, turn, probability, second, quantile, azimuth))
-    unchecked = DirectionTable(one, other, p, q, squares, azimuths, 0.0, chance, min(of_slices, 1.0), wanted, law)
+    grids = frozen(square), frozen(turn), frozen(probability), frozen(second)
+    unchecked = DirectionTable(*grids, frozen(quantile), frozen(azimuth), 0.0, chance, wanted, law)
     # the middle between neighbours, and the outer half cells
     between, p = np.concatenate(([0.25], np.arange(1, n_in), [n_in - 0.25])) / n_in, np.arange(slices * each) + 0.5
     distance = np.empty(n_in + 1)

@@ -17,6 +17,7 @@ from ..geometry.surfaces.surface import FEWEST
 from ..kernels import KernelMatrix, SurfaceLaw, Zernike, discretise
 from ..spectral import SpectralGap, accommodation, spectral_gap
 from ..spectral.consequences.surface_accommodation import SurfaceAccommodation
+from .pictures import Drawings
 from .result import (
     TracerCheck,
     blocks_as_text,
@@ -27,7 +28,7 @@ from .result import (
     ray_lines,
     rows_of,
 )
-from .study import CHECK_RAYS, SavedStudy, tracer_check
+from .study import CHECK_RAYS, TOLERANCE, SavedStudy, tracer_check
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -115,19 +116,17 @@ class SurfaceStudy(SavedStudy):
         blocks |= {"law": matrix_lines(self.matrix), "gap": gap_lines(self, "gap")}
         return blocks_as_text(blocks, verbose, found if by_angle else None)
 
-    def _drawings(self) -> list[tuple[Any, tuple[float, float]]]:
-        return [(self._draw_surface, (7.0, 5.6)), (self._draw_directions, (6.4, 5.0)), (self._draw_angles, (6.4, 4.6))]
+    def _drawings(self) -> Drawings:
+        return ((self._draw_surface, (7.0, 5.6)), (self._draw_directions, (6.4, 5.0)), (self._draw_angles, (6.4, 4.6)))
 
     def _draw_surface(self, ax: Axes) -> None:
         """The map with rays that come from three sides."""
-        turns = np.array([0.3, 2.4, 4.5])
-        rays = np.column_stack([np.cos(turns), np.sin(turns), np.full(3, -1.0)])
-        self.law.surface.plot(np.outer([0.25, 0.45, 0.7], self.law.surface.periods), rays, ax)
+        surface, rays = self.law.surface, [[0.96, 0.3, -1.0], [-0.74, 0.68, -1.0], [-0.21, -0.98, -1.0]]
+        surface.plot(np.outer([0.25, 0.45, 0.7], surface.periods), rays, ax)
         ax.set_title(verbatim(f"{self.name}\ndot: a ray enters, ring: it leaves"), fontsize=11)
 
     def _draw_directions(self, ax: Axes) -> None:
-        zenith = np.radians(DRAWN)
-        self.law.plot([np.sin(zenith), 0.0, -np.cos(zenith)], ax)
+        self.law.plot([np.sin(np.radians(DRAWN)), 0.0, -np.cos(np.radians(DRAWN))], ax)
         ax.set_title(f"Outgoing velocities at {DRAWN:g} degrees of incidence", fontsize=11)
 
     def _draw_angles(self, ax: Axes) -> None:
@@ -139,14 +138,9 @@ class SurfaceStudy(SavedStudy):
 
 
 def study_surface(
-    law: SurfaceLaw,
-    name: str = "surface",
-    *,
-    tolerance: float = 1e-3,
-    rng: Rng = None,
-    progress: bool = True,
+    law: SurfaceLaw, name: str = "surface", *, tolerance: float = TOLERANCE, rng: Rng = None, progress: bool = True,
     incidence_deg: ArrayLike | None = None,
-) -> SurfaceStudy:
+) -> SurfaceStudy:  # fmt: skip
     """Study a surface: trace it, find accommodation, of its quarters too, and the gap of its law.
 
     Parameters
