@@ -170,6 +170,30 @@ def judge_errors(case: tuple[Surface, int]) -> Iterator[Judged]:
         yield Judged("tangential entry", wide, abs(float(found.symmetric[1, 1] - truth.symmetric[1, 1])))
 
 
+def judge_tables(case: tuple[Surface, int]) -> Iterator[Judged]:
+    """Means of functions with slopes of 1 at most over draws of a table and of its law, and distribution functions."""
+    surface, number = case
+    law, rng = ker.SurfaceLaw(surface, 0.3 if number % 4 == 3 else "random"), np.random.default_rng([11, number])
+    table, v = law.table(6, 7, 7, n_turn=6, tolerance=0.03, rng=number), cosine(CHECKED // 2, rng)
+    ahead = v[:, :2] / np.linalg.norm(v[:, :2], axis=1)[:, None]
+    draws = []
+    for out in (table.sample(v, rng), law.sample(v, rng)):
+        across = [np.sum(out[:, :2] * one, axis=1) for one in (ahead, ahead[:, ::-1] * [-1.0, 1.0])]
+        distances = [np.linalg.norm(out - v * sign, axis=1) for sign in ([1.0, 1.0, -1.0], [-1.0, -1.0, -1.0])]
+        draws.append(np.column_stack([out, *across, *distances]))
+    means, noise = (draws[0] - draws[1]).mean(axis=0), 4.0 * (draws[0] - draws[1]).std(axis=0) / math.sqrt(len(v))
+    worst = int(np.argmax(np.abs(means) - noise))
+    yield Judged("mean values", table.error, abs(float(means[worst])), float(noise[worst]))
+    far = 0.0
+    for i, square in enumerate(table.square):
+        down = np.array([math.sqrt(1.0 - square), 0.0, -math.sqrt(square)])
+        own = np.sort(law.sample(np.tile(down, (CHECKED // 2, 1)), rng)[:, 2] ** 2)
+        p, q = table.probability[1:-1], table.quantile[i, 0, 1:-1]
+        low, high = (np.searchsorted(own, q + side * 1e-9) / own.size for side in (-1.0, 1.0))
+        far = max(far, float((low - p).max()), float((p - high).max()))
+    yield Judged("distribution functions", table.distribution_error, far, math.sqrt(math.log(240.0) / CHECKED))
+
+
 def draw(number: int) -> tuple[Surface, int]:
     """A map and its number."""
     return random_map(number), number
@@ -182,4 +206,5 @@ CAMPAIGNS = (
     Campaign("surface-laws", "Do laws of surfaces keep the cosine law and reciprocity?", draw, judge_laws, 100, (0, 5)),
     Campaign("surface-errors", "Do errors of matrices of surfaces hold in 95 of 100 cases?",
              draw, judge_errors, 20, (0,), level=0.95),
+    Campaign("surface-tables", "Do the errors of tables of surfaces hold?", draw, judge_tables, 80, (3, 5), level=0.95),
 )  # fmt: skip
