@@ -70,7 +70,7 @@ class SavedStudy(Summary):
     def _drawings(self) -> Drawings:
         """What draws the pictures, and their sizes."""
 
-    _more = ".summary(verbose=True), .refusals, .to_json(), .save(folder)"
+    _more = ".summary(verbose=True), .to_json(), .save(folder)"
 
     def _headline(self) -> str:
         return f"of {self.name}"  # type: ignore[attr-defined]
@@ -129,6 +129,7 @@ class Study(StudyResult, SavedStudy):
     """
 
     pictures = PICTURES
+    _more = ".summary(verbose=True), .refusals, .to_json(), .save(folder)"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""

@@ -176,7 +176,7 @@ def study_surface(
     >>> round(report.tracer.expected_collisions**2, 12), report.gap.verdict
     (2.0, 'no gap')
     """
-    instance("law", law, SurfaceLaw, "ker.SurfaceLaw(surface)")
+    instance("law", law, SurfaceLaw, "ker.SurfaceLaw(geo.Surface([[0.0, 1.0]]))")
     wanted, source, surface = positive_number("tolerance", tolerance), generator(rng, 0), law.surface
     degrees = INCIDENCE if incidence_deg is None else incidence_deg
     with progress_bar(4, "part", name, shown=progress) as bar:

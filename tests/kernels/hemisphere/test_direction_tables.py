@@ -49,7 +49,7 @@ def test_cells_between_quantiles_have_equally_many_rays_of_the_law(name):
 @pytest.mark.parametrize("sizes", [(2, 2, 2), (8, 9, 9)])
 def test_mean_values_of_functions_of_slope_1_differ_from_those_of_the_law_by_less_than_the_error(name, sizes):
     law, v = LAWS[name], cosine(50_000, RNG(2))
-    table = law.table(*sizes, n_turn=8, tolerance=0.03, rng=1)
+    table = law.table(*sizes, n_turn=6, tolerance=0.04, rng=1)
     ahead = v[:, :2] / np.linalg.norm(v[:, :2], axis=1)[:, None]
     left = ahead[:, ::-1] * [-1.0, 1.0]
     values = [
@@ -69,8 +69,8 @@ def test_mean_values_of_functions_of_slope_1_differ_from_those_of_the_law_by_les
 
 
 def test_the_error_of_a_fine_table_is_mostly_the_noise_of_the_rays():
-    coarse, fine, more = (LAWS["random"].table(n, n, n, tolerance=tol) for n, tol in ((3, 0.02), (9, 0.02), (9, 0.01)))
-    assert 0.04 < coarse.error < 0.065 and fine.error < 0.1 and more.error < 0.7 * fine.error
+    coarse, fine, more = (LAWS["random"].table(n, n, n, tolerance=tol) for n, tol in ((3, 0.02), (9, 0.04), (9, 0.02)))
+    assert 0.04 < coarse.error < 0.065 and fine.error < 0.15 and more.error < 0.7 * fine.error
 
 
 def test_grooves_that_reflect_back_are_exact_but_where_the_azimuth_jumps():
