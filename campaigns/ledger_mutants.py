@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import ast
 import copy
-import gc
 import signal
 import sys
 import warnings
@@ -21,7 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from types import CodeType, FrameType, FunctionType
+from types import CodeType, FrameType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -212,14 +211,10 @@ def mutants_of(entry: Entry) -> dict[str, Formula]:
     assert entry.check is not None and entry.right is not None
     formula = entry.right
     entry.check(watched)
-    functions = {id(formula): formula} if isinstance(formula, FunctionType) else {}
-    # one search for all, which looks through everything that Python holds
-    owners = [owner for owner in gc.get_referrers(*called) if isinstance(owner, FunctionType)]
-    for code in called:
-        functions.update({id(owner): owner for owner in owners if owner.__code__ is code})
     found = {
         label: _within(formula, function, code)
-        for function in functions.values()
+        for function in _reached(formula)
+        if function is formula or function.__code__ in called
         for label, code in changes(function).items()
     }
     args, result = calls[0]
@@ -234,6 +229,30 @@ def mutants_of(entry: Entry) -> dict[str, Formula]:
             if turned is not None and not _is_zero(turned):
                 found[f"result {index + 1} {name}"] = _with_part(formula, index, negate)
     return found
+
+
+def _reached(formula: Formula) -> list[FunctionType]:
+    """The ledger's functions that a formula can call, itself first: in closures, by name, or by name in a module."""
+    found: list[FunctionType] = []
+    waiting: list[Any] = [formula]
+    while waiting:
+        one = waiting.pop(0)
+        if not isinstance(one, FunctionType) or one in found:
+            continue
+        if one is not formula and not one.__code__.co_filename.startswith(HELPERS):
+            continue
+        found.append(one)
+        used = _names(one.__code__)
+        named = [value for name, value in one.__globals__.items() if name in used]
+        modules = [vars(value) for value in named if isinstance(value, ModuleType)]
+        waiting += [cell.cell_contents for cell in one.__closure__ or ()] + named
+        waiting += [value for names in modules for name, value in names.items() if name in used]
+    return found
+
+
+def _names(code: CodeType) -> set[str]:
+    """The names that a function's code looks up, with those of functions inside of it."""
+    return set(code.co_names).union(*(_names(part) for part in code.co_consts if isinstance(part, CodeType)))
 
 
 def _reads(formula: Formula, index: int) -> bool:

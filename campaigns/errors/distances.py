@@ -176,6 +176,6 @@ def known_distances(weights: tuple[float, float]) -> Iterator[Judged]:
 
 CAMPAIGNS = (
     Campaign("distances", "Do errors of distances of laws hold?", random_pair, conditional_distances, 84, range(1)),
-    Campaign("joint-distances", "Do errors of joint distances hold?", random_joint_case, joint_distances, 48, (0, 6)),
+    Campaign("joint-distances", "Do errors of joint distances hold?", random_joint_case, joint_distances, 48, (0, 5)),
     Campaign("known-distances", "Do they hold against a closed form?", random_weights, known_distances, 12, range(2)),
 )

@@ -42,4 +42,4 @@ def judge(case: Case) -> Iterator[Judged]:
     yield Judged(kind, 0.5 * (high - low), abs(0.5 * (low + high) - float(gap)), gap.error, outcome="proved")
 
 
-CAMPAIGNS = (Campaign("proofs", "Do proved intervals contain the gap?", draw, judge, 24, [2], seconds=900.0),)
+CAMPAIGNS = (Campaign("proofs", "Do proved intervals contain the gap?", draw, judge, 24, [3], seconds=900.0),)

@@ -155,7 +155,7 @@ def test_alternating_cells_do_not_converge_and_flattening_ones_do():
     assert flattening.scales[0] == 1e-3
 
 
-@pytest.mark.parametrize("fraction", [1e-9, 3e-9, 1e-8, 3e-8, 1e-7, 3e-7, 1e-6, 3e-6, 1e-5])
+@pytest.mark.parametrize("fraction", [1e-9, 1e-8, 1e-7, 1e-5])
 def test_narrow_hollows_keep_their_accuracy_beside_a_flat_top(fraction):
     # the coordinates of a hollow of width 1e-10 round to 1e-6 of it, which is symmetric no more
     found = ker.wall_for(ker.maxwell(fraction))
