@@ -61,7 +61,7 @@ RETURNED = {
     "kernels.limit_study": "LimitStudy",
     "kernels.weak_limit": "WeakLimit",
     "kernels.play": "BilliardRecord Reflector",
-    "kernels.play_gas": "GasRecord",
+    "kernels.play_gas": "GasRecord GasStatistics",
     "kernels.distance": "Distance",
     "kernels.difference_test": "DifferenceTest",
     "kernels.displacements": "Displacements",

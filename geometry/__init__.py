@@ -7,7 +7,8 @@
 - Trace rays: MushroomGenerations, Status, billiard_map, nested_reflection, trace, trajectory.
 - Draw walls: draw_wall.
 - Collide disks: Disk, InnerDisk, RollingCharts, SatelliteDisk, ConfigurationSpace, DiskStatus, collide,
-  collide_cylinder, collide_modified, collide_pair, collide_rim, collision_path, good_fraction, shadow, Container.
+  collide_cylinder, collide_modified, collide_pair, collide_rim, collision_path, good_fraction, shadow, Container,
+  Torus.
 - Verify a formula, and the formulas of a disk: verify, symbolic.
 """
 
@@ -34,7 +35,7 @@ from .disk.satellites import RollingCharts
 from .plotting.walls import draw_wall
 from .surfaces.reading import read_surface
 from .surfaces.surface import Surface
-from .tables.container import Container
+from .tables.container import Container, Torus
 from .tracing.boundary_map import billiard_map, nested_reflection
 from .tracing.generations import MushroomGenerations
 from .tracing.tracing import Status, trace, trajectory
@@ -78,6 +79,7 @@ __all__ = [
     "SelfAffine",
     "Status",
     "Surface",
+    "Torus",
     "Wall",
     "billiard_map",
     "collide",

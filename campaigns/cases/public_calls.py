@@ -89,7 +89,7 @@ def methods_of(kind: type) -> set[tuple[type, str]]:
 # One object of every class whose methods take arguments, several where methods depend on what the object holds.
 OBJECTS: tuple[Any, ...] = (
     ARC, geo.Bezier([(0, 0), (0.5, -1), (1, 0)]), geo.Segment((0, 0), (1, 0)), TEETH, DISK, PROFILE, SPACE, BUMPS,
-    MUSHROOMS, STRIP, CIRCLE, geo.InnerDisk(0.25, 0.1), geo.RollingCharts(np.pi / 30.0, 1.0),
+    MUSHROOMS, STRIP, CIRCLE, geo.Torus(9.0, 7.0), geo.InnerDisk(0.25, 0.1), geo.RollingCharts(np.pi / 30.0, 1.0),
     geo.HeightCorrelation(0.1), geo.SelfAffine(0.5), SURFACE,
     BINS, ker.Legendre(4), ker.Panels([0.0, 1.0, np.pi], 2), ker.TensorBasis((ker.Bins(2), MOMENTUM_BINS)), SINE,
     MATRIX, SAMPLED, LAW, ker.lambertian(), ker.specular(), TRIANGLES, ker.RectangularTeethLaw(1.0),
@@ -227,12 +227,13 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "notched_angle": {"angle": 0.5},
     "play": {"laws": COLLISION, "container": STRIP, "position": [[0.0, 0.0]], "velocity": [[1.0, 1.0, 0.0]],
              "collisions": 2},
-    "play_gas": {"position": [[0.0, 0.0]], "velocity": [[1.0, 0.0, 0.0]], "walls": None},
+    "play_gas": {"position": [[0.0, 0.0]], "velocity": [[1.0, 0.0, 0.0]], "walls": None, "every": 1, "interval": 0.5},
     "position_distance": {"first": geo.flat(), "second": geo.flat(), "tolerance": 0.5, "rays": 16},
     "shadow": {"position": [0.0, 0.0], "velocity": [0.0, -1.0, 0.0]},
     "spectrum": {"kernel": LAW},
     "study_wall": {"wall": geo.flat(), "disk": None},
     "sweep": {"family": ker.maxwell, "grid": {"diffuse_fraction": [0.5]}},
+    "Torus": {"width": 9.0, "height": 7.0},
     "trajectory": {"x": 0.3, "theta": 1.0},
     "triangular_teeth": {"angle": 1.0},
     "tube": {"height": 0.2, "spacing": 1.0},

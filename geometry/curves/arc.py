@@ -386,34 +386,16 @@ class Arc(Curve):
         rise, run = math.sin(t1) - math.sin(t0), math.cos(t1) - math.cos(t0)
         return 0.5 * (a * b * (t1 - t0) + cx * b * rise - cy * a * run)
 
-    def arrival(self, position: Floats, velocity: Floats, own: Bools, slack: float, front: bool = True) -> Floats:
-        turn = 1.0 if front else -1.0
-        axes = np.array(self.semi_axes)
-        start, direction = (position - np.array(self.center)) / axes, velocity[:, :2] / axes
-        square = np.sum(direction**2, axis=1)
-        along = np.sum(start * direction, axis=1)
-        across = np.abs(start[:, 0] * direction[:, 1] - start[:, 1] * direction[:, 0])
-        excess = np.where(own, 0.0, np.sum(start**2, axis=1) - 1.0)
-        speed = np.sqrt(square)
-        root = np.sqrt(np.maximum((speed - across) * (speed + across), 0.0))
-        behind = slack / float(axes.min())
-        tangent = np.zeros(len(position), dtype=bool)
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            if self.direction * turn > 0:
-                # the way out of the circle; from the circle itself C = 0
-                time = np.where(along > 0.0, -excess / (along + root), (root - along) / square)
-                time = np.where(own, -2.0 * along / square, time)
-                # within rounding the path is tangent: it is reached unless it leaves the arc there
-                tangent = ~own & (
-                    np.abs(across - speed) <= TANGENT * speed * (1.0 + np.hypot(start[:, 0], start[:, 1]))
-                )
-                hit = own | ((tangent | (across < speed)) & (time * speed >= -behind))
-            else:
-                time = excess / (root - along)
-                hit = ~own & (along < 0.0) & (across < speed) & (excess >= -behind)
-            time = np.maximum(time, 0.0)
-            met = start + direction * (time + np.where(tangent, AHEAD / speed, 0.0))[:, None]
-        return np.where(hit & np.isfinite(time) & self._within_span(met, behind), time, np.inf)
+    @property
+    def wall_row(self) -> Floats:
+        (low_x, low_y, high_x, high_y), span = self.box, abs(self.end_angle - self.start_angle)
+        columns = {
+            c.WALL_KIND: c.ARC_WALL, c.WALL_X: self.center[0], c.WALL_Y: self.center[1],
+            c.SEMI_X: self.semi_axes[0], c.SEMI_Y: self.semi_axes[1], c.DIRECTION: self.direction,
+            c.FIRST_ANGLE: self.start_angle, c.WALL_SPAN: span, c.WALL_SIZE: math.hypot(high_x - low_x, high_y - low_y),
+            c.FROM_X: self.start[0], c.FROM_Y: self.start[1], c.TO_X: self.end[0], c.TO_Y: self.end[1],
+        }  # fmt: skip
+        return c.row_of(c.WALL_COLUMNS, columns)
 
     def _within_span(self, unit: Floats, slack: float) -> Bools:
         """Return whether points (n, 2) of the unit circle belong to the arc."""

@@ -110,6 +110,27 @@ BEZIER_COLUMNS = 15
 LOWS = 9
 REFINED_ARC_COLUMNS = 21
 
+# walls of a table in which points move: one row for each line without ends, segment or arc of an ellipse.
+WALL_KIND = 0
+WALL_X = 1  # a point of a straight wall; the centre of an ellipse
+WALL_Y = 2
+INNER_X = 3  # of straight walls the unit normal into the table, and the length
+INNER_Y = 4
+WALL_LENGTH = 5
+SEMI_X = 3  # of arcs the semi-axes, 1 or -1 for the direction, the first angle and the span
+SEMI_Y = 4
+DIRECTION = 5
+FIRST_ANGLE = 6
+WALL_SPAN = 7
+WALL_SIZE = 8  # of arcs the diagonal of the box, and the ends
+FROM_X = 9
+FROM_Y = 10
+TO_X = 11
+TO_Y = 12
+WALL_COLUMNS = 13
+# Kinds of walls; the times of arrival at a given one are computed elsewhere.
+GIVEN_WALL, LINE_WALL, SEGMENT_WALL, ARC_WALL = 0.0, 1.0, 2.0, 3.0
+
 # closed: one after another the closed forms of the hollows that have one, see `blocks`; places in a form.
 FORM_LEFT = 0  # x of the ends of the opening
 FORM_RIGHT = 1

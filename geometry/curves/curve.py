@@ -202,7 +202,11 @@ class Curve(ABC):
     def signed_area(self) -> float:
         """Half of the integral of x dy - y dx along the curve."""
 
-    @abstractmethod
+    @property
+    def wall_row(self) -> Floats | None:
+        """The row of the walls of a table, with the columns from `columns.WALL_KIND` on; None: `arrival` is asked."""
+        return None
+
     def arrival(self, position: Floats, velocity: Floats, own: Bools, slack: float, front: bool = True) -> Floats:
         """Return the times (n,) at which moving points reach the curve from its left, inf where they do not.
 
@@ -217,6 +221,7 @@ class Curve(ABC):
         front : bool
             If False, arrivals from the right.
         """
+        raise NotImplementedError
 
     @abstractmethod
     def touch(self, position: Floats) -> tuple[Floats, Floats, Floats]:

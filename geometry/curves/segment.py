@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, shaped
 from ...core.errors import WallError
+from . import columns as c
 from .curve import Bools, Box, Curve, Point, as_point, parameters, stretch_factors
 from .reading import Table, check_keys, pair_of
 
@@ -139,17 +140,11 @@ class Segment(Curve):
         (x0, y0), (x1, y1) = self.start, self.end
         return 0.5 * (x0 * y1 - x1 * y0)
 
-    def arrival(self, position: Floats, velocity: Floats, own: Bools, slack: float, front: bool = True) -> Floats:
-        turn = 1.0 if front else -1.0
-        along = self.tangent(0.0)
-        normal = turn * np.array([-along[1], along[0]])
-        relative = position - np.array(self.start)
-        distance, approach = np.sum(relative * normal, axis=1), -np.sum(velocity[:, :2] * normal, axis=1)
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            time = np.maximum(distance, 0.0) / approach
-            at = np.sum((relative + velocity[:, :2] * time[:, None]) * along, axis=1)
-        hit = (approach > 0.0) & (distance >= -slack) & (at >= -slack) & (at <= self.length + slack) & ~own
-        return np.where(hit & np.isfinite(time), time, np.inf)
+    @property
+    def wall_row(self) -> Floats:
+        (x, y), (dx, dy) = self.start, self.tangent(0.0).tolist()
+        columns = {c.WALL_KIND: c.SEGMENT_WALL, c.WALL_X: x, c.WALL_Y: y}
+        return c.row_of(c.WALL_COLUMNS, {**columns, c.INNER_X: -dy, c.INNER_Y: dx, c.WALL_LENGTH: self.length})
 
     def touch(self, position: Floats) -> tuple[Floats, Floats, Floats]:
         tangent = np.broadcast_to(self.tangent(0.0), position.shape)

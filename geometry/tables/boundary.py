@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, shortened
 from ...core.errors import InputError
 from ...core.rounding import EPS
-from ..curves.arc import Arc
+from ..curves.arc import TANGENT, Arc
 from ..curves.curve import Curve
 
 # Distance, relative to the size of the table, up to which the end of one curve is the start of the next. Ends that are
@@ -32,8 +32,6 @@ MOST_CURVED = 1e3
 FLATTENING = 1e-6
 # Directions, radians, of the lines by which it is decided whether a point is inside; the majority counts.
 LINES_OF_SIGHT = (0.7312, 2.8251, 4.9187)
-# Rounding of the distance of a path from the centre of an arc, relative to the distance of its start.
-TANGENT = 8.0 * EPS
 TINIEST = float(np.finfo(np.float64).tiny)
 
 
@@ -195,14 +193,25 @@ def begins_along(curve: Curve, position: Floats) -> NDArray[np.bool_]:
 
     Paths from there begin on the curve, whichever side of it rounding has put the points.
     """
-    if curve.is_straight or (isinstance(curve, Arc) and curve.direction < 0):
-        return np.zeros(len(position), dtype=bool)
     size = size_of([curve]) + float(np.abs(position).max(initial=0.0))
     ends = np.array([curve.start, curve.end])[:, None] - position
     inner = curve.is_whole | np.all(np.hypot(ends[..., 0], ends[..., 1]) > SLACK * size, axis=0)
     found = np.asarray(inner & curve.is_on(position, TANGENT * size))
     found[found] = curve.touch(position[found])[2] > 0.0
     return found
+
+
+def arrivals_at(
+    curve: Curve, position: Floats, velocity: Floats, own: NDArray[np.bool_], slack: float, front: bool
+) -> Floats:
+    """The times of `Curve.arrival`, of a curve of any kind."""
+    if curve.wall_row is None:
+        return curve.arrival(position, velocity, own, slack, front)
+    from .compiled.flights import arrivals
+
+    times, points = np.empty(len(position)), np.ascontiguousarray(position)
+    arrivals(curve.wall_row[None], points, np.ascontiguousarray(velocity), own, slack, 1.0 if front else -1.0, times)
+    return times
 
 
 def on_the_left(curves: Sequence[Curve], position: Floats, bounded: bool) -> NDArray[np.bool_]:
@@ -216,7 +225,7 @@ def on_the_left(curves: Sequence[Curve], position: Floats, bounded: bool) -> NDA
     for angle in LINES_OF_SIGHT:
         ray = np.broadcast_to([math.cos(angle), math.sin(angle)], position.shape)
         left, right = (
-            np.min([curve.arrival(position, ray, free, EPS, front) for curve in curves], axis=0)
+            np.min([arrivals_at(curve, position, ray, free, EPS, front) for curve in curves], axis=0)
             for front in (True, False)
         )
         votes += np.where(left == right, not bounded, left < right)

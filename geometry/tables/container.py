@@ -12,11 +12,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, frozen, indices, number_between, positive_number, sequence, shaped
+from ...core.checks import (
+    Floats,
+    Value,
+    finite_array,
+    frozen,
+    indices,
+    number_between,
+    positive_number,
+    sequence,
+    shaped,
+)
 from ...core.errors import InputError
 from ...core.estimates import Summary
-from ...core.rounding import EPS
 from ...core.tables import axes_or_new
+from ..curves import columns as c
 from ..curves.arc import Arc
 from ..curves.bezier import GRAZE
 from ..curves.curve import Curve
@@ -29,8 +39,51 @@ if TYPE_CHECKING:
 
 # Tolerance for the length 1 of the normals, which have a few rounding errors.
 UNIT_TOLERANCE = 1e-12
-# Distance from a corner, relative to the coordinates, up to which rounding decides which wall is met first.
-CORNER_ROUNDING = 16.0 * EPS
+
+
+@dataclass(frozen=True)
+class Torus(Value):
+    """The rectangle [0, width) x [0, height) with opposite sides identified: a gas without walls, for `play_gas`.
+
+    Parameters
+    ----------
+    width, height : float
+        The periods, greater than 0.
+
+    Raises
+    ------
+    InputError
+        If a period is not positive.
+
+    Examples
+    --------
+    >>> Torus(12.0, 9.0).area
+    108.0
+    """
+
+    width: float
+    height: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "width", positive_number("width", self.width))
+        object.__setattr__(self, "height", positive_number("height", self.height))
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """Width and height."""
+        return self.width, self.height
+
+    @property
+    def area(self) -> float:
+        """The area, width times height."""
+        return self.width * self.height
+
+    def draw(self, ax: Axes | None = None) -> Axes:
+        """Draw one period into matplotlib Axes, new ones by default, and return them."""
+        axes, (x, y) = axes_or_new(ax), (self.width, self.height)
+        axes.plot([0.0, x, x, 0.0, 0.0], [0.0, 0.0, y, y, 0.0], color="black", linestyle=":", linewidth=1.2)
+        axes.set_aspect("equal")
+        return axes
 
 
 @dataclass(frozen=True, repr=False)
@@ -265,12 +318,13 @@ class Container(Summary):
 
     def _closed_curves(self) -> tuple[Curve, ...]:
         table = self.closed()
-        if len(table.points) or not table._has_outer_loop:
+        if len(table.points) or not table.has_outer_loop:
             raise InputError("container: expected a polygon, or curves with an outer loop, such as Container.circle()")
         return table.curves
 
     @property
-    def _has_outer_loop(self) -> bool:
+    def has_outer_loop(self) -> bool:
+        """Whether the curves have an outer loop."""
         areas = (sum(self.curves[k].signed_area for k in loop) for loop in boundary.loops_of(self.curves))
         return bool(self.curves) and any(area > 0.0 for area in areas)
 
@@ -279,7 +333,7 @@ class Container(Summary):
         inside = np.all(self.distances(position) >= 0.0, axis=1)
         if self.curves:
             points = finite_array("position", position)
-            inside = inside & boundary.on_the_left(self.curves, points, self._has_outer_loop)
+            inside = inside & boundary.on_the_left(self.curves, points, self.has_outer_loop)
         return np.asarray(inside)
 
     def next_wall(
@@ -307,45 +361,37 @@ class Container(Summary):
         position, velocity = shaped("position", position, last.size, 2), shaped("velocity", velocity, last.size, "k")
         if velocity.shape[1] not in (2, 3):
             raise InputError(f"velocity: expected shape (n, 2) or (n, 3), got {velocity.shape}")
-        times = np.full((len(position), self.wall_count), np.inf)
-        straight = len(self.points)
-        if straight:
-            approach = -np.sum(velocity[:, None, :2] * self.normals, axis=2)
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                flight = np.maximum(self.distances(position), 0.0) / approach
-            own = last[:, None] == np.arange(straight)
-            times[:, :straight] = np.where((approach > 0.0) & ~own & np.isfinite(flight), flight, np.inf)
-        slack = boundary.SLACK * boundary.size_of(self.curves) if self.curves else 0.0
-        new = np.flatnonzero(last < 0)
-        for k, curve in enumerate(self.curves, straight):
-            begins = last == k
-            if new.size:
+        time, wall = np.full(len(position), np.inf), np.full(len(position), -1)
+        (walls, corners, slack), new = self.wall_table, np.flatnonzero(last < 0)
+        for k, curve in enumerate(self.curves, len(self.points)):
+            if curve.wall_row is None:
+                begins = last == k
                 begins[new] = boundary.begins_along(curve, position[new])
-            times[:, k] = curve.arrival(position, velocity, begins, slack)
-        wall = np.argmin(times, axis=1)
-        first = times[np.arange(len(position)), wall]
-        wall = np.where(np.isfinite(first), wall, -1)
-        return first, wall, self._outcome(position, velocity, first, wall, slack)
+                arrival = curve.arrival(position, velocity, begins, slack)
+                wall, time = np.where(arrival < time, k, wall), np.minimum(time, arrival)
+        status, plane = np.empty(len(position), dtype=np.uint8), np.ascontiguousarray(velocity[:, :2])
+        from .compiled.flights import next_walls
 
-    def _outcome(
-        self, position: Floats, velocity: Floats, time: Floats, wall: NDArray[np.int64], slack: float
-    ) -> NDArray[np.uint8]:
-        """The ``FlightStatus`` of flights from positions (n, 2) that reach these walls after these times."""
-        status = np.full(len(wall), FlightStatus.FREE, dtype=np.uint8)
-        for k in np.unique(wall[wall >= 0]):
-            here = np.flatnonzero(wall == k)
-            start, plane = position[here], velocity[here, :2]
-            met = start + plane * time[here, None]
-            away = np.hypot(*np.moveaxis(met[:, None] - self._corners, -1, 0)).min(axis=1, initial=np.inf)
-            room = slack + CORNER_ROUNDING * np.abs(np.column_stack([start, met])).max(axis=1)
-            found = np.where(away <= room, FlightStatus.CORNER, FlightStatus.FLYING)
-            if k >= len(self.points):
-                point = self.touch(int(k), met)
-                up = np.sum(plane * point.normal, axis=1)
-                level = up >= -GRAZE * np.hypot(plane[:, 0], plane[:, 1])
-                found[(found == FlightStatus.FLYING) & level & (point.curvature > 0.0)] = FlightStatus.GRAZING
-            status[here] = found
-        return status
+        next_walls(walls, corners, slack, np.ascontiguousarray(position), plane, last, time, wall, status)
+        for k in np.unique(wall[(wall >= len(self.points)) & (status == FlightStatus.FLYING)]):
+            if self.curves[k - len(self.points)].wall_row is None:
+                here = np.flatnonzero((wall == k) & (status == FlightStatus.FLYING))
+                point = self.touch(int(k), position[here] + plane[here] * time[here, None])
+                level = np.sum(plane[here] * point.normal, axis=1) >= -GRAZE * np.hypot(*plane[here].T)
+                status[here[level & (point.curvature > 0.0)]] = FlightStatus.GRAZING
+        return time, wall, status
+
+    @cached_property
+    def wall_table(self) -> tuple[Floats, Floats, float]:
+        """The rows of all walls for compiled functions, the corners (c, 2), and by how much curves are longer."""
+        lines = [
+            c.row_of(c.WALL_COLUMNS, {c.WALL_KIND: c.LINE_WALL, c.WALL_X: x, c.WALL_Y: y, c.INNER_X: nx, c.INNER_Y: ny})
+            for (x, y), (nx, ny) in zip(self.points.tolist(), self.normals.tolist(), strict=True)
+        ]
+        rows = [curve.wall_row for curve in self.curves]
+        given = c.row_of(c.WALL_COLUMNS, {c.WALL_KIND: c.GIVEN_WALL})
+        slack = boundary.SLACK * boundary.size_of(self.curves) if self.curves else 0.0
+        return np.array([*lines, *(given if row is None else row for row in rows)]), self._corners, slack
 
     @cached_property
     def _corners(self) -> Floats:

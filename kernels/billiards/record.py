@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, choice, number_between, shaped, whole_number
+from ...core.checks import Floats, choice, instance, number_between, shaped, whole_number
 from ...core.estimates import Summary
 from ...core.tables import axes_or_new
 from ...geometry import Container, Disk
@@ -93,6 +93,15 @@ class BilliardRecord(Summary):
         """Kinetic energies <w, w>/2, shape (steps + 1, n)."""
         return np.asarray(0.5 * self.disk.inner(self.velocity, self.velocity))
 
+    @property
+    def _at_walls(self) -> NDArray[np.bool_]:
+        """Which entries after the first are new collisions with walls."""
+        return np.asarray(np.arange(len(self.wall) - 1)[:, None] < self.collisions)
+
+    def _seen(self, position: Floats) -> Floats:
+        """Positions (..., 2) as they are drawn."""
+        return position
+
     def extent(self, direction: ArrayLike = (1.0, 0.0)) -> Floats:
         """Range, shape (n,), of the collision positions along a direction, without the start."""
         along = self.position[1:] @ shaped("direction", direction, 2)
@@ -159,8 +168,9 @@ class BilliardRecord(Summary):
         True
         """
         choice("coordinates", coordinates, ("boundary", "velocity"))
+        instance("container", self.container, Container, "geo.Container.circle()")
         wall, position, velocity = self.wall[1:], self.position[1:], self.velocity[1:]
-        met = np.arange(len(wall))[:, None] < self.collisions
+        met = self._at_walls
         first, second = np.full(wall.shape, np.nan), np.full(wall.shape, np.nan)
         tangent = np.zeros((*wall.shape, 2))
         for k in range(self.container.wall_count):
@@ -241,14 +251,14 @@ class BilliardRecord(Summary):
         seconds = number_between("duration", duration, 0.0, LONGEST, closed="high")
         from matplotlib.animation import FuncAnimation
 
-        axes = self.draw_paths()
-        for line in axes.lines[-self.position.shape[1] :]:
-            line.remove()
+        axes = self.container.draw()
+        axes.set(xlabel="$x_1$", ylabel="$x_2$")
         went_on = self.time[-1, self.status == FlightStatus.FLYING]
         times = np.linspace(0.0, float(went_on.min() if went_on.size else self.time[-1].max()), count)
         small = DRAWN_RADIUS * max(np.ptp(self.position[..., 0]), np.ptp(self.position[..., 1]))
         size = self.radius or small
-        low, high = self.position.min(axis=(0, 1)) - 1.2 * size, self.position.max(axis=(0, 1)) + 1.2 * size
+        seen = self._seen(self.position)
+        low, high = seen.min(axis=(0, 1)) - 1.2 * size, seen.max(axis=(0, 1)) + 1.2 * size
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         trace = TRACE * float(np.mean(np.diff(self.time, axis=0)))
         lines: list[list[Line2D]] = []
@@ -260,9 +270,10 @@ class BilliardRecord(Summary):
         def show(frame: int) -> list[Artist]:
             now = times[frame]
             for k, (tail, edge, spoke) in enumerate(lines):
-                path = path_between(self.time[:, k], self.position[:, k], max(0.0, now - trace), now)
+                path, angle = path_between(self.time[:, k], self.position[:, k], self.angle[:, k], now, trace)
+                path += self._seen(path[-1]) - path[-1]
                 tail.set_data(*path.T)
-                (x, y), angle = path[-1], float(np.interp(now, self.time[:, k], self.angle[:, k]))
+                x, y = path[-1]
                 edge.set_data(x + size * np.cos(rim), y + size * np.sin(rim))
                 spoke.set_data([x, x + size * np.cos(angle)], [y, y + size * np.sin(angle)])
             return [line for group in lines for line in group]
@@ -275,8 +286,13 @@ class BilliardRecord(Summary):
         return animation
 
 
-def path_between(time: Floats, position: Floats, start: float, end: float) -> Floats:
-    """Return the polyline through the positions of a disk between two times, shape (k, 2)."""
-    inner = time[(time > start) & (time < end)]
-    at = np.concatenate([[start], inner, [end]])
-    return np.stack([np.interp(at, time, position[:, axis]) for axis in (0, 1)], axis=1)
+def path_between(time: Floats, position: Floats, angle: Floats, now: float, trace: float) -> tuple[Floats, float]:
+    """Return the polyline (k, 2) through the positions of a disk in the last time ``trace``, and the angle now."""
+    start = max(0.0, now - trace)
+    # of a long record the part around these times
+    first, last = np.searchsorted(time, [start, now])
+    part = slice(max(int(first) - 1, 0), int(last) + 1)
+    time, position = time[part], position[part]
+    at = np.concatenate([[start], time[(time > start) & (time < now)], [now]])
+    path = np.stack([np.interp(at, time, position[:, axis]) for axis in (0, 1)], axis=1)
+    return path, float(np.interp(now, time, angle[part]))

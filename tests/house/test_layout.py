@@ -19,7 +19,14 @@ MOST_MODULES = 14
 # Every folder once, from the ground up; a room's own names come after its folders.
 FLOORS = [
     *("core", "verification"),
-    *("geometry.curves", "geometry.disk", "geometry.tables", "geometry.cells", "geometry.scene"),
+    *(
+        "geometry.curves",
+        "geometry.disk",
+        "geometry.tables.compiled",
+        "geometry.tables",
+        "geometry.cells",
+        "geometry.scene",
+    ),
     *("geometry.scene.compiled", "geometry.walls"),
     *(
         "geometry.tracing.double_double",

@@ -1,7 +1,7 @@
 """Tables and named tuples of them in compiled functions. Loads numba.
 
-A table is a pointer to float64, as is a row, and a one-dimensional array a pointer to its elements: nothing is counted,
-and no index is compared with 0 or with a length. So a named tuple of tables is a few numbers.
+A table is a pointer to float64 or integers, as is a row, and a one-dimensional array a pointer to its elements: nothing
+is counted, and no index is compared with 0 or with a length. So a named tuple of tables is a few numbers.
 """
 
 from __future__ import annotations
@@ -21,24 +21,26 @@ PLACE = types.UniTuple(types.intp, 2)
 
 
 class Table(types.Type):
-    """The type of a table of float64 with a known number of columns."""
+    """The type of a table of numbers with a known number of columns."""
 
-    def __init__(self, columns: int) -> None:
-        self.columns = columns
-        super().__init__(f"table({columns})")
+    def __init__(self, columns: int, element: Any = NUMBER) -> None:
+        self.columns, self.element = columns, element
+        super().__init__(f"table({columns}, {element})")
 
 
 @register_model(Table)
 class _TableModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, ir.DoubleType().as_pointer())
+        super().__init__(manager, kind, manager[kind.element].get_value_type().as_pointer())
 
 
 @type_callable(operator.getitem)
 def _read(context: Any) -> Any:
     def typed(table, index):
         if isinstance(table, Table):
-            return NUMBER(table, PLACE) if isinstance(index, types.BaseTuple) else ROW(table, types.intp)
+            if isinstance(index, types.BaseTuple):
+                return table.element(table, PLACE)
+            return types.CPointer(table.element)(table, types.intp)
         return None
 
     return typed
@@ -47,7 +49,7 @@ def _read(context: Any) -> Any:
 @type_callable(operator.setitem)
 def _written(context: Any) -> Any:
     def typed(table, index, value):
-        return types.none(table, PLACE, NUMBER) if isinstance(table, Table) else None
+        return types.none(table, PLACE, table.element) if isinstance(table, Table) else None
 
     return typed
 
@@ -62,7 +64,7 @@ def _read_number(context: Any, builder: Any, signature: Any, values: Any) -> Any
     return builder.load(_pointer(builder, signature, values))
 
 
-@lower_builtin(operator.setitem, Table, types.UniTuple, types.Float)
+@lower_builtin(operator.setitem, Table, types.UniTuple, types.Number)
 def _write_number(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     builder.store(values[2], _pointer(builder, signature, values))
 
@@ -85,7 +87,8 @@ def kind_of(value: Any) -> Any:
         kinds = tuple(map(kind_of, value))
         return named(type(value), *kinds) if hasattr(value, "_fields") else types.BaseTuple.from_types(kinds)
     if isinstance(value, np.ndarray):
-        return Table(value.shape[1]) if value.ndim == 2 else types.CPointer(typeof(value).dtype)
+        element = typeof(value).dtype
+        return Table(value.shape[1], element) if value.ndim == 2 else types.CPointer(element)
     return typeof(value)
 
 

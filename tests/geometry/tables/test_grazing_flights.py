@@ -7,6 +7,8 @@ from campaigns.rays.grazing_flights import room_with_pillar
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.geometry.tables.boundary import FlightStatus
+from asperity.geometry.tables.compiled import flights
 
 DISK = geo.Disk(1.0, 1.0)
 
@@ -73,3 +75,8 @@ def test_lyapunov_exponents_need_no_trajectory_that_runs_into_a_corner():
     table = room_with_pillar(0.625)
     estimate = ker.lyapunov_exponent(table, ker.smooth(DISK), 64, 16, rng=0)
     assert estimate.value > 0.0 and "0 not resolved" in estimate.method
+
+
+def test_compiled_flights_have_the_statuses_of_containers():
+    for name in ("FLYING", "CORNER", "GRAZING", "FREE"):
+        assert getattr(flights, name) == FlightStatus[name]

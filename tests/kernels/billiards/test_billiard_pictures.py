@@ -69,7 +69,8 @@ def test_an_animation_shows_the_disks_where_they_are(tmp_path):
     # the last picture: the middle of the circle of the last disk, and its spoke
     end = found.time[-1].min()
     _, edge, spoke = pyplot.gcf().axes[0].lines[-3:]
-    middle = path_between(found.time[:, 4], found.position[:, 4], 0.0, end)[-1]
+    path, _ = path_between(found.time[:, 4], found.position[:, 4], found.angle[:, 4], end, end)
+    middle = path[-1]
     np.testing.assert_allclose(edge.get_xydata()[:-1].mean(axis=0), middle, atol=1e-12)
     np.testing.assert_allclose(spoke.get_xydata()[0], middle, atol=1e-12)
     assert STADIUM.contains(middle[None]).all()
