@@ -101,7 +101,6 @@ LAWS: dict[str, Callable[[], ker.Law]] = {
     "rays alone": lambda: bounced_law()(),
     "rays and their mirror images": lambda: bounced_law()(mirror_symmetric=True),
     "facets diffuse in part": lambda: ker.FacetedLaw(geo.triangular_teeth(0.9), ker.maxwell(0.3)),
-    "rough facets": lambda: ker.FacetedLaw(geo.focusing_arcs(1.0), ker.WallLaw(geo.dispersing_arcs(1.0))),
     "mushrooms": lambda: ker.MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 3)),
     "sum": lambda: 0.2 * ker.specular() + 0.5 * TEETH() + 0.3 * ker.lambertian(),
     "sum of isometries": lambda: 0.4 * TEETH() + 0.6 * ker.specular() @ TEETH(),
