@@ -89,9 +89,9 @@ def follow_facets(
     flat, who = np.flatnonzero(is_flat), np.flatnonzero(~is_flat)
     if len(flat):
         angle[flat], hits[flat], status[flat] = turn(angle[flat], flat), 1, Status.ESCAPED
-    for _ in range(MOST_HITS):
+    for most in range(MOST_HITS + 1):
         who = rays.advance(who)
-        if not len(who):
+        if not len(who) or most == MOST_HITS:
             break
         hits[who] += 1
         angle[who] = turn(angle[who], who)
