@@ -60,7 +60,7 @@ def reflected(
 
 
 def diffuse_groove(angle: float, number: int) -> float:
-    """3 E[cos theta cos theta'] of a symmetric groove with diffuse sides and an interior ``angle``, by Nystrom's method.
+    """3 E[cos theta cos theta'] of a symmetric groove with diffuse sides and this interior angle, by Nystrom's method.
 
     The sides have length 1. A point at the distance x from the apex sees the other side by the view factor
     K(x, y) dy = sin^2 w x y / (2 (x^2 + y^2 - 2 x y cos w)^(3/2)) dy, and the opening by the difference of cosines.
