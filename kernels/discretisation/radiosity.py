@@ -25,7 +25,7 @@ from ..walls.faceted_law import FacetedLaw
 from .method import Budget, rounding
 
 # Pairs of cells into which the boundary is divided, at least one for each piece, and limit on the pieces.
-PAIRS, MOST_PIECES = 32, 512
+PAIRS, MOST_PIECES = 32, 640
 # Diffuse rays are this fraction of the specular ones, which cost a tenth.
 DIFFUSE = 2
 # A ray of less weight is left; the weights of all that are left are counted.
@@ -147,20 +147,21 @@ def by_radiosity(law: FacetedLaw, basis: Basis, budget: Budget) -> KernelMatrix:
     another diffuse hit, G its next diffuse hit. Points of Sobol sequences have two dimensions, for any number of hits.
     The error is the 95 % quantile of the spread of eight parts, plus the change by cells twice as long.
     """
-    kept, boundary = 1.0 - (law.diffuse_fraction or 0.0), Boundary(law.wall)
+    cell = law.wall.cell
+    kept, boundary = 1.0 - (law.diffuse_fraction or 0.0), Boundary(cell)
     seeds = budget.rng.integers(0, 2**63, size=(3, 2)).tolist()
     mirrored = law.mirror_symmetric is True and is_mirror_symmetric(basis)
     number, cells = whole_sequences(budget.rays) // PARTS, len(boundary.lengths)
     each = whole_sequences(max(budget.rays // (DIFFUSE * cells), 1)) // PARTS
-    unscattered, lost = specular_sums(law.wall, kept, basis, number, seeds[0], mirrored)
+    unscattered, lost = specular_sums(cell, kept, basis, number, seeds[0], mirrored)
     points = shifted_points(sobol_sequence(seeds[1], 0), each, *random_shifts(seeds[1], 2))
     moved = np.random.default_rng(seeds[2]).random((cells, 1, 2))
     parts = [exchanged(boundary, kept, (part + moved) % 1.0, basis) for part in points]
-    flat = (1.0 - kept) * law.wall.flat_top / law.wall.period * np.outer(basis.constant, basis.constant)
+    flat = (1.0 - kept) * cell.flat_top / cell.period * np.outer(basis.constant, basis.constant)
 
     def matrix(direct: Floats, hits: Floats, exits: Floats, lengths: Floats) -> Floats:
         scattered = exits.T @ (lengths[:, None] * np.linalg.solve(np.diag(lengths) - hits, lengths[:, None] * exits))
-        found = 0.5 * (direct + direct.T) + (1.0 - kept) / law.wall.period * scattered + flat
+        found = 0.5 * (direct + direct.T) + (1.0 - kept) / cell.period * scattered + flat
         if mirrored:
             found = 0.5 * (found + mirror_image(found, basis))
         return with_row_sums(found, basis)
@@ -188,17 +189,17 @@ def by_radiosity(law: FacetedLaw, basis: Basis, budget: Budget) -> KernelMatrix:
 
 def one_diffuse_hit(law: FacetedLaw, basis: Basis, rays: int) -> Floats:
     """The matrix D of rays whose only hit is diffuse: P >= a D as kernels, for the diffuse fraction a."""
-    boundary = Boundary(law.wall)
+    boundary = Boundary(law.wall.cell)
     each = max(rays // len(boundary.lengths), 1)
     points = sobol_sequence((0,), 0).random(1 << (each - 1).bit_length())
     moved = np.random.default_rng(0).random((len(boundary.lengths), 1, 2))
     exits = exchanged(boundary, 0.0, (points + moved) % 1.0, basis)[1]
-    flat = law.wall.flat_top * np.outer(basis.constant, basis.constant)
-    return (exits.T @ (boundary.lengths[:, None] * exits) + flat) / law.wall.period
+    flat = law.wall.cell.flat_top * np.outer(basis.constant, basis.constant)
+    return (exits.T @ (boundary.lengths[:, None] * exits) + flat) / law.wall.cell.period
 
 
 def specular_sums(
-    wall: Wall, kept: float, basis: Basis, number: int, seed: tuple[int, ...], halved: bool
+    wall: Wall, kept: float, basis: Basis, number: int, seed: tuple[int, ...], halved: bool = False
 ) -> tuple[Floats, float]:
     """The matrix of the rays that no facet scatters, in each part of a Sobol sequence, and the fraction unresolved."""
     points = shifted_points(sobol_sequence(seed, 0), number, *random_shifts(seed, 2))

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.estimates import student_95
 from ...core.long_runs import progress_bar
-from ...geometry import Wall, trace
-from ...kernels import SINE, Bins, FacetedLaw, WallLaw
-from ...kernels.sampling.sobol import random_shifts, shifted_points, sobol_sequence
+from ...geometry import Wall
+from ...kernels import Bins, FacetedLaw, WallLaw
+from ...kernels.discretisation.radiosity import specular_sums
 from .grazing import REMEMBERED
 
 # Two rays with entry points this step apart leave at the same angle, to rounding, if all reflections are at straight
@@ -32,7 +32,7 @@ PEAKS, LEVELS, FINE_LEVELS, NEARBY_ANGLES, NEARER = 4, 5, 2, 9, 6.0
 BEYOND = 2.0
 ROUNDING = 1e-9
 # Of specular rays between facets: points of each Sobol sequence, its seed, and numbers of bins of trial functions.
-POINTS_OF_FACETS, SEED, CELLS = 2**15, (0,), (32, 128, 512)
+POINTS_OF_FACETS, SEED, CELLS = 2**15, (0,), (1, 32, 128, 512)
 
 
 @dataclass(frozen=True)
@@ -102,24 +102,16 @@ def specular_part(law: FacetedLaw) -> StraightPart:
     if not wall.is_polygonal:
         flat = kept * wall.flat_top / wall.period
         return StraightPart(flat, flat, kept * straight_part(WallLaw(wall)).high)
-    points = shifted_points(sobol_sequence(SEED, 0), POINTS_OF_FACETS, *random_shifts(SEED, 2))
-    x, theta = points[..., 0] * wall.period, SINE.quantile(points[..., 1])
-    rays = trace(wall, x, theta)
-    weight = np.where(rays.escaped, kept**rays.collisions, 0.0)
-    half = len(points) // 2
-    bounds = [_quotient(weight[half:])]
-    for cells in map(Bins, CELLS):
-        pairs = cells.index(theta) * cells.size + cells.index(np.where(rays.escaped, rays.theta, theta))
-        flux = np.bincount(pairs[:half].ravel(), weight[:half].ravel(), cells.size**2).reshape(cells.size, -1)
-        top = np.linalg.eigh(flux + flux.T)[1][:, -1]
-        bounds.append(_quotient(cells.size * weight[half:] * np.outer(top, top).ravel()[pairs[half:]]))
+    bounds = []
+    for basis in map(Bins, CELLS):
+        parts, _ = specular_sums(wall.cell, kept, basis, POINTS_OF_FACETS, SEED)
+        seen, others = np.split(parts, 2)
+        top = np.linalg.eigh(seen.sum(axis=0) + seen.sum(axis=0).T)[1][:, -1]
+        quotients = others @ top @ top
+        bounds.append(
+            max(float(quotients.mean() - student_95(len(others)) * quotients.std(ddof=1) / np.sqrt(len(others))), 0.0)
+        )
     return StraightPart(bounds[0], max(bounds), kept)
-
-
-def _quotient(values: Floats) -> float:
-    """The lower end, at least 0, of the 95 % interval of a mean, from values of independent parts."""
-    parts = values.mean(axis=1)
-    return max(float(parts.mean() - student_95(len(parts)) * parts.std(ddof=1) / np.sqrt(len(parts))), 0.0)
 
 
 def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
