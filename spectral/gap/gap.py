@@ -373,12 +373,10 @@ def _by_rays(law: Law, tolerance: float, rng: np.random.Generator, seconds: floa
         short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
         return _at_edge(law, edge, (*reasons, short), found, steps.overshoot(edge.high))
     low = max(edge.low, top - steps.noise)
-    if 0.0 < edge.low < edge.high < 1.0 and top < edge.high + steps.noise:
-        # the top of the spectrum lies between what is found and the end of the edge, whichever it is
-        between = replace(edge, low=low, high=max(edge.high, low))
-        return _at_edge(
-            law, between, (*reasons, f"no eigenvalue above {edge.high:.6g}, {top:.6g} is the largest"), found
-        )
+    if 0.0 < edge.low < edge.high < 1.0 and low < edge.high:
+        # the edge is not known better, and its interval contains the top of the spectrum
+        known = f"no eigenvalue beyond {edge.high:.6g} on any basis: {top:.6g} is the largest"
+        return _at_edge(law, replace(edge, low=low), (*reasons, known), found)
     # without convergence the two-grid error is meaningless; the gap of a Galerkin matrix is an upper bound
     method = made_from(found, "not converged: an upper bound but for its noise")
     error = max(error, abs(found.gap))
