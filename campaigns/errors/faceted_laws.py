@@ -22,7 +22,7 @@ from campaigns.judges.plain_facets import diffuse_arc, diffuse_groove, reflected
 CASES, RAYS, BATCHES, SIGMAS = 200, 2**17, 8, 4.0
 KINDS = ("matrix", "samples", "equations", "quotients", "two scales")
 # Teeth on each facet, and the largest distance from facets with the law of the teeth times their number; .34 was seen.
-TEETH, TWO_SCALES = (8, 32), 0.7
+TEETH, TWO_SCALES = (2, 8, 32, 128), 0.7
 
 
 def draw(number: int) -> tuple[int, str, Floats, float, float]:
