@@ -26,13 +26,14 @@ from .method import Budget, rounding
 
 # Pairs of cells into which the boundary is divided, at least one for each piece, and limit on the pieces.
 PAIRS, MOST_PIECES = 32, 640
-# Diffuse rays are this fraction of the specular ones, which cost a tenth.
+# Specular rays for each diffuse one, which takes about ten times as long.
 DIFFUSE = 2
 # A ray of less weight is left; the weights of all that are left are counted.
 LEAST_WEIGHT = 1e-9
 # What the error consists of.
 HOW = "spread of 8 parts, and change by cells twice as long"
-# Steps of the scaling to sums of rows 1. The distance falls with each by the second eigenvalue over two, or faster.
+# Steps of the scaling to sums of rows 1: each reduces the distance along an eigenvalue r by the factor (1 - r)/2.
+# Where r is near -1, the sums remain 1 within the error.
 STEPS = 40
 
 
