@@ -203,6 +203,7 @@ class States(NamedTuple):
     status: NDArray[np.uint8]
 
 
+_NUMBERS, _PAIRS = np.empty(0, np.int64), np.empty((0, 2))
 NO_STATES = States(
-    *[np.empty(0, np.int64)] * 4, np.empty(0), np.empty((0, 2)), np.empty((0, 2)), np.empty(0), np.empty(0, np.uint8)
+    _NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, np.empty(0), _PAIRS, _PAIRS, np.empty(0), np.empty(0, np.uint8)
 )
