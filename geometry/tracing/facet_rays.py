@@ -45,9 +45,9 @@ class FacetRays:
     @classmethod
     def leaving(cls, wall: Wall, *start: NDArray[Any]) -> FacetRays:
         """Rays that leave segments, arcs or openings, by hollow, kind, number, point, tangent and angle of `States`."""
-        *piece, point, tangent, angle = map(np.ascontiguousarray, start)
+        hollow, kind, number, point, tangent, angle = map(np.ascontiguousarray, start)
         at, status = np.full(len(angle), -1.0), np.full(len(angle), FLYING, np.uint8)
-        return cls(wall, States(NO_STATES.who, *piece, at, point, tangent, angle, status))
+        return cls(wall, States(NO_STATES.who, hollow, kind, number, at, point, tangent, angle, status))
 
     def advance(self, who: NDArray[np.int64], threads: int | None = None) -> NDArray[np.int64]:
         """Let some rays fly to their next facet, and return those that are on one, for any number of threads."""
@@ -63,7 +63,7 @@ class FacetRays:
             checked(lambda: next_facets(part.start, part.stop, states.address, tables.address, SLOTS.address))
 
         in_blocks(run, len(who), threads)
-        return who[self.states.status[who] == FLYING]
+        return np.asarray(who[self.states.status[who] == FLYING])
 
 
 def follow_facets(

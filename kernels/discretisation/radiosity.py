@@ -157,7 +157,8 @@ def by_radiosity(law: FacetedLaw, basis: Basis, budget: Budget) -> KernelMatrix:
     unscattered, lost = specular_sums(cell, kept, basis, number, seeds[0], mirrored)
     points = shifted_points(sobol_sequence(seeds[1], 0), each, *random_shifts(seeds[1], 2))
     moved = np.random.default_rng(seeds[2]).random((cells, 1, 2))
-    parts = [exchanged(boundary, kept, (part + moved) % 1.0, basis) for part in points]
+    found = (exchanged(boundary, kept, (part + moved) % 1.0, basis) for part in points)
+    all_hits, all_exits, left = zip(*found, strict=True)
     flat = (1.0 - kept) * cell.flat_top / cell.period * np.outer(basis.constant, basis.constant)
 
     def matrix(direct: Floats, hits: Floats, exits: Floats, lengths: Floats) -> Floats:
@@ -167,17 +168,16 @@ def by_radiosity(law: FacetedLaw, basis: Basis, budget: Budget) -> KernelMatrix:
             found = 0.5 * (found + mirror_image(found, basis))
         return with_row_sums(found, basis)
 
-    direct, hits, exits = unscattered.mean(axis=0), *(np.mean([part[k] for part in parts], axis=0) for k in range(2))
+    direct, hits, exits = unscattered.mean(axis=0), np.mean(all_hits, axis=0), np.mean(all_exits, axis=0)
     whole = matrix(direct, hits, exits, boundary.lengths)
-    each_part = [matrix(own, part[0], part[1], boundary.lengths) for own, part in zip(unscattered, parts, strict=True)]
-    centre = np.mean(each_part, axis=0)
-    replicates = tuple(read_only(part - centre + whole) for part in each_part)
+    parts = [matrix(*part, boundary.lengths) for part in zip(unscattered, all_hits, all_exits, strict=True)]
+    replicates = tuple(read_only(part - np.mean(parts, axis=0) + whole) for part in parts)
     # of two cells the lengths and fluxes add up, and their exits have the mean weighted by lengths, which are equal
     coarse = matrix(
         direct, hits.reshape(cells // 2, 2, -1, 2).sum(axis=(1, 3)), exits.reshape(cells // 2, 2, -1).mean(axis=1),
         boundary.lengths.reshape(-1, 2).sum(axis=1),
     )  # fmt: skip
-    lost = max(lost, float(np.mean([part[2] for part in parts])))
+    lost = max(lost, float(np.mean(left)))
     error = half_width(whole, replicates) + float(np.linalg.norm(whole - coarse)) + rounding(basis)
     if lost > UNRESOLVED_TOLERANCE:
         raise AccuracyError(f"{law!r}: {lost:.2g} of the rays did not escape, more than {UNRESOLVED_TOLERANCE:g}", lost)

@@ -105,7 +105,7 @@ class FacetedLaw(Law):
         def of_leaf(law: Law) -> float:
             return 1.0 if law.is_lambertian else 0.0 if law.retro is False else math.nan
 
-        rules = Rules(
+        rules: Rules[float] = Rules(
             of_leaf,
             lambda terms: sum(weight * fraction for weight, fraction in terms),
             lambda fractions: fractions[0] if len(fractions) == 1 else math.nan,

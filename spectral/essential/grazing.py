@@ -158,7 +158,8 @@ def _rays_of(law: Law) -> Callable[[Floats, Floats], tuple[Floats, NDArray[np.bo
 
         def weighted(x: Floats, theta: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
             rays = trace(wall, x * wall.period, theta)
-            return np.where(rays.escaped, rays.theta, theta), rays.escaped, kept**rays.collisions
+            outgoing = np.where(rays.escaped, rays.theta, theta)
+            return outgoing, rays.escaped, np.asarray(kept**rays.collisions, dtype=np.float64)
 
         return weighted
     reflect = law.random_map() if law.is_driven else None

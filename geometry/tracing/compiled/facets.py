@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...curves import columns as c
+from ...scene.compiled.tables import kind_of, reader_of
 from .pieces.formulas import exit_time, with_length_one
 from .pieces.kinds import reflect
 from .pieces.options import compiled, inlined
@@ -19,10 +20,8 @@ from .rays import (
     GRAZING,
     MOST_STEPS,
     UNCERTAIN,
-    kind_of,
     meets_corner,
     nearest_piece,
-    reader_of,
     scope_of,
     slots_at,
     tables_at,
