@@ -50,7 +50,8 @@ def test_properties_follow_from_wall_and_facets() -> None:
     bins = ker.Bins(3)
     backward = ker.discretise(turning.adjoint().facets, bins)
     assert np.allclose(backward.array, ker.discretise(tilted, bins).array.T, atol=1e-14)
-    assert ker.FacetedLaw(ARCS, ker.lambertian() @ ker.specular()).diffuse_fraction is None
+    assert ker.FacetedLaw(ARCS, ker.TriangularTeethLaw(1.0) @ ker.maxwell(0.2)).diffuse_fraction is None
+    assert ker.FacetedLaw(ARCS, ker.lambertian() @ ker.specular()).diffuse_fraction == 1.0
     assert ker.FacetedLaw(ARCS, ker.lambertian().in_specular_frame().in_specular_frame()).diffuse_fraction == 1.0
     assert ker.FacetedLaw(ARCS, ker.maxwell(0.2)).mirror_symmetric
     assert pickle.loads(pickle.dumps(law)) == law and hash(law) == hash(ker.FacetedLaw(LEANING, ker.maxwell(0.2)))
