@@ -20,12 +20,14 @@ from ...geometry.tracing.tracing import Status
 from ..expectations.conditionals import Conditionals
 from ..laws.law import ENTRY_POINTS, Law, check_paper_frame, entry_inside, retroreflection, sum_of
 from ..laws.structure import Rules, fold
-from .conditionals import UNRESOLVED_TOLERANCE
+from .conditionals import if_escaped
 from .wall_law import WallLaw
 
 T = TypeVar("T")
 # Rays that are followed together, so that their states stay in the cache.
 CHUNK = 2**16
+# What may become of rays.
+LOST = f"they met corners, were inside after {MOST_HITS} hits, or were not resolved by the facets' law"
 
 
 @dataclass(frozen=True)
@@ -150,24 +152,15 @@ class FacetedLaw(Law):
             outgoing[some] = np.where(resolved, left, incoming[some])
         return outgoing.reshape(theta.shape), escaped.reshape(theta.shape)
 
-    def _few_lost(self, outgoing: Floats, escaped: NDArray[np.bool_] | None) -> Floats:
-        """The outgoing angles, unless more than a fraction of 1e-4 of the rays did not escape."""
-        lost = 0.0 if escaped is None or not escaped.size else 1.0 - float(np.mean(escaped))
-        if lost > UNRESOLVED_TOLERANCE:
-            raise AccuracyError(
-                f"{self!r}: {lost:.2g} of {outgoing.size} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}: "
-                f"they met corners, were inside after {MOST_HITS} hits, or were not resolved by the facets' law",
-                lost,
-            )
-        return outgoing
-
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        return self._few_lost(*self._sample_with_status(theta, rng))
+        if self._known:
+            return sum_of(self._known).sample(theta, rng)
+        return if_escaped(self, *self._followed(rng.random(theta.shape), theta, rng), LOST)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Those of the parts, or drawn angles of rays that enter at equal distances."""
         if self._known:
             return sum_of(self._known)._conditionals(theta, tolerance, degree, edges)
         x, incoming = np.broadcast_arrays((np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS, theta[:, None])
-        outgoing = self._few_lost(*self._followed(x, incoming, np.random.default_rng(0)))
+        outgoing = if_escaped(self, *self._followed(x, incoming, np.random.default_rng(0)), LOST)
         return Conditionals.of_atoms(outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS), np.nan)
