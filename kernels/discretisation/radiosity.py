@@ -137,7 +137,7 @@ def exchanged(boundary: Boundary, kept: float, points: Floats, basis: Basis) -> 
             own = slice(k * each, (k + 1) * each)
             exits[k] = weight[own] @ basis.evaluate(np.where(escaped[own], states.angle[own], 1.0))
     flux = hits.reshape(cells, cells) / each * boundary.lengths[:, None]
-    return 0.5 * (flux + flux.T), exits / each, lost
+    return balanced(0.5 * (flux + flux.T), flux.sum(axis=1)), exits / each, lost
 
 
 def by_radiosity(law: FacetedLaw, basis: Basis, budget: Budget) -> KernelMatrix:
@@ -161,7 +161,7 @@ def by_radiosity(law: FacetedLaw, basis: Basis, budget: Budget) -> KernelMatrix:
     all_hits, all_exits, left = zip(*found, strict=True)
     flat = (1.0 - kept) * cell.flat_top / cell.period * np.outer(basis.constant, basis.constant)
 
-    def matrix(direct: Floats, hits: Floats, exits: Floats, lengths: Floats) -> Floats:
+    def matrix(direct: Floats, hits: Floats, exits: Floats, lengths: Floats = boundary.lengths) -> Floats:
         scattered = exits.T @ (lengths[:, None] * np.linalg.solve(np.diag(lengths) - hits, lengths[:, None] * exits))
         found = 0.5 * (direct + direct.T) + (1.0 - kept) / cell.period * scattered + flat
         if mirrored:
@@ -169,9 +169,14 @@ def by_radiosity(law: FacetedLaw, basis: Basis, budget: Budget) -> KernelMatrix:
         return with_row_sums(found, basis)
 
     direct, hits, exits = unscattered.mean(axis=0), np.mean(all_hits, axis=0), np.mean(all_exits, axis=0)
-    whole = matrix(direct, hits, exits, boundary.lengths)
-    parts = [matrix(*part, boundary.lengths) for part in zip(unscattered, all_hits, all_exits, strict=True)]
-    replicates = tuple(read_only(part - np.mean(parts, axis=0) + whole) for part in parts)
+    whole = matrix(direct, hits, exits)
+    # of all parts but one
+    left_out = [
+        matrix(*((PARTS * mean - own) / (PARTS - 1.0) for mean, own in zip((direct, hits, exits), part, strict=True)))
+        for part in zip(unscattered, all_hits, all_exits, strict=True)
+    ]
+    centre = np.mean(left_out, axis=0)
+    replicates = tuple(read_only(whole + (PARTS - 1.0) * (centre - part)) for part in left_out)
     # of two cells the lengths and fluxes add up, and their exits have the mean weighted by lengths, which are equal
     coarse = matrix(
         direct, hits.reshape(cells // 2, 2, -1, 2).sum(axis=(1, 3)), exits.reshape(cells // 2, 2, -1).mean(axis=1),
@@ -221,7 +226,20 @@ def with_row_sums(matrix: Floats, basis: Basis) -> Floats:
     if not basis.is_partition:
         keep_constant(matrix, basis.constant, both=True)
         return matrix
+    size = np.outer(basis.constant, basis.constant)
+    empty = np.flatnonzero(matrix @ basis.constant <= 0.0)
+    if empty.size:
+        raise AccuracyError(
+            f"{empty.size} of {basis.size} bins have no rays; use more samples, or fewer bins",
+            float(basis.weights[empty].sum()),
+        )
+    return balanced(matrix * size, basis.weights) / size
+
+
+def balanced(flux: Floats, sums: Floats) -> Floats:
+    """A symmetric array of fluxes, multiplied by a factor for each cell such that rows have the given sums."""
     for _ in range(STEPS):
-        scale = np.sqrt(basis.constant / (matrix @ basis.constant))
-        matrix = scale[:, None] * matrix * scale
-    return matrix
+        found = flux.sum(axis=1)
+        scale = np.sqrt(np.divide(sums, found, out=np.ones(len(sums)), where=found > 0.0))
+        flux = scale[:, None] * flux * scale
+    return flux

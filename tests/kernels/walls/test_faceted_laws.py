@@ -105,6 +105,14 @@ def test_the_matrix_of_sixty_four_bins_is_within_a_three_thousandth_of_a_finer_o
     assert np.linalg.norm(found.symmetric - finer.symmetric) < float(found.error) + float(finer.error)
 
 
+def test_few_rays_give_large_errors_and_bins_without_rays_are_refused() -> None:
+    law = ker.FacetedLaw(ARCS, ker.lambertian())
+    few = ker.discretise(law, ker.Bins(64), samples=16)
+    assert np.all(few.array >= 0.0) and float(few.error) > 1.0
+    with pytest.raises(AccuracyError, match="bins have no rays; use more samples"):
+        ker.discretise(law, ker.Bins(512), samples=16)
+
+
 def test_walls_of_bezier_pieces_and_facets_of_other_laws_are_sampled() -> None:
     bins = ker.Bins(4)
     for law in (
