@@ -5,7 +5,8 @@ where each one is at home.
 
 - Take and combine laws: Conditionals, DensityLaw, IntervalExchangeLaw, InvolutionLaw, Law, LeastResistanceLaw,
   MatrixLaw, henyey_greenstein, lambertian, maxwell, retroreflection, specular, HemisphereLaw, SurfaceLaw.
-- Take the law of a wall: CircularArcLaw, MushroomLaw, PolygonLaw, RectangularTeethLaw, TriangularTeethLaw, WallLaw.
+- Take the law of a wall: CircularArcLaw, FacetedLaw, MushroomLaw, PolygonLaw, RectangularTeethLaw, TriangularTeethLaw,
+  WallLaw.
 - Compute the matrix of a law: discretise, estimate, estimate_stream, KernelMatrix, load_matrix, Basis, Bins,
   Legendre, Panels, SINE, SINE_SQUARED, TensorBasis, Zernike.
 - Compare laws: difference_test, distance, retroreflection_distance.

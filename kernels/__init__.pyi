@@ -58,6 +58,7 @@ from .sampling.streams import estimate as estimate
 from .sampling.streams import estimate_stream as estimate_stream
 from .thermal.spring_wall import SpringWall as SpringWall
 from .walls.circular_arc import CircularArcLaw as CircularArcLaw
+from .walls.faceted_law import FacetedLaw as FacetedLaw
 from .walls.polygons import PolygonLaw as PolygonLaw
 from .walls.polygons import TriangularTeethLaw as TriangularTeethLaw
 from .walls.rectangular import RectangularTeethLaw as RectangularTeethLaw

@@ -102,6 +102,7 @@ LAWS: dict[str, Callable[[], ker.Law]] = {
     "traced wall": lambda: ker.WallLaw(geo.dispersing_arcs(1.0)),
     "rays alone": lambda: bounced_law()(),
     "rays and their mirror images": lambda: bounced_law()(mirror_symmetric=True),
+    "facets diffuse in part": lambda: ker.FacetedLaw(geo.triangular_teeth(0.9), ker.maxwell(0.3)),
     "mushrooms": lambda: ker.MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 3)),
     "sum": lambda: 0.2 * ker.specular() + 0.5 * TEETH() + 0.3 * ker.lambertian(),
     "sum of isometries": lambda: 0.4 * TEETH() + 0.6 * ker.specular() @ TEETH(),

@@ -108,8 +108,8 @@ def discretise(
     the beams of a polygonal wall resolve; 2^17 rays; conditional distributions, of walls that close and have at most 16
     pieces; all rays. The error does not grow if the tolerance falls. The same for a wall in the other frame.
 
-    Methods 1 to 10 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the
-    other frame from its inner law, a composition from its factors if none of them needs rays. Methods 11 to 13 come
+    Methods 1 to 11 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the
+    other frame from its inner law, a composition from its factors if none of them needs rays. Methods 12 to 14 come
     last. A wall is the sum of its `parts`.
 
     A law of matrices, with Lambertian reflection and isometries, in `Bins` that refine the matrices' is exact (auto).

@@ -37,6 +37,7 @@ from .quadrature import (
     by_map,
     has_conditionals,
 )
+from .radiosity import by_radiosity, has_radiosity
 from .traced import by_adaptive_angles, by_rays_or_conditionals
 
 
@@ -45,7 +46,7 @@ def _of(kind: type[Law], where: Callable[[Any, Basis], bool] = lambda law, basis
     return lambda law, basis: isinstance(law, kind) and where(law, basis)
 
 
-# Methods without rays, except the first. The docstring of `discretise` states the table.
+# Methods without rays, except the first and the last. The docstring of `discretise` states the table.
 METHODS: tuple[Method, ...] = (
     Method("auto", _of(WallLaw, where=lambda law, _: sum_of(law.parts) is law), by_rays_or_conditionals),
     Method("exact", lambda law, _: law.isometry_table() is not None, by_isometry_table),
@@ -61,6 +62,7 @@ METHODS: tuple[Method, ...] = (
     Method("quadrature", _of(LeastResistanceLaw, where=lambda _, basis: isinstance(basis, Bins)), by_interval_masses),
     Method("quadrature", lambda law, _: law.angle_map is not None, by_map),
     Method("quadrature", has_conditionals, by_conditionals),
+    Method("qmc", has_radiosity, by_radiosity),
 )
 # Methods with rays. They are tried if no method above accepts the law and its parts do not give its matrix.
 SAMPLED: tuple[Method, ...] = (
@@ -87,7 +89,7 @@ def matrix_by(law: Law, wanted: str, basis: Basis, budget: Budget) -> KernelMatr
     if found is None:
         names = ", ".join(name for name in get_args(MethodName)[1:] if computation(given, name, basis) is not None)
         raise InputError(f"method: {law!r} has no method {wanted!r}; it has {names}")
-    if budget.engine and _method(METHODS + SAMPLED, given, wanted, basis) is None:
+    if budget.engine and _method(SAMPLED, given, wanted, basis) is None:
         raise InputError(
             f"method: checkpoint and client take rays of one kind, and {wanted!r} computes {law!r} from its parts; "
             "use 'monte-carlo'"
@@ -191,7 +193,7 @@ def _of_chain(law: Composition, wanted: str, basis: Basis) -> Computation | None
 
 
 def _needs_no_rays(law: Law) -> bool:
-    return any(method.accepts(law, ANY_PANELS) for method in METHODS if method.name != "auto")
+    return any(method.accepts(law, ANY_PANELS) for method in METHODS if method.name not in ("auto", "qmc"))
 
 
 def _most_exact(computations: Sequence[Computation], budget: Budget) -> KernelMatrix:

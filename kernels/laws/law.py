@@ -289,6 +289,10 @@ class Law(Value, ABC):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         """`sample` for checked arguments, of which it gets a copy; called by `sample` only, which checks the angles."""
 
+    def _sample_with_status(self, theta: Floats, rng: np.random.Generator) -> tuple[Floats, NDArray[np.bool_] | None]:
+        """`sample`, and which rays escaped if rays are traced; the others count as retroreflected, however many."""
+        return self.sample(theta, rng), None
+
     def _branches(self, theta: Floats) -> tuple[Floats, Floats] | None:
         """`branches` for checked angles; None if there are none, or too many."""
         return None
@@ -477,6 +481,9 @@ class DrivenLaw(Law):
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.reflect(entry_inside(rng.random(theta.shape)), theta)
+
+    def _sample_with_status(self, theta: Floats, rng: np.random.Generator) -> tuple[Floats, NDArray[np.bool_] | None]:
+        return self.reflect_with_status(entry_inside(rng.random(theta.shape)), theta)
 
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         outgoing = self.reflect((np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS, theta[:, None])

@@ -26,11 +26,10 @@ from ...core.workers import BACKLOG, connected, in_order, results
 from ..bases.assembly import LARGE, largest_square_sum, mirror_image
 from ..bases.basis import Basis
 from ..bases.measure import SINE
-from ..laws.law import Law, entry_inside, outgoing_angles
+from ..laws.law import Law, outgoing_angles
 from ..matrices.defects import BLOCK
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..walls.conditionals import UNRESOLVED_TOLERANCE
-from ..walls.wall_law import WallLaw
 from .counts import matrix_from_counts, matrix_from_sums, sums_of_rows, with_missed_events
 
 # Rays of a task for a worker, a second of work or a few. Counts in cells do not depend on it; sums of real numbers are
@@ -153,12 +152,7 @@ class IndependentRays(Job):
         """Incoming and outgoing angles of the rays of a chunk, and which of them escaped, if the law tells."""
         own = np.random.default_rng([*self.root, part, index])
         theta = SINE.sample(number, own)
-        # the map of a driven law tells besides which rays escaped
-        closed = isinstance(self.law, WallLaw) and not self.law.has_traced_parts
-        reflect = self.law.random_map() if self.law.is_driven and not closed else None
-        if reflect is None:
-            return theta, self.law.sample(theta, own), None
-        outgoing, escaped = reflect(entry_inside(own.random(theta.shape)), theta.copy())
+        outgoing, escaped = self.law._sample_with_status(theta.copy(), own)
         return theta, outgoing_angles(outgoing, theta, self.law), escaped
 
     def identity(self) -> dict[str, Any]:

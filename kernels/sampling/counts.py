@@ -177,7 +177,7 @@ def matrix_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool,
     )
     fixed = np.array(means)
     for mean in fixed:
-        _keep_constant(mean, basis.constant, keeps_measure or symmetrise)
+        keep_constant(mean, basis.constant, keeps_measure or symmetrise)
         if symmetrise:
             mean[:] = 0.5 * (mean + mean.T)
     symmetric = np.asarray(np.mean(fixed, axis=0))
@@ -251,7 +251,7 @@ def _dimensions(products: Floats) -> tuple[float, float]:
     return squared / of_square, of_square**3 / of_cube**2
 
 
-def _keep_constant(array: Floats, constant: Floats, both: bool) -> None:
+def keep_constant(array: Floats, constant: Floats, both: bool) -> None:
     """Change an array such that it keeps the constant function, on one side or on both."""
     array -= (array @ constant - constant)[:, None] * constant
     if both:

@@ -176,6 +176,8 @@ def is_chaotic(wall: Wall) -> bool:
 # Rays that end in a corner, at a tangency or at the bounce limit count as retroreflected (see `WallLaw`). Their
 # fraction bounds the error in total variation. A larger one would be visible in a kernel estimated from a million rays.
 UNRESOLVED_TOLERANCE = 1e-4
+# Where the caller finds what became of them.
+CAUSES = "geometry.trace(wall, x, theta).counts() says how they ended, reflect_with_status() which they were"
 
 
 def traced_reflection(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
@@ -190,13 +192,10 @@ def traced_reflection(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Float
     return np.where(escaped, traced.theta, theta), escaped
 
 
-def if_escaped(law: Law, outgoing: Floats, escaped: NDArray[np.bool_]) -> Floats:
+def if_escaped(law: Law, outgoing: Floats, escaped: NDArray[np.bool_], causes: str = CAUSES) -> Floats:
     """The outgoing angles; raises an AccuracyError if more than a fraction of 1e-4 of the rays did not escape."""
     unresolved = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
     if unresolved > UNRESOLVED_TOLERANCE:
-        raise AccuracyError(
-            f"{law!r}: {unresolved:.2g} of {escaped.size} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}; "
-            "geometry.trace(wall, x, theta).counts() says how they ended, reflect_with_status() which they were",
-            unresolved,
-        )
+        lost = f"{unresolved:.2g} of {escaped.size} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}"
+        raise AccuracyError(f"{law!r}: {lost}; {causes}", unresolved)
     return outgoing

@@ -167,6 +167,9 @@ class WallLaw(_TracedLaw):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return super()._sample(theta, rng) if self.has_traced_parts else sum_of(self.parts).sample(theta, rng)
 
+    def _sample_with_status(self, theta: Floats, rng: np.random.Generator) -> tuple[Floats, NDArray[np.bool_] | None]:
+        return super()._sample_with_status(theta, rng) if self.has_traced_parts else (self.sample(theta, rng), None)
+
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """Those of the parts or isometries, or else by tracing; rays that do not escape count in the error."""
         if self._known is not None:

@@ -11,12 +11,12 @@ import numpy as np
 
 from ...core.checks import Floats, instance
 from ...core.estimates import ErrorKind, Summary, with_error
-from ...kernels import Law, WallLaw
+from ...kernels import FacetedLaw, Law, WallLaw
 from ...kernels.laws.law import in_frame, is_identity, sum_of
 from ...kernels.laws.structure import Rules, fold
 from ...kernels.walls.wall_law import made_of_isometries
 from .grazing import SWAP, GrazingLimit, grazing_limit
-from .straight_pieces import straight_part
+from .straight_pieces import specular_part, straight_part
 
 ROUNDING = 1e-15
 
@@ -122,6 +122,8 @@ def _leaf(law: Law) -> _Part:
         # the grazing limit of an isometric law matters in sums with other laws only
         return replace(_isometric(law), grazing=limit.matrix, error=limit.error, entry_error=limit.entry_error)
     limit = grazing_limit(law)
+    if isinstance(law, FacetedLaw):
+        return _of_facets(law, limit)
     errors = (limit.error, limit.entry_error)
     how = f"-> {with_error(limit.root, limit.error)} as theta -> 0 or pi"
     if not limit.resolved:
@@ -146,6 +148,26 @@ def _leaf(law: Law) -> _Part:
                 f"has a spectrum up to {reach}"
             )
     return _Part(modulus, limit.matrix, *errors, False, tuple(notes), fraction)
+
+
+def _of_facets(law: FacetedLaw, limit: GrazingLimit) -> _Part:
+    """The part of a wall with facets of their own: specular rays of weight (1 - a)^N, beside a compact rest."""
+    errors = (limit.error, limit.entry_error)
+    if law.diffuse_fraction is None or not law.wall.closes:
+        what = (
+            "facets that are not diffuse in part and else specular" if law.wall.closes else "a wall that does not close"
+        )
+        return _Part(
+            (0.0, 1.0), limit.matrix, *errors, False, (f"{law!r}: {what}: the essential spectrum may reach 1",)
+        )
+    found = specular_part(law)
+    note = (
+        f"{law!r}: the essential spectrum is that of specular rays with the weight (1 - a)^N after N hits, a = "
+        f"{law.diffuse_fraction:.6g}, because rays that a facet scatters are argued to add a compact operator: of "
+        f"straight pieces it reaches {found.low:.6g} to {found.high:.6g}, at grazing "
+        f"{with_error(limit.root, limit.error)}"
+    )
+    return _Part((found.low, found.high), limit.matrix, *errors, False, (note,), found.fraction)
 
 
 def _isometric(law: Law) -> _Part:

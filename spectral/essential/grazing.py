@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, singledispatch
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
 from ...geometry import Bezier, Wall, trace
 from ...geometry.cells.cell import flat_tops, hollows_between
 from ...geometry.curves.curve import Curve
-from ...kernels import CircularArcLaw, Law, WallLaw
+from ...kernels import CircularArcLaw, FacetedLaw, Law, WallLaw
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.laws.law import entry_inside
 
@@ -137,6 +138,32 @@ def _limit_of_wall(law: WallLaw) -> GrazingLimit:
     # the cell has the same law, and its entry points refer to its hollows
     cell = law.wall.cell if law.wall.closes else raised(law.wall)
     return _limit(law if cell is law.wall else WallLaw(cell), grazed(cell))
+
+
+@grazing_limit.register(FacetedLaw)
+@lru_cache(maxsize=REMEMBERED)
+def _limit_of_facets(law: FacetedLaw) -> GrazingLimit:
+    """The limit with the weight (1 - a)^N after N hits: diffuse rays leave at angles that are not grazing."""
+    if law.diffuse_fraction is None or not law.wall.closes:
+        return GrazingLimit(np.zeros((2, 2)), UNKNOWN, UNKNOWN, False)
+    cell = FacetedLaw(law.wall.cell, law.facets)
+    where = grazed(cell.wall)
+    return _limit(cell, replace(where, flat=(1.0 - law.diffuse_fraction) * where.flat))
+
+
+def _rays_of(law: Law) -> Callable[[Floats, Floats], tuple[Floats, NDArray[np.bool_] | None, Floats | float]] | None:
+    """The outgoing angles of rays from entry points, which of them escaped, and their weights; None without rays."""
+    if isinstance(law, FacetedLaw) and law.diffuse_fraction is not None:
+        wall, kept = law.wall, 1.0 - law.diffuse_fraction
+
+        def weighted(x: Floats, theta: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
+            rays = trace(wall, x * wall.period, theta)
+            outgoing = np.where(rays.escaped, rays.theta, theta)
+            return outgoing, rays.escaped, np.asarray(kept**rays.collisions, dtype=np.float64)
+
+        return weighted
+    reflect = law.random_map() if law.is_driven else None
+    return None if reflect is None else lambda x, theta: (*reflect(x, theta), 1.0)
 
 
 def raised(wall: Wall) -> Wall:
@@ -267,13 +294,13 @@ def _at_angle(law: Law, angle: float, end: int, parts: tuple[tuple[float, float]
         near = outgoing < 0.5 * np.pi
         return np.stack([np.where(near, fraction, 0.0), np.where(near, 0.0, fraction)], axis=-1)
 
-    reflect = law.random_map() if law.is_driven else None
-    if reflect is not None:
+    rays = _rays_of(law)
+    if rays is not None:
 
         def integrand(x: Floats) -> Floats:
-            outgoing, escaped = reflect(x, np.full(x.shape, theta))
+            outgoing, escaped, weight = rays(x, np.full(x.shape, theta))
             lost = np.zeros(x.shape) if escaped is None else 1.0 - escaped
-            return np.concatenate((ratio(outgoing), lost[:, None]), axis=-1)
+            return np.concatenate(((weight * ratio(outgoing).T).T, lost[:, None]), axis=-1)
 
         found = [_entry_integral(integrand, *part) for part in parts]
         value, error = sum((part[0] for part in found), np.zeros(3)), sum(part[1] for part in found)

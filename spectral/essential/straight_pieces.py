@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.estimates import student_95
 from ...core.long_runs import progress_bar
 from ...geometry import Wall
-from ...kernels import WallLaw
+from ...kernels import Bins, FacetedLaw, WallLaw
+from ...kernels.discretisation.radiosity import specular_sums
 from .grazing import REMEMBERED
 
 # Two rays with entry points this step apart leave at the same angle, to rounding, if all reflections are at straight
@@ -29,6 +31,8 @@ PEAKS, LEVELS, FINE_LEVELS, NEARBY_ANGLES, NEARER = 4, 5, 2, 9, 6.0
 # Error as a multiple of the change by the last level plus the last layer.
 BEYOND = 2.0
 ROUNDING = 1e-9
+# Of specular rays between facets: points of each Sobol sequence, its seed, and numbers of bins of trial functions.
+POINTS_OF_FACETS, SEED, CELLS = 2**15, (0,), (1, 32, 128, 512)
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,40 @@ def straight_part(law: WallLaw) -> StraightPart:
         return StraightPart(flat, flat, flat)
     with progress_bar(LAYERS * (1 + LEVELS), "layer", "essential edge") as bar:
         return _searched(law, flat, bar)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def specular_part(law: FacetedLaw) -> StraightPart:
+    r"""The isometries of a wall with facets a Lambertian + (1 - a) specular: rays that no facet scatters.
+
+    Notes
+    -----
+    B f(theta) = E[(1 - a)^N f(theta')], with N hits of a specular ray. For straight pieces B is made of isometries, so
+    its whole spectrum is essential. Its top is at least the quotient of any function: of constants, E[(1 - a)^N], and
+    of the top function of a matrix from one half of the rays, with the other half. Since N >= 1 it is at most 1 - a.
+    With curved pieces only the rays that meet straight ones alone count.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> found = specular_part(FacetedLaw(geo.triangular_teeth(0.9), ker.maxwell(0.2)))
+    >>> 0.7 < found.low < found.high == 0.8
+    True
+    """
+    wall, kept = law.wall, 1.0 - (law.diffuse_fraction or 0.0)
+    if not wall.is_polygonal:
+        flat = kept * wall.flat_top / wall.period
+        return StraightPart(flat, flat, kept * straight_part(WallLaw(wall)).high)
+    bounds = []
+    for basis in map(Bins, CELLS):
+        parts, _ = specular_sums(wall.cell, kept, basis, POINTS_OF_FACETS, SEED)
+        seen, others = np.split(parts, 2)
+        top = np.linalg.eigh(seen.sum(axis=0) + seen.sum(axis=0).T)[1][:, -1]
+        quotients = others @ top @ top
+        bounds.append(
+            max(float(quotients.mean() - student_95(len(others)) * quotients.std(ddof=1) / np.sqrt(len(others))), 0.0)
+        )
+    return StraightPart(bounds[0], max(bounds), kept)
 
 
 def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:

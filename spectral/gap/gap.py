@@ -31,7 +31,7 @@ from .methods import gap_of_power, law_eigenvalues
 from .refinement import EIGENVALUES, HOW, refined
 from .shallow import shallow_gap
 from .surfaces import gap_of_surface
-from .theorems import gap_by_theorem, gap_of_exact, split_gap
+from .theorems import gap_by_theorem, gap_of_exact, lower_bound, split_gap
 from .verdict import SpectralGap, isolated, made_from
 
 # Numbers of enclosed eigenvalues with the constants: of densities by modulus, of other laws the largest values.
@@ -362,7 +362,7 @@ def _by_rays(law: Law, tolerance: float, rng: np.random.Generator, seconds: floa
     """The gap from Galerkin matrices of growing size."""
     steps = refined(law, tolerance, rng, seconds, edge)
     found, error = steps.finest, steps.error
-    evidence = (*steps.evidence, *_lower_bound(law))
+    evidence = (*steps.evidence, *lower_bound(law))
     gap = isolated(found, error, HOW, edge, law.frame, evidence) if steps.converges else None
     if gap is not None:
         return gap
@@ -372,6 +372,11 @@ def _by_rays(law: Law, tolerance: float, rng: np.random.Generator, seconds: floa
     if edge.low > 0.0 and top < edge.high + steps.noise and relevant:
         short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
         return _at_edge(law, edge, (*reasons, short), found, steps.overshoot(edge.high))
+    low = max(edge.low, top - steps.noise)
+    if 0.0 < edge.low < edge.high < 1.0 and low < edge.high:
+        # the edge is not known better, and its interval contains the top of the spectrum
+        known = f"no eigenvalue beyond {edge.high:.6g} on any basis: {top:.6g} is the largest"
+        return _at_edge(law, replace(edge, low=low), (*reasons, known), found)
     # without convergence the two-grid error is meaningless; the gap of a Galerkin matrix is an upper bound
     method = made_from(found, "not converged: an upper bound but for its noise")
     error = max(error, abs(found.gap))
@@ -384,11 +389,6 @@ def _at_edge(
     method = "edge of the essential spectrum, from the law's action on grazing rays and its isometries"
     error = max(edge.error, overshoot)
     return SpectralGap(1.0 - edge.value, error, "estimate", method, "essential edge", evidence, law.frame, found)
-
-
-def _lower_bound(law: Law) -> tuple[str, ...]:
-    fraction = lambertian_fraction(law)
-    return (f"the gap is at least {fraction:.6g}, the Lambertian fraction of the law",) if fraction > 0.0 else ()
 
 
 def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ...kernels import KernelMatrix, Law
+from ...kernels import Bins, FacetedLaw, KernelMatrix, Law
+from ...kernels.discretisation.radiosity import has_radiosity, one_diffuse_hit
 from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.separation import lambertian_fraction
@@ -20,6 +21,8 @@ from .verdict import SpectralGap, made_from
 
 # Of n independent rays with the chance p of an event none shows it with the probability 5 % if n p is this, ln 20.
 UNSEEN = 3.0
+# Bins and rays of the bound by rays with one diffuse hit.
+ONE_HIT, RAYS = Bins(64), 2**16
 
 
 def gap_by_theorem(law: Law) -> SpectralGap | None:
@@ -54,6 +57,34 @@ def gap_by_theorem(law: Law) -> SpectralGap | None:
 
 def _stated(law: Law, value: float, error: float, verdict: Verdict, *evidence: str) -> SpectralGap:
     return SpectralGap(value, error, "bound", "structure of the law", verdict, evidence, law.frame)
+
+
+def lower_bound(law: Law) -> tuple[str, ...]:
+    """What is known to be below the gap, in words: the Lambertian fraction of a law, and diffuse facets."""
+    fraction = lambertian_fraction(law)
+    if fraction > 0.0:
+        return (f"the gap is at least {fraction:.6g}, the Lambertian fraction of the law",)
+    if not isinstance(law, FacetedLaw) or not has_radiosity(law, ONE_HIT) or not law.diffuse_fraction:
+        return ()
+    least = law.diffuse_fraction * form_of_one_hit(law)
+    return (
+        f"the gap is at least a gamma = {least:.3g}, a = {law.diffuse_fraction:.6g}, because P >= a D for rays with "
+        f"one hit, which is diffuse; gamma, the least form of D 1 - D off the constants, is estimated in {ONE_HIT!r}",
+    )
+
+
+def form_of_one_hit(law: FacetedLaw) -> float:
+    """The least value of the form of D 1 - D on functions of mean 0 in bins, D of rays with one hit, which is diffuse.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> round(form_of_one_hit(ker.FacetedLaw(geo.triangular_teeth(2.5), ker.maxwell(0.2))), 2)
+    0.81
+    """
+    matrix = one_diffuse_hit(law, ONE_HIT, RAYS)
+    constant = ONE_HIT.constant
+    return float(np.linalg.eigvalsh(np.diag(matrix @ constant / constant) - matrix)[1])
 
 
 def gap_of_exact(matrix: KernelMatrix, modulus: bool = False) -> SpectralGap:

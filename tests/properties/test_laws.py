@@ -22,7 +22,11 @@ JUMPS = {
     "involution": 1e-4,
     "traced wall": 1e-6,
     "least resistance": 1e-6,
+    # drawn rows, of many angles here
+    "facets diffuse in part": 5e-3,
 }
+# Means over a drawn row of 4096 angles, by 4.5 standard deviations of a function of size 1.
+DRAWN = {"facets diffuse in part": 4.5 / 64.0}
 
 
 def f(angle: np.ndarray) -> np.ndarray:
@@ -58,11 +62,12 @@ def test_adjoints_pass_to_the_other_side_and_the_measure_is_kept(law: ker.Law, r
     assert law.adjoint() is law or not law.reversible
 
 
-def test_mirrored_angles_have_mirrored_images_where_a_law_says_so(law: ker.Law) -> None:
+def test_mirrored_angles_have_mirrored_images_where_a_law_says_so(law: ker.Law, request) -> None:
     there, back = law.apply(g, math.pi - THETA), law.apply(lambda angle: g(math.pi - angle), THETA)
     if law.mirror_symmetric is not None:
-        # the probability of an entry point changes by its rounding
-        assert (np.abs(there - back).max() < 2e-8) == law.mirror_symmetric
+        # the probability of an entry point changes by its rounding; g has the size 10
+        allowed = 10.0 * DRAWN.get(request.node.callspec.params["law"], 2e-9)
+        assert (np.abs(there - back).max() < allowed) == law.mirror_symmetric
 
 
 def test_the_other_frame_turns_outgoing_angles_over_and_is_undone_by_itself(law: ker.Law) -> None:
@@ -73,19 +78,23 @@ def test_the_other_frame_turns_outgoing_angles_over_and_is_undone_by_itself(law:
     assert np.allclose(turned.in_specular_frame().apply(g, THETA), law.apply(g, THETA), rtol=0.0, atol=1e-14)
 
 
-def test_samples_follow_expectations_and_distributions_and_depend_on_the_generator_alone(law: ker.Law) -> None:
+def test_samples_follow_expectations_and_distributions_and_depend_on_the_generator_alone(law: ker.Law, request) -> None:
     rng, number, edges = np.random.default_rng(5), 10_000, np.linspace(0.0, math.pi, 8)
+    drawn_row = DRAWN.get(request.node.callspec.params["law"], 0.0)
     for theta in (0.3, 1.4, 2.6):
         drawn = law.sample(np.full(number, theta), rng)
         for function in (np.cos, g, lambda a: np.cos(5.0 * a)):
             value = function(drawn)
             spread = value.std() / math.sqrt(number)
-            assert abs(value.mean() - float(law.apply(function, theta))) <= 4.5 * spread + 5e-5
+            assert (
+                abs(value.mean() - float(law.apply(function, theta))) <= 4.5 * spread + drawn_row * value.std() + 5e-5
+            )
         masses = law.conditionals(theta, degree=0, edges=edges[1:-1]).masses(edges)[0]
         assert masses.sum() == pytest.approx(1.0, abs=1e-14)
         below = np.append(0.0, np.cumsum(masses))
         counted = np.mean(drawn[:, None] < edges, axis=0)
-        assert np.all(np.abs(counted - below) <= 4.5 * np.sqrt(below * np.maximum(1.0 - below, 0.0) / number) + 1e-3)
+        deviation = np.sqrt(below * np.maximum(1.0 - below, 0.0))
+        assert np.all(np.abs(counted - below) <= (4.5 / math.sqrt(number) + drawn_row) * deviation + 1e-3)
     assert np.array_equal(law.sample(THETA, rng=7), law.sample(THETA, rng=7))
 
 

@@ -181,3 +181,29 @@ def results_for(count: int) -> tuple[Floats, Floats, NDArray[np.int64], NDArray[
 
 # The types of the arrays of all rays.
 NO_RAYS = Rays(np.empty(0), np.empty(0), *results_for(0), np.empty(0, np.int64))
+
+
+# The status of a ray on a facet; the others are those of `Status`.
+FLYING = 4
+
+
+class States(NamedTuple):
+    """The rays ``who`` to move, and of every ray the hollow, the piece that it is on, with the parameter of `Own`, the
+    position, the facet's tangent with the free side on its left, the angle with it, and the status.
+    """
+
+    who: NDArray[np.int64]
+    hollow: NDArray[np.int64]
+    kind: NDArray[np.int64]
+    number: NDArray[np.int64]
+    s: Floats
+    point: Floats
+    tangent: Floats
+    angle: Floats
+    status: NDArray[np.uint8]
+
+
+_NUMBERS, _PAIRS = np.empty(0, np.int64), np.empty((0, 2))
+NO_STATES = States(
+    _NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, np.empty(0), _PAIRS, _PAIRS, np.empty(0), np.empty(0, np.uint8)
+)

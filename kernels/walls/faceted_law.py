@@ -1,0 +1,166 @@
+"""The law of a wall whose facets reflect by a law of their own: diffuse in part, or rough on a second scale."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.checks import Floats, instance
+from ...core.errors import AccuracyError, AsperityError, InputError
+from ...core.long_runs import slices
+from ...geometry import Wall
+from ...geometry.tracing.facet_rays import MOST_HITS, follow_facets
+from ...geometry.tracing.tracing import Status
+from ..expectations.conditionals import Conditionals
+from ..laws.law import ENTRY_POINTS, Law, check_paper_frame, entry_inside, retroreflection, sum_of
+from ..laws.structure import Rules, fold
+from .conditionals import if_escaped
+from .wall_law import WallLaw
+
+T = TypeVar("T")
+# Rays that are followed together, so that their states stay in the cache.
+CHUNK = 2**16
+# What may become of rays.
+LOST = f"they met corners, were inside after {MOST_HITS} hits, or were not resolved by the facets' law"
+
+
+@dataclass(frozen=True)
+class FacetedLaw(Law):
+    r"""The law of a wall whose facets reflect by the law ``facets``, in the frame of the facet's tangent and normal.
+
+    Parameters
+    ----------
+    wall : Wall
+    facets : Law
+        A law in the paper's convention: `maxwell` for a diffuse fraction, `WallLaw` of a finer wall for roughness of a
+        second scale, or another FacetedLaw. Flat tops reflect by it too.
+
+    Attributes
+    ----------
+    parts : tuple of (float, Law)
+        Of specular facets the parts of `WallLaw`, of retroreflecting ones retroreflection, of a flat wall ``facets``;
+        otherwise this law alone.
+    reversible, mirror_symmetric : bool or None
+        True if the facets are reversible, and if wall and facets are mirror-symmetric; else None (not known).
+    diffuse_fraction : float or None
+        The a of facets a Lambertian + (1 - a) specular; None for others.
+
+    Raises
+    ------
+    InputError
+        If ``facets`` is no law in the paper's convention, or its weights do not sum to 1.
+    AccuracyError
+        In `sample`, if more than a fraction of 1e-4 of the rays did not escape: they met a corner, or were inside after
+        10^5 hits, or a finer wall did not resolve them. Such rays count as retroreflected.
+
+    Notes
+    -----
+    Rays are drawn: at each hit the arriving angle becomes the incoming one of ``facets``. A conditional distribution
+    consists of 4096 drawn angles, without a known error. `discretise` takes view factors between parts of the boundary
+    for `maxwell` facets, and independent rays for others.
+
+    For a disk, ``CollisionLaw(FacetedLaw(wall.foreshorten(disk), facets), disk)`` has the law of the facets in the
+    metric of the energy; foreshortening does not commute with it (see the page on facets).
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> from asperity.kernels import maxwell, specular
+    >>> FacetedLaw(geo.flat(), maxwell(0.2)).parts
+    ((1.0, 0.2*lambertian() + 0.8*specular()),)
+    >>> FacetedLaw(geo.triangular_teeth(0.7), specular()).parts
+    ((1.0, TriangularTeethLaw(angle=0.7)),)
+    """
+
+    wall: Wall
+    facets: Law
+
+    def __post_init__(self) -> None:
+        instance("wall", self.wall, Wall, "geo.triangular_teeth(0.7)")
+        check_paper_frame("facets", self.facets, "ker.maxwell(0.2)")
+        self._set(reversible=self.facets.reversible or None)
+        self._named(lambda: self.facets.parts)
+        whole = self.wall.is_mirror_symmetric and self.facets.mirror_symmetric
+        known = sum_of(self._known).mirror_symmetric if self._known else whole
+        self._set(mirror_symmetric=known or None)
+
+    @property
+    def parts(self) -> tuple[tuple[float, Law], ...]:
+        return self._known or ((1.0, self),)
+
+    @cached_property
+    def _known(self) -> tuple[tuple[float, Law], ...] | None:
+        only = self.facets.parts[0][1] if len(self.facets.parts) == 1 else self.facets
+        if only.retro is not None:
+            return ((1.0, retroreflection()),) if only.retro else WallLaw(self.wall).parts
+        is_flat = self.wall.closes and not self.wall.cell.hollows
+        return ((1.0, self.facets),) if is_flat else None
+
+    @cached_property
+    def diffuse_fraction(self) -> float | None:
+        def of_leaf(law: Law) -> float:
+            return 1.0 if law.is_lambertian else 0.0 if law.retro is False else math.nan
+
+        rules: Rules[float] = Rules(
+            of_leaf,
+            lambda terms: sum(weight * fraction for weight, fraction in terms),
+            lambda fractions: fractions[0] if len(fractions) == 1 else math.nan,
+            lambda fraction: 1.0 if fraction == 1.0 else math.nan,
+        )
+        found = fold(self.facets, rules)
+        return None if math.isnan(found) else min(found, 1.0)
+
+    def adjoint(self) -> Law:
+        """The law of the same wall with the adjoint law of the facets."""
+        return self if self.reversible else FacetedLaw(self.wall, self._named(self.facets.adjoint))
+
+    def _named(self, call: Callable[[], T]) -> T:
+        """What a call of the facets' law returns; its refusals name this law."""
+        try:
+            return call()
+        except AsperityError as reason:
+            message = f"facets: {self.facets!r} on {self.wall!r}: {reason}"
+            if isinstance(reason, AccuracyError):
+                raise AccuracyError(message, reason.defect) from reason
+            raise InputError(message) from reason
+
+    def _sample_with_status(self, theta: Floats, rng: np.random.Generator) -> tuple[Floats, NDArray[np.bool_] | None]:
+        if self._known:
+            return sum_of(self._known)._sample_with_status(theta, rng)
+        return self._followed(rng.random(theta.shape), theta, rng)
+
+    def _followed(self, x: Floats, theta: Floats, rng: np.random.Generator) -> tuple[Floats, NDArray[np.bool_]]:
+        """Outgoing angles of rays that enter at fractions ``x`` of the period, and which of them escaped."""
+        outgoing, escaped = np.empty(theta.size), np.ones(theta.size, dtype=np.bool_)
+        entry, incoming = entry_inside(x.ravel()) * self.wall.period, theta.ravel()
+        for some in slices(theta.size, CHUNK):
+            resolved = escaped[some]
+
+            def turn(angle: Floats, who: NDArray[np.int64], resolved: NDArray[np.bool_] = resolved) -> Floats:
+                left, known = self._named(lambda: self.facets._sample_with_status(angle, rng))
+                resolved[who] &= True if known is None else known
+                return left
+
+            left, _, status = follow_facets(self.wall, entry[some], incoming[some], turn)
+            resolved &= status == Status.ESCAPED
+            outgoing[some] = np.where(resolved, left, incoming[some])
+        return outgoing.reshape(theta.shape), escaped.reshape(theta.shape)
+
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        if self._known:
+            return sum_of(self._known).sample(theta, rng)
+        return if_escaped(self, *self._followed(rng.random(theta.shape), theta, rng), LOST)
+
+    def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
+        """Those of the parts, or drawn angles of rays that enter at equal distances."""
+        if self._known:
+            return sum_of(self._known)._conditionals(theta, tolerance, degree, edges)
+        x, incoming = np.broadcast_arrays((np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS, theta[:, None])
+        outgoing = if_escaped(self, *self._followed(x, incoming, np.random.default_rng(0)), LOST)
+        return Conditionals.of_atoms(outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS), np.nan)
