@@ -180,6 +180,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Estimate": {"kind": "bound", "method": "by hand"},
     "FacetedLaw": {"facets": LAW},
     "HeightCorrelation": {"length": 0.1},
+    "HemisphereLaw": {"facets": "finer grooves"},
     "InnerDisk": {"spacing": 0.25, "depth": 0.1},
     "KernelMatrix": {"error": MATRIX.error, "samples": None, "law": None},
     "KernelMatrix.save": {"path": "no/kernel.npz"},

@@ -25,11 +25,24 @@ def reflected(
 
     A facet reflects diffusely with the probability ``diffuse``, back with ``back``, and else as a mirror.
     """
+    incoming = -np.stack([np.cos(theta), np.sin(theta), np.zeros(len(theta))], axis=1)
+    velocity, hits = flown(vertices, incoming, diffuse, back, rng)
+    return np.arctan2(velocity[:, 1], velocity[:, 0]), hits
+
+
+def flown(
+    vertices: Floats, incoming: Floats, diffuse: float, back: float, rng: np.random.Generator, in_space: bool = False
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Outgoing velocities of particles of speed 1 and hits on grooves along the third axis; see `reflected`.
+
+    ``in_space`` a diffuse facet has the cosine law of the half sphere, else that of the half circle with the velocity
+    along the grooves kept.
+    """
     start, edge = vertices[:-1], np.diff(vertices, axis=0)
     along = edge / np.hypot(*edge.T)[:, None]
-    number, width = len(theta), vertices[-1, 0] - vertices[0, 0]
+    number, width = len(incoming), vertices[-1, 0] - vertices[0, 0]
     point = np.stack([vertices[0, 0] + width * rng.random(number), np.zeros(number)], axis=1)
-    velocity = -np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    velocity, along_groove = incoming[:, :2].copy(), incoming[:, 2].copy()
     own, hits = np.full(number, -1), np.zeros(number, np.int64)
     moving = np.arange(number)
     while len(moving):
@@ -49,14 +62,21 @@ def reflected(
         t = along[first]
         n = np.stack([-t[:, 1], t[:, 0]], axis=1)
         vt, vn = np.sum(v * t, axis=1), np.abs(np.sum(v * n, axis=1))
-        u, cosine = rng.random(len(moving)), 1.0 - 2.0 * rng.random(len(moving))
+        u, size = rng.random(len(moving)), np.hypot(vt, vn)
+        tangential = size * (1.0 - 2.0 * rng.random(len(moving)))
+        normal = np.sqrt(size**2 - tangential**2)
         is_diffuse, is_back = u < diffuse, (u >= diffuse) & (u < diffuse + back)
-        vt = np.where(is_diffuse, cosine, np.where(is_back, -vt, vt))
-        vn = np.where(is_diffuse, np.sqrt(1.0 - cosine**2), vn)
+        if in_space:
+            # tangential velocities of the cosine law are uniform on the disc
+            radius, turn = np.sqrt(rng.random(len(moving))), 2.0 * pi * rng.random(len(moving))
+            tangential, normal = radius * np.cos(turn), np.sqrt(1.0 - radius**2)
+            along_groove[moving] = np.where(is_diffuse, radius * np.sin(turn), along_groove[moving])
+        vt = np.where(is_diffuse, tangential, np.where(is_back, -vt, vt))
+        vn = np.where(is_diffuse, normal, vn)
         point[moving], velocity[moving] = p + reach[:, None] * v, vt[:, None] * t + vn[:, None] * n
         own[moving] = first
         hits[moving] += 1
-    return np.arctan2(velocity[:, 1], velocity[:, 0]), hits
+    return np.column_stack([velocity, along_groove]), hits
 
 
 def diffuse_groove(angle: float, number: int) -> float:

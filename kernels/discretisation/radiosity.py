@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, read_only
+from ...core.checks import Floats, generator, read_only
 from ...core.errors import AccuracyError
 from ...geometry import Segment, Wall, trace
 from ...geometry.curves import columns as c
@@ -14,15 +17,16 @@ from ...geometry.tracing.compiled.pieces.records import FIRST_CURVE, LINE, State
 from ...geometry.tracing.facet_rays import MOST_HITS, FacetRays
 from ..bases.angles import clipped_inside
 from ..bases.assembly import add_products, is_mirror_symmetric, largest_square_sum, mirror_image
-from ..bases.basis import Basis
+from ..bases.basis import Basis, Frame
 from ..bases.measure import SINE
 from ..laws.law import Law
+from ..laws.structure import SpatialLaw
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..sampling.counts import half_width, keep_constant
 from ..sampling.sobol import PARTS, random_shifts, shifted_points, sobol_sequence, whole_sequences
 from ..walls.conditionals import UNRESOLVED_TOLERANCE
 from ..walls.faceted_law import FacetedLaw
-from .method import Budget, rounding
+from .method import DEFAULT_SAMPLES, SEED_WITHOUT_RNG, Budget, rounding
 
 # Pairs of cells into which the boundary is divided, at least one for each piece, and limit on the pieces.
 PAIRS, MOST_PIECES = 32, 640
@@ -219,6 +223,30 @@ def specular_sums(
         outgoing = np.where(rays.escaped[part], rays.theta[part], theta[part])
         add_products(total[part], basis, theta[part], outgoing, weight[part])
     return total, 1.0 - float(np.mean(rays.escaped))
+
+
+@dataclass(frozen=True)
+class UnscatteredRays(SpatialLaw):
+    """The part B f = E[(1 - a)^N f(theta')] of a wall with facets diffuse in part: its rays keep their plane in space.
+
+    Its matrix comes from rays of a Sobol sequence, as many as ``samples`` of the call say.
+    """
+
+    law: FacetedLaw
+    frame: Frame = "paper"
+
+    def matrix_on(self, basis: Basis, discretise: partial[KernelMatrix]) -> KernelMatrix:
+        asked = discretise.keywords
+        seed = tuple(generator(asked.get("rng"), SEED_WITHOUT_RNG).integers(0, 2**63, size=2).tolist())
+        number = whole_sequences(asked.get("samples") or DEFAULT_SAMPLES) // PARTS
+        cell, kept = self.law.wall.cell, 1.0 - (self.law.diffuse_fraction or 0.0)
+        parts, lost = specular_sums(cell, kept, basis, number, seed)
+        parts = 0.5 * (parts + parts.transpose(0, 2, 1))
+        if self.frame == "specular":
+            parts = np.array([mirror_image(part, basis, rows=False) for part in parts])
+        whole = parts.mean(axis=0)
+        error = half_width(whole, tuple(parts)) + rounding(basis) + 2.0 * lost * largest_square_sum(basis)
+        return KernelMatrix(read_only(whole), basis, frobenius_error(error, "estimate", HOW), method="qmc")
 
 
 def with_row_sums(matrix: Floats, basis: Basis) -> Floats:

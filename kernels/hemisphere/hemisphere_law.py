@@ -6,8 +6,8 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import (
     Floats,
     Rng,
+    choice,
     finite_number,
     foreign,
     frozen,
@@ -35,10 +36,22 @@ from ..bases.polynomials import Legendre
 from ..bases.spaces import Zernike, zernike_functions
 from ..discretisation.discretisation import discretise
 from ..discretisation.method import SEED_WITHOUT_RNG
-from ..laws.law import Law, as_weight, drawn_terms, in_frame, used_terms
+from ..discretisation.radiosity import UnscatteredRays
+from ..laws.law import (
+    Combination,
+    Composition,
+    Law,
+    Power,
+    SpecularFrame,
+    as_weight,
+    drawn_terms,
+    in_frame,
+    used_terms,
+)
 from ..laws.structure import Discretiser, SpatialLaw
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..matrices.output import COLOUR_POWER
+from ..walls.faceted_law import FacetedLaw
 from .direction_tables import DirectionTable, directions, incoming_velocities, polar, tabulated
 
 if TYPE_CHECKING:
@@ -53,6 +66,7 @@ TICKS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 # Weight, and the laws applied one after the other.
 Term: TypeAlias = "tuple[float, tuple[DirectionFactor, ...]]"
 Orientation: TypeAlias = float | Literal["random"]
+FacetsInSpace: TypeAlias = Literal["finer grooves", "diffuse in space"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -406,12 +420,16 @@ class HemisphereLaw(DirectionFactor):
         seen against the direction of the grooves, so that grooves along y (pi/2) have the wall's x along x.
         ``"random"``: a direction that each particle finds at random, uniformly: an isotropic wall of patches of grooves
         that are wide against the roughness.
+    facets : {"finer grooves", "diffuse in space"}, optional
+        Needed where the law contains a `FacetedLaw`. ``"finer grooves"``: facets too keep the component b along the
+        grooves. ``"diffuse in space"``: facets diffuse in part, such as ``maxwell(0.2)``, draw b anew by the cosine law
+        at each diffuse hit; across the grooves nothing changes.
 
     Raises
     ------
     InputError
         If the law is none or its weights do not sum to 1, or the orientation is neither an angle up to 2 pi nor
-        "random".
+        "random". If ``facets`` is missing, or diffuse in space though the law is not that of facets diffuse in part.
 
     Notes
     -----
@@ -430,11 +448,34 @@ class HemisphereLaw(DirectionFactor):
 
     law: Law
     orientation: Orientation = "random"
+    facets: FacetsInSpace | None = None
 
     def __post_init__(self) -> None:
         instance("law", self.law, Law, "ker.WallLaw(wall)")
         _ = self.law.parts  # raises InputError unless the weights of a combination make it a law
         self._set(orientation=checked_orientation(self.orientation))
+        if self.facets is not None:
+            choice("facets", self.facets, get_args(FacetsInSpace))
+        elif has_facets(self.law):
+            raise InputError(
+                f"facets: expected one of {get_args(FacetsInSpace)} for {self.law!r}, got None; pass "
+                "facets='diffuse in space' if a diffuse facet draws the velocity along the grooves anew, or "
+                "facets='finer grooves' if it keeps this velocity"
+            )
+        if self.facets == "diffuse in space" and self.redrawing is None:
+            raise InputError(
+                "facets: 'diffuse in space' expected a FacetedLaw whose facets are diffuse in part, such as "
+                f"ker.maxwell(0.2), got {self.law!r}; pass facets='finer grooves', or add and multiply such laws by "
+                "0.3 * H1 + 0.7 * H2 and H1 @ H2"
+            )
+
+    @cached_property
+    def redrawing(self) -> FacetedLaw | None:
+        """The law, in the paper's convention, whose diffuse facets draw the component along the grooves anew."""
+        paper = in_frame(self.law, "paper")
+        if self.facets != "diffuse in space" or not isinstance(paper, FacetedLaw) or paper.diffuse_fraction is None:
+            return None
+        return paper
 
     @property
     def specular(self) -> Law:
@@ -451,8 +492,15 @@ class HemisphereLaw(DirectionFactor):
         planar = discretise(self.specular, Legendre(degree + 1))
         matrix = matrix_of_average if isinstance(self.orientation, str) else matrix_of_grooves
         angle = () if isinstance(self.orientation, str) else (self.orientation,)
-        found, error = matrix(planar.symmetric, degrees, orders, *angle), float(planar.error)
-        return OnDisc(found, error, math.sqrt(degree + 1.0) * error, planar.error.kind)
+        error, kind = float(planar.error), planar.error.kind
+        if self.redrawing is None:
+            found = matrix(planar.symmetric, None, degrees, orders, *angle)
+        else:
+            rest = discretise(UnscatteredRays(self.redrawing, "specular"), Legendre(degree + 1))
+            found = matrix(rest.symmetric, planar.symmetric - rest.symmetric, degrees, orders, *angle)
+            # the planar error acts on means over b only, that of the unscattered rays on the rest
+            error, kind = max(error, float(rest.error)), rest.error.kind
+        return OnDisc(found, error, math.sqrt(degree + 1.0) * error, kind)
 
     def reflected(self, incoming: Floats, rng: np.random.Generator) -> Floats:
         """`sample` for checked velocities of shape (n, 3)."""
@@ -464,15 +512,34 @@ class HemisphereLaw(DirectionFactor):
             angle = rng.uniform(0.0, 2.0 * np.pi, x.size)
         cosine, sine = np.cos(angle), np.sin(angle)
         across, along = x * sine - y * cosine, x * cosine + y * sine
-        paper = in_frame(self.law, "paper")
-        theta = paper.sample(clipped_inside(np.arctan2(-down, -across)), rng)
-        speed = np.hypot(across, down)
+        theta, speed = clipped_inside(np.arctan2(-down, -across)), np.hypot(across, down)
+        if self.redrawing is None:
+            theta = in_frame(self.law, "paper").sample(theta, rng)
+        else:
+            theta, scattered = self.redrawing.scattered(theta, rng)
+            # one component of a uniform point of the disc
+            b = np.sqrt(rng.random(theta.size)) * np.cos(2.0 * np.pi * rng.random(theta.size))
+            whole = np.hypot(speed, along)
+            along, speed = np.where(scattered, [whole * b, whole * np.sqrt(1.0 - b * b)], [along, speed])
         tangential = in_the_plane(speed * np.cos(theta), along, angle)
         return np.asarray(size * np.column_stack([tangential, speed * np.sin(theta)]))
 
     def __repr__(self) -> str:
         angle = "" if isinstance(self.orientation, str) else f", orientation={self.orientation:.12g}"
-        return f"HemisphereLaw({self.law!r}{angle})"
+        facets = "" if self.facets is None else f", facets={self.facets!r}"
+        return f"HemisphereLaw({self.law!r}{angle}{facets})"
+
+
+def has_facets(law: Law) -> bool:
+    """Whether a law contains that of a wall whose facets have a law of their own."""
+    inner: Sequence[Law] = ()
+    if isinstance(law, Composition):
+        inner = law.laws
+    elif isinstance(law, Combination):
+        inner = [term for _, term in law.terms]
+    elif isinstance(law, Power | SpecularFrame):
+        inner = [law.law]
+    return isinstance(law, FacetedLaw) or any(map(has_facets, inner))
 
 
 @dataclass(frozen=True, repr=False)
@@ -556,11 +623,14 @@ def draw_on_disc(outgoing: Floats, incoming: Floats, ax: Axes) -> Axes:
 Indices = NDArray[np.int64]
 
 
-def matrix_of_grooves(planar: Floats, degrees: Indices, orders: Indices, angle: float) -> Floats:
+def matrix_of_grooves(
+    planar: Floats, redrawn: Floats | None, degrees: Indices, orders: Indices, angle: float
+) -> Floats:
     """<f_i, P f_j> of grooves in a direction of the plane, in the Zernike functions with these degrees and orders.
 
-    ``planar`` is the matrix in the specular frame in Legendre(n), with n above all degrees. The rules are exact:
-    products of the integrals over x with l + l' even are polynomials in b, with l + l' odd sqrt(1 - b^2) times such.
+    ``planar`` is the matrix in the specular frame in Legendre(n), with n above all degrees, of rays that keep b, and
+    ``redrawn`` that of rays that draw b anew. The rules are exact: products of the integrals over x with l + l' even
+    are polynomials in b, with l + l' odd sqrt(1 - b^2) times such. The integrals themselves are so for l even and odd.
     """
     count = len(planar)
     x, weight = np.polynomial.legendre.leggauss(count)
@@ -569,14 +639,16 @@ def matrix_of_grooves(planar: Floats, degrees: Indices, orders: Indices, angle: 
     node = np.pi * np.arange(1, count + 1) / (count + 1)
     chebyshev = np.cos(node), 2.0 / (count + 1) * np.sin(node) ** 2
     legendre = x, 2.0 / np.pi * np.sqrt(1.0 - x * x) * weight
-    total = np.zeros((degrees.size, degrees.size))
-    for part, (b, mass) in ((np.where(odd, 0.0, planar), chebyshev), (np.where(odd, planar, 0.0), legendre)):
-        if part.any():
+    total, means = np.zeros((degrees.size, degrees.size)), np.zeros((degrees.size, count))
+    for parity, (b, mass) in enumerate((chebyshev, legendre)):
+        part = np.where(odd == parity, planar, 0.0)
+        if part.any() or redrawn is not None:
             across, along = -np.sqrt(1.0 - b * b)[:, None] * x, np.broadcast_to(b[:, None], (count, count))
             values = zernike_functions(in_the_plane(across, along, angle), degrees, orders)
             found = np.einsum("bxk,xl->bkl", values, moments, optimize=True)
             total += np.tensordot(mass[:, None, None] * found, found @ part.T, axes=([0, 2], [0, 2]))
-    return total
+            means[:, parity::2] = np.tensordot(mass, found[..., parity::2], axes=1)
+    return total if redrawn is None else total + means @ redrawn @ means.T
 
 
 def in_the_plane(across: Floats, along: Floats, angle: float | Floats) -> Floats:
@@ -588,14 +660,14 @@ def in_the_plane(across: Floats, along: Floats, angle: float | Floats) -> Floats
     return np.stack([across * sine + along * cosine, along * sine - across * cosine], axis=-1)
 
 
-def matrix_of_average(planar: Floats, degrees: Indices, orders: Indices) -> Floats:
+def matrix_of_average(planar: Floats, redrawn: Floats | None, degrees: Indices, orders: Indices) -> Floats:
     """The mean of `matrix_of_grooves` over all directions; with the order m, -m has to be there too.
 
     Turning multiplies e^(i m phi) by a number of modulus 1 that averages to 0 between different orders. Between equal
     ones the mean is that of the blocks of cosines and of sines, because grooves along x do not distinguish phi and
     pi - phi.
     """
-    fixed, total = matrix_of_grooves(planar, degrees, orders, 0.0), np.zeros((degrees.size, degrees.size))
+    fixed, total = matrix_of_grooves(planar, redrawn, degrees, orders, 0.0), np.zeros((degrees.size, degrees.size))
     for order in range(int(orders.max(initial=0)) + 1):
         cosines, sines = np.flatnonzero(orders == order), np.flatnonzero(orders == -order)
         block = 0.5 * (fixed[np.ix_(cosines, cosines)] + fixed[np.ix_(sines, sines)])

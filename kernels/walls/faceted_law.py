@@ -17,6 +17,7 @@ from ...core.long_runs import slices
 from ...geometry import Wall
 from ...geometry.tracing.facet_rays import MOST_HITS, follow_facets
 from ...geometry.tracing.tracing import Status
+from ..bases.measure import SINE
 from ..expectations.conditionals import Conditionals
 from ..laws.law import ENTRY_POINTS, Law, check_paper_frame, entry_inside, retroreflection, sum_of
 from ..laws.structure import Rules, fold
@@ -151,6 +152,23 @@ class FacetedLaw(Law):
             resolved &= status == Status.ESCAPED
             outgoing[some] = np.where(resolved, left, incoming[some])
         return outgoing.reshape(theta.shape), escaped.reshape(theta.shape)
+
+    def scattered(self, theta: Floats, rng: np.random.Generator) -> tuple[Floats, NDArray[np.bool_]]:
+        """`sample` for facets diffuse in part, shape (n,), and which rays met a diffuse facet."""
+        fraction, found = self.diffuse_fraction or 0.0, np.zeros(theta.size, dtype=np.bool_)
+        outgoing, escaped = np.empty(theta.size), np.empty(theta.size, dtype=np.bool_)
+        entry = entry_inside(rng.random(theta.size)) * self.wall.period
+        for some in slices(theta.size, CHUNK):
+            own = found[some]
+
+            def turn(angle: Floats, who: NDArray[np.int64], own: NDArray[np.bool_] = own) -> Floats:
+                is_diffuse = rng.random(angle.size) < fraction
+                own[who] |= is_diffuse
+                return np.where(is_diffuse, SINE.sample(angle.size, rng), np.pi - angle)
+
+            outgoing[some], _, status = follow_facets(self.wall, entry[some], theta[some], turn)
+            escaped[some] = status == Status.ESCAPED
+        return if_escaped(self, outgoing, escaped, LOST), found
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         if self._known:

@@ -218,7 +218,7 @@ def _without_specular(law: Law | DirectionLaw) -> tuple[float, Any]:
     if isinstance(law, DirectionLaw):
         terms = []
         for weight, laws in law.parts:
-            if len(laws) > 1 or not isinstance(laws[0], HemisphereLaw):
+            if len(laws) > 1 or not isinstance(laws[0], HemisphereLaw) or laws[0].redrawing is not None:
                 terms.append((weight, laws))
                 continue
             part, rest = _without_specular(in_paper_frame(laws[0].law))

@@ -264,6 +264,7 @@ def accommodation(
             law,
             lambda one: _averaged(_parts(in_paper_frame(one), wanted, source)),
             lambda one: of_surface(one, wanted, None, None, source),
+            source,
         )
     if azimuth_deg is not None:
         raise InputError(f"azimuth_deg: expected none for {law!r}, a law in the plane, got {azimuth_deg!r}")

@@ -5,6 +5,10 @@ direction, and E the mean over all directions of grooves with a Lambertian cross
 component b, P_i is at most 1 - g_i plus g_i times the projection on the constants, so that the mixture is at most
 1 - G + G E as a quadratic form, G = sum w_i g_i. The eigenvalues of E on Zernike functions of degree n are 1/(n + 1).
 Hence the gap is at least G/2, and the essential spectrum is at most 1 - G, because E is compact.
+
+Where facets with the diffuse fraction a draw b anew, the law is P_i on means over b, and on the rest the law of rays
+without a diffuse hit, of norm at most 1 - a. It is at most 1 - g_i plus g_i times the projection on the constants, with
+the smaller of g_i and a for g_i, in any direction.
 """
 
 from __future__ import annotations
@@ -40,7 +44,8 @@ def gap_of_grooves(
     used = [laws for _, laws in law.parts]
     angles = [one.orientation for laws in used for one in laws]
     fixed = [float(angle) for angle in angles if not isinstance(angle, str)]
-    if len(fixed) == len(angles) and np.ptp(np.mod(fixed, np.pi)) == 0.0:
+    redraws = any(isinstance(one, HemisphereLaw) and one.redrawing is not None for laws in used for one in laws)
+    if len(fixed) == len(angles) and np.ptp(np.mod(fixed, np.pi)) == 0.0 and not redraws:
         reason = "all grooves have the same direction: every function of the velocity along them is kept"
         return SpectralGap(0.0, 0.0, "bound", "structure of the law", "no gap", (reason,), "specular")
 
@@ -88,8 +93,12 @@ def _largest(
 
 
 def _at_least(law: DirectionLaw, planar_gap: Callable[[Law], Estimate]) -> float:
-    """The planar gap less its error for grooves of random direction; 0 for those of a fixed one and for surfaces."""
-    if not isinstance(law, HemisphereLaw) or not isinstance(law.orientation, str):
+    """The planar gap less its error for grooves of random direction; 0 for those of a fixed one and for surfaces.
+
+    If diffuse facets draw the velocity along the grooves anew, it is at most their fraction, for any direction.
+    """
+    if not isinstance(law, HemisphereLaw) or (law.redrawing is None and not isinstance(law.orientation, str)):
         return 0.0
     found = planar_gap(law.specular)
-    return max(found.value - found.error, 0.0)
+    most = 1.0 if law.redrawing is None else law.redrawing.diffuse_fraction or 0.0
+    return min(max(found.value - found.error, 0.0), most)

@@ -28,6 +28,7 @@ DISK, LAW, WALL, P = geo.Disk(), ker.lambertian(), geo.koch(1), ker.discretise(k
 SPECULAR, Z = LAW.in_specular_frame(), sp.Symbol("z")
 CUSP = geo.Bezier([(-1, 0), (1, 1), (-1, 1), (1, 0)])
 ROOF = (geo.Segment((1, 0), (0, 3)), geo.Segment((0, 3), (-1, 0)))
+FACETED = ker.FacetedLaw(WALL, ker.maxwell(0.2))
 
 # A part of the message, the call that it refuses, and the one that it advises.
 REMEDIES = {
@@ -131,6 +132,17 @@ REMEDIES = {
     "use WallLaw(wall), which traces curves": (
         lambda: ker.PolygonLaw(geo.focusing_arcs()),
         lambda: ker.WallLaw(geo.focusing_arcs()),
+    ),
+    "or facets='finer grooves' if it keeps": (
+        lambda: ker.HemisphereLaw(FACETED),
+        lambda: [ker.HemisphereLaw(FACETED, facets=one) for one in ("diffuse in space", "finer grooves")],
+    ),
+    "pass facets='finer grooves', or add and multiply": (
+        lambda: ker.HemisphereLaw(FACETED @ FACETED, facets="diffuse in space"),
+        lambda: (
+            ker.HemisphereLaw(FACETED @ FACETED, facets="finer grooves"),
+            ker.HemisphereLaw(FACETED, facets="diffuse in space") @ ker.HemisphereLaw(FACETED, facets="finer grooves"),
+        ),
     ),
     "use it with ker.HemisphereLaw(law)": (
         lambda: ker.discretise(LAW, ker.Zernike(2)),

@@ -4,10 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaigns.judges.plain_facets import flown
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.errors import InputError
 
 RNG = 20_260_401
 ROUGH, SMOOTH, RETRO = (ker.HemisphereLaw(law) for law in (ker.lambertian(), ker.specular(), ker.retroreflection()))
@@ -300,3 +302,75 @@ def test_the_matrix_of_a_law_of_directions_is_saved_and_has_a_spectrum(tmp_path)
     assert restored.basis == matrix.basis and restored.frame == "specular"
     np.testing.assert_allclose(spec.spectrum(matrix, k=4).values, [1, 1 / 2, 1 / 2, 1 / 3], atol=1e-13)
     assert (matrix @ (lambda at: at[..., 0])) == pytest.approx(0.5 * matrix.basis.project(lambda at: at[..., 0]))
+
+
+TEETH = geo.triangular_teeth(0.9)
+
+
+@pytest.mark.parametrize(
+    ("wall", "facets"), [(TEETH, "diffuse in space"), (LEANING.wall, "diffuse in space"), (TEETH, "finer grooves")]
+)
+def test_diffuse_facets_reflect_in_space_as_own_rays_of_the_cosine_law(wall, facets):
+    """Rays of the judge in three dimensions; the matrix and the samples agree with them entry by entry."""
+    law = ker.HemisphereLaw(ker.FacetedLaw(wall, ker.maxwell(0.3)), np.pi / 2, facets)
+    rng = np.random.default_rng(RNG)
+    incoming = cosine_law(rng, 2**17)
+    matrix = ker.discretise(law, ker.Zernike(3), samples=2**17)
+    # grooves along y: across is x, and the judge has the normal second and the grooves third
+    found, _ = flown(wall.vertices, incoming[:, [0, 2, 1]], 0.3, 0.0, rng, in_space=facets == "diffuse in space")
+    for outgoing in (found[:, [0, 2, 1]], law.sample(incoming, rng=1)):
+        scores = scores_of_entries(incoming, outgoing, matrix)[1:, 1:]
+        assert np.abs(scores).max() < LARGEST_Z and np.abs(outgoing[:, 2]).min() > 0.0
+
+
+def test_the_accommodation_along_grooves_is_the_probability_of_a_diffuse_hit():
+    law = ker.FacetedLaw(TEETH, ker.maxwell(0.3))
+    found = spec.accommodation(ker.HemisphereLaw(law, facets="diffuse in space"), 1e-3)
+    rng = np.random.default_rng(RNG)
+    rays = geo.trace(TEETH, rng.random(2**18), ker.SINE.sample(2**18, rng))
+    scattered = 1.0 - 0.7**rays.collisions
+    assert abs(z_score(scattered, found.along.value)) < LARGEST_Z
+    # of the independent rays of a plan in three dimensions
+    assert abs(found.across.value - (1.0 + 4.0 * 0.04935)) < 4.0 * 0.0002 + found.across.error
+    assert abs(found.along.value - (1.0 - 4.0 * 0.11513)) < 4.0 * 0.00009 + found.along.error
+    assert found.tangential.value == pytest.approx(0.5 * (found.across.value + found.along.value), abs=1e-14)
+    incoming = cosine_law(rng, 2**17)
+    outgoing, _ = flown(TEETH.vertices, incoming[:, [0, 2, 1]], 0.3, 0.0, rng, in_space=True)
+    changes = 1.0 - 18.0 * (-incoming[:, 2] * outgoing[:, 1] - 4.0 / 9.0)
+    assert abs(z_score(changes, found.normal.value)) < LARGEST_Z
+    kept = spec.accommodation(ker.HemisphereLaw(law, facets="finer grooves"), 1e-3)
+    assert kept.along.value == 0.0 and kept.tangential.value == pytest.approx(0.5 * kept.across.value, abs=1e-15)
+
+
+def test_a_flat_wall_of_diffuse_facets_is_the_wall_of_maxwell_in_space():
+    law = ker.FacetedLaw(geo.flat(), ker.maxwell(0.4))
+    matrix = ker.discretise(ker.HemisphereLaw(law, 0.3, "diffuse in space"), ker.Zernike(3), samples=2**12)
+    assert np.linalg.norm(matrix.symmetric - np.diag([1.0] + [0.6] * 9)) < float(matrix.error) < 1e-3
+    found = spec.accommodation(ker.HemisphereLaw(law, facets="diffuse in space"), 1e-6)
+    for one in (found.across, found.along, found.normal, found.maxwell_fraction):
+        assert abs(one.value - 0.4) <= one.error + 1e-12
+
+
+def test_grooves_of_one_direction_have_a_gap_if_their_facets_are_diffuse_in_space():
+    law = ker.FacetedLaw(TEETH, ker.maxwell(0.3))
+    kept, drawn = (
+        spec.spectral_gap(ker.HemisphereLaw(law, 0.0, facets), 0.3) for facets in ("finer grooves", "diffuse in space")
+    )
+    assert kept.verdict == "no gap"
+    # rays without a diffuse hit keep the velocity along, and are at least E .7^N of all
+    along = spec.accommodation(ker.HemisphereLaw(law, 0.0, "diffuse in space"), 1e-2).along
+    assert 0.0 < drawn.value - drawn.error < drawn.value <= along.value + along.error + 1e-3
+
+
+def test_facets_must_say_what_becomes_of_the_velocity_along_the_grooves():
+    law = ker.FacetedLaw(TEETH, ker.maxwell(0.3))
+    for one in (law, law.in_specular_frame(), law @ law, law**2, 0.5 * law + 0.5 * ker.lambertian()):
+        with pytest.raises(InputError, match=r"pass facets='diffuse in space' .* or facets='finer grooves'"):
+            ker.HemisphereLaw(one)
+        assert "finer grooves" in repr(ker.HemisphereLaw(one, facets="finer grooves"))
+    with pytest.raises(InputError, match=r"^facets: expected 'finer grooves' or 'diffuse in space'"):
+        ker.HemisphereLaw(law, facets="diffuse")
+    two_scales = ker.FacetedLaw(TEETH, ker.WallLaw(TEETH))
+    for one in (law @ law, ker.lambertian(), two_scales):
+        with pytest.raises(InputError, match=r"add and multiply such laws"):
+            ker.HemisphereLaw(one, facets="diffuse in space")
