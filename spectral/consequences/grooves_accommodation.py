@@ -105,9 +105,7 @@ def _redrawn(
     for fraction, planar, own in zip((ACROSS, 0.0, UP), (across, across, normal), unscattered.tolist(), strict=True):
         value = 1.0 - fraction * (1.0 - planar.value) - (1.0 - fraction) * own
         method = f"{planar.method}; rays without a diffuse hit"
-        found.append(
-            Estimate(value, fraction * planar.error + (1.0 - fraction) * error, "estimate", method)
-        )
+        found.append(Estimate(value, fraction * planar.error + (1.0 - fraction) * error, "estimate", method))
     return found[0], found[1], found[2]
 
 

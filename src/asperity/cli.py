@@ -142,6 +142,11 @@ def main() -> None:
 @main.command(epilog=WALL_HELP)
 @click.argument("wall")
 @with_disk
+@click.option(
+    "--facets",
+    help="Law of the facets, by default mirrors: maxwell:diffuse_fraction=0.2, another LAW of `asperity realise`, or a "
+    "finer WALL.",
+)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for pictures, matrix and JSON; made if missing.")
 @click.option("--tolerance", default=1e-3, help="Error asked of gaps, and of matrices for every bin.")
 @click.option("--bins", default=128, help="Number of equal-measure bins of the matrix.")
@@ -159,8 +164,8 @@ def main() -> None:
 @click.option("--spacing", help="WALL is a height map with points at this distance, or DX,DY.")
 @click.option("--orientation", help="WALL is a height map, of random orientation or turned by this angle in radians.")
 def study(
-    wall: str, disk: Disk | None, seed: int, out: Path | None, force: bool, picture_format: str, dpi: float,
-    as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, spacing: str | None,
+    wall: str, disk: Disk | None, facets: str | None, seed: int, out: Path | None, force: bool, picture_format: str,
+    dpi: float, as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, spacing: str | None,
     orientation: str | None, **asked: Any,
 ) -> None:  # fmt: skip
     """Study WALL: law, symmetry, spectrum, gap, and the collision law of a disk.
@@ -174,22 +179,25 @@ def study(
       asperity study focusing-arcs:half_angle=0.9 --out study
       asperity study profile.txt --inertia-ratio 0.5 --json
       asperity study triangular-teeth --incidence 0,30,60 --table law.csv
+      asperity study triangular-teeth:angle=0.9 --facets maxwell:diffuse_fraction=0.2
       asperity study map.txt:units=um/nm --spacing 0.5 --out study
     """
     from .core.files import removed_on_failure
     from .core.long_runs import QUIET
     from .geometry import wall_from_text
-    from .kernels import WallLaw
+    from .kernels.inverse.named_laws import facets_from_text
     from .study import PICTURES, SavedStudy, SurfaceStudy, picture_names, prepare_folder, study_surface, study_wall
+    from .study.study import law_of
 
     if quiet and (as_json or verbose):
         raise click.UsageError("--quiet prints nothing; leave --json and --verbose out")
     if quiet:
         os.environ[QUIET] = "1"
     is_map = spacing is not None or orientation is not None
-    if is_map and disk is not None:
-        raise click.UsageError("a disk collides with a wall; leave its options out with a height map")
-    found: Any = surface_law_of(wall, spacing, orientation) if is_map else WallLaw(wall_from_text(wall))
+    if is_map and (disk is not None or facets is not None):
+        raise click.UsageError("a disk and --facets belong to a wall; leave them out with a height map")
+    of_facets = None if facets is None else facets_from_text(facets)
+    found: Any = surface_law_of(wall, spacing, orientation) if is_map else law_of(wall_from_text(wall), of_facets)
     # what may be refused comes before the work
     degrees = None if incidence is None else numbers_of("incidence", "degrees", incidence)
     if table is not None:
@@ -206,7 +214,9 @@ def study(
         if is_map:
             asked.pop("bins")
         report: SavedStudy = (
-            study_surface(found, name, **asked) if is_map else study_wall(found.wall, name, disk, **asked)
+            study_surface(found, name, **asked)
+            if is_map
+            else study_wall(found.wall, name, disk, facets=of_facets, **asked)
         )
         if not quiet:
             text = report.to_json() if as_json else report.summary(verbose=verbose, by_angle=degrees is not None)

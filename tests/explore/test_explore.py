@@ -4,6 +4,7 @@ import io
 import os
 import time
 import zipfile
+from dataclasses import replace
 from itertools import islice, pairwise
 from pathlib import Path
 
@@ -139,6 +140,19 @@ def test_foreshortening_shows_the_law_that_the_disk_feels():
     assert np.abs(first.kernel.array - felt.array).max() < 1e-12
     plain = first_answer(Question(TEETH, "teeth", disk)).collision
     assert np.array_equal(first.collision.fractions, plain.fractions)
+
+
+def test_a_diffuse_fraction_of_the_facets_changes_law_and_collision_and_teeth_gain_a_gap():
+    disk, facets = geo.Disk(1.0, 0.5), ker.maxwell(0.5)
+    question = Question(TEETH, "teeth", disk, diffuse_fraction=0.5)
+    assert question.law == ker.FacetedLaw(TEETH, facets)
+    assert question.collision.law == ker.FacetedLaw(TEETH.foreshorten(disk), facets)
+    first = first_answer(question)
+    assert first.kernel.method == "qmc" and first.gap.verdict == "undecided" and first.gap.value > 0.1
+    mirrors = first_answer(replace(question, diffuse_fraction=0.0))
+    assert mirrors.gap.verdict == "no gap" and mirrors.kernel.method == "exact"
+    moved = first.collision.mean.value - mirrors.collision.mean.value
+    assert abs(moved) > first.collision.mean.error + mirrors.collision.mean.error
 
 
 def test_a_refusal_replaces_an_earlier_one():

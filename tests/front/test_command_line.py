@@ -43,6 +43,19 @@ def test_one_existing_file_is_enough_to_refuse_before_the_work_and_nothing_else_
     assert (tmp_path / "study.json").read_text() == "mine"
 
 
+def test_a_study_of_facets_with_a_law_of_their_own_names_it_and_refuses_others(tmp_path):
+    options = ("--bins", 4, "--tolerance", 0.1, "--table", tmp_path / "law.csv")
+    lines = run("study", "flat", "--facets", "maxwell:diffuse_fraction=0.25", *options).stdout.splitlines()
+    assert "facets     0.25*lambertian() + 0.75*specular(), at each hit" in lines
+    table = np.loadtxt(tmp_path / "law.csv", delimiter=",")
+    assert np.allclose(table[1:, 1:], ker.maxwell(0.25).table(64, 65).quantile, rtol=0.0, atol=1e-9)
+    plain = json.loads(run("study", "flat", "--facets", "flat", *options[:4], "--json").stdout)
+    assert plain["wall"]["facets"].startswith("WallLaw(")
+    for text, reason in (("maxwell:diffuse_fraction=2", "[0, 1], got 2.0"), ("maxwel:0.2", "finer wall")):
+        assert reason in refused("study", "flat", "--facets", text)
+        assert "facets: expected maxwell:NUMBER" in refused("study", "flat", "--facets", text)
+
+
 def test_a_study_prints_accommodation_by_degrees_and_writes_a_table(tmp_path):
     options = ("--bins", 8, "--incidence", "0,30", "--table", tmp_path / "law.csv")
     lines = run("study", "triangular-teeth:angle=0.7", *options).stdout.splitlines()

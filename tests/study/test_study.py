@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -159,6 +160,23 @@ def test_the_summary_lists_all_eigenvalues_by_modulus(arcs):
     numbers = [float(part.split("(")[0].split()[0]) for part in line.split("modulus: ")[1].split(" (")[0].split(", ")]
     assert len(numbers) == 10 and "the 10 of largest modulus" in line
     assert np.all(np.diff(np.abs(numbers)) <= 0.0) and numbers[2] == pytest.approx(-0.311346443, abs=1e-3)
+
+
+def test_facets_with_a_law_of_their_own_are_named_everywhere_and_have_their_numbers(tmp_path):
+    wall, facets, name = geo.flat(), ker.maxwell(0.5), "0.5*lambertian() + 0.5*specular()"
+    report = study_wall(wall, "plate", facets=facets, bins=8)
+    assert np.array_equal(report.matrix.array, ker.discretise(facets, ker.Bins(8)).array)
+    assert report.collision.law == ker.FacetedLaw(wall.foreshorten(geo.Disk()), facets)
+    assert report.gap.value == 0.5 and abs(report.accommodation.tangential.value - 0.5) < 1e-12
+    assert f"\nfacets     {name}" in report.summary()
+    plain = json.loads(report.to_json())
+    assert plain["wall"]["facets"] == name
+    figure = Figure()
+    draw_study_wall(report, figure.subplots())
+    assert "facets 0.5" in figure.axes[0].get_title()
+    assert report.title == f"plate, facets {name}"
+    with pytest.raises(InputError, match=r"^facets: expected a Law"):
+        study_wall(wall, facets=0.5)
 
 
 def test_a_refused_gap_is_reported_and_the_rest_stands(monkeypatch, tmp_path):

@@ -14,11 +14,12 @@ from ..core.errors import AsperityError
 from ..core.estimates import LEVEL, NORMAL_95, Estimate
 from ..core.rounding import EPS
 from ..geometry import Disk, Wall
-from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise, no_slip_matrix, smooth_matrix
+from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, discretise, maxwell, no_slip_matrix, smooth_matrix
 from ..kernels.bases.basis import Frame
 from ..spectral import SpectralGap, accommodation, spectral_gap, spectrum
 from ..spectral.consequences.momentum_accommodation import Accommodation
 from ..study.pictures import INCOMING, allowed_velocities
+from ..study.study import law_of
 
 Points: TypeAlias = Sequence[tuple[float, float]]
 # Of a wall with more vertices none can be dragged.
@@ -41,6 +42,8 @@ class Question:
         Whether they are those of the wall that the disk feels, instead of the wall itself.
     of_catalogue : bool
         Whether the wall is a named one.
+    diffuse_fraction : float
+        Of the hits of the facets, which are mirrors else.
 
     Examples
     --------
@@ -55,6 +58,7 @@ class Question:
     convention: Frame = "paper"
     foreshortened: bool = False
     of_catalogue: bool = False
+    diffuse_fraction: float = 0.0
 
     @cached_property
     def seen(self) -> Wall:
@@ -62,9 +66,14 @@ class Question:
         return self.wall.foreshorten(self.disk) if self.foreshortened else self.wall
 
     @property
+    def facets(self) -> Law | None:
+        """The law of the facets; None for mirrors."""
+        return maxwell(self.diffuse_fraction) if self.diffuse_fraction > 0.0 else None
+
+    @property
     def law(self) -> Law:
         """The law in the chosen convention."""
-        law = WallLaw(self.seen)
+        law = law_of(self.seen, self.facets)
         return law.in_specular_frame() if self.convention == "specular" else law
 
     @property
@@ -75,7 +84,7 @@ class Question:
     @property
     def collision(self) -> CollisionLaw:
         """The collision law of the disk with the wall itself."""
-        return CollisionLaw.from_wall(self.wall, self.disk)
+        return CollisionLaw(law_of(self.wall.foreshorten(self.disk), self.facets), self.disk)
 
 
 def draggable_vertices(wall: Wall) -> list[tuple[float, float]]:
@@ -263,7 +272,7 @@ def first_answer(question: Question) -> Answer:
     for reason in answer.refusals.values():
         answer = answer.refused(reason, "gap", "spectrum")
     answer = _with_eigenvalues_of_matrix(answer)
-    if question.seen.is_polygonal and not question.seen.islands:
+    if question.seen.is_polygonal and not question.seen.islands and question.facets is None:
         # a theorem decides
         answer = _with_gap(answer, question, GAP_TOLERANCES[0])
     elif answer.spectrum is not None and answer.kernel is not None:

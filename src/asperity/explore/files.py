@@ -84,7 +84,7 @@ def wall_as_toml(wall: Wall) -> bytes:
 
 def studied(question: Question) -> Iterator[bytes]:
     """Study the wall, and give the files of the study with the wall as one zip archive."""
-    report = study_wall(question.seen, question.name, question.disk, progress=False)
+    report = study_wall(question.seen, question.name, question.disk, facets=question.facets, progress=False)
     archive = io.BytesIO()
     with TemporaryDirectory(prefix="asperity-") as folder, zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as whole:
         question.seen.save(Path(folder) / "wall.toml")

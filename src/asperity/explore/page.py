@@ -13,6 +13,7 @@ from typing import Any
 import panel as pn
 from bokeh.events import PanEnd, PanStart
 
+from ..core.checks import number_between
 from ..core.errors import AsperityError
 from ..geometry import WALLS, Disk, Wall, wall_from_text
 from ..study.result import resistance_from
@@ -29,7 +30,7 @@ GRACE = 0.4
 RANGES = {
     "angle": (0.05, 3.0), "height_to_width": (0.05, 6.0), "half_angle": (0.05, 1.55), "curvature": (0.02, 1.98),
     "mass": (0.1, 5.0), "inertia_ratio": (0.05, 5.0), "stem_to_cap": (0.02, 0.95), "stem_aspect": (0.0, 3.0),
-    "generations": (1, 4),
+    "generations": (1, 4), "diffuse_fraction": (0.0, 1.0),
 }  # fmt: skip
 DRAWN = "a polygon of your own"
 CONVENTIONS = {"retroreflection = identity": "paper", "specular = identity": "specular"}
@@ -104,6 +105,7 @@ class Page:
         self.mass = _slider("mass of the disk", *RANGES["mass"], self.question.disk.mass)
         ratio = self.question.disk.inertia_ratio
         self.inertia_ratio = _slider("inertia ratio J/(m r²) of the disk", *RANGES["inertia_ratio"], ratio)
+        self.diffuse = _slider("diffuse fraction of the facets", *RANGES["diffuse_fraction"], 0.0)
         self.convention = pn.widgets.RadioButtonGroup(
             name="Convention", options=CONVENTIONS, value="paper", orientation="vertical", **STRETCH
         )
@@ -116,7 +118,7 @@ class Page:
         self.choice.param.watch(lambda _: self._wall_chosen(), "value")
         self.file.param.watch(lambda _: self._file_sent(), "value")
         self.options.param.watch(lambda _: self._open_file(), "value")
-        for widget in (self.mass, self.inertia_ratio, self.convention, self.foreshortened):
+        for widget in (self.mass, self.inertia_ratio, self.diffuse, self.convention, self.foreshortened):
             widget.param.watch(lambda _: self._ask_again(), "value")
 
     def _make_saving(self) -> None:
@@ -150,9 +152,9 @@ class Page:
         figures = (self.wall_figure, self.kernel, self.spectrum, self.collision)
         panes = [pn.pane.Bokeh(figure.plot, margin=4, **STRETCH) for figure in figures]
         controls = pn.Column(
-            self.choice, self.sliders, self.mass, self.inertia_ratio, self.foreshortened, self.convention, self.options,
-            self.file, self.save, self.study, self.take, self.saved, styles={"flex": "1 1 240px", "min-width": "240px"},
-            margin=4,
+            self.choice, self.sliders, self.mass, self.inertia_ratio, self.diffuse, self.foreshortened, self.convention,
+            self.options, self.file, self.save, self.study, self.take, self.saved,
+            styles={"flex": "1 1 240px", "min-width": "240px"}, margin=4,
         )  # fmt: skip
         title = pn.pane.HTML("<h2 style='margin: 4px 0'>asperity explore</h2>", stylesheets=[TEXT])
         plots = pn.Column(*panes, styles=GRID, margin=0, **STRETCH)
@@ -246,6 +248,7 @@ class Page:
         """Begin to make a wall and its answers in another process; the last wall stays until they come."""
         try:
             disk = Disk(float(self.mass.value), float(self.inertia_ratio.value))
+            fraction = number_between("diffuse fraction", self.diffuse.value, 0.0, 1.0, closed="low high")
         except AsperityError as reason:
             self._refuse(str(reason))
             return
@@ -254,7 +257,7 @@ class Page:
         # three results, so that a wall that is dragged has answers and not pictures alone
         self._background.ask(
             drawing.pictured_and_answered, wall, name, disk, self.convention.value, bool(self.foreshortened.value),
-            of_catalogue, first=3,
+            of_catalogue, fraction, first=3,
         )  # fmt: skip
         self._show_status()
 
@@ -374,7 +377,7 @@ class Page:
         """End the computations, and let go of the widgets."""
         self._background.drop()
         self._saving.drop()
-        _forget([self.mass, self.inertia_ratio, *self.parameters.values()])
+        _forget([self.mass, self.inertia_ratio, self.diffuse, *self.parameters.values()])
 
 
 def _slider(name: str, low: float, high: float, value: float) -> Any:

@@ -69,7 +69,8 @@ def draw_study_wall(study: StudyResult, ax: Axes) -> None:
     x, theta = chosen_rays(study.wall)
     draw_wall(study.wall, x, theta, ax=ax)
     key = "dot: a ray enters, ring: it leaves" if len(x) else f"no ray leaves within {MOST_BOUNCES} collisions"
-    ax.set_title(f"{_title(study.name)}\n{key}", fontsize=11)
+    key += "; facets drawn as mirrors" if study.facets is not None and len(x) else ""
+    ax.set_title(f"{_title(study.title)}\n{key}", fontsize=11)
 
 
 def chosen_rays(wall: Wall) -> tuple[Floats, Floats]:
@@ -91,7 +92,7 @@ def chosen_rays(wall: Wall) -> tuple[Floats, Floats]:
 
 def _draw_kernel(study: StudyResult, ax: Axes) -> None:
     study.matrix.plot(ax)
-    ax.set_title(_title(f"Reflection law of {study.name}"), fontsize=11)
+    ax.set_title(_title(f"Reflection law of {study.title}"), fontsize=11)
 
 
 def _draw_spectrum(study: StudyResult, ax: Axes) -> None:
@@ -104,6 +105,8 @@ def _draw_spectrum(study: StudyResult, ax: Axes) -> None:
         study.spectrum.plot(ax)
     else:
         draw_spectrum(study.spectrum, study.gap, ax)
+    if study.facets is not None:
+        ax.set_title(f"{_title(study.title)}\n{ax.get_title()}", fontsize=11)
 
 
 def _draw_collision(study: StudyResult, ax: Axes) -> None:
@@ -111,6 +114,8 @@ def _draw_collision(study: StudyResult, ax: Axes) -> None:
     figure.clear()
     figure.set_layout_engine("constrained")
     draw_outgoing_velocities(study.collision, figure)
+    if study.facets is not None:
+        figure.suptitle(_title(study.title), fontsize=11)
 
 
 def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:

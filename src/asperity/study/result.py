@@ -66,6 +66,8 @@ class StudyResult(Summary):
     ----------
     name : str
     wall : Wall
+    facets : Law or None
+        The law of the facets; None for mirrors.
     disk : Disk
     disk_given : bool
         Whether somebody asked for this disk; the summary begins with it then.
@@ -100,6 +102,7 @@ class StudyResult(Summary):
 
     name: str
     wall: Wall
+    facets: Law | None
     disk: Disk
     disk_given: bool
     tolerance: float
@@ -116,6 +119,11 @@ class StudyResult(Summary):
     refusals: Mapping[str, str]
     consequences: Consequences
     accommodation: Accommodation | None
+
+    @property
+    def title(self) -> str:
+        """The name of the wall, with the law of facets that are no mirrors."""
+        return self.name if self.facets is None else f"{self.name}, facets {self.facets!r}"
 
     @property
     def resistance(self) -> Estimate | None:
@@ -236,6 +244,8 @@ def report_of(study: StudyResult, by_angle: bool, verbose: bool) -> str:
             f"length {wall.arc_length:.6g}{unit}, {cells}{islands}",
         ],
     }
+    if study.facets is not None:
+        blocks["facets"] = [f"{study.facets!r}, at each hit"]
     of_disk = {
         "disk": [
             f"mass {disk.mass:g}, inertia ratio {disk.inertia_ratio:g}, radius {disk.radius:g}: feels the wall "
@@ -425,6 +435,7 @@ def study_as_dict(study: StudyResult) -> dict[str, Any]:
             "name": study.name, "period": wall.period, "depth": wall.depth, "arc_length": wall.arc_length,
             "pieces": len(wall.pieces), "hollows": len(wall.hollows), "islands": len(wall.islands),
             "closes": wall.closes, "polygonal": wall.is_polygonal, "mirror_symmetric": wall.is_mirror_symmetric,
+            "facets": None if study.facets is None else repr(study.facets),
         },
         "tracer": study.tracer and study.tracer.as_dict(),
         "law": matrix_as_dict(study.matrix),

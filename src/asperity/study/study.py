@@ -24,7 +24,7 @@ from ..core.long_runs import progress_bar
 from ..geometry import Disk, Wall, trace
 from ..geometry.cells.miniature import wall_miniature
 from ..geometry.tracing.tracing import StatusCounts
-from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
+from ..kernels import Bins, CollisionLaw, FacetedLaw, KernelMatrix, Law, WallLaw, discretise
 from ..kernels.bases.measure import SINE
 from ..spectral import SpectralGap, Spectrum, accommodation, enclosures, spectral_gap, spectrum
 from ..spectral.bounds.enclosure import Enclosures
@@ -154,6 +154,7 @@ def study_wall(
     name: str = "wall",
     disk: Disk | None = None,
     *,
+    facets: Law | None = None,
     tolerance: float = TOLERANCE,
     bins: int = BINS,
     rng: Rng = None,
@@ -169,6 +170,8 @@ def study_wall(
         What the wall is called in summaries and titles.
     disk : Disk, optional
         By default the uniform disk. The summary begins with a disk that is given.
+    facets : Law, optional
+        The law of the facets, of `FacetedLaw`; mirrors by default. Those of the wall that the disk feels have it too.
     tolerance : float
         Error asked of the gaps and of the matrices; what was reached is reported.
     bins : int
@@ -189,7 +192,7 @@ def study_wall(
     Raises
     ------
     InputError
-        If the tolerance, the number of bins or an angle is unsuitable.
+        If the facets' law, the tolerance, the number of bins or an angle is unsuitable.
     AccuracyError
         If more than 1e-4 of the rays do not escape.
 
@@ -202,7 +205,7 @@ def study_wall(
     """
     instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
     positive_number("tolerance", tolerance)
-    basis = Bins(bins)
+    basis, law = Bins(bins), law_of(wall, facets)
     rng = generator(rng, 0)
     if incidence_deg is not None:
         # refused before the work
@@ -212,7 +215,6 @@ def study_wall(
     with progress_bar(9, "part", name, shown=progress) as bar:
         tracer = check_tracer(wall, rng) if wall.hollows else None
         bar.update()
-        law = WallLaw(wall)
         matrix = _matrix(law, basis, tolerance, rng)
         bar.update()
         gap, specular_gap = _gaps(law, tolerance, rng, refusals)
@@ -221,7 +223,7 @@ def study_wall(
         bar.update()
         enclosed = _or_refusal(lambda: _enclosures(law, gap, tolerance), refusals, "enclosures", reason=AsperityError)
         bar.update()
-        collision = CollisionLaw.from_wall(wall, disk)
+        collision = CollisionLaw(law_of(wall.foreshorten(disk), facets), disk)
         # only the detailed report mentions it
         collision_matrix = _matrix(collision.law, basis, tolerance, rng, most=FIRST_SAMPLES)
         bar.update()
@@ -234,10 +236,15 @@ def study_wall(
         )
         bar.update()
     return Study(
-        name, wall, disk, given, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed, collision,
-        collision_matrix, collision_gap, MappingProxyType(conservation), MappingProxyType(refusals), consequences,
-        momentum,
+        name, wall, facets, disk, given, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed,
+        collision, collision_matrix, collision_gap, MappingProxyType(conservation), MappingProxyType(refusals),
+        consequences, momentum,
     )  # fmt: skip
+
+
+def law_of(wall: Wall, facets: Law | None) -> Law:
+    """The law of a wall with facets of this law, or mirrors; raises InputError for a law that no facet can have."""
+    return WallLaw(wall) if facets is None else FacetedLaw(wall, facets)
 
 
 def picture_names(picture_format: str, pictures: Sequence[str] = PICTURES) -> list[str]:
@@ -272,7 +279,7 @@ def _or_refusal(
 
 
 def _gaps(
-    law: WallLaw, tolerance: float, rng: np.random.Generator, refusals: dict[str, str]
+    law: Law, tolerance: float, rng: np.random.Generator, refusals: dict[str, str]
 ) -> tuple[SpectralGap | None, SpectralGap | None]:
     """In the paper's convention and in Feres'."""
     gap = _or_refusal(lambda: spectral_gap(law, tolerance, rng), refusals, "gap")
@@ -281,7 +288,7 @@ def _gaps(
 
 
 def _spectrum(
-    law: WallLaw, matrix: KernelMatrix, gap: SpectralGap | None, tolerance: float, rng: np.random.Generator
+    law: Law, matrix: KernelMatrix, gap: SpectralGap | None, tolerance: float, rng: np.random.Generator
 ) -> Spectrum:
     if gap is not None and gap.verdict == "no gap":
         # whatever the basis, these are numbers of the grid; those of the matrix that is shown and saved
@@ -291,7 +298,7 @@ def _spectrum(
     return with_gap(law_eigenvalues(law, EIGENVALUES, MATRIX_FRACTION * tolerance, rng), gap)
 
 
-def _enclosures(law: WallLaw, gap: SpectralGap | None, tolerance: float) -> Enclosures:
+def _enclosures(law: Law, gap: SpectralGap | None, tolerance: float) -> Enclosures:
     if gap is not None and gap.verdict == "no gap":
         raise AccuracyError("1 belongs to the essential spectrum, and no eigenvalue next to it is isolated", 0.0)
     return enclosures(law, ENCLOSED, tolerance=MATRIX_FRACTION * tolerance)
