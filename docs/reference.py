@@ -107,6 +107,7 @@ STORY = (
     "a_gas_channel",
     "a_tube",
     "a_table_for_dsmc",
+    "partly_diffuse_facets",
     "knudsen_diffusion",
     "retroreflectors",
     "two_laws_compared",

@@ -84,6 +84,22 @@ def test_the_table_falls_in_error_and_its_draws_keep_the_cosine_law(run):
     assert "error of bilinear interpolation" in names["path"].read_text(encoding="utf-8")
 
 
+def test_partly_diffuse_facets_accommodate_more_than_a_guess_and_along_by_the_probability_of_a_hit(run):
+    names = run("partly_diffuse_facets")
+    rng = np.random.default_rng(0)
+    x, theta = rng.random(2**16), ker.SINE.sample(2**16, rng)
+    for name, wall in names["walls"].items():
+        hits, found = geo.trace(wall, x, theta).collisions, names["found"][name]
+        mirrors = float(spec.accommodation(ker.HemisphereLaw(ker.WallLaw(wall)), 1e-3).tangential)
+        for fraction, one in zip(names["fractions"], found, strict=True):
+            kept = (1.0 - fraction) ** hits
+            assert abs(one.along.value - 1.0 + kept.mean()) <= 4.5 * kept.std() / 2**8 + one.along.error
+            assert one.tangential.value > mirrors + fraction * (1.0 - mirrors)
+    # by independent rays in space
+    assert names["found"]["steep grooves"][-1].across.value == pytest.approx(1.297, abs=2e-3)
+    assert np.allclose(np.linalg.norm(names["reflected"], axis=1), np.linalg.norm(names["velocities"], axis=1))
+
+
 def test_grains_conserve_energy_and_momentum_and_slide_if_smooth_and_roll_back_if_not(run):
     names = run("a_granular_collision")
     disks, before, rest = (names["first"], names["second"]), names["before"], names["rest"]
