@@ -165,8 +165,8 @@ def main() -> None:
 @click.option("--orientation", help="WALL is a height map, of random orientation or turned by this angle in radians.")
 def study(
     wall: str, disk: Disk | None, facets: str | None, seed: int, out: Path | None, force: bool, picture_format: str,
-    dpi: float, as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None, spacing: str | None,
-    orientation: str | None, **asked: Any,
+    dpi: float, as_json: bool, verbose: bool, quiet: bool, incidence: str | None, table: Path | None,
+    spacing: str | None, orientation: str | None, **asked: Any,
 ) -> None:  # fmt: skip
     """Study WALL: law, symmetry, spectrum, gap, and the collision law of a disk.
 

@@ -507,6 +507,15 @@ def test_another_convention_does_not_lose_the_wall_that_is_awaited(page):
     assert page.choice.value == "koch"
 
 
+def test_the_slider_of_the_facets_asks_anew_and_refuses_fractions_above_1(page):
+    page.diffuse.value = 0.5
+    collected(page, lambda: page.question.diffuse_fraction == 0.5 and page.answer is not None)
+    assert page.answer.gap.verdict == "undecided" and page.answer.kernel.method == "qmc"
+    page.diffuse.value = 2.0
+    assert "diffuse fraction: expected a number in [0, 1], got 2.0" in page.message
+    assert page.question.diffuse_fraction == 0.5
+
+
 # -- command line
 
 
