@@ -196,7 +196,7 @@ def _multiplied(parts: Sequence[Sum | None]) -> Sum | None:
 # Weight, law of theta, and whether psi becomes pi - psi (else it is unchanged).
 Term: TypeAlias = tuple[float, Law, bool]
 # `discretise` with all its arguments but law and basis.
-Discretiser: TypeAlias = Callable[[Law, Basis], KernelMatrix]
+Discretiser: TypeAlias = "Callable[[Law | SpatialLaw, Basis], KernelMatrix]"
 
 
 class SpatialLaw(Value, ABC):

@@ -23,6 +23,7 @@ from ...core.estimates import Estimate
 from ...kernels import KernelMatrix, Law, Zernike, discretise
 from ...kernels.bases.basis import Basis
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw, HemisphereLaw
+from ...kernels.laws.structure import Discretiser, SpatialLaw
 from ..eigenvalues.spectra import ONE_MATRIX, Verdict
 from .verdict import SpectralGap
 
@@ -50,7 +51,7 @@ def gap_of_grooves(
         return SpectralGap(0.0, 0.0, "bound", "structure of the law", "no gap", (reason,), "specular")
 
     @lru_cache
-    def planar(one: Law, basis: Basis) -> KernelMatrix:
+    def planar(one: Law | SpatialLaw, basis: Basis) -> KernelMatrix:
         return discretise(one, basis, tolerance=0.1 * tolerance, rng=rng)
 
     value, change, wrong = np.inf, np.inf, 0.0
@@ -79,9 +80,7 @@ def gap_of_grooves(
     return SpectralGap(value, error, "estimate", method, verdict, tuple(reasons), "specular").cut_at_zero()
 
 
-def _largest(
-    law: DirectionLaw, degree: int, planar: Callable[[Law, Basis], KernelMatrix], invariant: bool
-) -> tuple[float, float]:
+def _largest(law: DirectionLaw, degree: int, planar: Discretiser, invariant: bool) -> tuple[float, float]:
     """The largest eigenvalue of the matrix off the constants, and the error of the matrix as an operator."""
     top, wrong = -np.inf, 0.0
     for order in range(degree + 1) if invariant else (None,):
