@@ -147,7 +147,7 @@ def draw_picture(record: Path, picture: Path) -> None:
 CAMPAIGNS = (
     Campaign(
         "facet-gaps", "Is the gap with the diffuse fraction a at least a times that of diffuse facets?", draw, judge,
-        CASES, (3, 8, 9),
+        CASES, (3, 9),
     ),
 )  # fmt: skip
 

@@ -115,7 +115,7 @@ class SurfaceLaw(DirectionFactor):
     def on_zernike(
         self, degree: int, degrees: NDArray[np.int64], orders: NDArray[np.int64], discretise: Discretiser
     ) -> OnDisc:
-        found: Any = discretise(self, Zernike(degree))  # type: ignore[arg-type]
+        found: Any = discretise(self, Zernike(degree))
         # n (n + 1)/2 functions have lower degrees, (n + m)/2 of the same degree lower orders
         own = degrees * (degrees + 1) // 2 + (degrees + orders) // 2
         error = float(found.error)
@@ -128,7 +128,7 @@ class SurfaceLaw(DirectionFactor):
         method, tolerance, symmetrise = (asked.pop(name) for name in ("method", "tolerance", "symmetrise"))
         choice("method", method, METHODS)
         samples, source = asked.pop("samples"), generator(asked.pop("rng"), SEED_WITHOUT_RNG)
-        budget = checked_budget(self, method, tolerance, samples, source, symmetrise=symmetrise, engine=asked)  # type: ignore[arg-type]
+        budget = checked_budget(self, method, tolerance, samples, source, symmetrise=symmetrise, engine=asked)
         sampler = SobolSampler(self, basis, budget.rng, SurfaceRays)
         found = sobol_matrix(sampler, replace(budget, rays=min(PILOT_RAYS, budget.rays), engine=None))
         excess = float(found.error) / max(budget.tolerance, EPS)

@@ -349,6 +349,11 @@ def test_a_flat_wall_of_diffuse_facets_is_the_wall_of_maxwell_in_space():
     found = spec.accommodation(ker.HemisphereLaw(law, facets="diffuse in space"), 1e-6)
     for one in (found.across, found.along, found.normal, found.maxwell_fraction):
         assert abs(one.value - 0.4) <= one.error + 1e-12
+    tubes = [
+        spec.transmission(one, 3.0, "tube", 2e-2, 1)
+        for one in (ker.HemisphereLaw(law, facets="diffuse in space"), ker.maxwell(0.4))
+    ]
+    assert abs(tubes[0].value - tubes[1].value) < 2.0 * tubes[0].error < 0.04
 
 
 def test_grooves_of_one_direction_have_a_gap_if_their_facets_are_diffuse_in_space():
