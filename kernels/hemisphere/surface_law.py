@@ -128,7 +128,7 @@ class SurfaceLaw(DirectionFactor):
         method, tolerance, symmetrise = (asked.pop(name) for name in ("method", "tolerance", "symmetrise"))
         choice("method", method, METHODS)
         samples, source = asked.pop("samples"), generator(asked.pop("rng"), SEED_WITHOUT_RNG)
-        budget = checked_budget(self, method, tolerance, samples, source, symmetrise=symmetrise, engine=asked)
+        budget = checked_budget(self, method, tolerance, samples, source, symmetrise=symmetrise, engine=asked)  # type: ignore[arg-type]
         sampler = SobolSampler(self, basis, budget.rng, SurfaceRays)
         found = sobol_matrix(sampler, replace(budget, rays=min(PILOT_RAYS, budget.rays), engine=None))
         excess = float(found.error) / max(budget.tolerance, EPS)
