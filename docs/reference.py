@@ -103,6 +103,7 @@ STORY = (
     "a_measured_surface",
     "a_disk",
     "a_granular_collision",
+    "a_gas_of_rough_disks",
     "no_slip_billiards",
     "a_gas_channel",
     "a_tube",

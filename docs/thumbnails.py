@@ -86,6 +86,20 @@ def grains(ax: Axes) -> None:
     ax.set(xlim=(-2.8, 4.6), ylim=(-1.7, 3.4), aspect="equal")
 
 
+def gas(ax: Axes) -> None:
+    """Disks of a gas between collisions, each with a spoke."""
+    from matplotlib.patches import Circle
+
+    seats = np.array([(2.5 * i, 2.5 * j) for i in range(10) for j in range(7)])
+    velocity = np.random.default_rng(1).standard_normal((len(seats), 3))
+    pair = ker.PairLaw(ker.retroreflection(), geo.Disk())
+    record = ker.play_gas(geo.Torus(25.0, 17.5), pair, seats, velocity, 400, every=400)
+    for (x, y), angle in zip(record.position[-1] % (25.0, 17.5), record.angle[-1], strict=True):
+        ax.add_patch(Circle((x, y), 1.0, facecolor=BLUE, edgecolor="black", alpha=0.7))
+        ax.plot([x, x + np.cos(angle)], [y, y + np.sin(angle)], color="black")
+    ax.set(xlim=(2.0, 23.0), ylim=(1.5, 16.2), aspect="equal")
+
+
 def rough_disks(ax: Axes) -> None:
     """Two disks with bumps on their rims."""
     turn = np.linspace(0.0, 2.0 * np.pi, 1441)
@@ -137,6 +151,7 @@ def exchange(ax: Axes) -> None:
 
 
 PICTURES: dict[str, Callable[[Axes], None]] = {
+    "a_gas_of_rough_disks": gas,
     "a_granular_collision": grains,
     "a_wall_for_a_law": hollows,
     "rough_disks": rough_disks,

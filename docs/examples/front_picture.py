@@ -56,14 +56,17 @@ def main(path: Path, theta: float = 1.1) -> dict[str, float]:
             frames.append(image_of(figure))
             for artist in drawn:
                 artist.remove()
-    # one palette for all: what does not move is not stored again
-    palette = frames[-1].quantize(COLOURS)
+    store(frames, path, COLOURS, [MILLISECONDS] * (len(frames) - 1) + [LAST])
+    law = masses.reshape(BINS, -1).sum(axis=1) / np.diff(edges)
+    return {"frames": len(frames), "difference": float(abs(density - law).max())}
+
+
+def store(frames: list[Image], path: Path, colours: int, milliseconds: list[int]) -> None:
+    """Write a GIF with one palette for all frames: what does not move is not stored again."""
+    palette = frames[-1].quantize(colours)
     palette.putpalette([255 if level > 245 else level for level in palette.getpalette()])
     stored = [frame.quantize(palette=palette, dither=0) for frame in frames]
-    stored[0].save(path, save_all=True, append_images=stored[1:], loop=0, optimize=True,
-                   duration=[MILLISECONDS] * (len(stored) - 1) + [LAST])  # fmt: skip
-    law = masses.reshape(BINS, -1).sum(axis=1) / np.diff(edges)
-    return {"frames": len(stored), "difference": float(abs(density - law).max())}
+    stored[0].save(path, save_all=True, append_images=stored[1:], loop=0, optimize=True, duration=milliseconds)
 
 
 def path_of(wall: geo.Wall, x: float, theta: float) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 import importlib.util
 import re
 import sys
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -156,6 +157,8 @@ def test_the_moving_picture_ends_with_the_law_and_is_small(tmp_path):
 
 
 def test_the_gallery_draws_what_pages_show(tmp_path, monkeypatch):
+    from PIL import Image
+
     monkeypatch.syspath_prepend(EXAMPLES)
     gallery = load("gallery")
     # the studies are tested for themselves; here only what becomes of them
@@ -163,8 +166,12 @@ def test_the_gallery_draws_what_pages_show(tmp_path, monkeypatch):
     for name in studies:
         monkeypatch.setattr(getattr(gallery, name), "main", lambda picture: picture.touch())
         sys.modules.pop(name, None)
+    monkeypatch.setattr(gallery, "moving_gas", partial(gallery.moving_gas, frames=3))
     drawn = {path.name for path in gallery.main(tmp_path / "gallery")}
-    assert drawn == {"front.gif", "walls.png", *(f"{name.replace('_', '-')}.png" for name in studies[1:])}
+    for path, frames in ((tmp_path / "gallery" / "gas.gif", 3), (EXAMPLES.parent / "gallery" / "gas.gif", 30)):
+        with Image.open(path) as picture:
+            assert picture.n_frames == frames and picture.info["loop"] == 0
+    assert drawn == {"front.gif", "gas.gif", "walls.png", *(f"{name.replace('_', '-')}.png" for name in studies[1:])}
     docs = EXAMPLES.parent
     pages = [path.read_text(encoding="utf-8") for path in [docs.parent / "README.md", *docs.glob("**/*.md")]]
     # others too may have a picture there, if a page shows it
@@ -172,7 +179,8 @@ def test_the_gallery_draws_what_pages_show(tmp_path, monkeypatch):
     assert drawn <= committed
     for name in committed:
         assert any(f"gallery/{name}" in page for page in pages), name
-        assert (docs / "gallery" / name).stat().st_size < (1_000_000 if name == "front.gif" else 150_000)
+        largest = {"front.gif": 1_000_000, "gas.gif": 400_000}.get(name, 150_000)
+        assert (docs / "gallery" / name).stat().st_size < largest
 
 
 def test_walls_are_found_for_laws(tmp_path):
