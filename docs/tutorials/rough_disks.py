@@ -237,6 +237,7 @@ print(f"kurtosis of spins   {whole.spin_kurtosis}")
 assert abs(3 * float(whole.spin_fraction) - 1) < min(0.01, 6 * whole.spin_fraction.error)
 assert 95 < float(whole.collision_rate) < 105
 assert abs(float(whole.spin_kurtosis) - 3) < 0.05
+assert found["flatter bumps, K = 1/3"][1].spin_fraction.error > found["round bumps, K = 1"][1].spin_fraction.error
 
 # %%
 # How fast? The spectral gap of the collision law says what part of a direction is forgotten in each collision. For
