@@ -325,8 +325,8 @@ class Container(Summary):
     @property
     def has_outer_loop(self) -> bool:
         """Whether the curves have an outer loop."""
-        areas = (sum(self.curves[k].signed_area for k in loop) for loop in boundary.loops_of(self.curves))
-        return bool(self.curves) and any(area > 0.0 for area in areas)
+        loops = boundary.loops_of(self.curves) if self.curves else []
+        return any(sum(self.curves[k].signed_area for k in loop) > 0.0 for loop in loops)
 
     def contains(self, position: ArrayLike) -> NDArray[np.bool_]:
         """Return whether each of the points (n, 2) is inside or on the boundary."""

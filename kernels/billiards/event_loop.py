@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.checkpoints import Stored
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
 from ...geometry import Container, Disk, Torus
@@ -157,6 +158,43 @@ class EventLoop:
         source = np.frombuffer(json.dumps(self.rng.bit_generator.state).encode(), np.uint8)
         clock = np.array([self.base, self.unresolved, self._restarted])
         return {**{name: getattr(self, name) for name in CHANGING}, "clock": clock, "rng": source}
+
+    def stored(self, arrays: Mapping[str, NDArray[Any]]) -> dict[str, Stored]:
+        """What the arrays of a snapshot must be; NaN is in no range."""
+        ranges = {"heads": (-1, len(self.floats) - 1), "uniforms": (0.0, 1.0)}
+        found = {
+            name: Stored(own.dtype.kind, own.shape, *ranges.get(name, (-math.inf, math.inf)))
+            for name, own in ((name, getattr(self, name)) for name in CHANGING)
+        }
+        return {**found, "clock": Stored("f", (3,), 0.0), "rng": Stored("u", (arrays["rng"].size,), 0, 255)}
+
+    def check(self, arrays: Mapping[str, NDArray[Any]], events: int) -> None:
+        """Raise a ValueError if a number of a snapshot would lead the compiled loop out of its tables."""
+        ints, n, walls = arrays["ints"], len(self.floats), len(self.laws) - 1
+        disk, wall, index = (-1, n - 1), (-1, walls - 1), np.arange(n)
+        flow = {
+            g.EVENTS: (0, events), g.DRAWN: (0, BLOCK), g.ANSWERED: (g.NO_ANSWER, g.A_VELOCITY), g.FIRST: disk,
+            g.SECOND: disk, g.LAW: (0, walls), g.TERM: (0, len(self.terms) - 1), g.EVENT_DISK: disk,
+            g.EVENT_PARTNER: disk, g.EVENT_WALL: wall, g.CROSSED: (0, math.inf),
+        }  # fmt: skip
+        good = all(low <= arrays["flow"][k] <= high for k, (low, high) in flow.items())
+        columns = {g.LAST: wall, g.STATUS: (0, max(FlightStatus)), g.AFTER: disk, g.BEFORE: disk, g.PLACE: (0, n - 1)}
+        good &= all(np.all((ints[:, k] >= low) & (ints[:, k] <= high)) for k, (low, high) in columns.items())
+        next_wall, kind = ints[:, g.WALL], ints[:, g.KIND]
+        met = [(one == g.NO_EVENT) | ((one < 0) & (one >= -walls)) for one in (next_wall, kind)]
+        crossed = (kind <= g.CROSSING) & (kind > g.CROSSING - 4)
+        good &= bool(np.all(met[0] & (met[1] | crossed | ((kind >= 0) & (kind < n)))))
+        good &= np.array_equal(np.sort(ints[:, g.HEAP]), index)
+        if not (good and np.array_equal(ints[ints[:, g.PLACE], g.HEAP], index)):
+            raise ValueError("a number without meaning")
+        # each disk is in one list
+        listed, seen = arrays["heads"][arrays["heads"] >= 0], np.zeros(n, np.int64)
+        while len(listed) and seen.max(initial=0) <= 1:
+            np.add.at(seen, listed, 1)
+            listed = ints[listed, g.AFTER]
+            listed = listed[listed >= 0]
+        if np.any(seen != 1):
+            raise ValueError("lists of cells that do not have each disk once")
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a `snapshot` of this gas."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checkpoints import Checkpoint, packed_arrays, unpacked_arrays
+from ...core.checkpoints import Checkpoint, Stored, packed_arrays, unpacked_arrays
 from ...core.checks import (
     Floats,
     Rng,
@@ -372,16 +373,36 @@ class _Store:
     def save(self, file: Checkpoint) -> None:
         """Store all that is kept, and the state of the loop."""
         states = dict(zip(STATES, map(np.array, zip(*self.states, strict=True)), strict=True))
-        kept = {"integrals": self.integrals, "marks": self.marks, "counts": [self.counted, self.kept]}
+        marks = np.reshape(self.marks, (-1, len(self.loop.floats), 2))
+        kept = {"integrals": self.integrals, "marks": marks, "counts": [self.counted, self.kept]}
         file.put("gas", packed_arrays({**self.loop.snapshot(), **states, **kept}), now=True)
 
     def restore(self, file: Checkpoint) -> None:
         """Go on from what is stored."""
-        for _, arrays in file.parts(lambda _, content: unpacked_arrays(content)):
+        for _, arrays in file.parts(lambda _, content: self.read(content)):
             self.states = list(zip(*(arrays[name] for name in STATES), strict=True))
             self.integrals, self.marks = list(arrays["integrals"]), list(arrays["marks"])
             self.counted, self.kept = arrays["counts"].tolist()
             self.loop.restore(arrays)
+
+    def read(self, content: bytes) -> dict[str, NDArray[Any]]:
+        """The arrays of a part; raises an error if they are not those of such a gas."""
+        found, n, most = (
+            unpacked_arrays(content),
+            len(self.loop.floats),
+            max(len(self.loop.floats), len(self.loop.laws)),
+        )
+        m = len(found["time"])
+        expected = {
+            **self.loop.stored(found), "time": Stored("f", (m,), 0.0), "met": Stored("i", (m, 3), -1, most - 1),
+            "position": Stored("f", (m, n, 2)), "angle": Stored("f", (m, n)), "velocity": Stored("f", (m, n, 3)),
+            "integrals": Stored("f", (len(found["integrals"]), len(self.integrals[0]))),
+            "marks": Stored("f", (len(found["marks"]), n, 2)), "counts": Stored("i", (2,), 0, self.events),
+        }  # fmt: skip
+        arrays = unpacked_arrays(content, expected)
+        self.loop.check(arrays, self.events)
+        json.loads(arrays["rng"].tobytes())
+        return arrays
 
     def mark(self) -> None:
         """Keep the positions in a torus after every 16th row of integrals."""

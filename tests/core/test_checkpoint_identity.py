@@ -255,6 +255,18 @@ CALLS = {
         partial(ker.play, geo.Container.strip(), ker.CollisionLaw(ker.MatrixLaw(array), DISK), **FLIGHT)
         for array in (SWAP, np.eye(2))
     ],
+    "kernels.play_gas": [
+        partial(
+            ker.play_gas,
+            geo.Torus(8.0, 8.0),
+            ker.PairLaw(ker.MatrixLaw(array), DISK, DISK),
+            [[2.0, 2.0], [6.0, 2.5]],
+            [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
+            6,
+            rng=1,
+        )
+        for array in (SWAP, np.eye(2))
+    ],
     "kernels.limit_study": [
         partial(ker.limit_study, DISK, geo.triangular_teeth(0.7), [1e-3, 1e-4, 1e-5], spacing=own_spacing(x), **SHORT)
         for x in (5.0, 5.5)
