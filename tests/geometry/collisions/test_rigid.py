@@ -123,7 +123,7 @@ def test_the_wall_is_periodic_and_the_ring_of_satellites_too():
 
 def test_the_invariant_measure_is_kept():
     # K preserves <w, e2> dx1 dalpha dw: the mean of a function over incoming states is that over outgoing ones
-    wall, scale, n = WALLS["focusing"], 0.05, 40_000
+    wall, scale, n = WALLS["focusing"], 0.05, 20_000
     position, velocity = states(wall, scale, n, seed=5)
     out = geo.collide(DISK, wall, scale, position, velocity)
     for function in (lambda t, p: np.cos(t) ** 2, lambda t, p: np.cos(p), lambda t, p: np.cos(t + 2 * p)):

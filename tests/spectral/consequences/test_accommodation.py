@@ -178,7 +178,7 @@ def exact_coefficients(vertices, theta):
 @pytest.mark.parametrize("diffuse", [0.0, 1e-9])
 def test_coefficients_of_random_shallow_walls_have_the_digits_of_sums_in_fifty_digits(size, diffuse):
     rng = np.random.default_rng(int(-np.log10(size)))
-    for _ in range(3):
+    for _ in range(2):
         vertices = random_polygon(size, rng)
         law = ker.WallLaw(geo.Wall([geo.Segment(*ends) for ends in pairwise(vertices)]))
         law = diffuse * ker.lambertian() + (1.0 - diffuse) * law if diffuse else law
