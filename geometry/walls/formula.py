@@ -1,4 +1,4 @@
-"""Walls y = f(x): Bezier pieces near a function, its slope and its curvature."""
+"""Walls y = f(x): Bezier pieces near a function, its slope and its second derivative."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, number_between, numbers
 from ...core.errors import InputError, WallError
 from ...core.given import Vectorised
+from ...core.long_runs import progress_bar
 from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
@@ -21,13 +22,13 @@ from ..curves.segment import Segment
 # Tolerances; below the least, slopes of doubles would not be known.
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-11, 0.01
 # Chebyshev nodes of the polynomials that stand for the function, from 1 to -1, and their shortest interval, in periods.
-NODES, NARROWEST = np.cos(np.pi * (np.arange(17) + 0.5) / 17), 2.0**-16
-# Tolerance of the polynomials: their slopes are taken for those of the function.
-RESOLVED = 1e-2
+NODES, NARROWEST = np.cos(np.pi * (np.arange(17) + 0.5) / 17), 2.0**-24
+# Tolerance of the polynomials, and of their derivatives as the last four terms show it at most, as fractions.
+RESOLVED, SEEN, LAST = 1e-2, 0.1, np.arange(13, 17)
 # The function is compared at so many points of an interval at least, and at so many in a period.
 LEAST_POINTS, POINTS = 32, 1024
-# Slope and curvature of a piece of width h may differ by so many tolerances over h, and over h^2.
-SLOPES, CURVATURES = 10.0, 100.0
+# Slope and second derivative of a piece of width h may differ by so many tolerances over h, and over h^2.
+SLOPES, SECONDS = 10.0, 100.0
 # Parameters at which a piece is compared, and cubic Bernstein polynomials at those at which it is fitted.
 COMPARED, FITTED = np.linspace(0.0, 1.0, 65), np.linspace(0.0, 1.0, 18)[1:-1]
 BERNSTEIN = np.stack([comb(3, k) * FITTED**k * (1.0 - FITTED) ** (3 - k) for k in range(4)], axis=1)
@@ -51,18 +52,21 @@ def pieces_of_function(
     parts = [part for low, high in pairwise(edges) for part in _smooth_parts(given, low, high, period, step)]
     slopes = _slopes(parts, mirrored, step)
     pieces: list[Curve] = []
-    for part, ends in zip(parts, slopes, strict=True):
-        # the function's own values, but for jumps
-        own, y = given(part.domain), part(part.domain)
-        y = np.where(np.abs(own - y) <= RESOLVED * step, own, y)
-        pieces += _fitted(part, part.domain, y, ends, step)
+    with progress_bar(len(parts), "interval", "wall of a function") as bar:
+        for part, ends in zip(parts, slopes, strict=True):
+            # the function's own values, but for jumps
+            own, y = given(part.domain.copy()), part(part.domain)
+            y = np.where(np.abs(own - y) <= RESOLVED * step, own, y)
+            pieces += _fitted(part, part.domain, y, ends, step)
+            bar.update()
     if mirrored:
         pieces += [piece.stretched(-1.0, 1.0).moved(period, 0.0).reversed() for piece in reversed(pieces)]
     return _joined(pieces, step)
 
 
 def _values(height: Vectorised, x: Floats) -> Floats:
-    found = height(x)
+    # a copy, because the function may change it
+    found = height(x.copy())
     bad = ~np.isfinite(found)
     if bad.any():
         raise WallError(f"height: expected finite heights, got {found[bad][0]} at x = {x[bad][0]:.9g}")
@@ -81,11 +85,6 @@ def _smooth_parts(height: Vectorised, low: float, high: float, period: float, st
     """Polynomials that are the function on intervals side by side."""
     from scipy.fft import dct
 
-    if high - low < NARROWEST * period:
-        raise WallError(
-            f"height: expected slopes and curvatures that are continuous between breakpoints, but near x = {low:.4g} "
-            "they are not; pass the places of jumps as breakpoints, and make an Arc where the wall is vertical"
-        )
     middle = 0.5 * (low + high)
     level = _values(height, np.array([middle]))
     # without the level, the rounding errors are those of the differences; the transform rounds less than `interpolate`
@@ -95,8 +94,17 @@ def _smooth_parts(height: Vectorised, low: float, high: float, period: float, st
     found = Chebyshev(coefficients, [low, high])
     number = max(LEAST_POINTS, int(POINTS * (high - low) / period))
     x = low + (np.arange(number) + 0.5) * (high - low) / number
-    if np.all(np.abs(found(x) - _values(height, x)) <= RESOLVED * step):
+    off, last = float(np.abs(found(x) - _values(height, x)).max()), np.abs(coefficients[LAST])
+    # at the ends, the derivatives of the k-th Chebyshev polynomial are k^2 and k^2 (k^2 - 1)/3
+    slope, bend = 2.0 * last @ LAST**2, 4.0 / 3.0 * last @ (LAST**2 * (LAST**2 - 1))
+    if off <= RESOLVED * step and slope <= SEEN * SLOPES * step and bend <= SEEN * SECONDS * step:
         return [found]
+    if high - low < NARROWEST * period:
+        raise WallError(
+            f"height: expected slopes and curvatures that are continuous between breakpoints, but near x = {low:.4g} "
+            f"heights differ by {off:.1g} from those of a smooth curve; pass the places of jumps as breakpoints, or a "
+            "tolerance above the rounding or noise of the heights, and make an Arc where the wall is vertical"
+        )
     return [*_smooth_parts(height, low, middle, period, step), *_smooth_parts(height, middle, high, period, step)]
 
 
@@ -151,7 +159,7 @@ def _with_handles(height: Chebyshev, x: Floats, y: Floats, slope: Floats) -> Bez
 
 
 def _is_near(curve: Bezier, height: Chebyshev, width: float, step: float) -> bool:
-    """Whether heights, slopes and curvatures are within the tolerance."""
+    """Whether heights, slopes and second derivatives are within the tolerance."""
     x, y = polyval(COMPARED, curve.powers)
     vx, vy = polyval(COMPARED, polyder(curve.powers))
     ax, ay = polyval(COMPARED, polyder(curve.powers, 2))
@@ -159,11 +167,11 @@ def _is_near(curve: Bezier, height: Chebyshev, width: float, step: float) -> boo
         return False
     first = height.deriv()
     slope, bend = first(x), first.deriv()(x)
-    curvature = (vx * ay - vy * ax) / np.hypot(vx, vy) ** 3
+    second = (vx * ay - vy * ax) / vx**3
     return bool(
         np.all(np.abs(y - height(x)) <= step)
         and np.all(np.abs(vy / vx - slope) <= SLOPES * step / width)
-        and np.all(np.abs(curvature - bend / np.hypot(1.0, slope) ** 3) <= CURVATURES * step / width**2)
+        and np.all(np.abs(second - bend) <= SECONDS * step / width**2)
     )
 
 
@@ -173,7 +181,7 @@ def _joined(pieces: list[Curve], step: float) -> list[Curve]:
     joined: list[Curve] = []
     here: Point = (0.0, pieces[-1].end[1] - top)
     for piece in (piece.moved(0.0, -top) for piece in pieces):
-        if abs(piece.start[1] - here[1]) > step:
+        if abs(piece.start[1] - here[1]) > RESOLVED * step:
             joined.append(Segment(here, piece.start))
             here = piece.start
         joined.append(piece.pinned(here, piece.end))

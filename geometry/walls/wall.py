@@ -218,8 +218,8 @@ class Wall(Cell):
         -------
         Wall
             On each piece, of width h, the height differs from f by at most ``tolerance * period``, the slope from f'
-            by 10 times this over h, and the curvature by 100 times this over h^2. Intervals on which f is linear are
-            segments, and where f jumps there are vertical segments.
+            by 10 times this over h, and the second derivative from f'' by 100 times this over h^2. Intervals on which f
+            is linear are segments, and where f jumps there are vertical segments.
 
         Raises
         ------

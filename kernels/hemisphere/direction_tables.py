@@ -56,7 +56,8 @@ class DirectionTable(SavedTable):
     error : float
         Mean distance of outgoing velocities of speed 1 between table and law at the same probabilities, over incoming
         velocities of the cosine law between those of the grid. It is an estimate by independent rays and includes their
-        noise, and it bounds the difference of mean values of any function with the Lipschitz constant 1.
+        noise. Averaged over incoming velocities, mean values of a function with the Lipschitz constant 1 differ by no
+        more.
     distribution_error : float
         Half width of 95 % of the distribution functions of the square, at all incoming velocities of the grid together.
         Those of the azimuth in a slice come from fewer rays, which ``error`` contains.

@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, instance
+from ...core.checks import Floats, Rng, angles, generator, instance
 from ...core.errors import AccuracyError, AsperityError, InputError
 from ...core.long_runs import slices
 from ...geometry import Wall
@@ -64,7 +64,8 @@ class FacetedLaw(Law):
     -----
     Rays are drawn: at each hit the arriving angle becomes the incoming one of ``facets``. A conditional distribution
     consists of 4096 drawn angles, without a known error. `discretise` takes view factors between parts of the boundary
-    for `maxwell` facets, and independent rays for others.
+    for `maxwell` facets on closed walls of at most 640 segments and arcs, and independent rays for all others, among
+    them walls with Bezier pieces such as `sinusoid`.
 
     For a disk, ``CollisionLaw(FacetedLaw(wall.foreshorten(disk), facets), disk)`` has the law of the facets in the
     metric of the energy; foreshortening does not commute with it (see the page on facets).
@@ -153,20 +154,21 @@ class FacetedLaw(Law):
             outgoing[some] = np.where(resolved, left, incoming[some])
         return outgoing.reshape(theta.shape), escaped.reshape(theta.shape)
 
-    def scattered(self, theta: Floats, rng: np.random.Generator) -> tuple[Floats, NDArray[np.bool_]]:
+    def scattered(self, theta: ArrayLike, rng: Rng = None) -> tuple[Floats, NDArray[np.bool_]]:
         """`sample` for facets diffuse in part, shape (n,), and which rays met a diffuse facet."""
-        fraction, found = self.diffuse_fraction or 0.0, np.zeros(theta.size, dtype=np.bool_)
-        outgoing, escaped = np.empty(theta.size), np.empty(theta.size, dtype=np.bool_)
-        entry = entry_inside(rng.random(theta.size)) * self.wall.period
-        for some in slices(theta.size, CHUNK):
+        source, incoming = generator(rng), angles("theta", theta).ravel()
+        fraction, found = self.diffuse_fraction or 0.0, np.zeros(incoming.size, dtype=np.bool_)
+        outgoing, escaped = np.empty(incoming.size), np.empty(incoming.size, dtype=np.bool_)
+        entry = entry_inside(source.random(incoming.size)) * self.wall.period
+        for some in slices(incoming.size, CHUNK):
             own = found[some]
 
             def turn(angle: Floats, who: NDArray[np.int64], own: NDArray[np.bool_] = own) -> Floats:
-                is_diffuse = rng.random(angle.size) < fraction
+                is_diffuse = source.random(angle.size) < fraction
                 own[who] |= is_diffuse
-                return np.where(is_diffuse, SINE.sample(angle.size, rng), np.pi - angle)
+                return np.where(is_diffuse, SINE.sample(angle.size, source), np.pi - angle)
 
-            outgoing[some], _, status = follow_facets(self.wall, entry[some], theta[some], turn)
+            outgoing[some], _, status = follow_facets(self.wall, entry[some], incoming[some], turn)
             escaped[some] = status == Status.ESCAPED
         return if_escaped(self, outgoing, escaped, LOST), found
 

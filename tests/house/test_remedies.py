@@ -40,9 +40,10 @@ REMEDIES = {
         lambda: asperity.verify((Z + 1) ** 2 == Z**2 + 2 * Z + 1),
         lambda: (asperity.verify(Z * Z, Z**2), asperity.verify(sp.Eq((Z + 1) ** 2, Z**2 + 2 * Z + 1))),
     ),
-    "pass the places of jumps as breakpoints, and make an Arc": (
+    "pass the places of jumps as breakpoints, or a tolerance above": (
         lambda: geo.Wall.from_function(lambda x: np.where(x < 0.3, 0.0, x - 0.3)),
         lambda: (
+            geo.Wall.from_function(lambda x: 1e6 + np.cos(2 * np.pi * x), tolerance=1e-6),
             geo.Wall.from_function(lambda x: np.where(x < 0.3, 0.0, x - 0.3), breakpoints=[0.3]),
             geo.Wall([geo.Arc((0.5, 0.0), 0.5, np.pi, 2 * np.pi)]),
         ),

@@ -132,7 +132,11 @@ class SurfaceStudy(SavedStudy):
     def _draw_angles(self, ax: Axes) -> None:
         found = self.accommodation
         ax.errorbar(found.incidence_deg, found.tangential_at, found.tangential_errors, marker="o", label="tangential")
-        ax.errorbar(found.incidence_deg, found.normal_at, found.normal_errors, marker="s", label="normal")
+        # no line through the pole of the normal coefficient, at cos(incidence) = 2/3
+        beyond = np.cos(np.radians(found.incidence_deg)) < 2.0 / 3.0
+        for side, label in ((~beyond, "normal"), (beyond, None)):
+            parts = (np.asarray(one)[side] for one in (found.incidence_deg, found.normal_at, found.normal_errors))
+            ax.errorbar(*parts, marker="s", color="C1", label=label)
         ax.set(xlabel="incidence (degrees from the normal)", ylabel="accommodation of momentum")
         ax.legend()
 

@@ -88,9 +88,9 @@ def test_the_function_may_have_any_period_and_level_and_is_called_with_arrays():
     ("height", "options", "words"),
     [
         ("cos", {}, "height: expected a function of arrays of positions, got 'cos'"),
-        (lambda x: np.where(x < 0.3, 0.0, x - 0.3), {}, "but near x = 0.3 they are not"),
+        (lambda x: np.where(x < 0.3, 0.0, x - 0.3), {}, "but near x = 0.3 heights differ by"),
         (lambda x: -np.sqrt(0.25 - (x - 0.5) ** 2), {}, "make an Arc where the wall is vertical"),
-        (lambda x: np.where(x < 0.31, 0.0, -1.0), {}, "near x = 0.31 they are not"),
+        (lambda x: np.where(x < 0.31, 0.0, -1.0), {}, "near x = 0.31 heights differ by 0.6"),
         (lambda x: np.where(x < 0.3, 0.0, np.nan), {}, "height: expected finite heights, got nan at x = 0.30"),
         (lambda x: 1.0 if x < 0.5 else 0.0, {}, "numpy.vectorize(function)"),
         (np.cos, {"tolerance": 1e-13}, "tolerance: expected a number in [1e-11, 0.01]"),
@@ -100,6 +100,7 @@ def test_the_function_may_have_any_period_and_level_and_is_called_with_arrays():
         (np.cos, {"breakpoints": [math.nan]}, "breakpoints"),
         (np.cos, {"breakpoints": 0.5}, "breakpoints: expected a list of positions in [0, 1], got 0.5"),
         (lambda x: x + 1j, {}, "values of the function"),
+        (lambda x: 1e5 + 0.1 * np.cos(2 * np.pi * x + 1), {}, "a tolerance above the rounding or noise of the heights"),
     ],
 )
 def test_what_is_no_wall_is_refused_with_the_place(height, options, words):
@@ -112,3 +113,38 @@ def test_what_the_refusals_advise_is_taken():
     assert of(np.vectorize(lambda x: 1.0 if x < 0.5 else 0.0), breakpoints=[0.5]).depth == 1.0
     wall = geo.Wall([geo.Arc((0.5, 0.0), 0.5, math.pi, 2 * math.pi)])
     assert wall.depth == 0.5
+
+
+@pytest.mark.parametrize(
+    ("height", "slope", "bend", "tolerance"),
+    [
+        (lambda u: 0.0246 * np.arctan(u), lambda u: 0.0246 / (1 + u**2), lambda u: -0.0492 * u / (1 + u**2) ** 2, 9e-5),
+        (lambda u: 0.2 / (1 + u**2), lambda u: -0.4 * u / (1 + u**2) ** 2,
+         lambda u: (1.2 * u**2 - 0.4) / (1 + u**2) ** 3, 1e-3),
+    ],
+    ids=["step", "peak"],
+)  # fmt: skip
+def test_derivatives_hold_beside_narrow_details_at_coarse_tolerances(height, slope, bend, tolerance):
+    middle, width = 0.476, 6e-4
+    wall = of(lambda x: height((x - middle) / width), tolerance=tolerance)
+    s = np.linspace(0.0, 1.0, 65)
+    for piece in wall.pieces:
+        h = piece.end[0] - piece.start[0]
+        if h > 0.0:
+            u = (piece.point(s)[:, 0] - middle) / width
+            tangent = piece.tangent(s)
+            steep = tangent[:, 1] / tangent[:, 0]
+            second = np.array([piece.curvature(t) for t in s]) * np.hypot(1.0, steep) ** 3
+            assert np.abs(steep - slope(u) / width).max() <= 10.0 * tolerance / h
+            assert np.abs(second - bend(u) / width**2).max() <= 100.0 * tolerance / h**2
+
+
+def test_a_narrow_peak_with_breakpoints_at_both_sides_is_seen_and_the_arguments_are_kept():
+    wall = of(lambda x: 0.1 * np.exp(-(((x - 0.4) / 1e-5) ** 2)), breakpoints=[0.4 - 1e-4, 0.4 + 1e-4])
+    assert wall.depth == pytest.approx(0.1, abs=1e-9)
+
+    def changed(x):
+        x -= 0.5
+        return 0.1 * np.cos(2 * np.pi * x)
+
+    assert of(changed).depth == pytest.approx(0.2, abs=1e-9)
