@@ -135,8 +135,8 @@ class SurfaceStudy(SavedStudy):
         # no line through the pole of the normal coefficient, at cos(incidence) = 2/3
         beyond = np.cos(np.radians(found.incidence_deg)) < 2.0 / 3.0
         for side, label in ((~beyond, "normal"), (beyond, None)):
-            parts = (np.asarray(one)[side] for one in (found.incidence_deg, found.normal_at, found.normal_errors))
-            ax.errorbar(*parts, marker="s", color="C1", label=label)
+            degrees, error = np.asarray(found.incidence_deg)[side], found.normal_errors[side]
+            ax.errorbar(degrees, found.normal_at[side], error, marker="s", color="C1", label=label)
         ax.set(xlabel="incidence (degrees from the normal)", ylabel="accommodation of momentum")
         ax.legend()
 
