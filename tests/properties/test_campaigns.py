@@ -11,7 +11,6 @@ from campaigns import engine
 from campaigns.engine import Campaign, Judged, campaigns, faults, refuted, rows
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("campaign", campaigns().values(), ids=list(campaigns()))
 def test_no_campaign_refutes_the_library_in_small(campaign):
     found = [(number, campaign.judged(number)) for number in campaign.small]
