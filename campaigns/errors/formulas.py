@@ -30,7 +30,7 @@ def draw(number: int) -> Formula:
     """A random function of the kinds in turn."""
     rng = np.random.default_rng([62, number])
     kind, period = KINDS[number % len(KINDS)], float(np.exp(rng.uniform(-3.0, 3.0)))
-    tolerance, breakpoints = 10.0 ** rng.uniform(-11.0, -3.0), np.empty(0)
+    tolerance, breakpoints = 10.0 ** rng.uniform(-10.0, -3.0), np.empty(0)
     size = period * np.exp(rng.uniform(-4.0, 0.5))
     if kind == "rational":
         middle, width = rng.uniform(0.2, 0.8) * period, period * np.exp(rng.uniform(-2.5, -0.5))

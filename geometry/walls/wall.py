@@ -208,7 +208,7 @@ class Wall(Cell):
         period : float
             Greater than 0.
         tolerance : float
-            From 1e-11 to 0.01, in periods.
+            From 1e-11 to 0.01, in periods. Below 1e-10 the rounding of the heights may not allow it, and is refused.
         breakpoints : array_like, shape (n,)
             Positions at which f or its first two derivatives jump; 0 and the period are breakpoints.
         unit : str
