@@ -364,6 +364,12 @@ def test_a_refused_file_is_read_again_when_its_options_change_or_it_is_sent_agai
     waited(page, lambda: page.question.name == "koch" and not page._awaited)
 
 
+@pytest.mark.parametrize("name", geo.WALLS)
+def test_every_named_wall_can_be_chosen_and_has_its_sliders(page, name):
+    page.choice.value = name
+    assert page.parameters.keys() == geo.WALLS[name].defaults.keys()
+
+
 @pytest.mark.usefixtures("uncollected")
 def test_vertices_and_numbers_beyond_the_limits_are_refused_before_any_work(page):
     x = np.linspace(0.0, 1.0, 100_000)

@@ -30,7 +30,7 @@ GRACE = 0.4
 RANGES = {
     "angle": (0.05, 3.0), "height_to_width": (0.05, 6.0), "half_angle": (0.05, 1.55), "curvature": (0.02, 1.98),
     "mass": (0.1, 5.0), "inertia_ratio": (0.05, 5.0), "stem_to_cap": (0.02, 0.95), "stem_aspect": (0.0, 3.0),
-    "generations": (1, 4), "diffuse_fraction": (0.0, 1.0),
+    "generations": (1, 4), "amplitude": (0.02, 2.0), "diffuse_fraction": (0.0, 1.0),
 }  # fmt: skip
 DRAWN = "a polygon of your own"
 CONVENTIONS = {"retroreflection = identity": "paper", "specular = identity": "specular"}
