@@ -45,7 +45,8 @@ def pieces_of_function(
     if inner.ndim != 1 or not np.all((inner >= 0.0) & (inner <= period)):
         raise InputError(f"breakpoints: expected a list of positions in [0, {period:g}], got {breakpoints!r}")
     edges = np.unique([0.0, *inner.tolist(), period]).tolist()
-    given = Vectorised.of(height)
+    # a copy, because the function may change what it gets
+    given = Vectorised(lambda x: height(x.copy()))
     mirrored = _is_mirrored(given, edges, step)
     if mirrored:
         edges = [edge for edge in edges if edge < 0.5 * period] + [0.5 * period]
@@ -55,7 +56,7 @@ def pieces_of_function(
     with progress_bar(len(parts), "interval", "wall of a function") as bar:
         for part, ends in zip(parts, slopes, strict=True):
             # the function's own values, but for jumps
-            own, y = given(part.domain.copy()), part(part.domain)
+            own, y = given(part.domain), part(part.domain)
             y = np.where(np.abs(own - y) <= RESOLVED * step, own, y)
             pieces += _fitted(part, part.domain, y, ends, step)
             bar.update()
@@ -65,8 +66,7 @@ def pieces_of_function(
 
 
 def _values(height: Vectorised, x: Floats) -> Floats:
-    # a copy, because the function may change it
-    found = height(x.copy())
+    found = height(x)
     bad = ~np.isfinite(found)
     if bad.any():
         raise WallError(f"height: expected finite heights, got {found[bad][0]} at x = {x[bad][0]:.9g}")

@@ -159,14 +159,14 @@ class EventLoop:
         clock = np.array([self.base, self.unresolved, self._restarted])
         return {**{name: getattr(self, name) for name in CHANGING}, "clock": clock, "rng": source}
 
-    def stored(self, arrays: Mapping[str, NDArray[Any]]) -> dict[str, Stored]:
+    def stored(self) -> dict[str, Stored]:
         """What the arrays of a snapshot must be; NaN is in no range."""
         ranges = {"heads": (-1, len(self.floats) - 1), "uniforms": (0.0, 1.0)}
         found = {
             name: Stored(own.dtype.kind, own.shape, *ranges.get(name, (-math.inf, math.inf)))
             for name, own in ((name, getattr(self, name)) for name in CHANGING)
         }
-        return {**found, "clock": Stored("f", (3,), 0.0), "rng": Stored("u", (arrays["rng"].size,), 0, 255)}
+        return {**found, "clock": Stored("f", (3,), 0.0), "rng": Stored("u", (None,), 0, 255)}
 
     def check(self, arrays: Mapping[str, NDArray[Any]], events: int) -> None:
         """Raise a ValueError if a number of a snapshot would lead the compiled loop out of its tables."""

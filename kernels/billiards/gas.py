@@ -387,19 +387,16 @@ class _Store:
 
     def read(self, content: bytes) -> dict[str, NDArray[Any]]:
         """The arrays of a part; raises an error if they are not those of such a gas."""
-        found, n, most = (
-            unpacked_arrays(content),
-            len(self.loop.floats),
-            max(len(self.loop.floats), len(self.loop.laws)),
-        )
-        m = len(found["time"])
+        n, most = len(self.loop.floats), max(len(self.loop.floats), len(self.loop.laws))
         expected = {
-            **self.loop.stored(found), "time": Stored("f", (m,), 0.0), "met": Stored("i", (m, 3), -1, most - 1),
-            "position": Stored("f", (m, n, 2)), "angle": Stored("f", (m, n)), "velocity": Stored("f", (m, n, 3)),
-            "integrals": Stored("f", (len(found["integrals"]), len(self.integrals[0]))),
-            "marks": Stored("f", (len(found["marks"]), n, 2)), "counts": Stored("i", (2,), 0, self.events),
+            **self.loop.stored(), "time": Stored("f", (None,), 0.0), "met": Stored("i", (None, 3), -1, most - 1),
+            "position": Stored("f", (None, n, 2)), "angle": Stored("f", (None, n)),
+            "velocity": Stored("f", (None, n, 3)), "integrals": Stored("f", (None, len(self.integrals[0]))),
+            "marks": Stored("f", (None, n, 2)), "counts": Stored("i", (2,), 0, self.events),
         }  # fmt: skip
         arrays = unpacked_arrays(content, expected)
+        if len({len(arrays[name]) for name in STATES}) > 1:
+            raise ValueError("states of different numbers")
         self.loop.check(arrays, self.events)
         json.loads(arrays["rng"].tobytes())
         return arrays

@@ -15,6 +15,7 @@ from ...geometry.curves import columns as c
 from ...geometry.curves.curve import Curve
 from ...geometry.tracing.compiled.pieces.records import FIRST_CURVE, LINE, States
 from ...geometry.tracing.facet_rays import MOST_HITS, FacetRays
+from ...geometry.tracing.tracing import Status
 from ..bases.angles import clipped_inside
 from ..bases.assembly import add_products, is_mirror_symmetric, largest_square_sum, mirror_image
 from ..bases.basis import Basis, Frame
@@ -129,7 +130,7 @@ def exchanged(boundary: Boundary, kept: float, points: Floats, basis: Basis) -> 
         who = who[weight[who] > LEAST_WEIGHT]
         states.angle[who] = np.pi - states.angle[who]
         who = rays.advance(who)
-    escaped = states.status == 0
+    escaped = states.status == Status.ESCAPED
     lost = float(weight[~escaped].sum()) / weight.size
     weight[~escaped] = 0.0
     exits = np.zeros((cells, basis.size))

@@ -37,18 +37,8 @@ from ..bases.spaces import Zernike, zernike_functions
 from ..discretisation.discretisation import discretise
 from ..discretisation.method import SEED_WITHOUT_RNG
 from ..discretisation.radiosity import UnscatteredRays
-from ..laws.law import (
-    Combination,
-    Composition,
-    Law,
-    Power,
-    SpecularFrame,
-    as_weight,
-    drawn_terms,
-    in_frame,
-    used_terms,
-)
-from ..laws.structure import Discretiser, SpatialLaw
+from ..laws.law import Law, as_weight, drawn_terms, in_frame, used_terms
+from ..laws.structure import Discretiser, SpatialLaw, holds_of_all
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..matrices.output import COLOUR_POWER
 from ..walls.faceted_law import FacetedLaw
@@ -456,7 +446,7 @@ class HemisphereLaw(DirectionFactor):
         self._set(orientation=checked_orientation(self.orientation))
         if self.facets is not None:
             choice("facets", self.facets, get_args(FacetsInSpace))
-        elif has_facets(self.law):
+        elif not holds_of_all(self.law, lambda part: not isinstance(part, FacetedLaw)):
             raise InputError(
                 f"facets: expected one of {get_args(FacetsInSpace)} for {self.law!r}, got None; pass "
                 "facets='diffuse in space' if a diffuse facet draws the velocity along the grooves anew, or "
@@ -528,18 +518,6 @@ class HemisphereLaw(DirectionFactor):
         angle = "" if isinstance(self.orientation, str) else f", orientation={self.orientation:.12g}"
         facets = "" if self.facets is None else f", facets={self.facets!r}"
         return f"HemisphereLaw({self.law!r}{angle}{facets})"
-
-
-def has_facets(law: Law) -> bool:
-    """Whether a law contains that of a wall whose facets have a law of their own."""
-    inner: Sequence[Law] = ()
-    if isinstance(law, Composition):
-        inner = law.laws
-    elif isinstance(law, Combination):
-        inner = [term for _, term in law.terms]
-    elif isinstance(law, Power | SpecularFrame):
-        inner = [law.law]
-    return isinstance(law, FacetedLaw) or any(map(has_facets, inner))
 
 
 @dataclass(frozen=True, repr=False)

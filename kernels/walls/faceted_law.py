@@ -139,38 +139,40 @@ class FacetedLaw(Law):
 
     def _followed(self, x: Floats, theta: Floats, rng: np.random.Generator) -> tuple[Floats, NDArray[np.bool_]]:
         """Outgoing angles of rays that enter at fractions ``x`` of the period, and which of them escaped."""
-        outgoing, escaped = np.empty(theta.size), np.ones(theta.size, dtype=np.bool_)
-        entry, incoming = entry_inside(x.ravel()) * self.wall.period, theta.ravel()
-        for some in slices(theta.size, CHUNK):
-            resolved = escaped[some]
+        incoming, resolved = theta.ravel(), np.ones(theta.size, dtype=np.bool_)
 
-            def turn(angle: Floats, who: NDArray[np.int64], resolved: NDArray[np.bool_] = resolved) -> Floats:
-                left, known = self._named(lambda: self.facets._sample_with_status(angle, rng))
-                resolved[who] &= True if known is None else known
-                return left
+        def turn(angle: Floats, who: NDArray[np.int64]) -> Floats:
+            left, known = self._named(lambda: self.facets._sample_with_status(angle, rng))
+            resolved[who] &= True if known is None else known
+            return left
 
-            left, _, status = follow_facets(self.wall, entry[some], incoming[some], turn)
-            resolved &= status == Status.ESCAPED
-            outgoing[some] = np.where(resolved, left, incoming[some])
-        return outgoing.reshape(theta.shape), escaped.reshape(theta.shape)
+        left, escaped = self._turned(x.ravel(), incoming, turn)
+        resolved &= escaped
+        return np.where(resolved, left, incoming).reshape(theta.shape), resolved.reshape(theta.shape)
 
     def scattered(self, theta: ArrayLike, rng: Rng = None) -> tuple[Floats, NDArray[np.bool_]]:
         """`sample` for facets diffuse in part, shape (n,), and which rays met a diffuse facet."""
         source, incoming = generator(rng), angles("theta", theta).ravel()
         fraction, found = self.diffuse_fraction or 0.0, np.zeros(incoming.size, dtype=np.bool_)
-        outgoing, escaped = np.empty(incoming.size), np.empty(incoming.size, dtype=np.bool_)
-        entry = entry_inside(source.random(incoming.size)) * self.wall.period
-        for some in slices(incoming.size, CHUNK):
-            own = found[some]
 
-            def turn(angle: Floats, who: NDArray[np.int64], own: NDArray[np.bool_] = own) -> Floats:
-                is_diffuse = source.random(angle.size) < fraction
-                own[who] |= is_diffuse
-                return np.where(is_diffuse, SINE.sample(angle.size, source), np.pi - angle)
+        def turn(angle: Floats, who: NDArray[np.int64]) -> Floats:
+            is_diffuse = source.random(angle.size) < fraction
+            found[who] |= is_diffuse
+            return np.where(is_diffuse, SINE.sample(angle.size, source), np.pi - angle)
 
-            outgoing[some], _, status = follow_facets(self.wall, entry[some], incoming[some], turn)
+        return if_escaped(self, *self._turned(source.random(incoming.size), incoming, turn), LOST), found
+
+    def _turned(
+        self, x: Floats, theta: Floats, turn: Callable[[Floats, NDArray[np.int64]], Floats]
+    ) -> tuple[Floats, NDArray[np.bool_]]:
+        """Outgoing angles and escapes of rays, shape (n,), which ``turn`` turns at facets; it takes their numbers."""
+        outgoing, escaped = np.empty(theta.size), np.empty(theta.size, dtype=np.bool_)
+        entry = entry_inside(x) * self.wall.period
+        for some in slices(theta.size, CHUNK):
+            own = lambda angle, who, first=some.start: turn(angle, first + who)  # noqa: E731
+            outgoing[some], _, status = follow_facets(self.wall, entry[some], theta[some], own)
             escaped[some] = status == Status.ESCAPED
-        return if_escaped(self, outgoing, escaped, LOST), found
+        return outgoing, escaped
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         if self._known:

@@ -102,9 +102,11 @@ def specular_part(law: FacetedLaw) -> StraightPart:
     if not wall.is_polygonal:
         flat = kept * wall.flat_top / wall.period
         return StraightPart(flat, flat, kept * straight_part(WallLaw(wall)).high)
-    bounds = []
-    for basis in map(Bins, CELLS):
-        parts, _ = specular_sums(wall.cell, kept, basis, POINTS_OF_FACETS, SEED)
+    bounds, most = [], CELLS[-1]
+    fine, _ = specular_sums(wall.cell, kept, Bins(most), POINTS_OF_FACETS, SEED)
+    for cells in CELLS:
+        each = most // cells
+        parts = fine.reshape(-1, cells, each, cells, each).sum(axis=(2, 4)) / each
         seen, others = np.split(parts, 2)
         top = np.linalg.eigh(seen.sum(axis=0) + seen.sum(axis=0).T)[1][:, -1]
         quotients = others @ top @ top

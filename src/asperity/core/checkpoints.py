@@ -224,10 +224,13 @@ def differences(there: Any, here: Any, name: str = "") -> Iterator[str]:
 
 
 class Stored(NamedTuple):
-    """What an array in a checkpoint must be: its kind, as numpy names it, its shape, and the range of its numbers."""
+    """What an array in a checkpoint must be: its kind, as numpy names it, its shape, and the range of its numbers.
+
+    Where the shape has None, any length will do.
+    """
 
     kind: str
-    shape: tuple[int, ...]
+    shape: tuple[int | None, ...]
     low: float = -sys.float_info.max
     high: float = sys.float_info.max
 
@@ -263,7 +266,8 @@ def unpacked_arrays(content: bytes, expected: Mapping[str, Stored] | None = None
         raise ValueError(f"expected {', '.join(expected)}, got {', '.join(found)}")
     for name, (kind, shape, low, high) in (expected or {}).items():
         array = found[name]
-        if array.dtype.kind != kind or array.shape != shape:
+        alike = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
+        if array.dtype.kind != kind or not alike:
             raise ValueError(f"{name}: expected kind {kind} of shape {shape}, got {array.dtype} of {array.shape}")
         # NaN is in no range
         if kind in "iuf" and not np.all((array >= low) & (array <= high)):
