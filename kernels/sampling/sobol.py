@@ -98,13 +98,21 @@ class SobolRays(Job):
 
     def add_points(self, sums: RaySums, first: int, points: Floats) -> None:
         """Add the rays of points of the unit cube, shape (PARTS, rays, dimension), to the tables from ``first`` on."""
+        sums.add_rows(first, *self.traced(sums, points))
+
+    def traced(self, sums: RaySums, points: Floats) -> tuple[Floats, Floats]:
+        """Incoming and outgoing angles; those that did not escape are counted."""
         reflect = self.law.random_map()
         assert reflect is not None  # checked by the sampler
         x, u = np.moveaxis(points, -1, 0)
-        theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
+        theta = self.incoming(u)
         outgoing, escaped = reflect(entry_inside(x), theta.copy())
         sums.count_unresolved(escaped)
-        sums.add_rows(first, theta, outgoing_angles(outgoing, theta, self.law))
+        return theta, outgoing_angles(outgoing, theta, self.law)
+
+    def incoming(self, u: Floats) -> Floats:
+        """The incoming angles of uniform numbers."""
+        return clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
 
     def identity(self) -> dict[str, Any]:
         return {

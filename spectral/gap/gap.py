@@ -23,16 +23,17 @@ from ..bounds.images import is_costly, is_traced, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import Rank
-from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, Verdict, matrix_spectrum
+from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, matrix_spectrum
 from ..essential.compact import compact_matrix
 from ..essential.edge import EssentialEdge, essential_edge, without_identity
 from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
+from .rays import OF_EDGE, gap_by_rays, suits_rays
 from .refinement import EIGENVALUES, HOW, refined
 from .shallow import shallow_gap
 from .surfaces import gap_of_surface
 from .theorems import gap_by_theorem, gap_of_exact, lower_bound, split_gap
-from .verdict import SpectralGap, isolated, made_from
+from .verdict import SpectralGap, gap_between, isolated, made_from
 
 # Numbers of enclosed eigenvalues with the constants: of densities by modulus, of other laws the largest values.
 OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
@@ -42,8 +43,12 @@ OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
 TOLERANCES, CLOSER = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), 0.25
 # Where enclosures of densities take too long, these tolerances are tried.
 SURE = 1e-9, 1e-6
-# A gap that misses its tolerance is held against other methods if its error exceeds this, which rays may reach.
-LARGEST_MISS = 2e-3
+# A gap that misses its tolerance is held against other methods if its error exceeds this, which they may reach: rays on
+# panels (True), or matrices in polynomials.
+LARGEST_MISS = {True: 1e-4, False: 2e-3}
+# Tolerance that rays on panels reach, and fraction of the time limit for enclosures which are tried before them then;
+# fractions for these rays, after enclosures and where there are none.
+OF_RAYS, BEFORE_RAYS, AFTER_ENCLOSURES, ALONE = 5e-5, 0.4, 1.1, 1.5
 # The same for laws near a matrix, relative to the gap.
 COMPACT_MISS = 1e-3
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
@@ -60,7 +65,8 @@ def enclosed_gap(
     if law.has_density:
         return _of_density(law, tolerance, edge, seconds)
     if suits_panels(law) and not is_costly(law):
-        with suppress(OutOfTime), time_limited(seconds):
+        allowed = BEFORE_RAYS if tolerance >= OF_RAYS and suits_rays(law) else 1.0
+        with suppress(OutOfTime), time_limited(allowed * seconds):
             for gap in _on_panels(law, tolerance, edge, rank):
                 best = gap if best is None or gap.error < best.error else best
                 if best.error <= tolerance:
@@ -114,14 +120,12 @@ def _gap_of(law: Law, found: Enclosures, edge: EssentialEdge, rank: Rank = np.po
         how, value = f"bounds of the eigenvalue; {found.method}", 1.0 - 0.5 * (top.low + top.high)
         return SpectralGap(value, 0.5 * top.width, top.kind, how, "isolated", (str(top),), law.frame)
     # no eigenvalue that is not listed is above the radius
-    reach = max(found.separation.radius, edge.high, *(item.high for item in others if item.index is not None))
-    low = max(edge.low, *(item.low for item in others))
-    if reach >= 1.0:
+    high = max(found.separation.radius, *(item.high for item in others if item.index is not None))
+    if max(high, edge.high) >= 1.0:
         return None
-    verdict: Verdict = "isolated" if low > edge.high else "essential edge" if reach <= edge.high else "undecided"
     how = f"bounds of all eigenvalues; {found.method}"
-    evidence = (f"no eigenvalue off the constants is above {reach:.3g}: {found.separation.reason}", *edge.reasons)
-    return SpectralGap(1.0 - 0.5 * (low + reach), 0.5 * (reach - low), "estimate", how, verdict, evidence, law.frame)
+    evidence = (f"no eigenvalue off the constants is above {high:.3g}: {found.separation.reason}",)
+    return gap_between(max(item.low for item in others), high, edge, how, evidence, law.frame)
 
 
 @reported("spectral gap")
@@ -257,9 +261,11 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     edge = essential_edge(law)
     if is_traced(law) and edge.high < 1.0 and gap_by_theorem(law) is None:
         found = enclosed_gap(law, tolerance, edge, time_limit, np.abs)
-        if found is not None and found.error <= max(tolerance, LARGEST_MISS):
-            return held_against_oscillations(law, found)
-        upper = _by_rays(law, tolerance, generator(rng, 0), time_limit, edge)
+        if found is None or found.error > max(tolerance, LARGEST_MISS[suits_rays(law)]):
+            found = _by_rays_or(law, found, tolerance, generator(rng, 0), time_limit, edge, np.abs)
+        if found is not None:
+            return held_against_oscillations(law, found).cut_at_zero()
+        upper = _by_polynomials(law, tolerance, generator(rng, 0), time_limit, edge)
     else:
         upper = spectral_gap(law, tolerance, rng, time_limit=time_limit)
     if upper.verdict == "no gap" or lambertian_fraction(law) == upper.value:
@@ -350,15 +356,32 @@ def _by_matrices(
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
     enclosed = enclosed_gap(law, tolerance, edge, seconds)
-    if enclosed is not None and enclosed.error <= max(tolerance, LARGEST_MISS):
+    if enclosed is not None and enclosed.error <= max(tolerance, LARGEST_MISS[suits_rays(law)]):
         return enclosed
-    sampled = _by_rays(law, tolerance, rng, seconds, edge)
+    found = _by_rays_or(law, enclosed, tolerance, rng, seconds, edge)
+    if found is not None:
+        return found
+    sampled = _by_polynomials(law, tolerance, rng, seconds, edge)
     # the gap of slow functions is an upper bound, which faster ones may refute
     refuted = enclosed is not None and sampled.value - sampled.error > enclosed.value + enclosed.error
     return sampled if enclosed is None or (sampled.error < enclosed.error and not refuted) else enclosed
 
 
-def _by_rays(law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge) -> SpectralGap:
+def _by_rays_or(
+    law: Law, enclosed: SpectralGap | None, tolerance: float, rng: np.random.Generator, seconds: float,
+    edge: EssentialEdge, rank: Rank = np.positive,
+) -> SpectralGap | None:  # fmt: skip
+    """The better of an enclosed gap and one by rays on panels; None if there is neither."""
+    if not suits_rays(law):
+        return None
+    allowed = ALONE if enclosed is None else AFTER_ENCLOSURES
+    sampled = gap_by_rays(law, tolerance, rng, seconds * allowed, edge, rank)
+    return sampled if enclosed is None else min(enclosed, sampled, key=lambda one: one.error)
+
+
+def _by_polynomials(
+    law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge
+) -> SpectralGap:
     """The gap from Galerkin matrices of growing size."""
     steps = refined(law, tolerance, rng, seconds, edge)
     found, error = steps.finest, steps.error
@@ -386,9 +409,8 @@ def _by_rays(law: Law, tolerance: float, rng: np.random.Generator, seconds: floa
 def _at_edge(
     law: Law, edge: EssentialEdge, evidence: tuple[str, ...], found: Spectrum | None = None, overshoot: float = 0.0
 ) -> SpectralGap:
-    method = "edge of the essential spectrum, from the law's action on grazing rays and its isometries"
     error = max(edge.error, overshoot)
-    return SpectralGap(1.0 - edge.value, error, "estimate", method, "essential edge", evidence, law.frame, found)
+    return SpectralGap(1.0 - edge.value, error, "estimate", OF_EDGE, "essential edge", evidence, law.frame, found)
 
 
 def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:

@@ -73,6 +73,16 @@ def isolated(
     return SpectralGap(found.gap, error, "estimate", made_from(found, how), "isolated", reasons, convention, found)
 
 
+def gap_between(
+    low: float, high: float, edge: EssentialEdge, how: str, evidence: tuple[str, ...], convention: str
+) -> SpectralGap:
+    """The gap of a law with an edge of the essential spectrum whose largest eigenvalue lies between two numbers."""
+    verdict: Verdict = "isolated" if low > edge.high else "essential edge" if high <= edge.high < 1.0 else "undecided"
+    low, high = max(low, edge.low), max(high, edge.high)
+    value, error = 1.0 - 0.5 * (low + high), 0.5 * (high - low)
+    return SpectralGap(value, error, "estimate", how, verdict, (*evidence, *edge.reasons), convention)
+
+
 def draw_spectrum(found: Spectrum, gap: SpectralGap, ax: Axes | None = None) -> Axes:
     """Draw eigenvalues of a matrix and the gap of its law, which is shaded and labelled with its verdict.
 

@@ -1,0 +1,95 @@
+"""Gaps by rays from graded panels, against closed forms, enclosures and other rays."""
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import AccuracyError
+from asperity.kernels.laws.law import DrivenLaw
+from asperity.spectral.essential.edge import EssentialEdge, essential_edge
+from asperity.spectral.gap import rays
+from asperity.spectral.gap.rays import gap_by_rays, suits_rays, tops_by_rays
+
+# Eigenvalues of the arc of half angle 1.2 in both conventions, from enclosures to 1e-9.
+ARC, IN_SPECULAR, LEAST = 0.3670253152, 0.311346443, -0.311346443
+NO_EDGE = EssentialEdge(0.0, 0.0, "estimate", ())
+
+
+def tops(law, seed, seconds, rank=np.positive, edge=0.0):
+    return list(tops_by_rays(law, np.random.default_rng(seed), seconds, edge, rank))
+
+
+def island_wall():
+    """A disk above a groove: rays stay for long between them."""
+    groove = geo.Bezier([(0, 0), (0.3, -0.5), (0.7, -0.5), (1, 0)])
+    return geo.Wall([groove], islands=[[geo.Arc((0.5, -0.12), 0.08, 0.0, -2.0 * np.pi)]])
+
+
+def test_errors_hold_at_every_number_of_rays():
+    law, misses, number = ker.CircularArcLaw(1.2), 0, 0
+    for seed in range(8):
+        for top in tops(law, seed, 0.5):
+            misses += abs(top.value - ARC) > top.error
+            number += 1
+    assert number >= 24 and misses <= 0.05 * number + 1
+
+
+def test_rays_in_the_other_convention_and_by_modulus_give_the_same_eigenvalue():
+    law = ker.CircularArcLaw(1.2)
+    for one, rank, value in ((law.in_specular_frame(), np.positive, IN_SPECULAR), (law, np.abs, ARC)):
+        top = tops(one, 3, 2.0, rank)[-1]
+        assert abs(top.value - value) <= top.error < 2e-3
+
+
+def test_the_error_decreases_with_the_rays_and_a_longer_limit_never_adds_to_it():
+    law = ker.WallLaw(island_wall())
+    assert suits_rays(law)
+    edge = essential_edge(law)
+    errors = [gap_by_rays(law, 1e-6, np.random.default_rng(0), limit, edge).error for limit in (0.2, 0.4, 0.8, 1.6)]
+    assert errors == sorted(errors, reverse=True) and errors[-1] < 0.5 * errors[0]
+
+
+def test_a_chaotic_hollow_has_its_gap_from_rays_and_another_seed_agrees():
+    law = ker.WallLaw(island_wall())
+    edge = essential_edge(law)
+    first, second = (gap_by_rays(law, 1e-3, np.random.default_rng(seed), 4.0, edge) for seed in (1, 2))
+    assert first.verdict == second.verdict == "isolated" and max(first.error, second.error) <= 1e-3
+    assert abs(first.value - second.value) <= first.error + second.error
+    matrix = ker.discretise(law, ker.Legendre(48), samples=2**19, method="by_sobol_rays", rng=5)
+    of_matrix = spec.spectral_gap(matrix).value
+    # the gap of a matrix is above the law's but for its noise
+    assert -2e-3 <= of_matrix - first.value <= 1e-2
+
+
+def test_a_level_that_misses_what_rays_in_bins_show_is_not_believed(monkeypatch):
+    law = ker.CircularArcLaw(1.2)
+    monkeypatch.setattr(rays, "values_in_bins", lambda _: (np.array([0.9]), np.array([0.2])))
+    gap = gap_by_rays(law, 1e-2, np.random.default_rng(0), 0.3, NO_EDGE)
+    assert gap.verdict != "essential edge" and gap.value - gap.error == pytest.approx(0.0, abs=1e-15)
+    assert gap.value + gap.error == pytest.approx(0.1)
+
+
+def test_an_edge_that_no_panel_reaches_is_the_gap():
+    edge = EssentialEdge(0.5, 0.5001, "estimate", ("as told",))
+    gap = gap_by_rays(ker.CircularArcLaw(1.2), 1e-6, np.random.default_rng(0), 2.0, edge)
+    assert gap.verdict == "essential edge" and gap.value == pytest.approx(0.49995) and gap.error < 1e-4
+    assert "no eigenvalue beyond the edge" in " ".join(gap.evidence)
+
+
+def test_rays_that_do_not_escape_are_refused():
+    class Losing(DrivenLaw):
+        reversible = True
+
+        def reflect(self, x, theta):
+            return np.pi - np.asarray(theta) + 0.0 * np.asarray(x)
+
+        def reflect_with_status(self, x, theta):
+            return self.reflect(x, theta), np.asarray(x) > 0.01
+
+        def key(self):
+            return ("losing",)
+
+    with pytest.raises(AccuracyError, match="did not escape"):
+        tops(Losing(), 0, 0.2)
