@@ -166,7 +166,8 @@ class _PanelRays(SobolRays):
         """Add products of the panels' Legendre polynomials, which are transformed when all rays are added."""
         for row, angles in enumerate(zip(*self.traced(sums, points), strict=True), first):
             (source, here), (target, there) = map(self.basis.positions, angles)
-            add_blocks(sums.tables[row], self.basis, source, target, legvander(here, DEGREE), legvander(there, DEGREE))
+            functions = (np.asarray(legvander(one, DEGREE), dtype=np.float64) for one in (here, there))
+            add_blocks(sums.tables[row], self.basis, source, target, *functions)
 
     def incoming(self, u: Floats) -> Floats:
         panel = np.clip(np.searchsorted(self.cumulative, u, side="right") - 1, 0, len(self.cumulative) - 2)
