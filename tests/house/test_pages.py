@@ -60,6 +60,10 @@ def test_the_proved_interval_contains_the_estimate(run):
     # Feres and Zhang 2010
     assert f"{low:.4f}" == f"{high:.4f}" == "0.0373"
     assert high - low < 1e-4 * high
+    # in the picture the thresholds separate the eigenvalues as the proof says
+    first, even, second, _ = names["steps"]
+    certificate = names["proof"].certificate
+    assert first < float(certificate["threshold"]) < second and float(certificate["other"]) < even
 
 
 def entry(law, function):
