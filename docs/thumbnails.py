@@ -139,6 +139,13 @@ def profile(ax: Axes) -> None:
     wall_with(geo.Wall.from_profile(x, 0.08 * height, "step"), 0.5, 1.2, -0.5, 0.2)(ax)
 
 
+def height_map(ax: Axes) -> None:
+    """A random surface, lit from the left."""
+    field = geo.Surface.random(geo.HeightCorrelation(0.12), 96, rms_slope=0.7, rng=2).heights
+    slope = np.tile(np.roll(field, -1, axis=0) - field, (2, 1))[: int(96 * INCHES[0] / INCHES[1])]
+    ax.pcolormesh(slope.T, cmap="gray", shading="gouraud")
+
+
 def hollows(ax: Axes) -> None:
     """A wall for Maxwell's law."""
     wall_with(ker.wall_for(ker.maxwell(0.5), 4).wall, 0.4, 1.2, -0.4, 0.4)(ax)
@@ -153,6 +160,7 @@ def exchange(ax: Axes) -> None:
 PICTURES: dict[str, Callable[[Axes], None]] = {
     "a_gas_of_rough_disks": gas,
     "a_granular_collision": grains,
+    "a_measured_surface": height_map,
     "a_wall_for_a_law": hollows,
     "rough_disks": rough_disks,
     "walls_converge": for_lambert,

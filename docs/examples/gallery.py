@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 import sys
 from pathlib import Path
 
@@ -27,7 +28,17 @@ def main(folder: Path) -> list[Path]:
     wall_for_a_law.main(picture=folder / "wall-for-a-law.png")
     walls_converge.main(picture=folder / "walls-converge.png")
     exchange_hollow.main(picture=folder / "exchange-hollow.png")
+    proved_gap(folder / "proved-gap.png")
     return sorted(folder.iterdir())
+
+
+def proved_gap(path: Path) -> None:
+    """Save the picture of the short example, whose window does not open."""
+    from matplotlib import pyplot
+
+    pyplot.switch_backend("Agg")
+    runpy.run_path(str(Path(__file__).parents[1] / "how-to" / "a_proved_gap.py"))["fig"].savefig(path, dpi=90)
+    pyplot.close()
 
 
 def moving_gas(path: Path, frames: int = 30) -> None:

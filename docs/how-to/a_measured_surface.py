@@ -6,6 +6,8 @@ From a measured height map to the momentum that a gas leaves on the surface, and
 leave it.
 """
 
+# sphinx_gallery_thumbnail_path = "generated/thumbnails/a_measured_surface.png"
+
 import tempfile
 from pathlib import Path
 

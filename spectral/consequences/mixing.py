@@ -348,7 +348,7 @@ def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) ->
 
     Notes
     -----
-    Source: R. Feres and H.-K. Zhang, Commun. Math. Phys. 299 (2010): P_F - 1 is about 2 h times the Legendre operator
+    Source: R. Feres and H.-K. Zhang, J. Stat. Phys. 141 (2010) 1039: P_F - 1 is about 2 h times the Legendre operator
     for walls of mean squared slope h, so 1 - lambda_l is about 2 h l (l + 1), and the gap 4 h.
 
     Examples

@@ -161,17 +161,19 @@ def test_the_gallery_draws_what_pages_show(tmp_path, monkeypatch):
 
     monkeypatch.syspath_prepend(EXAMPLES)
     gallery = load("gallery")
-    # the studies are tested for themselves; here only what becomes of them
+    # the studies, and the short example of a proof, are tested for themselves; here only what becomes of them
     studies = ("front_picture", "least_resistance", "wall_for_a_law", "walls_converge", "exchange_hollow")
     for name in studies:
         monkeypatch.setattr(getattr(gallery, name), "main", lambda picture: picture.touch())
         sys.modules.pop(name, None)
     monkeypatch.setattr(gallery, "moving_gas", partial(gallery.moving_gas, frames=3))
+    monkeypatch.setattr(gallery, "proved_gap", lambda picture: picture.touch())
     drawn = {path.name for path in gallery.main(tmp_path / "gallery")}
     for path, frames in ((tmp_path / "gallery" / "gas.gif", 3), (EXAMPLES.parent / "gallery" / "gas.gif", 30)):
         with Image.open(path) as picture:
             assert picture.n_frames == frames and picture.info["loop"] == 0
-    assert drawn == {"front.gif", "gas.gif", "walls.png", *(f"{name.replace('_', '-')}.png" for name in studies[1:])}
+    others = {"front.gif", "gas.gif", "walls.png", "proved-gap.png"}
+    assert drawn == {*others, *(f"{name.replace('_', '-')}.png" for name in studies[1:])}
     docs = EXAMPLES.parent
     pages = [path.read_text(encoding="utf-8") for path in [docs.parent / "README.md", *docs.glob("**/*.md")]]
     # others too may have a picture there, if a page shows it

@@ -60,6 +60,10 @@ def test_the_proved_interval_contains_the_estimate(run):
     # Feres and Zhang 2010
     assert f"{low:.4f}" == f"{high:.4f}" == "0.0373"
     assert high - low < 1e-4 * high
+    # in the picture the thresholds separate the eigenvalues as the proof says
+    first, even, second, _ = names["steps"]
+    certificate = names["proof"].certificate
+    assert first < float(certificate["threshold"]) < second and float(certificate["other"]) < even
 
 
 def entry(law, function):
@@ -220,6 +224,21 @@ def test_no_line_of_a_page_is_lost_as_a_comment():
     lines = [(page.name, line) for page in pages for line in page.read_text(encoding="utf-8").splitlines()]
     assert len(pages) > 40
     assert not [(name, line) for name, line in lines if line.lstrip().startswith("%")]
+
+
+def test_every_work_of_the_bibliography_is_cited():
+    """Each author of an entry is named on another page or in a docstring."""
+    root = DOCS.parent
+    files = [page for page in DOCS.rglob("*.md") if page.name != "bibliography.md"]
+    files += [
+        path for room in ("docs/how-to", "geometry", "kernels", "spectral") for path in (root / room).rglob("*.py")
+    ]
+    text = "".join(path.read_text(encoding="utf-8") for path in files if "_build" not in path.parts)
+    entries = re.split(r"^- ", (DOCS / "bibliography.md").read_text(encoding="utf-8"), flags=re.M)[1:]
+    authors = re.compile(r"[A-Z][\w.-]*\. ((?:de |Garcia )?[A-Z]\w+)")
+    names = [authors.findall(re.split(r"\*|\[|\d{4}", entry)[0]) for entry in entries]
+    assert len(entries) > 30 and all(names)
+    assert [name for found in names for name in found if name not in text] == []
 
 
 def test_the_commands_on_the_pages_exist():
