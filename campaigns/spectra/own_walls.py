@@ -1,10 +1,11 @@
 """Gaps of walls as users draw them: reached or not, the processor time, and the error against two judges.
 
 A case is a random wall of one to five pieces in one of the conventions: mixed pieces, Bezier pieces, arcs that touch,
-islands, mirror images, several hollows below flat tops, and smooth profiles of 20 points. The judges are the gap at a
-tenth of the least tolerance with a long time limit, and matrices of the textbook tracer's rays, in Legendre polynomials
-and in bins that become narrow at grazing, whose eigenvalues are lower bounds of those of the law. In the table each row
-is a tolerance; the outcomes count the gaps that reach it by the processor time that they take.
+islands, mirror images, several hollows below flat tops, and smooth profiles of 20 points. The judges are rays from
+panels with a seed of their own, which share nothing but the tracer with the enclosures, and matrices of the textbook
+tracer's rays, in Legendre polynomials and in bins that become narrow at grazing, whose eigenvalues are lower bounds of
+those of the law. Every eighth wall is asked for 1e-6 too, and judged by the gap at a tenth of this. In the table each
+row is a tolerance; the outcomes count the gaps that reach it by the processor time that they take.
 """
 
 from __future__ import annotations
@@ -20,17 +21,22 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.checks import Floats
+from asperity.spectral.bounds.contraction import self_adjoint_elsewhere
+from asperity.spectral.essential.edge import essential_edge
+from asperity.spectral.gap.rays import gap_by_rays
 from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
 from campaigns.engine import Campaign, Judged
 from campaigns.spectra import verdicts
 
 WALLS, KINDS = 200, 8
-# Tolerances with their time limits, those of the judge, and the seconds by which gaps are counted.
-LIMITS, JUDGE, STEPS = {1e-3: 10.0, 1e-4: 10.0, 1e-6: 60.0}, (1e-7, 120.0), (2, 4, 15, 60, 120)
+# Tolerances with their time limits; those of every eighth wall, the second of them the judge's; time limit of the rays
+# that judge, and the seconds by which gaps are counted.
+LIMITS, FINE, EVERY = {1e-3: 10.0, 1e-4: 10.0}, {1e-6: 60.0, 1e-7: 60.0}, 8
+RAYS_LIMIT, STEPS = 4.0, (1, 2, 4, 15, 60, 120)
 # Bins of the second judge, and rays from each.
 BINS, RAYS_OF_BIN = 400, 1024
 PROFILE = geo.HeightCorrelation(0.2)
-Case = tuple[str, ker.Law, geo.Wall]
+Case = tuple[str, ker.Law, geo.Wall, bool]
 
 
 def chain(number: int, pieces: int) -> geo.Wall:
@@ -83,7 +89,7 @@ def draw(number: int) -> Case:
         ("smooth profile", geo.random_wall(PROFILE, 20, rms_slope=0.2 + 0.1 * (group % 4), rng=number, smooth=True))
     )  # fmt: skip
     law = ker.WallLaw(wall)
-    return name, law.in_specular_frame() if group % 2 else law, wall
+    return name, law.in_specular_frame() if group % 2 else law, wall, group % EVERY == number % EVERY
 
 
 def reach_in_bins(wall: geo.Wall, mirrored: bool, modulus: bool) -> float:
@@ -126,22 +132,27 @@ def _parts(rays: int) -> list[NDArray[np.intp]]:
 
 def judge(case: Case) -> Iterator[Judged]:
     """The gap to each tolerance against the judges."""
-    _, law, wall = case
+    _, law, wall, fine = case
     found = {}
-    for tolerance, limit in LIMITS.items():
+    for tolerance, limit in (LIMITS | FINE if fine else LIMITS).items():
         begun = time.process_time()
         gap = spec.spectral_gap(law, tolerance, time_limit=limit)
         found[tolerance] = gap, time.process_time() - begun
-    known = spec.spectral_gap(law, JUDGE[0], time_limit=JUDGE[1])
+    other = self_adjoint_elsewhere(law)
+    own, rank = (law, np.positive) if other is None else (other, np.abs)
+    by_rays = gap_by_rays(own, 0.0, np.random.default_rng(1), RAYS_LIMIT, essential_edge(own), rank)
     signs = (-1.0) ** np.arange(1, verdicts.DEGREES[-1]) if law.frame == "specular" else 1.0
-    tops, noise = verdicts.reference(verdicts.matrices(wall) * signs, norm=not known.self_adjoint)
+    tops, noise = verdicts.reference(verdicts.matrices(wall) * signs, norm=other is not None)
     most = 1.0 - float(tops[-1]) + noise + verdicts.NOISE_OF_SIZE
-    most = min(most, 1.0 - reach_in_bins(wall, law.frame == "specular" and known.self_adjoint, not known.self_adjoint))
+    most = min(most, 1.0 - reach_in_bins(wall, law.frame == "specular" and other is None, other is not None))
     for tolerance, (gap, seconds) in found.items():
         within = next((step for step in STEPS if seconds <= step), STEPS[-1])
         outcome = f"within {within} s" if gap.error <= tolerance else f"missed: {gap.verdict}"
         fault = f"rays of the textbook show a gap below {most:.4g}" if gap.value - gap.error > most else ""
-        yield Judged(f"{tolerance:g}", gap.error, abs(gap.value - known.value), known.error, fault, outcome)
+        yield Judged(f"{tolerance:g}", gap.error, abs(gap.value - by_rays.value), by_rays.error, fault, outcome)
+    if fine:
+        (gap, _), (finest, _) = (found[tolerance] for tolerance in FINE)
+        yield Judged("1e-06 beside 1e-07", gap.error, abs(gap.value - finest.value), finest.error)
 
 
 CAMPAIGNS = (
