@@ -23,7 +23,7 @@ from asperity import spectral as spec
 from asperity.core.checks import Floats
 from asperity.spectral.bounds.contraction import self_adjoint_elsewhere
 from asperity.spectral.essential.edge import essential_edge
-from asperity.spectral.gap.rays import gap_by_rays
+from asperity.spectral.gap.gap import gap_by_rays
 from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
 from campaigns.engine import Campaign, Judged
 from campaigns.spectra import verdicts

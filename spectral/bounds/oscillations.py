@@ -1,4 +1,4 @@
-"""Rayleigh quotients by rays, of fast oscillations and in bins, which detect spectrum missed by trial functions."""
+"""Rayleigh quotients of fast oscillations by rays, which detect spectrum missed by trial functions."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
-from ...core.long_runs import count_time
 from ...kernels import Law
-from ...kernels.bases.angles import cell_among
 from ...kernels.bases.assembly import one_blas_thread
 from ...kernels.bases.measure import SINE
 
@@ -28,11 +26,6 @@ SIGMAS = 6.0
 FASTEST_SLOW, SLOW_FRACTION = 40.0, 0.01
 # Lower limit of the root mean square of theta' - theta.
 LEAST_MOVE = 1e-6
-# Edges of bins, in equal ratios near grazing, and the numbers of bins joined on two levels; rays from each bin, their
-# nominal time in seconds, and number of the largest values.
-_GRAZING = np.geomspace(1e-4, 0.1, 60)
-BIN_EDGES = np.concatenate([[0.0], _GRAZING, np.linspace(0.1, np.pi - 0.1, 264)[1:-1], np.pi - _GRAZING[::-1], [np.pi]])
-JOINED, RAYS_OF_BIN, RAY_TIME, LARGEST = (1, 8), 256, 1e-6, 6
 
 
 @lru_cache(maxsize=8)
@@ -48,63 +41,6 @@ def fast_top(law: Law) -> tuple[float, str] | None:
         return None
     top = 1.0 - quotient - SIGMAS * spread - SLOW_FRACTION
     return top, f"by {RAYS} rays cos(t theta + phase), t = {frequency:.6g}, has a mean of {top:.6g} at least"
-
-
-@lru_cache(maxsize=8)
-def values_in_bins(law: Law) -> tuple[Floats, Floats]:
-    """Lower bounds, by rays, of the largest eigenvalues off the constants of a law P, and of those of -P.
-
-    Matrices of half of the rays, in bins of two widths, show functions; the other half shows the quotients in their
-    span. No bound is given if rays do not escape.
-    """
-    bins = len(BIN_EDGES) - 1
-    count_time(RAY_TIME * RAYS_OF_BIN * bins)
-    rng = np.random.default_rng(0)
-    low, high = 0.5 - 0.5 * np.cos(BIN_EDGES[:-1]), 0.5 - 0.5 * np.cos(BIN_EDGES[1:])
-    position = (np.arange(RAYS_OF_BIN) + rng.random((bins, RAYS_OF_BIN))) / RAYS_OF_BIN
-    theta = SINE.quantile(low[:, None] + (high - low)[:, None] * position)
-    try:
-        out = law.sample(theta.ravel(), rng).reshape(theta.shape)
-    except AccuracyError:
-        return np.empty(0), np.empty(0)
-    cell = np.arange(bins)[:, None] * bins + cell_among(BIN_EDGES, out.ravel()).reshape(out.shape)
-    mass = high - low
-    root = np.sqrt(mass)
-
-    def matrix(first: int, step: int) -> Floats:
-        # of a flux between two bins, which is the same in both directions, the rays from both are samples
-        hits = np.bincount(cell[:, first::step].ravel(), minlength=bins * bins).reshape(bins, bins)
-        flux = (hits + hits.T) * step / RAYS_OF_BIN / np.add.outer(1.0 / mass, 1.0 / mass)
-        return np.asarray(flux / np.outer(root, root) - np.outer(root, root))
-
-    with one_blas_thread():
-        shown, parts = matrix(0, 2), np.array([matrix(k, 2 * PARTS) for k in range(1, 2 * PARTS, 2)])
-        trial = np.column_stack([root, *(_extremal_in_bins(shown, root, number) for number in JOINED)])
-        trial = np.linalg.qr(trial)[0][:, 1:]
-        shown, parts = trial.T @ shown @ trial, trial.T @ parts @ trial
-        return _lower_bounds(shown, parts), _lower_bounds(-shown, -parts)
-
-
-def _extremal_in_bins(matrix: Floats, root: Floats, number: int) -> Floats:
-    """Eigenvectors of the largest and of the least eigenvalues, in bins of which a number is joined."""
-    group = np.arange(len(root)) // number
-    joined = (group[:, None] == np.arange(group[-1] + 1)) * root[:, None]
-    joined /= np.linalg.norm(joined, axis=0)
-    vectors = joined @ np.linalg.eigh(joined.T @ matrix @ joined)[1]
-    return np.asarray(vectors[:, np.r_[:LARGEST, -LARGEST:0]])
-
-
-def _lower_bounds(shown: Floats, parts: Floats) -> Floats:
-    """Lower bounds of the largest eigenvalues from independent matrices in the eigenvectors of a first one."""
-    vectors = np.linalg.eigh(shown)[1][:, ::-1]
-    bounds = []
-    for number in range(1, LARGEST + 1):
-        # the least eigenvalue in a space of this dimension is a lower bound of the one of this number
-        each = vectors[:, :number].T @ parts @ vectors[:, :number]
-        least = np.linalg.eigh(each.mean(axis=0))[1][:, 0]
-        quotients = np.einsum("i,pij,j->p", least, each, least)
-        bounds.append(float(quotients.mean() - SIGMAS * quotients.std(ddof=1) / np.sqrt(PARTS)))
-    return np.maximum.accumulate(bounds[::-1])[::-1]
 
 
 def least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:

@@ -16,7 +16,8 @@ from ..eigenvalues.dense import symmetric_half
 from ..essential.compact import compact_matrix
 from ..essential.edge import essential_edge
 from .images import is_traced
-from .oscillations import fast_top, values_in_bins
+from .oscillations import fast_top
+from .rays_on_panels import suits_rays, values_by_rays
 
 # For a law with eigenvalues g^l the power P^p is chosen with x = g^p near this value. Then the sum of the omitted
 # squares, x^(2 m)/(1 - x^2), is below the last listed square, x^(2 m - 2), and above rounding.
@@ -72,7 +73,7 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float, 
     if fast is not None and fast[0] > next_value:
         return Separation(1.0, "estimate", f"fast oscillations show spectrum near 1, how much is not known: {fast[1]}")
     # rays see eigenfunctions in narrow intervals of angles, between the nodes of panels
-    above, below = values_in_bins(law) if is_traced(law) else (np.empty(0), np.empty(0))
+    above, below = values_by_rays(law) if is_traced(law) and suits_rays(law) else (np.empty(0), np.empty(0))
     seen = above if by_value else -np.sort(-np.append(above, below))
     if np.any(seen[len(values) - 1 : len(values)] > next_value):
         shown = f"rays show another eigenvalue, of at least {seen[len(values) - 1]:.3g}"

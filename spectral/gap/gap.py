@@ -21,6 +21,7 @@ from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewh
 from ..bounds.enclosure import Enclosures, as_power, enclosed_trial_space, enclosures
 from ..bounds.images import is_costly, is_traced, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
+from ..bounds.rays_on_panels import Top, suits_rays, tops_by_rays, values_by_rays
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import Rank
 from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, matrix_spectrum
@@ -28,7 +29,6 @@ from ..essential.compact import compact_matrix
 from ..essential.edge import EssentialEdge, essential_edge, without_identity
 from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
-from .rays import OF_EDGE, gap_by_rays, suits_rays
 from .refinement import EIGENVALUES, HOW, refined
 from .shallow import shallow_gap
 from .surfaces import gap_of_surface
@@ -53,6 +53,8 @@ OF_RAYS, BEFORE_RAYS, AFTER_ENCLOSURES, ALONE = 5e-5, 0.4, 1.1, 1.5
 COMPACT_MISS = 1e-3
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
 PLANAR = 1e-2
+# Rays after which panels that reach no edge show that nothing is beyond it, and the method in words then.
+AT_EDGE, OF_EDGE = 2**19, "edge of the essential spectrum, from the law's action on grazing rays and its isometries"
 # Number of eigenvalues computed to find the least one.
 MODULI = 3
 
@@ -120,7 +122,7 @@ def _gap_of(law: Law, found: Enclosures, edge: EssentialEdge, rank: Rank = np.po
         how, value = f"bounds of the eigenvalue; {found.method}", 1.0 - 0.5 * (top.low + top.high)
         return SpectralGap(value, 0.5 * top.width, top.kind, how, "isolated", (str(top),), law.frame)
     # no eigenvalue that is not listed is above the radius
-    high = max(found.separation.radius, *(item.high for item in others if item.index is not None))
+    high = max([found.separation.radius, *(item.high for item in others if item.index is not None)])
     if max(high, edge.high) >= 1.0:
         return None
     how = f"bounds of all eigenvalues; {found.method}"
@@ -378,6 +380,33 @@ def _by_rays_or(
     allowed = ALONE if enclosed is None else AFTER_ENCLOSURES
     sampled = gap_by_rays(law, tolerance, rng, seconds * allowed, edge, rank)
     return sampled if enclosed is None else min(enclosed, sampled, key=lambda one: one.error)
+
+
+def gap_by_rays(
+    law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge, rank: Rank = np.positive
+) -> SpectralGap:
+    """The gap, or 1 - slem if ranked by modulus, from rays until its error is at most the tolerance.
+
+    Levels that miss an eigenvalue which others show are left out.
+    """
+    above, below = values_by_rays(law)
+    shown = max([0.0, *above[:1], *(below[:1] if rank is np.abs else ())])
+    tops: list[Top] = []
+    best: Top | None = None
+    for top in tops_by_rays(law, rng, seconds, edge.high, rank):
+        tops.append(top)
+        if top.rays >= AT_EDGE and max(top.reached, shown) < edge.low:
+            least = f"{top.reached:.6g} is the largest by {top.rays} rays"
+            evidence = (*map(str, tops), f"no eigenvalue beyond the edge {edge.value:.8g}: {least}")
+            return gap_between(0.0, 0.0, edge, OF_EDGE, evidence, law.frame)
+        if top.value + top.error >= shown and (best is None or top.error < best.error):
+            best = top
+            if best.error <= tolerance:
+                break
+    how = "quotients of an eigenfunction by rays from panels; sampling error + error of the eigenfunction"
+    evidence = (*map(str, tops), f"rays show an eigenvalue of at least {shown:.3g}")
+    low, high = (shown, 1.0) if best is None else (best.value - best.error, min(best.value + best.error, 1.0))
+    return gap_between(low, high, edge, how, evidence, law.frame)
 
 
 def _by_polynomials(

@@ -15,7 +15,7 @@ from asperity.core import long_runs
 from asperity.core.long_runs import time_limited
 from asperity.spectral.bounds.enclosure import enclosed_trial_space
 from asperity.spectral.bounds.operator_residuals import residuals
-from asperity.spectral.bounds.oscillations import values_in_bins
+from asperity.spectral.bounds.rays_on_panels import values_by_rays
 from asperity.spectral.bounds.separation import rest_of_spectrum
 from asperity.spectral.bounds.trial_space import adapted_trial_space
 from asperity.spectral.eigenvalues.spectra import SpectrumErrors, matrix_spectrum
@@ -143,12 +143,25 @@ def test_a_rough_gap_does_not_overlook_grazing_eigenfunctions():
     assert abs(found.value - 0.00537) <= found.error + 1e-4
 
 
-def test_rays_in_bins_bound_eigenvalues_from_below():
+def test_rays_on_panels_bound_eigenvalues_from_below():
     """The arc of half angle .6 has .286691174546(10), and -.5378593."""
-    above, below = values_in_bins(ker.CircularArcLaw(0.6))
+    above, below = values_by_rays(ker.CircularArcLaw(0.6))
     assert 0.24 < above[0] <= 0.2866912 and 0.5 < below[0] <= 0.5378594
     assert np.all(np.diff(above) <= 0.0) and np.all(np.diff(below) <= 0.0)
-    assert values_in_bins(ker.WallLaw(bezier_wall(8)))[0][0] > 0.8
+    assert values_by_rays(ker.WallLaw(bezier_wall(8)))[0][0] > 0.8
+
+
+def test_a_rough_gap_does_not_overlook_an_eigenfunction_on_a_milliradian():
+    """On the left side of this wall rays stay near 3.136; the gap is .016969(13) by enclosures to 1e-4."""
+    points = [
+        (0.0, 0.0), (0.031737594411543404, -0.23255464910259996), (0.06347518882308681, -0.2716773589130254),
+        (0.09521278323463023, -0.37097678583764937), (0.3952563969880583, -0.5801061442415665),
+        (0.6953000107414864, -0.45147293052028287), (0.9953436244949145, -0.4557258125210434),
+        (0.9968957496632763, -0.4130341694727618), (0.9984478748316382, -0.29765140732060863), (1.0, 0.0),
+    ]  # fmt: skip
+    wall = geo.Wall([geo.Bezier(points[k : k + 4]) for k in (0, 3, 6)])
+    found = spec.spectral_gap(ker.WallLaw(wall), 1e-2)
+    assert abs(found.value - 0.016969) <= found.error + 1.3e-5 and found.error <= 1e-2
 
 
 def test_no_separation_where_rays_show_another_eigenvalue():

@@ -8,9 +8,10 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError
 from asperity.kernels.laws.law import DrivenLaw
+from asperity.spectral.bounds.rays_on_panels import suits_rays, tops_by_rays
 from asperity.spectral.essential.edge import EssentialEdge, essential_edge
-from asperity.spectral.gap import rays
-from asperity.spectral.gap.rays import gap_by_rays, suits_rays, tops_by_rays
+from asperity.spectral.gap import gap as module
+from asperity.spectral.gap.gap import gap_by_rays
 
 # Eigenvalues of the arc of half angle 1.2 in both conventions, from enclosures to 1e-9.
 ARC, IN_SPECULAR, LEAST = 0.3670253152, 0.311346443, -0.311346443
@@ -65,7 +66,7 @@ def test_a_chaotic_hollow_has_its_gap_from_rays_and_another_seed_agrees():
 
 def test_a_level_that_misses_what_rays_in_bins_show_is_not_believed(monkeypatch):
     law = ker.CircularArcLaw(1.2)
-    monkeypatch.setattr(rays, "values_in_bins", lambda _: (np.array([0.9]), np.array([0.2])))
+    monkeypatch.setattr(module, "values_by_rays", lambda _: (np.array([0.9]), np.array([0.2])))
     gap = gap_by_rays(law, 1e-2, np.random.default_rng(0), 0.3, NO_EDGE)
     assert gap.verdict != "essential edge" and gap.value - gap.error == pytest.approx(0.0, abs=1e-15)
     assert gap.value + gap.error == pytest.approx(0.1)
