@@ -40,7 +40,7 @@ plt.show()
 
 # %%
 # The file states unit, convention, grid and errors in comments. The page about :doc:`tables </tables>` has samplers in
-# NumPy, C and Fortran.
+# NumPy, C++ and Fortran, and :doc:`SPARTA </sparta>` runs with one.
 
 law, table = ker.WallLaw(walls["round bumps"]), tables["round bumps"][3]
 path = table.save(Path(tempfile.mkdtemp()) / "law.csv")

@@ -204,7 +204,7 @@ print("diffuse {:.4f} l/s, Maxwell {:.4f} l/s, plate {:.4f} l/s".format(*conduct
 # ---------------------
 # A simulation draws outgoing angles from a table of quantiles: for each incoming angle the outgoing angles at equally
 # spaced probabilities. The page :doc:`/generated/how-to/a_table_for_dsmc` says how large it should be, the page on
-# :doc:`tables </tables>` has samplers in C and Fortran.
+# :doc:`tables </tables>` has samplers in C++ and Fortran.
 
 table = law.table(32, 33, 1e-2)
 file = table.save(path.with_name("plate.csv"))

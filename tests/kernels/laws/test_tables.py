@@ -174,11 +174,12 @@ def test_a_table_of_a_measured_profile_says_that_it_misses_the_tolerance_and_by_
         assert np.abs(off).max() < table.distribution_error + 0.01
 
 
+CLIENTS = Path(__file__).parents[3] / "docs" / "clients"
 PAGE = (Path(__file__).parents[3] / "docs" / "tables.md").read_text(encoding="utf-8")
 
 
 def block_of(language, number=0):
-    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)[number]
+    return re.findall(rf"^```{re.escape(language)}\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)[number]
 
 
 def assert_angles_of(law, table, theta, drawn):
@@ -209,8 +210,11 @@ def test_the_sampler_in_numpy_on_the_page_draws_from_the_law(tmp_path, monkeypat
     assert np.array_equal(own, table.sample(grazing, np.random.default_rng(7)))
 
 
+STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", f"-I{CLIENTS}"]
 COMPILERS = {
-    "c": ("cc", ".c", ["-std=c99", "-Wall", "-Werror"]),
+    "c++": ("g++", ".cpp", ["-std=c++17", *STRICT]),
+    # the standard that SPARTA is compiled with
+    "c++11": ("g++", ".cpp", ["-std=c++11", *STRICT]),
     "fortran": ("gfortran", ".f90", ["-std=f2008", "-Wall"]),
 }
 
@@ -232,7 +236,7 @@ def compiled(language, text, folder):
     return run
 
 
-@pytest.mark.parametrize(("language", "sizes"), [("c", []), ("fortran", [24, 25])])
+@pytest.mark.parametrize(("language", "sizes"), [("c++", []), ("fortran", [24, 25])])
 def test_the_compiled_samplers_on_the_page_draw_from_the_law(language, sizes, tmp_path):
     run, law, rows = compiled(language, block_of(language), tmp_path), ker.CircularArcLaw(1.2), 20_000
     table = law.table(24, 25)
@@ -280,19 +284,6 @@ def test_the_sampler_in_space_in_numpy_draws_from_the_law(orientation, tmp_path,
     assert_velocities_of(LOPSIDED, orientation, drawn)
 
 
-C_MAIN = """
-int main(int argc, char **argv) {
-    Table table = read_table(argv[1]);
-    double v[3], phi = atof(argv[2]);
-    if (argc != 3) return 2;
-    while (scanf("%lf %lf %lf", v, v + 1, v + 2) == 3) {
-        double angle = phi < 0 ? 6.283185307179586 * drand48() : phi;
-        reflect(&table, v, angle, drand48());
-        printf("%.17g %.17g %.17g\\n", v[0], v[1], v[2]);
-    }
-    return 0;
-}
-"""
 FORTRAN_MAIN = """
 program draw
   use tables
@@ -321,20 +312,164 @@ end program draw
 """
 
 
-def program_in_space(language):
-    """The blocks of the page, with a main program that reflects the velocities that it reads."""
-    plain, added = block_of(language), block_of(language, 1)
-    if language == "c":
-        return plain[: plain.index("int main")] + added + C_MAIN
+def test_the_sampler_in_space_in_fortran_draws_from_the_law(tmp_path):
+    plain, added = block_of("fortran"), block_of("fortran", 1)
     head = plain[: plain.index("end module tables")]
-    return head + added + "end module tables\n" + FORTRAN_MAIN
-
-
-@pytest.mark.parametrize("language", COMPILERS)
-def test_the_compiled_samplers_in_space_draw_from_the_law(language, tmp_path):
-    run = compiled(language, program_in_space(language), tmp_path)
+    run = compiled("fortran", head + added + "end module tables\n" + FORTRAN_MAIN, tmp_path)
     LOPSIDED.table(64, 65).save(tmp_path / "law.csv")
     given = "\n".join(" ".join(map(repr, row)) for row in VELOCITIES.tolist())
     for orientation in ("random", 0.4):
         drawn = run(-1.0 if orientation == "random" else orientation, given=given)
         assert_velocities_of(LOPSIDED, orientation, drawn.reshape(-1, 3))
+
+
+CPP_MAIN = """
+#include "asperity_table.hpp"
+#include <cstdio>
+#include <cstring>
+
+// Angles for lines with theta and u, or velocities for lines with v, phi, u and w; prints an error and ends with 1.
+int main(int, char** argv) {
+    try {
+        const asperity::Table law(argv[1]);
+        double v[3], phi, u, w;
+        if (!std::strcmp(argv[2], "angles"))
+            while (std::scanf("%lf %lf", v, &u) == 2) std::printf("%.17g ", law.sample(v[0], u));
+        else
+            while (std::scanf("%lf %lf %lf %lf %lf %lf", v, v + 1, v + 2, &phi, &u, &w) == 6) {
+                law.reflect(v, phi, u, w);
+                std::printf("%.17g %.17g %.17g ", v[0], v[1], v[2]);
+            }
+    } catch (const std::exception& problem) {
+        std::fputs(problem.what(), stderr);
+        return 1;
+    }
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def header(tmp_path_factory):
+    """A program that draws by the C++ header what it reads, from the table law.csv in a folder."""
+    folder = tmp_path_factory.mktemp("header")
+    return folder, compiled("c++11", CPP_MAIN, folder)
+
+
+def lines_of(*columns):
+    """Numbers as the programs read them."""
+    return "\n".join(" ".join(map(repr, row)) for row in np.column_stack(columns).tolist())
+
+
+@pytest.mark.parametrize("law", [ker.CircularArcLaw(1.2), LOPSIDED, LOPSIDED.in_specular_frame()], ids=repr)
+def test_the_header_draws_the_angles_of_the_table(law, header):
+    (folder, run), table = header, law.table(24, 25)
+    table.save(folder / "law.csv", overwrite=True)
+    theta = np.concatenate([np.linspace(0.001, 3.141, 500), [1e-300, 1e-9, np.nextafter(np.pi, 0.0)]])
+    u = np.random.default_rng(1).random(theta.size)
+    found = run("angles", given=lines_of(theta, u))
+    assert np.allclose(found, table.sample(theta, np.random.default_rng(1)), rtol=1e-13, atol=1e-15)
+
+
+def velocities(count, speed=300.0):
+    """Incoming velocities of a gas, and an angle and two numbers for each."""
+    rng = np.random.default_rng(2)
+    return speed * rng.normal(size=(count, 3)) * [1, 1, 0] - [0, 0, speed] * rng.random((count, 1)), rng.random(
+        (2, count)
+    )
+
+
+@pytest.mark.parametrize("law", [LOPSIDED, LOPSIDED.in_specular_frame()], ids=repr)
+@pytest.mark.parametrize("phi", [0.0, 2.5])
+def test_the_header_reflects_across_grooves_as_the_table_does(law, phi, header):
+    (folder, run), table = header, law.table(24, 25)
+    table.save(folder / "law.csv", overwrite=True)
+    v, (u, w) = velocities(300)
+    found = run("velocities", given=lines_of(v, np.full(300, phi), u, w)).reshape(-1, 3)
+    # grooves have the direction g, and the law's x axis is that of g x normal
+    g, normal = np.array([np.cos(phi), np.sin(phi), 0.0]), np.array([0.0, 0.0, 1.0])
+    across = np.cross(g, normal)
+    angle = table._at(np.arctan2(-v @ normal, -v @ across), u)
+    angle = np.pi - angle if table.frame == "specular" else angle
+    size = np.linalg.norm(v - np.outer(v @ g, g), axis=1)[:, None]
+    own = np.outer(v @ g, g) + size * (np.outer(np.cos(angle), across) + np.outer(np.sin(angle), normal))
+    assert np.allclose(found, own, rtol=0.0, atol=1e-10)
+
+
+FIELD = geo.Surface.random(geo.HeightCorrelation(0.1), 16, rms_slope=1.0, rng=2)
+IN_SPACE = [
+    ker.SurfaceLaw(FIELD),
+    ker.SurfaceLaw(FIELD, 0.4),
+    0.5 * ker.SurfaceLaw(FIELD) + 0.5 * ker.HemisphereLaw(ker.specular()),
+]
+
+
+@pytest.mark.parametrize("law", IN_SPACE, ids=["random", "fixed", "mixed"])
+def test_the_header_draws_the_velocities_of_tables_of_directions(law, header):
+    (folder, run), table = header, law.table(4, 5, 6, n_turn=3, tolerance=0.1)
+    table.save(folder / "law.csv", overwrite=True)
+    v, _ = velocities(300)
+    draws = np.random.default_rng(5).random((2, 300))
+    found = run("velocities", given=lines_of(v, np.zeros(300), *draws)).reshape(-1, 3)
+    assert np.allclose(found, table.sample(v, np.random.default_rng(5)), rtol=0.0, atol=1e-10)
+    # turned with the surface by phi
+    c, s = np.cos(0.7), np.sin(0.7)
+    turned = run("velocities", given=lines_of(v @ [[c, s, 0], [-s, c, 0], [0, 0, 1]], np.full(300, 0.7), *draws))
+    assert np.allclose(turned.reshape(-1, 3), found @ [[c, s, 0], [-s, c, 0], [0, 0, 1]], rtol=0.0, atol=1e-10)
+
+
+def cut(text, line, to=None):
+    """The text without a line, or with another in its place."""
+    lines = text.splitlines(keepends=True)
+    lines[line] = "" if to is None else f"{to}\n"
+    return "".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("change", "given", "words"),
+    [
+        (lambda text: None, "", "expected a file that can be read, got none"),
+        (lambda text: cut(text, 0), "", "expected a first line that begins with '# asperity table 1:' or"),
+        (lambda text: cut(text, -1), "", "expected 0.523599 as number 1 in row 2 of numbers, of 4 with equal steps"),
+        (lambda text: text[:-5], "", "expected a whole file, got one that ends within line 12"),
+        (lambda text: cut(text, 9, "0.6,1.0,x"), "", "expected 6 numbers in line 10, got 2: 0.6 1.0 x"),
+        (lambda text: cut(text, 9, "0.6,1,1,1,1,1x"), "", "expected 6 numbers in line 10, got 6: 0.6 1 1 1 1 1x"),
+        (lambda text: cut(text, 9, ""), "", "expected 6 numbers in line 10, got 0: "),
+        (lambda text: "".join(text.splitlines(keepends=True)[:8]), "", "expected 3 rows of 3 numbers, got 1 rows"),
+        (lambda text: text, "3.2 0.5", r"expected an incoming angle in (0, pi), got 3.2"),
+        (lambda text: text, "1.0 1.5", "expected a random number in [0, 1), got 1.5"),
+        (lambda text: text, "nan 0.5", "expected an incoming angle in (0, pi), got nan"),
+    ],
+)  # fmt: skip
+def test_the_header_says_what_it_expected_and_what_came(change, given, words, header):
+    folder, run = header
+    path = ker.CircularArcLaw(1.2).table(4, 5).save(folder / "law.csv", overwrite=True)
+    text = change(path.read_text())
+    path.unlink() if text is None else path.write_text(text)
+    with pytest.raises(subprocess.CalledProcessError) as refused:
+        run("angles", given=given)
+    assert f"{path}: {words}" in refused.value.stderr
+
+
+def test_the_header_refuses_tables_of_directions_that_are_cut_and_calls_of_the_other_kind(header):
+    folder, run = header
+    path = IN_SPACE[1].table(3, 3, 3, n_turn=2, tolerance=0.3).save(folder / "law.csv", overwrite=True)
+    text = path.read_text()
+    lines = text.splitlines(keepends=True)
+    for change, kind, given, words in (
+        (text, "angles", "1.0 0.5", "expected a law in the plane, got one of directions in space"),
+        (text, "velocities", "1 0 0 0 0.5 0.5", "expected a velocity with a negative third component, got 0"),
+        (text, "velocities", "1 0 -1 0 0.5 nan", "expected a random number in [0, 1), got nan"),
+        ("".join(lines[:-4]), "velocities", "", "expected 0.25 as number 1 in row 2 of numbers, of 9 with equal steps"),
+        ("".join(lines[:-8]), "velocities", "", "expected rows for at least two incoming angles, got 4 rows"),
+        ("".join(lines[:-1]), "velocities", "", "expected 0.25 as number 1 in row 2 of numbers, of 12"),
+        (
+            text.replace("3.14159", "3.0", 1),
+            "velocities",
+            "",
+            "expected 3.14159 as number 2 in row 4 of numbers, of 13",
+        ),
+    ):
+        path.write_text(change)
+        with pytest.raises(subprocess.CalledProcessError) as refused:
+            run(kind, given=given)
+        assert words in refused.value.stderr
