@@ -180,7 +180,7 @@ def simulated_times(
     half = number_between("radius", radius, 1.0 / LARGEST, LARGEST)
     pace = number_between("speed", speed, 1.0 / LARGEST, LARGEST)
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
-    job = _Particles(laws, levels, particles, root, half, pace, arrangement)
+    job = _Particles(laws[0], laws[-1], levels, particles, root, half, pace, arrangement)
     parts = all_parts(job.times, -(-particles // TOGETHER), identity_of("exit times", job), engine, job.stored)
     return ExitTimes(frozen(levels), frozen(np.concatenate([part["times"] for part in parts])), half, pace)
 
@@ -338,7 +338,8 @@ def _passed(levels: Floats, reached: NDArray[np.int64], ends: Floats) -> tuple[N
 class _Particles:
     """Particles in a channel, ``TOGETHER`` of them at a time; what a worker is sent."""
 
-    laws: tuple[Law, ...]
+    law: Law
+    other: Law
     lengths: Floats
     particles: int
     seed: tuple[int, ...]
@@ -357,7 +358,6 @@ class _Particles:
     def times(self, part: int) -> dict[str, Floats]:
         """Exit times of the particles of one part, which depend on its number alone."""
         channel = Channel(self.radius, math.inf, self.arrangement == "half-turn")
-        wall, rng = np.arange(self.count(part)) % len(self.laws), np.random.default_rng([*self.seed, part])
-        return {
-            "times": channel.crossings(self.laws, self.lengths, wall.astype(np.float64), rng, of_x=True) / self.speed
-        }
+        laws = tuple(dict.fromkeys((self.law, self.other)))
+        wall, rng = np.arange(self.count(part)) % len(laws), np.random.default_rng([*self.seed, part])
+        return {"times": channel.crossings(laws, self.lengths, wall.astype(np.float64), rng, of_x=True) / self.speed}
