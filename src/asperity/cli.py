@@ -430,7 +430,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
 
 
 @main.command(epilog=WALL_HELP)
-@click.argument("wall", default="triangular-teeth")
+@click.argument("wall", default="focusing-arcs")
 @click.option("--port", type=click.IntRange(0, 65535), default=5006, help="0 for any that is free.")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @click.option("--out", type=NEW_FOLDER, help="Write what is saved into this folder.")

@@ -364,6 +364,20 @@ def test_a_refused_file_is_read_again_when_its_options_change_or_it_is_sent_agai
     waited(page, lambda: page.question.name == "koch" and not page._awaited)
 
 
+def test_separator_decimal_sign_and_encoding_of_a_profile_are_fields(page):
+    text = "x;höhe\n0;0,0\n1;-0,5\n2;-0,1\n3;-0,4\n"
+    page.reading["decimal"].value = "."
+    page.file.filename, page.file.value = "profile.txt", text.encode("latin-1")
+    waited(page, lambda: page.message)
+    for key, value in (("delimiter", "semicolon"), ("encoding", "latin-1"), ("decimal", "comma")):
+        page.reading[key].value = value
+    waited(page, lambda: page.question.name == "profile" and not page.message)
+    assert page.question.wall.depth == pytest.approx(0.5)
+    # they are none of a wall file
+    page.file.filename, page.file.value = "wall.toml", wall_as_toml(TEETH)
+    waited(page, lambda: page.question.name == "wall" and not page.message)
+
+
 @pytest.mark.parametrize("name", geo.WALLS)
 def test_every_named_wall_can_be_chosen_and_has_its_sliders(page, name):
     page.choice.value = name

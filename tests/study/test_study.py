@@ -282,6 +282,18 @@ def test_momentum_and_resistance_are_those_of_the_library(which, request):
     assert report.as_dict()["resistance"]["error"] == report.resistance.error
 
 
+def test_pictures_are_titled_by_the_wall_and_its_parameters_without_the_options_of_a_reader(teeth):
+    long = "line.txt:seam=step,units=um/nm,delimiter=semicolon,decimal=comma,usecols=0/2,skiprows=3,encoding=latin-1"
+    for name, title in (
+        (long, "line.txt"),
+        ("koch:generations=2", "koch, generations = 2"),
+        ("ratio 1:2", "ratio 1:2"),
+    ):
+        ax = Figure().subplots()
+        draw_study_wall(replace(teeth, name=name), ax)
+        assert ax.get_title().splitlines()[0] == title
+
+
 @pytest.mark.parametrize(("kind", "start"), [("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_pictures_are_written_in_the_format_that_is_asked_for(teeth, tmp_path, kind, start):
     paths = teeth.save(tmp_path, picture_format=kind, dpi=50)

@@ -15,7 +15,7 @@ from ..core.errors import AsperityError
 from ..core.estimates import NORMAL_95, Estimate, Summary, estimate_as_dict, finite, with_error
 from ..core.rounding import EPS
 from ..core.version import __version__
-from ..geometry import Disk, Wall
+from ..geometry import WALLS, Disk, Wall
 from ..kernels import CollisionLaw, KernelMatrix, Law
 from ..spectral import SpectralGap, Spectrum, mean_squared_slope
 from ..spectral.bounds.enclosure import Enclosures
@@ -122,13 +122,29 @@ class StudyResult(Summary):
 
     @property
     def title(self) -> str:
-        """The name of the wall, with the law of facets that are no mirrors."""
-        return self.name if self.facets is None else f"{self.name}, facets {self.facets!r}"
+        """The name of the wall with its parameters, and the law of facets that are no mirrors."""
+        name = title_of(self.name)
+        return name if self.facets is None else f"{name}, facets {self.facets!r}"
 
     @property
     def resistance(self) -> Estimate | None:
         """That of a tumbling body with this wall, where a smooth one has 1; None where accommodation is."""
         return None if self.accommodation is None else resistance_from(self.accommodation)
+
+
+def title_of(name: str) -> str:
+    """What pictures call a wall: of a named one its parameters too, of a file none of the options of its reader.
+
+    Examples
+    --------
+    >>> title_of("focusing-arcs:half_angle=0.9"), title_of("line.txt:seam=step,units=um/nm"), title_of("a: b")
+    ('focusing-arcs, half_angle = 0.9', 'line.txt', 'a: b')
+    """
+    file, _, options = name.partition(":")
+    parts = [part.partition("=") for part in options.split(",")]
+    if not all(equals for _, equals, _ in parts):
+        return name
+    return ", ".join([file, *(f"{key} = {value}" for key, _, value in parts if file in WALLS)])
 
 
 def resistance_from(found: Accommodation) -> Estimate:
