@@ -87,8 +87,6 @@ class StudyResult(Summary):
     enclosures : Enclosures or None
         Intervals that hold eigenvalues of P~ itself; None where ``refusals`` says why.
     collision : CollisionLaw
-    collision_matrix : KernelMatrix
-        P~ of the foreshortened wall, in bins.
     collision_gap : SpectralGap or None
     conservation : dict
         Largest relative change of the kinetic energy and of the rolling momentum in sampled collisions.
@@ -113,7 +111,6 @@ class StudyResult(Summary):
     spectrum: Spectrum | None
     enclosures: Enclosures | None
     collision: CollisionLaw
-    collision_matrix: KernelMatrix
     collision_gap: SpectralGap | None
     conservation: Mapping[str, float]
     refusals: Mapping[str, str]
@@ -267,8 +264,7 @@ def report_of(study: StudyResult, by_angle: bool, verbose: bool) -> str:
             f"mass {disk.mass:g}, inertia ratio {disk.inertia_ratio:g}, radius {disk.radius:g}: feels the wall "
             f"{1.0 / disk.foreshortening:.4g} times as deep"
         ],
-        "collision": gap_lines(study, "collision_gap", "gap of that wall ")
-        + [f"law of that wall {line}" for line in matrix_lines(study.collision_matrix)],
+        "collision": gap_lines(study, "collision_gap", "gap of that wall "),
         "conserved": [
             f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
             f"{study.conservation['rolling_momentum_defect']:.0e}"
@@ -465,8 +461,7 @@ def study_as_dict(study: StudyResult) -> dict[str, Any]:
         "enclosures": study.enclosures and enclosures_as_list(study.enclosures),
         "collision": {
             "mass": disk.mass, "inertia_ratio": disk.inertia_ratio, "radius": disk.radius,
-            "foreshortening": disk.foreshortening, "law": matrix_as_dict(study.collision_matrix), "gap": gaps[2],
-            **study.conservation,
+            "foreshortening": disk.foreshortening, "gap": gaps[2], **study.conservation,
         },
         "consequences": study.consequences.as_dict(),
         "accommodation": study.accommodation and _accommodation(study.accommodation),

@@ -212,7 +212,7 @@ def study_wall(
         from_degrees(incidence_deg)
     given, disk = disk is not None, disk or Disk()
     refusals: dict[str, str] = {}
-    with progress_bar(9, "part", name, shown=progress) as bar:
+    with progress_bar(8, "part", name, shown=progress) as bar:
         tracer = check_tracer(wall, rng) if wall.hollows else None
         bar.update()
         matrix = _matrix(law, basis, tolerance, rng)
@@ -224,9 +224,6 @@ def study_wall(
         enclosed = _or_refusal(lambda: _enclosures(law, gap, tolerance), refusals, "enclosures", reason=AsperityError)
         bar.update()
         collision = CollisionLaw(law_of(wall.foreshorten(disk), facets), disk)
-        # only the detailed report mentions it
-        collision_matrix = _matrix(collision.law, basis, tolerance, rng, most=FIRST_SAMPLES)
-        bar.update()
         collision_gap = _or_refusal(lambda: spectral_gap(collision.law, tolerance, rng), refusals, "collision_gap")
         bar.update()
         consequences = consequences_of(wall, law, gap, specular_gap, found)
@@ -237,7 +234,7 @@ def study_wall(
         bar.update()
     return Study(
         name, wall, facets, disk, given, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed,
-        collision, collision_matrix, collision_gap, MappingProxyType(conservation), MappingProxyType(refusals),
+        collision, collision_gap, MappingProxyType(conservation), MappingProxyType(refusals),
         consequences, momentum,
     )  # fmt: skip
 
@@ -304,17 +301,15 @@ def _enclosures(law: Law, gap: SpectralGap | None, tolerance: float) -> Enclosur
     return enclosures(law, ENCLOSED, tolerance=MATRIX_FRACTION * tolerance)
 
 
-def _matrix(
-    law: Law, basis: Bins, tolerance: float, rng: np.random.Generator, most: int = MOST_SAMPLES
-) -> KernelMatrix:
-    """In bins; where rays are needed, as many as the error of a first sample asks for, and at most ``most``."""
+def _matrix(law: Law, basis: Bins, tolerance: float, rng: np.random.Generator) -> KernelMatrix:
+    """In bins; where rays are needed, as many as the error of a first sample asks for, and at most `MOST_SAMPLES`."""
     wanted = tolerance * float(np.sqrt(basis.size))
     found = discretise(law, basis, tolerance=wanted, samples=FIRST_SAMPLES, rng=rng)
-    if not found.samples or found.tolerance_met or most <= FIRST_SAMPLES:
+    if not found.samples or found.tolerance_met:
         return found
     # the error falls at least like the root of their number
     more = 2 ** math.ceil(2.0 * math.log2(float(found.error) / wanted))
-    return discretise(law, basis, tolerance=wanted, samples=min(FIRST_SAMPLES * more, most), rng=rng)
+    return discretise(law, basis, tolerance=wanted, samples=min(FIRST_SAMPLES * more, MOST_SAMPLES), rng=rng)
 
 
 def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
