@@ -105,6 +105,16 @@ def test_a_study_makes_one_matrix_that_of_the_wall(monkeypatch):
     )
 
 
+def test_the_study_of_the_wall_is_told_before_the_collision_of_the_disk(monkeypatch):
+    told = []
+    monkeypatch.setattr(study_module, "_conservation", lambda *_: told.append("disk") or dict(study_module.UNKNOWN))
+    whole = study_wall(geo.focusing_arcs(1.2), bins=8, tolerance=0.1, progress=False, first=told.append)
+    part, after = told
+    assert after == "disk" and part.collision_gap is None and whole.collision_gap is not None
+    cut = part.summary().index("\ndisk ")
+    assert whole.summary()[:cut] == part.summary()[:cut] and "gap " in part.summary()[:cut]
+
+
 def test_the_summary_names_method_error_tolerance_and_both_conventions(arcs):
     text = arcs.summary(verbose=True)
     assert "Bins(32) by quadrature, Frobenius error" in text and text.count("tolerance 0.01 met") == 3
