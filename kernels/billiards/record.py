@@ -282,7 +282,7 @@ class BilliardRecord(Summary):
                     line.set_data(*_outlines(drawn, size, turns, from_centre=line is spoke))
             return [line for group in lines for line in group]
 
-        # of an axes in a subfigure, the figure above it; `get_figure(root=True)` needs matplotlib 3.10
+        # of an axes in a subfigure, the figure above it
         figure = axes.figure.figure
         animation = FuncAnimation(figure, show, frames=count, interval=1e3 * seconds / count, blit=False)
         # matplotlib warns of an animation of which no picture was drawn
