@@ -96,6 +96,11 @@ class GasRecord(BilliardRecord):
         """In one period of a torus."""
         return position if isinstance(self.container, Container) else position % self.container.periods
 
+    def _corners(self, seen: Floats) -> Floats:
+        if isinstance(self.container, Container):
+            return super()._corners(seen)
+        return np.array([(0.0, 0.0), self.container.periods])
+
     def _images(self, position: Floats) -> Floats:
         """In a torus the images that lie in this period in part, of a disk with its centre in it."""
         if isinstance(self.container, Container):

@@ -102,6 +102,10 @@ class BilliardRecord(Summary):
         """Positions (..., 2) as they are drawn."""
         return position
 
+    def _corners(self, seen: Floats) -> Floats:
+        """Points (k, 2) that the centres of drawn disks may reach."""
+        return seen.reshape(-1, 2)
+
     def _images(self, position: Floats) -> Floats:
         """Where a disk is drawn, shape (k, 2)."""
         return position[None]
@@ -262,7 +266,8 @@ class BilliardRecord(Summary):
         small = DRAWN_RADIUS * max(np.ptp(self.position[..., 0]), np.ptp(self.position[..., 1]))
         size = self.radius or small
         seen = self._seen(self.position)
-        low, high = seen.min(axis=(0, 1)) - 1.2 * size, seen.max(axis=(0, 1)) + 1.2 * size
+        corners = self._corners(seen)
+        low, high = corners.min(axis=0) - 1.2 * size, corners.max(axis=0) + 1.2 * size
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         trace = TRACE * float(np.mean(np.diff(self.time, axis=0)))
         lines: list[list[Line2D]] = []

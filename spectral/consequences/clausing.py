@@ -201,15 +201,13 @@ def transmission(
     diffuse = max(fraction for fraction, _ in split)
     if diffuse * far <= EPS:
         return Estimate(1.0, diffuse * far, "bound", "no more particles are reflected otherwise than specularly")
-    found = _found(*map(tuple, zip(*rough, strict=True)), section, far, wanted, source)
+    found = _found(rough, section, far, wanted, source)
     ends = found.value - found.error, found.value + found.error
     low, high = np.clip(ends, 0.0, 1.0).tolist()
     return found if (low, high) == ends else replace(found, value=0.5 * (low + high), error=0.5 * (high - low))
 
 
-def _laws_of_walls(
-    law: Law | DirectionLaw, other: Law | DirectionLaw | None, section: Section
-) -> tuple[Law, ...] | tuple[DirectionLaw, ...]:
+def _laws_of_walls(law: Law | DirectionLaw, other: Law | DirectionLaw | None, section: Section) -> tuple[Any, ...]:
     """The law of both walls or the laws of floor and ceiling, planar ones in the paper's convention."""
     if other is not None and section == "tube":
         raise InputError(f"other: a tube has one wall; expected no second law, got {other!r}; take section='channel'")
@@ -218,14 +216,15 @@ def _laws_of_walls(
             return (law,)
         instance("other", other, DirectionLaw, "ker.HemisphereLaw(law)")
         return tuple(dict.fromkeys((law, other)))
-    return laws_of_walls(law, other)
+    second: Any = other
+    return laws_of_walls(law, second)
 
 
 def _found(
-    laws: tuple[Any, ...], fractions: tuple[float, ...], rests: tuple[Any, ...], section: Section, length: float,
-    tolerance: float, rng: np.random.Generator,
-) -> Estimate:  # fmt: skip
-    """The transmission of laws that with probabilities ``fractions`` reflect by ``rests``, else specularly."""
+    walls: Sequence[tuple[Any, float, Any]], section: Section, length: float, tolerance: float, rng: np.random.Generator
+) -> Estimate:
+    """The transmission, from law, fraction of reflections not known to be specular, and law of these, for each wall."""
+    laws, fractions, rests = zip(*walls, strict=True)
     longest, runs = LONGEST * GEOMETRIES[section].width, _Runs(fractions)
     largest = max(fractions)
     if isinstance(laws[0], DirectionLaw):
@@ -425,7 +424,7 @@ class _Runs:
         if len(self.fractions) == 1:
             return rounds, wall
         odd = rng.random(wall.shape) * self.stopped < np.where(wall > 0, *self.fractions)
-        return 2.0 * rounds - odd, np.where(odd, 1.0 - wall, wall)
+        return np.asarray(2.0 * rounds - odd), np.where(odd, 1.0 - wall, wall)
 
     def entering(self, number: int, rng: np.random.Generator, *, times: bool) -> tuple[Floats, Floats]:
         """Numbers k of flights to the first diffuse reflection, and its wall; with ``times`` k times as often.
@@ -442,7 +441,7 @@ class _Runs:
         kind = rng.choice(4, number, p=chance / chance.sum())
         flights = 2.0 * rounds - (kind < 2)
         taken = rng.random(number) * 2.0 * rounds < flights if times else np.ones(number, dtype=bool)
-        return flights[taken], (kind % 2.0)[taken]
+        return np.asarray(flights[taken]), (kind[taken] % 2).astype(np.float64)
 
 
 def _diffuse_flights(geometry: _Geometry, runs: _Runs, length: float) -> _Flights:
@@ -465,10 +464,11 @@ def _diffuse_flights(geometry: _Geometry, runs: _Runs, length: float) -> _Flight
 
     def beyond(z: Floats) -> Floats:
         # from each wall to the others, the factors of their reflections included
-        return sum(
+        parts = (
             averaged(geometry.beyond, z, number, chance)[..., None] * (matrix @ runs.reflection).sum(axis=1)
             for matrix, number, chance in terms
         )
+        return np.asarray(sum(parts))
 
     return _Flights(
         tuple((matrix, density(number, chance)) for matrix, number, chance in terms),
@@ -518,8 +518,8 @@ def _solved(flights: _Flights, matrix: Floats, length: float, nodes: int) -> tup
     weight = (half[:, None] * weight).ravel()
     signs, walls = flights.signs, len(flights.arriving[0][0])
     flown: Floats = np.zeros(())
-    for between, arriving in flights.arriving:
-        rows = np.stack([_row(flights, arriving, edges, unit, x, nodes) for x in place[: len(half) // 2].ravel()])
+    for between, function in flights.arriving:
+        rows = np.stack([_row(flights, function, edges, unit, x, nodes) for x in place[: len(half) // 2].ravel()])
         # the second half of the channel is the mirror image
         turned = (signs[:, None, None] * signs * rows)[::-1, :, ::-1]
         flown = flown + np.einsum("vw,xiyj->xviywj", between, np.concatenate((rows, turned)))

@@ -244,7 +244,7 @@ def study(
         report: SavedStudy = (
             study_surface(found, name, **asked)
             if is_map
-            else study_wall(found.wall, name, disk, facets=of_facets, first=early and early.tell, **asked)
+            else study_wall(found.wall, name, disk, facets=of_facets, first=early.tell if early else None, **asked)
         )
         if early is not None:
             early.finish(report)

@@ -65,8 +65,8 @@ def save_pictures(drawings: Drawings, paths: Sequence[Path], dpi: float = RESOLU
         if kind == "png" and drawn.tell() > LARGEST_PNG:
             from PIL import Image
 
-            # a relief has more colours than eyes tell apart
-            few = Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+            # a relief has more colours than eyes tell apart; those of the few points on rays stay
+            few = Image.open(drawn).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
             few.save(stream, format="png", optimize=True, dpi=(dpi, dpi))
         else:
             stream.write(drawn.getvalue())

@@ -258,8 +258,10 @@ def study_wall(
         bar.update()
         conservation = _conservation(collision, rng)
         bar.update()
-    found_of_disk = {"collision_gap": collision_gap, "conservation": MappingProxyType(conservation)}
-    return replace(of_wall, refusals=MappingProxyType(refusals), **found_of_disk)
+    return replace(
+        of_wall, collision_gap=collision_gap, conservation=MappingProxyType(conservation),
+        refusals=MappingProxyType(refusals),
+    )  # fmt: skip
 
 
 def law_of(wall: Wall, facets: Law | None) -> Law:

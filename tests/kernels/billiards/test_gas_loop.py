@@ -259,6 +259,7 @@ def test_a_disk_at_the_edge_of_a_torus_has_images():
     axes = still.animate(frames=2)._fig.axes[0]
     edge, spoke = (line.get_xydata() for line in axes.lines[-5:-3])
     assert np.isnan(edge[:, 0]).sum() == np.isnan(spoke[:, 0]).sum() == 3
+    assert axes.get_xlim() == (-1.2, 10.2) and axes.get_ylim() == (-1.2, 8.2)
 
 
 def test_states_for_which_there_is_no_memory_are_refused_before_the_run(monkeypatch):
