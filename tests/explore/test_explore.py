@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from asperity import cli
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
@@ -362,6 +363,11 @@ def test_a_refused_file_is_read_again_when_its_options_change_or_it_is_sent_agai
     page.choice.value = "koch"
     page.options.value = "seam=mirror"
     waited(page, lambda: page.question.name == "koch" and not page._awaited)
+
+
+def test_the_page_opens_on_a_wall_that_has_a_gap():
+    (default,) = (one.default for one in cli.explore.params if one.name == "wall")
+    assert spec.spectral_gap(ker.WallLaw(geo.wall_from_text(default)), 1e-2).verdict == "isolated"
 
 
 def test_separator_decimal_sign_and_encoding_of_a_profile_are_fields(page):
