@@ -370,6 +370,15 @@ def test_the_page_opens_on_a_wall_that_has_a_gap():
     assert spec.spectral_gap(ker.WallLaw(geo.wall_from_text(default)), 1e-2).verdict == "isolated"
 
 
+def test_a_gap_of_which_no_digit_is_known_is_shown_as_an_interval():
+    pytest.importorskip("panel", reason="the page needs asperity[explore]")
+    from asperity.explore.page import answer_as_html
+
+    coarse = first_answer(Question(geo.focusing_arcs(1.2), "arcs"))
+    assert coarse.gap.verdict == "undecided" and coarse.gap.error >= coarse.gap.value
+    assert f"<b>0 to {2.0 * coarse.gap.value:.2g}</b>, undecided" in answer_as_html(coarse)
+
+
 def test_separator_decimal_sign_and_encoding_of_a_profile_are_fields(page):
     text = "x;höhe\n0;0,0\n1;-0,5\n2;-0,1\n3;-0,4\n"
     page.reading["decimal"].value = "."

@@ -422,7 +422,11 @@ def answer_as_html(answer: Answer) -> str:
         rows["gap"] = f"<b>0</b>, no gap ({html.escape(gap.evidence[0])}); {gap.convention} convention"
     elif gap is not None:
         name = "" if gap.self_adjoint else "1 - norm on functions of mean 0: "
-        value = f"{name}<b>{html.escape(str(gap))}</b>"
+        # a value of which no digit is known is shown as the interval
+        known = (
+            str(gap) if gap.error < gap.value else f"{max(gap.value - gap.error, 0.0):g} to {gap.value + gap.error:.2g}"
+        )
+        value = f"{name}<b>{html.escape(known)}</b>"
         rows["gap"] = f"{value}, {gap.verdict}, error {gap.error:.1e} ({gap.kind}); {gap.convention} convention"
         rows["by"] = html.escape(gap.method)
     if momentum is not None:
