@@ -314,7 +314,7 @@ def _check_states(loop: EventLoop, events: int, interval: float) -> None:
     begun = {name: array.copy() for name, array in loop.snapshot().items()}
     loop.run(min(events, PILOT * len(loop.floats)))
     states = loop.time * events / max(loop.events, 1) / interval
-    check_memory("interval", "the record", int(min(9.0 * len(loop.floats) * states, 1e30)))
+    check_memory("duration over interval", "the record", int(min(9.0 * len(loop.floats) * states, 1e30)))
     loop.restore(begun)
 
 
@@ -448,7 +448,7 @@ class _Store:
             if code != TIME:
                 return code
             if stored & (stored - 1) == 0:
-                check_memory("interval", "the record", 18 * len(self.loop.floats) * stored)
+                check_memory("duration over interval", "the record", 18 * len(self.loop.floats) * stored)
             self.keep(stored * self.interval, [-1, -1, -1], stored * self.interval)
 
     def keep(self, time: float, met: list[int], at: float | None = None) -> None:

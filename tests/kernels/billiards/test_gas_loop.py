@@ -267,7 +267,7 @@ def test_states_for_which_there_is_no_memory_are_refused_before_the_run(monkeypa
 
     made = []
     monkeypatch.setattr(module._Store, "fill", lambda *_: made.append(1))
-    with pytest.raises(InputError, match=r"^interval: the record takes .* GB of memory"):
+    with pytest.raises(InputError, match=r"^duration over interval: the record takes .* GB of memory"):
         play(ker.specular(), None, 10**6, interval=1e-9)
     assert not made
 
