@@ -13,7 +13,7 @@ DEV := $(VENV)/.installed-dev
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help study test test-all test-lowest test-newest check format-check lint types docs bench build format clean distclean
+.PHONY: help study test test-all test-lowest test-newest test-wheel check format-check lint types docs bench build format clean distclean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -32,6 +32,15 @@ test-lowest: ## run the tests with the lowest versions of all dependencies, in .
 	$(PYTHON) -m venv --clear .venv-lowest
 	.venv-lowest/bin/python -m pip install --quiet --constraint constraints/lowest.txt --editable '.[dev]'
 	.venv-lowest/bin/python -m pytest --numprocesses auto --dist worksteal
+
+# The sdist has the tests and pages; the package is the installed wheel's, because no test imports `src`.
+test-wheel: $(DEV) ## run the tests, but the slow ones, of the sdist with the wheel built from it, in .venv-wheel
+	rm -rf dist
+	$(PY) -m build
+	$(PYTHON) -m venv --clear .venv-wheel
+	.venv-wheel/bin/python -m pip install --quiet "$$(echo dist/*.whl)[dev]"
+	mkdir .venv-wheel/sdist && tar --extract --gzip --file dist/*.tar.gz --strip-components 1 --directory .venv-wheel/sdist
+	cd .venv-wheel/sdist && ../bin/python -m pytest --numprocesses auto --dist worksteal -m 'not slow' tests
 
 test-newest: ## run the tests with the newest versions of all dependencies, in .venv-newest
 	$(PYTHON) -m venv --clear .venv-newest
@@ -79,7 +88,7 @@ clean: ## remove what the other targets wrote, except the environments
 	find . -path './.venv*' -prune -o -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean ## remove the environments too
-	rm -rf $(VENV) .venv-lowest .venv-newest
+	rm -rf $(VENV) .venv-lowest .venv-newest .venv-wheel
 
 # An environment that was left half made (no pip in it) is made again.
 define make_environment

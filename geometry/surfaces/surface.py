@@ -319,6 +319,12 @@ class Surface(Value):
                 paths.append((self.trajectory(x, v), bool(self.trace(x, v).escaped)))
         return draw_surface(self.heights, self.spacing, self.unit, paths, ax)
 
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether the map is a part and its mirror images in both directions, as measured maps are made periodic."""
+        z = self.heights
+        return min(z.shape) > 2 and all(np.array_equal(one[1:], one[:0:-1]) for one in (z, z.T))
+
     def quarters(self) -> tuple[Surface, Surface, Surface, Surface]:
         """The quarters of a measured map, each made periodic by its mirror image, for the spread of any quantity.
 
@@ -336,7 +342,7 @@ class Surface(Value):
         [1.0, 1.0, 4.0, 4.0]
         """
         z = self.heights
-        if all(np.array_equal(one[1:], one[:0:-1]) for one in (z, z.T)):
+        if self.is_mirrored:
             z = z[: len(z) // 2 + 1, : z.shape[1] // 2 + 1]
         n, m = z.shape
         if min(n, m) < FEWEST:

@@ -52,6 +52,8 @@ ROWS, MARKED, TOGETHER = 1024, 16, 50_000
 # Seconds between two writes into a checkpoint, and how much longer at least than a write they are.
 SAVED, PATIENCE = 10.0, 20.0
 # What is kept of a state.
+# Events for each disk whose time predicts that of all.
+PILOT = 8
 STATES = ("time", "met", "position", "angle", "velocity")
 
 
@@ -93,6 +95,20 @@ class GasRecord(BilliardRecord):
     def _seen(self, position: Floats) -> Floats:
         """In one period of a torus."""
         return position if isinstance(self.container, Container) else position % self.container.periods
+
+    def _corners(self, seen: Floats) -> Floats:
+        if isinstance(self.container, Container):
+            return super()._corners(seen)
+        return np.array([(0.0, 0.0), self.container.periods])
+
+    def _images(self, position: Floats) -> Floats:
+        """In a torus the images that lie in this period in part, of a disk with its centre in it."""
+        if isinstance(self.container, Container):
+            return position[None]
+        periods = np.array(self.container.periods)
+        all_images = position + np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2) * periods
+        beyond = np.maximum(np.maximum(-all_images, all_images - periods), 0.0)
+        return np.asarray(all_images[np.hypot(*beyond.T) < self.radius])
 
     @property
     def radius(self) -> float:
@@ -268,6 +284,8 @@ def play_gas(
         "seed": root,
     }  # fmt: skip
     loop = EventLoop(container, pair.law, laws, disk, located, moving, np.random.default_rng(root))
+    if interval is not None:
+        _check_states(loop, events, wanted)
     store = _Store(loop, events, every if interval is None else events + 1, wanted)
     store.fill(lambda: nullcontext() if checkpoint is None else Checkpoint(checkpoint, identity, key=key))
     return store.record(container, pair)
@@ -289,6 +307,15 @@ def _laws(container: Container | Torus, disk: Disk, walls: Reflector | Sequence[
     if laws[0].disk != disk:
         raise InputError("walls: expected laws of the disk of the pair")
     return laws
+
+
+def _check_states(loop: EventLoop, events: int, interval: float) -> None:
+    """Refuse states for which there is no memory, by the time of the first events, which are made and forgotten."""
+    begun = {name: array.copy() for name, array in loop.snapshot().items()}
+    loop.run(min(events, PILOT * len(loop.floats)))
+    states = loop.time * events / max(loop.events, 1) / interval
+    check_memory("duration over interval", "the record", int(min(9.0 * len(loop.floats) * states, 1e30)))
+    loop.restore(begun)
 
 
 def _check_apart(located: Floats, container: Container | Torus, diameter: float) -> None:
@@ -421,7 +448,7 @@ class _Store:
             if code != TIME:
                 return code
             if stored & (stored - 1) == 0:
-                check_memory("interval", "the record", 18 * len(self.loop.floats) * stored)
+                check_memory("duration over interval", "the record", 18 * len(self.loop.floats) * stored)
             self.keep(stored * self.interval, [-1, -1, -1], stored * self.interval)
 
     def keep(self, time: float, met: list[int], at: float | None = None) -> None:

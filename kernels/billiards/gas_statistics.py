@@ -25,7 +25,7 @@ DURATION, RIM2, V4, RIM4, PAIRS, WALLS, VIRIAL, IMPULSE = range(8)
 
 @dataclass(frozen=True, repr=False)
 class GasStatistics(Summary):
-    """Means over time of a gas; the error of what is not known is inf, and its method says why.
+    """Means over time of a gas; what is not known is nan with the error inf, and its method says why.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ def batched(value: Callable[[Floats], float], rows: Floats, few: str, missing: s
     The error is inf for the reason ``few``, and nothing is known for the reason ``missing``.
     """
     if missing:
-        return Estimate(0.0, math.inf, "estimate", f"not known: {missing}")
+        return Estimate(math.nan, math.inf, "estimate", f"not known: {missing}")
     total, errors = rows.sum(axis=0), []
     found = float(value(total))
     if few:

@@ -102,6 +102,14 @@ class BilliardRecord(Summary):
         """Positions (..., 2) as they are drawn."""
         return position
 
+    def _corners(self, seen: Floats) -> Floats:
+        """Points (k, 2) that the centres of drawn disks may reach."""
+        return seen.reshape(-1, 2)
+
+    def _images(self, position: Floats) -> Floats:
+        """Where a disk is drawn, shape (k, 2)."""
+        return position[None]
+
     def extent(self, direction: ArrayLike = (1.0, 0.0)) -> Floats:
         """Range, shape (n,), of the collision positions along a direction, without the start."""
         along = self.position[1:] @ shaped("direction", direction, 2)
@@ -258,7 +266,8 @@ class BilliardRecord(Summary):
         small = DRAWN_RADIUS * max(np.ptp(self.position[..., 0]), np.ptp(self.position[..., 1]))
         size = self.radius or small
         seen = self._seen(self.position)
-        low, high = seen.min(axis=(0, 1)) - 1.2 * size, seen.max(axis=(0, 1)) + 1.2 * size
+        corners = self._corners(seen)
+        low, high = corners.min(axis=0) - 1.2 * size, corners.max(axis=0) + 1.2 * size
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         trace = TRACE * float(np.mean(np.diff(self.time, axis=0)))
         lines: list[list[Line2D]] = []
@@ -273,17 +282,25 @@ class BilliardRecord(Summary):
                 path, angle = path_between(self.time[:, k], self.position[:, k], self.angle[:, k], now, trace)
                 path += self._seen(path[-1]) - path[-1]
                 tail.set_data(*path.T)
-                x, y = path[-1]
-                edge.set_data(x + size * np.cos(rim), y + size * np.sin(rim))
-                spoke.set_data([x, x + size * np.cos(angle)], [y, y + size * np.sin(angle)])
+                drawn = self._images(path[-1])
+                for line, turns in ((edge, rim), (spoke, np.array([angle]))):
+                    line.set_data(*_outlines(drawn, size, turns, from_centre=line is spoke))
             return [line for group in lines for line in group]
 
-        # of an axes in a subfigure, the figure above it; `get_figure(root=True)` needs matplotlib 3.10
+        # of an axes in a subfigure, the figure above it
         figure = axes.figure.figure
         animation = FuncAnimation(figure, show, frames=count, interval=1e3 * seconds / count, blit=False)
         # matplotlib warns of an animation of which no picture was drawn
         figure.canvas.draw()
         return animation
+
+
+def _outlines(centres: Floats, size: float, angles: Floats, *, from_centre: bool) -> Floats:
+    """Points (2, n) at these angles about each of the centres, and those themselves, with gaps between them."""
+    points = centres[:, None] + size * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    begun = centres[:, None] if from_centre else points[:, :0]
+    gap = np.full((len(centres), 1, 2), np.nan)
+    return np.asarray(np.concatenate([begun, points, gap], axis=1).reshape(-1, 2)[:-1].T)
 
 
 def path_between(time: Floats, position: Floats, angle: Floats, now: float, trace: float) -> tuple[Floats, float]:

@@ -40,9 +40,40 @@ class Distance(Estimate):
         For empirical matrices: the mean distance between samples of this size from one law. A distance near the noise
         floor is not significant; use `difference_test` to decide. For joint distances the noise floor of kind
         ``"rows"`` is given, which is not smaller. None if neither matrix has counts.
+    tolerance : float or None
+        Of laws: the error that was asked for.
+
+    Examples
+    --------
+    A distance that its error does not tell from 0 says which tolerance would, if it is about right:
+
+    >>> print(Distance(0.007, 0.008, "estimate", "", tolerance=0.01))
+    0.007(8), not told from 0: ask for tolerance=4e-03
     """
 
     noise_floor: float | None = None
+    tolerance: float | None = None
+
+    def _headline(self) -> str:
+        return str(self)
+
+    def __str__(self) -> str:
+        return f"{super().__str__()}{self._doubt()}"
+
+    def _doubt(self) -> str:
+        """Whether the interval contains 0, and what would tell."""
+        if self.error < self.value or self.error == 0.0:
+            return ""
+        if self.noise_floor is not None:
+            how = "difference_test decides between samples"
+        elif self.tolerance is None:
+            how = "matrices with smaller errors would tell"
+        elif self.error > self.tolerance:
+            how = f"the tolerance {self.tolerance:g} was not reached"
+        else:
+            # with half of the value as its error the distance would be told from 0
+            how = f"ask for tolerance={0.5 * self.value or 0.1 * self.error:.0e}"
+        return f", not told from 0: {how}"
 
 
 def distance(
@@ -137,14 +168,14 @@ def distance(
             f"distance: expected laws in the same frame, got {one.frame!r} and {other.frame!r}; use "
             "in_specular_frame() on one"
         )
-    if kind == "pseudometric":
-        return _labelled(moment_distance(one, other, tolerance))
     laws = [law for law in (one, other) if isinstance(law, Law)]
+    if kind == "pseudometric":
+        return _labelled(moment_distance(one, other, tolerance), asked=tolerance if len(laws) == 2 else None)
     if len(laws) < 2:
         return _between_matrices(*_on_same_bins(one, other, tolerance), power, kind)
     if kind == "joint":
-        return _labelled(joint_law_distance(laws[0], laws[1], power, tolerance))
-    return _labelled(law_distance(laws[0], laws[1], power, kind == "sup", tolerance))
+        return _labelled(joint_law_distance(laws[0], laws[1], power, tolerance), asked=tolerance)
+    return _labelled(law_distance(laws[0], laws[1], power, kind == "sup", tolerance), asked=tolerance)
 
 
 def _between_collisions(
@@ -176,8 +207,8 @@ def _between_matrices(first: KernelMatrix, second: KernelMatrix, order: float, k
     return _labelled(found, noise_floor(first, second, order, sup))
 
 
-def _labelled(found: Estimate, floor: float | None = None) -> Distance:
-    return Distance(found.value, found.error, found.kind, found.method, floor)
+def _labelled(found: Estimate, floor: float | None = None, asked: float | None = None) -> Distance:
+    return Distance(found.value, found.error, found.kind, found.method, floor, asked)
 
 
 # Weights of 2^-60 and less are below the rounding of the sum.

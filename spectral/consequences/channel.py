@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Unpack, get_args
+from typing import Literal, TypeVar, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,10 +30,12 @@ from ...core.long_runs import Engine, all_parts, identity_of, reported
 from ...kernels import Law
 from ...kernels.bases.angles import joined_lists
 from ...kernels.bases.measure import SINE
+from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.law import in_frame
 from ...kernels.laws.structure import holds_of_all
 
 Arrangement = Literal["mirror", "half-turn"]
+L = TypeVar("L", Law, DirectionLaw)
 
 # Smallest angle; below half of it, pi - theta would round to pi.
 SMALLEST = float(np.spacing(np.pi))
@@ -111,6 +114,7 @@ def exit_times(
     radius: float = 1.0,
     speed: float = 1.0,
     arrangement: Arrangement = "mirror",
+    other: Law | None = None,
     **engine: Unpack[Engine],
 ) -> ExitTimes:
     """Simulate exit times of particles from a channel between two rough walls.
@@ -118,7 +122,7 @@ def exit_times(
     Parameters
     ----------
     law : Law
-        The law of the walls, in either convention.
+        The law of both walls, or of the lower one, in either convention.
     lengths : array_like
         At least three increasing values of L at which exits are timed.
     particles : int
@@ -128,6 +132,9 @@ def exit_times(
         Half the width of the channel, and the speed of the particles.
     arrangement : {"mirror", "half-turn"}
         The upper wall is the mirror image of the lower one, or is rotated by pi.
+    other : Law, optional
+        The law of the upper wall, as it is when this wall lies below, in the same convention. Every second particle
+        then starts at it.
     checkpoint : path, optional
         A file to which the times of every 4096 particles are added; the same call goes on with it.
     client : int, str or distributed.Client, optional
@@ -152,11 +159,12 @@ def exit_times(
     >>> bool(found.means[0] < found.means[1])
     True
     """
-    return simulated_times(law, lengths, particles, rng, radius, speed, arrangement, engine)
+    return simulated_times(law, other, lengths, particles, rng, radius, speed, arrangement, engine)
 
 
 def simulated_times(
     law: Law,
+    other: Law | None,
     lengths: ArrayLike,
     particles: int,
     rng: Rng,
@@ -167,12 +175,12 @@ def simulated_times(
     least: int = 3,
 ) -> ExitTimes:
     """`exit_times` at ``least`` lengths or more."""
-    paper, levels = checked(law, "lengths", lengths, arrangement, particles, least)
-    refuse_kept_sines(paper)
+    laws, levels = checked(law, other, "lengths", lengths, arrangement, particles, least)
+    refuse_kept_sines(*laws)
     half = number_between("radius", radius, 1.0 / LARGEST, LARGEST)
     pace = number_between("speed", speed, 1.0 / LARGEST, LARGEST)
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
-    job = _Particles(paper, levels, particles, root, half, pace, arrangement)
+    job = _Particles(laws[0], laws[-1], levels, particles, root, half, pace, arrangement)
     parts = all_parts(job.times, -(-particles // TOGETHER), identity_of("exit times", job), engine, job.stored)
     return ExitTimes(frozen(levels), frozen(np.concatenate([part["times"] for part in parts])), half, pace)
 
@@ -183,31 +191,57 @@ def in_paper_frame(law: Law) -> Law:
     return in_frame(law, "paper")
 
 
+def laws_of_walls(law: Law, other: Law | None) -> tuple[Law, ...]:
+    """The laws of the lower and of the upper wall in the paper's convention; one law if they are the same."""
+    paper = in_paper_frame(law)
+    if other is None:
+        return (paper,)
+    instance("other", other, Law, "ker.WallLaw(wall)")
+    if other.frame != law.frame:
+        raise InputError(
+            f"other: expected a law in the convention of the first, {law!r}, got {other!r}; call in_specular_frame() "
+            "on one of them"
+        )
+    return tuple(dict.fromkeys((paper, in_frame(other, "paper"))))
+
+
 def checked(
-    law: Law, name: str, levels: ArrayLike, arrangement: str, particles: int, least: int = 3
-) -> tuple[Law, Floats]:
-    """The law in the paper's convention and increasing levels, at which each particle gives a number."""
-    paper, found = in_paper_frame(law), finite_array(name, levels).ravel()
+    law: Law, other: Law | None, name: str, levels: ArrayLike, arrangement: str, particles: int, least: int = 3
+) -> tuple[tuple[Law, ...], Floats]:
+    """The laws of the walls in the paper's convention and increasing levels, at which each particle gives a number."""
+    laws, found = laws_of_walls(law, other), finite_array(name, levels).ravel()
     if found.size < least or found[0] <= 0.0 or np.any(np.diff(found) <= 0.0):
         raise InputError(f"{name}: expected at least {least} increasing positive {name}, got {shortened(levels)}")
     choice("arrangement", arrangement, get_args(Arrangement))
     check_memory("particles", f"the table of {name}", 2 * found.size * whole_number("particles", particles, 2))
-    return paper, found
+    return laws, found
 
 
-def refuse_kept_sines(law: Law) -> None:
-    """An InputError if every ray keeps its angle to the wall."""
-    if holds_of_all(law, lambda part: part.keeps_sine):
+def refuse_kept_sines(*laws: Law) -> None:
+    """An InputError if at these walls every ray keeps its angle to the wall."""
+    if all(holds_of_all(law, lambda part: part.keeps_sine) for law in laws):
         raise InputError(
             "law: every ray keeps its angle to the wall, so all flights of a particle are equally long, the mean "
-            f"exit times are infinite and the particles have no common diffusivity; got {law!r}, expected a law that "
-            "changes angles, as a mixture with lambertian() does"
+            "exit times are infinite and the particles have no common diffusivity; got "
+            f"{' and '.join(map(repr, laws))}, expected a law that changes angles, as a mixture with lambertian() does"
         )
 
 
-def reflected(law: Law, incoming: Floats, rng: np.random.Generator) -> Floats:
+def sampled(laws: Sequence[L], incoming: Floats, wall: Floats, rng: np.random.Generator) -> Floats:
+    """What the laws of the walls draw for incoming angles or velocities at walls of these numbers."""
+    if len(laws) == 1:
+        return laws[0].sample(incoming, rng)
+    found = np.empty_like(incoming)
+    for number, law in enumerate(laws):
+        here = wall == number
+        if here.any():
+            found[here] = law.sample(incoming[here], rng)
+    return found
+
+
+def reflected(laws: Sequence[Law], incoming: Floats, wall: Floats, rng: np.random.Generator) -> Floats:
     """Outgoing angles; incoming ones that rounding took to 0 or pi are moved inside."""
-    return law.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
+    return sampled(laws, np.clip(incoming, SMALLEST, np.pi - SMALLEST), wall, rng)
 
 
 @dataclass(frozen=True)
@@ -261,7 +295,9 @@ class Channel:
         radial = np.where(wall > 0, self.bend + self.half - up, self.bend - self.half + up)
         return np.asarray(self.bend * np.arctan2(along, radial))
 
-    def crossings(self, law: Law, levels: Floats, wall: Floats, rng: np.random.Generator, *, of_x: bool) -> Floats:
+    def crossings(
+        self, laws: Sequence[Law], levels: Floats, wall: Floats, rng: np.random.Generator, *, of_x: bool
+    ) -> Floats:
         """Where particles that start at X = 0 on these walls cross increasing levels, shape (particles, n).
 
         Levels of abs(X), in a straight channel: the lengths of path up to them. Levels of the length of path: X there.
@@ -286,8 +322,9 @@ class Channel:
             x, run, wall = x_end[stays], run_end[stays], after[stays]
             going, reached = going[stays], reached[stays]
             incoming = math.pi - self.framed(arriving[stays], wall)
-            direction = self.framed(reflected(law, incoming, rng), wall)
-        raise InputError(f"law: {law!r} keeps {len(x)} particles below {levels[-1]:g} after {MOST_FLIGHTS} flights")
+            direction = self.framed(reflected(laws, incoming, wall, rng), wall)
+        walls = " and ".join(map(repr, laws))
+        raise InputError(f"law: {walls} keeps {len(x)} particles below {levels[-1]:g} after {MOST_FLIGHTS} flights")
 
 
 def _passed(levels: Floats, reached: NDArray[np.int64], ends: Floats) -> tuple[NDArray[np.int64], ...]:
@@ -302,6 +339,7 @@ class _Particles:
     """Particles in a channel, ``TOGETHER`` of them at a time; what a worker is sent."""
 
     law: Law
+    other: Law
     lengths: Floats
     particles: int
     seed: tuple[int, ...]
@@ -320,5 +358,6 @@ class _Particles:
     def times(self, part: int) -> dict[str, Floats]:
         """Exit times of the particles of one part, which depend on its number alone."""
         channel = Channel(self.radius, math.inf, self.arrangement == "half-turn")
-        wall, rng = np.zeros(self.count(part)), np.random.default_rng([*self.seed, part])
-        return {"times": channel.crossings(self.law, self.lengths, wall, rng, of_x=True) / self.speed}
+        laws = tuple(dict.fromkeys((self.law, self.other)))
+        wall, rng = np.arange(self.count(part)) % len(laws), np.random.default_rng([*self.seed, part])
+        return {"times": channel.crossings(laws, self.lengths, wall.astype(np.float64), rng, of_x=True) / self.speed}

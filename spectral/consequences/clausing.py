@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, choice, generator, number_between, positive_number
+from ...core.checks import Floats, Rng, choice, generator, instance, number_between, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, RULE_OF_THREE, Estimate, student_95
 from ...core.long_runs import reported
@@ -19,12 +19,12 @@ from ...kernels import KernelMatrix, Law, Legendre, discretise, specular
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw, HemisphereCombination, HemisphereLaw
 from ...kernels.laws.structure import sum_of_words, words_of
 from ...kernels.walls.rectangular import sum_rule
-from .channel import LARGEST, in_paper_frame, reflected
+from .channel import LARGEST, in_paper_frame, laws_of_walls, reflected, sampled
 
 Section = Literal["channel", "tube"]
 Function: TypeAlias = Callable[[Floats], Floats]
-# Directions of flight, and the displacements along the axis and directions that follow after a reflection.
-Reflections: TypeAlias = Callable[[Floats], tuple[Floats, Floats]]
+# Directions of flight and numbers of walls, and the displacements along the axis, directions and walls that follow.
+Reflections: TypeAlias = Callable[[Floats, Floats], tuple[Floats, Floats, Floats]]
 
 # Gauss nodes of a panel in two resolutions, whose difference is the error of diffuse walls.
 NODES = (8, 10)
@@ -99,7 +99,13 @@ GEOMETRIES: dict[Section, _Geometry] = {
 
 @reported("transmission")
 def transmission(
-    law: Law | DirectionLaw, length: float, section: Section = "channel", tolerance: float = 1e-4, rng: Rng = None
+    law: Law | DirectionLaw,
+    length: float,
+    section: Section = "channel",
+    tolerance: float = 1e-4,
+    rng: Rng = None,
+    *,
+    other: Law | DirectionLaw | None = None,
 ) -> Estimate:
     r"""The probability that a particle that enters a channel or a tube leaves it at the other end (Clausing).
 
@@ -108,10 +114,10 @@ def transmission(
     Parameters
     ----------
     law : Law or DirectionLaw
-        The law of the walls: a planar one, in either convention, or one of directions in space such as a
-        `HemisphereLaw`. The upper wall of a channel is the mirror image of the lower one. The orientation of grooves is
-        their angle with the axis: 0 for grooves along it, pi/2 for grooves across. In a tube ``lambertian()`` and
-        ``maxwell(a)`` mean the diffuse law and its mixture in space; other planar laws are refused.
+        The law of the walls, or of the floor of a channel: a planar one, in either convention, or one of directions in
+        space such as a `HemisphereLaw`. The ceiling of a channel is the mirror image of a floor. The
+        orientation of grooves is their angle with the axis: 0 for grooves along it, pi/2 for grooves across. In a tube
+        ``lambertian()`` and ``maxwell(a)`` mean the diffuse law and its mixture in space; it takes no other planar law.
     length : float
         The length in widths of the channel, or in radii of the tube.
     section : {"channel", "tube"}
@@ -120,6 +126,8 @@ def transmission(
         The wanted error. Diffuse walls and mixtures with specular ones, of any fraction, reach 1e-8.
     rng : None, int or numpy.random.Generator
         The source of the rays of other laws.
+    other : Law or DirectionLaw, optional
+        The law of the ceiling of a channel, of the same kind and in the same convention as that of the floor.
 
     Returns
     -------
@@ -132,8 +140,8 @@ def transmission(
     Raises
     ------
     InputError
-        If an argument is not as described, the tube has another planar law, or a tube with these has a length times
-        diffuse fraction of more than 2 x 10^5 radii.
+        If an argument is not as described, the tube has another planar law or a second one, or its length times
+        diffuse fraction is more than 2 x 10^5 radii.
 
     Notes
     -----
@@ -150,6 +158,12 @@ def transmission(
     Where it misses the tolerance, for laws near isometries, such as those of straight pieces, and in tubes, particles
     are simulated from their first reflection on that is not specular; the fraction that has none is exact.
 
+    With two laws there is a probability u for each wall. Flights lead to the other wall, so the equations are coupled
+    crosswise. If both walls are diffuse with probabilities a and b, else specular, the number k of flights from one
+    diffuse reflection to the next is even or odd as it leads to the same wall or to the other one: from the floor it is
+    2 m + 1 with the probability r^m b, r = (1 - a)(1 - b), and 2 m + 2 with r^m (1 - b) a. A specular ceiling is a
+    symmetry plane: the channel passes as many particles as one of half the length with the other law on both walls.
+
     Source: P. Clausing, Ann. Phys. 404 (1932) 961.
 
     Examples
@@ -159,6 +173,11 @@ def transmission(
     0.24056
     >>> print(f"{spec.transmission(ker.lambertian(), 10.0, 'tube'):.7f}")
     0.1909424
+
+    A smooth ceiling doubles the width of the channel:
+
+    >>> print(f"{spec.transmission(ker.lambertian(), 20.0, other=ker.specular()):.5f}")
+    0.24056
 
     Grooves across a tube hold more particles back than grooves along it:
 
@@ -174,42 +193,59 @@ def transmission(
     far = number_between("length", length, 0.0, LARGEST)
     choice("section", section, get_args(Section))
     wanted, source = positive_number("tolerance", tolerance), generator(rng)
-    given = law if isinstance(law, DirectionLaw) else in_paper_frame(law)
-    diffuse, rest = _without_specular(given)
+    laws = _laws_of_walls(law, other, section)
+    split = [_without_specular(one) for one in laws]
+    # a specular ceiling is a symmetry plane of a channel with twice the width
+    rough = [(one, *parts) for one, parts in zip(laws, split, strict=True) if parts[0] > 0.0]
+    far *= max(len(rough), 1) / len(laws)
+    diffuse = max(fraction for fraction, _ in split)
     if diffuse * far <= EPS:
         return Estimate(1.0, diffuse * far, "bound", "no more particles are reflected otherwise than specularly")
-    found = _found(given, rest, diffuse, section, far, wanted, source)
+    found = _found(rough, section, far, wanted, source)
     ends = found.value - found.error, found.value + found.error
     low, high = np.clip(ends, 0.0, 1.0).tolist()
     return found if (low, high) == ends else replace(found, value=0.5 * (low + high), error=0.5 * (high - low))
 
 
-def _found(
-    law: Law | DirectionLaw, rest: Any, diffuse: float, section: Section, length: float, tolerance: float,
-    rng: np.random.Generator,
-) -> Estimate:  # fmt: skip
-    """The transmission of a law that with probability ``diffuse`` reflects by ``rest``, else specularly."""
-    enter, longest = ENTRIES[section], LONGEST * GEOMETRIES[section].width
+def _laws_of_walls(law: Law | DirectionLaw, other: Law | DirectionLaw | None, section: Section) -> tuple[Any, ...]:
+    """The law of both walls or the laws of floor and ceiling, planar ones in the paper's convention."""
+    if other is not None and section == "tube":
+        raise InputError(f"other: a tube has one wall; expected no second law, got {other!r}; take section='channel'")
     if isinstance(law, DirectionLaw):
-        return _by_flights(
-            section, length, tolerance, rng, enter, partial(_leave, rest, section, diffuse, rng), diffuse
-        )
-    if rest.is_lambertian and diffuse * length <= longest:
-        return _by_integral_equation(GEOMETRIES[section], diffuse, length)
+        if other is None:
+            return (law,)
+        instance("other", other, DirectionLaw, "ker.HemisphereLaw(law)")
+        return tuple(dict.fromkeys((law, other)))
+    second: Any = other
+    return laws_of_walls(law, second)
+
+
+def _found(
+    walls: Sequence[tuple[Any, float, Any]], section: Section, length: float, tolerance: float, rng: np.random.Generator
+) -> Estimate:
+    """The transmission, from law, fraction of reflections not known to be specular, and law of these, for each wall."""
+    laws, fractions, rests = zip(*walls, strict=True)
+    longest, runs = LONGEST * GEOMETRIES[section].width, _Runs(fractions)
+    largest = max(fractions)
+    if isinstance(laws[0], DirectionLaw):
+        enter, leave = partial(ENTRIES[section], runs=runs, rng=rng), partial(_leave, rests, section, runs, rng)
+        return _by_flights(section, length, tolerance, runs, enter, leave)
+    if all(rest.is_lambertian for rest in rests) and largest * length <= longest:
+        return _by_integral_equation(GEOMETRIES[section], runs, length)
     if section == "channel":
-        smooth = _by_polynomials(law, length, tolerance, rng)
+        smooth = _by_polynomials(laws, length, tolerance, rng)
         if smooth.error <= tolerance:
             return smooth
-        turn, least = partial(_turn, rest, diffuse, rng), 2.0 * smooth.error
-        flown = _by_flights(section, length, tolerance, rng, _entered_in_plane, turn, diffuse, least=least)
+        enter, turn = partial(_entered_in_plane, runs=runs, rng=rng), partial(_turn, rests, runs, rng)
+        flown = _by_flights(section, length, tolerance, runs, enter, turn, least=2.0 * smooth.error)
         return min(smooth, flown, key=lambda found: found.error)
-    if not rest.is_lambertian:
+    if not rests[0].is_lambertian:
         raise InputError(
             "law: in a tube expected lambertian(), maxwell(a) or HemisphereLaw(law, orientation), because a planar law "
-            f"does not tell the direction of its grooves, got {law!r}"
+            f"does not tell the direction of its grooves, got {laws[0]!r}"
         )
     raise InputError(
-        f"length: in a tube expected at most {longest:g} radii over the diffuse fraction, got {length:g}, {diffuse:g}"
+        f"length: in a tube expected at most {longest:g} radii over the diffuse fraction, got {length:g}, {largest:g}"
     )
 
 
@@ -234,30 +270,32 @@ def _without_specular(law: Law | DirectionLaw) -> tuple[float, Any]:
 
 
 # ---- the integral equation -----------------------------------------------------------------------------------------
-def _by_integral_equation(geometry: _Geometry, diffuse: float, length: float) -> Estimate:
-    flights, one = _diffuse_flights(geometry, diffuse, length), np.ones((1, 1))
-    (coarse, _), (fine, slope) = (_solved(flights, one, length, nodes) for nodes in NODES)
-    error = abs(fine - coarse) + ROUNDING * (1.0 + float(slope[0, 0]))
+def _by_integral_equation(geometry: _Geometry, runs: _Runs, length: float) -> Estimate:
+    flights, matrix = _diffuse_flights(geometry, runs, length), runs.reflection
+    (coarse, _), (fine, slope) = (_solved(flights, matrix, length, nodes) for nodes in NODES)
+    error = abs(fine - coarse) + ROUNDING * (1.0 + float(np.sum(matrix * slope)))
     return Estimate(fine, error, "estimate", f"integral equation, {NODES[1]} nodes a panel; error from {NODES[0]}")
 
 
-def _by_polynomials(law: Law, length: float, tolerance: float, rng: np.random.Generator) -> Estimate:
+def _by_polynomials(laws: Sequence[Law], length: float, tolerance: float, rng: np.random.Generator) -> Estimate:
     """In polynomials of the cosine, of degrees that double until the tolerance is met or the work exceeds its limit."""
     levels = [
-        one for one in LEVELS if (len(_panels(length, FULL_PANELS / one[0])) - 1) * math.prod(one) <= MOST_UNKNOWNS
+        one
+        for one in LEVELS
+        if (len(_panels(length, FULL_PANELS / one[0])) - 1) * math.prod(one) * len(laws) <= MOST_UNKNOWNS
     ]
     value, changes, error, size = math.nan, list[float](), math.inf, 0
     for accuracy in (MATRIX_TOLERANCE, 0.1 * tolerance):
-        matrix = discretise(law, Legendre(FIRST_SIZE), tolerance=accuracy, rng=rng)
-        kept = np.asarray(matrix.symmetric)[FIRST_SIZE // 2 :, FIRST_SIZE // 2 :]
-        if float(np.linalg.norm(kept, 2)) > MOST_KEPT:
+        matrices = [discretise(law, Legendre(FIRST_SIZE), tolerance=accuracy, rng=rng) for law in laws]
+        kept = [np.asarray(one.symmetric)[FIRST_SIZE // 2 :, FIRST_SIZE // 2 :] for one in matrices]
+        if max(float(np.linalg.norm(one, 2)) for one in kept) > MOST_KEPT:
             levels = []
-        if not levels or _in_polynomials(matrix, length, *levels[0])[1] <= 0.5 * tolerance:
+        if not levels or _in_polynomials(matrices, length, *levels[0])[1] <= 0.5 * tolerance:
             break
     for degree, nodes in levels:
         if degree > FIRST_SIZE:
-            matrix = discretise(law, Legendre(degree), tolerance=accuracy, rng=rng)
-        finer, noise = _in_polynomials(matrix, length, degree, nodes)
+            matrices = [discretise(law, Legendre(degree), tolerance=accuracy, rng=rng) for law in laws]
+        finer, noise = _in_polynomials(matrices, length, degree, nodes)
         if noise > tolerance:
             break
         changes = [abs(finer - value), *(change / GAIN for change in changes)]
@@ -267,40 +305,52 @@ def _by_polynomials(law: Law, length: float, tolerance: float, rng: np.random.Ge
             error = max(changes[:-1]) + noise
         if error <= tolerance:
             break
-    method = f"integral equation in {size} polynomials of the cosine, by {matrix.method}; error from {size // 2}"
+    methods = " and ".join(dict.fromkeys(one.method for one in matrices))
+    method = f"integral equation in {size} polynomials of the cosine, by {methods}; error from {size // 2}"
     return Estimate(value, error, "estimate", method)
 
 
-def _in_polynomials(matrix: KernelMatrix, length: float, size: int, nodes: int) -> tuple[float, float]:
-    """The transmission in so many polynomials, with its error by that of the matrix."""
-    value, slope = _solved(_planar_flights(size, length), matrix.symmetric[:size, :size].T, length, nodes)
-    # of a sum of matrices the spread shows only the error of rays
-    if matrix.replicates and "+" not in matrix.method:
-        parts = [float(np.sum(slope.T * np.asarray(part)[:size, :size])) for part in matrix.replicates]
-        return value, student_95(len(parts)) * float(np.std(parts, ddof=1)) / math.sqrt(len(parts))
-    return value, float(matrix.error) * float(np.linalg.norm(slope))
+def _in_polynomials(matrices: Sequence[KernelMatrix], length: float, size: int, nodes: int) -> tuple[float, float]:
+    """The transmission in so many polynomials, with its error by those of the matrices of the walls."""
+    from scipy.linalg import block_diag
+
+    whole = block_diag(*(matrix.symmetric[:size, :size].T for matrix in matrices))
+    value, slope = _solved(_planar_flights(size, length, len(matrices)), whole, length, nodes)
+    noise = 0.0
+    for wall, matrix in enumerate(matrices):
+        own = slope[wall * size :, wall * size :][:size, :size]
+        # of a sum of matrices the spread shows only the error of rays
+        if matrix.replicates and "+" not in matrix.method:
+            parts = [float(np.sum(own.T * np.asarray(part)[:size, :size])) for part in matrix.replicates]
+            noise += student_95(len(parts)) * float(np.std(parts, ddof=1)) / math.sqrt(len(parts))
+        else:
+            noise += float(matrix.error) * float(np.linalg.norm(own))
+    return value, noise
 
 
 @dataclass(frozen=True)
 class _Flights:
-    """Flights between reflections, with the directions expanded in N functions.
+    """Flights between reflections at W walls, with the directions expanded in N functions.
 
     Attributes
     ----------
-    arriving, leaving : callable
-        From displacements along the axis to the functions of the directions, shape (..., N). Those of arriving
-        particles are times the density of the displacement.
+    arriving : sequence of (array, callable)
+        Matrices of shape (W, W) for flights from walls to walls. Functions from displacements along the axis to the
+        functions of the directions times the density of the displacement, shape (..., N).
+    leaving : callable
+        From displacements to the functions of the directions, shape (..., N).
     beyond : callable
-        From distances to the integrals of the leaving functions over larger displacements, shape (..., N).
+        From distances to the integrals of the leaving functions over larger displacements, shape (..., W N).
     signs : array, shape (N,)
         1 for functions that are even along the axis, -1 for odd ones.
     entering, direct : float
-        Particles that enter in units of those that a wall sends to the end; the fraction that is never reflected.
+        Particles that enter, those towards one of two walls, in units of those that a wall sends to the end; the
+        fraction that is never reflected.
     width, resolved : float
         The distance at which the density begins to fall; the length of the panels at the ends.
     """
 
-    arriving: Function
+    arriving: tuple[tuple[Floats, Function], ...]
     leaving: Function
     beyond: Function
     signs: Floats
@@ -326,40 +376,109 @@ def _runs(diffuse: float) -> tuple[Floats, Floats]:
     return flights, np.concatenate(weight) * diffuse * np.exp((flights - 1.0) * math.log1p(-diffuse))
 
 
-def _direct(geometry: _Geometry, diffuse: float, length: float) -> float:
-    """The fraction of the entering particles that pass without a diffuse reflection."""
-    terms, chance = _runs(diffuse)
-    return float(chance * diffuse * terms @ geometry.passing(length / terms))
+@dataclass(frozen=True)
+class _Runs:
+    """Flights up to a diffuse reflection, which both walls or the one and the other have with these probabilities.
+
+    Of two walls with probabilities a and b, else specular, the number of flights is odd if the last one leads to the
+    other wall. A round of two flights has no diffuse reflection with the probability r = (1 - a)(1 - b).
+    """
+
+    fractions: tuple[float, ...]
+
+    @property
+    def stopped(self) -> float:
+        """The probability of a diffuse reflection in a flight if both walls are alike, else in a round."""
+        high, low = max(self.fractions), min(self.fractions)
+        return high if len(self.fractions) == 1 else high + (1.0 - high) * low
+
+    @property
+    def reflection(self) -> Floats:
+        """The matrix of reflection for particles that `terms` counts."""
+        return np.diag(self.fractions) if len(self.fractions) > 1 else np.ones((1, 1))
+
+    def terms(self) -> list[tuple[Floats, Floats, Floats]]:
+        """Matrices from walls to walls, numbers of flights, and probabilities up to the factors of `reflection`."""
+        number, chance = _runs(self.stopped)
+        if len(self.fractions) == 1:
+            return [(np.ones((1, 1)), number, chance)]
+        a, b = self.fractions
+        chance = chance / self.stopped
+        return [(np.eye(2)[::-1], 2.0 * number - 1.0, chance), (np.diag([1.0 - b, 1.0 - a]), 2.0 * number, chance)]
+
+    def direct(self, geometry: _Geometry, length: float) -> float:
+        """The fraction of the entering particles that pass without a diffuse reflection."""
+        # k passing(length/k) is the flux through an opening k times as wide; second differences of it in k pass
+        if len(self.fractions) == 1:
+            ((_, number, chance),) = self.terms()
+            return float(chance * self.fractions[0] * number @ geometry.passing(length / number))
+        (_, odd, chance), (_, even, _) = self.terms()
+        a, b = self.fractions
+        one = odd * geometry.passing(length / odd)
+        both = even * geometry.passing(length / even)
+        return float(chance @ (a * b * one + 0.5 * (a * a * (1.0 - b) + b * b * (1.0 - a)) * both))
+
+    def after(self, wall: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Numbers of flights from a reflection at these walls to the next diffuse one, and its wall."""
+        rounds = rng.geometric(self.stopped, wall.shape).astype(np.float64)
+        if len(self.fractions) == 1:
+            return rounds, wall
+        odd = rng.random(wall.shape) * self.stopped < np.where(wall > 0, *self.fractions)
+        return np.asarray(2.0 * rounds - odd), np.where(odd, 1.0 - wall, wall)
+
+    def entering(self, number: int, rng: np.random.Generator, *, times: bool) -> tuple[Floats, Floats]:
+        """Numbers k of flights to the first diffuse reflection, and its wall; with ``times`` k times as often.
+
+        The place of this reflection is k times that of a first collision. Of two walls fewer numbers are returned.
+        """
+        rounds = rng.geometric(self.stopped, number).astype(np.float64)
+        if times:
+            rounds += rng.geometric(self.stopped, number) - 1.0
+        if len(self.fractions) == 1:
+            return rounds, np.zeros(number)
+        a, b = self.fractions
+        chance = np.array([a * b, a * b, a * a * (1.0 - b), b * b * (1.0 - a)])
+        kind = rng.choice(4, number, p=chance / chance.sum())
+        flights = 2.0 * rounds - (kind < 2)
+        taken = rng.random(number) * 2.0 * rounds < flights if times else np.ones(number, dtype=bool)
+        return np.asarray(flights[taken]), (kind[taken] % 2).astype(np.float64)
 
 
-def _diffuse_flights(geometry: _Geometry, diffuse: float, length: float) -> _Flights:
+def _diffuse_flights(geometry: _Geometry, runs: _Runs, length: float) -> _Flights:
     """Flights from one diffuse reflection to the next."""
-    terms, chance = _runs(diffuse)
+    terms = runs.terms()
 
-    def averaged(function: Function, z: Floats, factor: Floats) -> Floats:
-        return np.asarray(sum(one * function(z / k) for k, one in zip(terms, factor, strict=True)))
+    def averaged(function: Function, z: Floats, number: Floats, factor: Floats) -> Floats:
+        return np.asarray(sum(one * function(z / k) for k, one in zip(number, factor, strict=True)))
 
-    def kernel(z: Floats) -> Floats:
-        return averaged(geometry.kernel, z, chance / terms)
-
-    if terms.size > 1:
+    def density(number: Floats, chance: Floats) -> Function:
+        kernel = partial(averaged, geometry.kernel, number=number, factor=chance / number)
+        if number.size == 1:
+            return lambda z: kernel(np.abs(z))[..., None]
         from scipy.interpolate import make_interp_spline
 
         # analytic in log(z) for large z: a spline of degree 7 is right to rounding
         grid = np.linspace(0.0, math.asinh(length / geometry.width), KNOTS * (1 + math.ceil(math.asinh(length))))
         spline = make_interp_spline(grid, kernel(geometry.width * np.sinh(grid)), k=7)
+        return lambda z: spline(np.arcsinh(np.abs(z) / geometry.width))[..., None]
 
-    def arriving(z: Floats) -> Floats:
-        distance = np.abs(z)
-        return (spline(np.arcsinh(distance / geometry.width)) if terms.size > 1 else kernel(distance))[..., None]
+    def beyond(z: Floats) -> Floats:
+        # from each wall to the others, the factors of their reflections included
+        parts = (
+            averaged(geometry.beyond, z, number, chance)[..., None] * (matrix @ runs.reflection).sum(axis=1)
+            for matrix, number, chance in terms
+        )
+        return np.asarray(sum(parts))
 
     return _Flights(
-        arriving, lambda z: np.ones((*z.shape, 1)), lambda z: averaged(geometry.beyond, z, chance)[..., None],
-        np.ones(1), 2.0 * diffuse, _direct(geometry, diffuse, length), geometry.width, geometry.width,
+        tuple((matrix, density(number, chance)) for matrix, number, chance in terms),
+        lambda z: np.ones((*z.shape, 1)), beyond, np.ones(1),
+        2.0 * runs.fractions[0] if len(runs.fractions) == 1 else 1.0, runs.direct(geometry, length), geometry.width,
+        geometry.width,
     )  # fmt: skip
 
 
-def _planar_flights(size: int, length: float) -> _Flights:
+def _planar_flights(size: int, length: float, walls: int = 1) -> _Flights:
     """Flights across the channel between reflections of any law, in polynomials of the cosine of the angle."""
     basis, signs = Legendre(size), np.asarray((-1.0) ** np.arange(size), dtype=np.float64)
     unit, weight = np.polynomial.legendre.leggauss(size // 2 + 1)
@@ -371,13 +490,15 @@ def _planar_flights(size: int, length: float) -> _Flights:
         # half of the integral over the cosine, from z/sqrt(1 + z^2) to 1
         part = GEOMETRIES["channel"].beyond(z)[..., None]
         inner = basis.evaluate(np.arccos(1.0 - part * (1.0 + unit)))
-        return np.asarray(np.einsum("...qi,q->...i", inner, 0.5 * weight) * part)
+        return np.tile(np.einsum("...qi,q->...i", inner, 0.5 * weight) * part, walls)
 
     def arriving(z: Floats) -> Floats:
         return leaving(z) * (signs * GEOMETRIES["channel"].kernel(z)[..., None])
 
     direct = float(GEOMETRIES["channel"].passing(np.array(length)))
-    return _Flights(arriving, leaving, beyond, signs, 2.0, direct, 1.0, min(FULL_PANELS / size, 1.0))
+    # each flight leads to the other wall
+    across = ((np.eye(walls)[::-1], arriving),)
+    return _Flights(across, leaving, beyond, signs, 2.0 / walls, direct, 1.0, min(FULL_PANELS / size, 1.0))
 
 
 def _panels(length: float, width: float) -> Floats:
@@ -395,11 +516,15 @@ def _solved(flights: _Flights, matrix: Floats, length: float, nodes: int) -> tup
     half = 0.5 * np.diff(edges)
     place = (edges[:-1] + half)[:, None] + half[:, None] * unit
     weight = (half[:, None] * weight).ravel()
-    size, signs = flights.signs.size, flights.signs
-    rows = np.stack([_row(flights, edges, unit, x, nodes) for x in place[: len(half) // 2].ravel()])
-    # the second half of the channel is the mirror image
-    turned = (signs[:, None, None] * signs * rows)[::-1, :, ::-1]
-    flown = np.concatenate((rows, turned)).reshape(place.size * size, -1)
+    signs, walls = flights.signs, len(flights.arriving[0][0])
+    flown: Floats = np.zeros(())
+    for between, function in flights.arriving:
+        rows = np.stack([_row(flights, function, edges, unit, x, nodes) for x in place[: len(half) // 2].ravel()])
+        # the second half of the channel is the mirror image
+        turned = (signs[:, None, None] * signs * rows)[::-1, :, ::-1]
+        flown = flown + np.einsum("vw,xiyj->xviywj", between, np.concatenate((rows, turned)))
+    signs = np.tile(signs, walls)
+    flown = flown.reshape(place.size * signs.size, -1)
     place = place.ravel()
 
     first = flights.entering * signs * flights.beyond(place)
@@ -418,7 +543,7 @@ def _reflected(matrix: Floats, first: Floats, flown: Floats) -> Floats:
     return np.asarray(np.linalg.solve(equation, (first @ matrix.T).ravel()))
 
 
-def _row(flights: _Flights, edges: Floats, unit: Floats, x: float, nodes: int) -> Floats:
+def _row(flights: _Flights, arriving: Function, edges: Floats, unit: Floats, x: float, nodes: int) -> Floats:
     """Moments of particles arriving at x from the Lagrange polynomials of all nodes, shape (N, nodes in all, N)."""
     size, length = flights.signs.size, edges[-1]
     # intervals that double from x on, in both directions
@@ -432,7 +557,7 @@ def _row(flights: _Flights, edges: Floats, unit: Floats, x: float, nodes: int) -
     vandermonde = np.polynomial.legendre.legvander
     lagrange = vandermonde(local, nodes - 1) @ np.linalg.inv(vandermonde(unit, nodes - 1))
     leaving = (lagrange[..., None] * flights.leaving(z)[:, :, None, :]).reshape(*z.shape, -1)
-    part = np.swapaxes(flights.arriving(z) * (half * weight)[..., None], 1, 2) @ leaving
+    part = np.swapaxes(arriving(z) * (half * weight)[..., None], 1, 2) @ leaving
     row = np.zeros((len(edges) - 1, size, nodes * size))
     np.add.at(row, panel, part)
     return row.reshape(-1, size, nodes, size).swapaxes(0, 1).reshape(size, -1, size)
@@ -443,10 +568,9 @@ def _by_flights(
     section: Section,
     length: float,
     tolerance: float,
-    rng: np.random.Generator,
-    enter: Callable[[int, float, float, np.random.Generator], tuple[Floats, Floats]],
+    runs: _Runs,
+    enter: Callable[[int, float], tuple[Floats, Floats, Floats]],
     reflect: Reflections,
-    diffuse: float = 1.0,
     *,
     least: float = math.inf,
 ) -> Estimate:
@@ -454,15 +578,15 @@ def _by_flights(
 
     Flights end early if by their spread they would not come below the error ``least`` at the limit of their work.
     """
-    direct = _direct(GEOMETRIES[section], diffuse, length)
+    direct, diffuse = runs.direct(GEOMETRIES[section], length), max(runs.fractions)
     # a particle has diffuse * length reflections on average: some are enough that all leave within the limit
     together = int(min(max(MOST_REFLECTIONS / (BATCHES * (1.0 + diffuse * length)), LEAST_TOGETHER), TOGETHER))
     through = particles = unresolved = work = 0
     value, error = math.nan, math.inf
     while error > tolerance and work < MOST_REFLECTIONS:
-        x, direction = enter(together, length, diffuse, rng)
-        particles += x.size
-        passed, left, done = _flown(length, x, direction, reflect)
+        entered = enter(together, length)
+        particles += entered[0].size
+        passed, left, done = _flown(length, *entered, reflect)
         through, unresolved, work = through + passed, unresolved + left, work + done + together
         count = max(particles, 1)
         fraction, half = through / count, 0.5 * unresolved / count
@@ -476,7 +600,7 @@ def _by_flights(
     return Estimate(value, error, "estimate", method)
 
 
-def _flown(length: float, x: Floats, direction: Floats, reflect: Reflections) -> tuple[int, int, int]:
+def _flown(length: float, x: Floats, direction: Floats, wall: Floats, reflect: Reflections) -> tuple[int, int, int]:
     """Of particles that meet a wall the numbers that leave at the far end and that stay inside, and the work done.
 
     The work is the number of reflections, those of few particles at a time counted as `LEAST_TOGETHER`.
@@ -484,81 +608,91 @@ def _flown(length: float, x: Floats, direction: Floats, reflect: Reflections) ->
     through = work = 0
     while x.size and work < MOST_REFLECTIONS:
         work += max(x.size, LEAST_TOGETHER)
-        shift, direction = reflect(direction)
+        shift, direction, wall = reflect(direction, wall)
         x = x + shift
         through += int(np.count_nonzero(x >= length))
         inside = (x > 0.0) & (x < length)
-        x, direction = x[inside], direction[inside]
+        x, direction, wall = x[inside], direction[inside], wall[inside]
     return through, x.size, work
 
 
-def _entered_in_plane(number: int, length: float, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Where particles are first reflected diffusely, of those that are, and their angles to the wall."""
+def _entered_in_plane(
+    number: int, length: float, runs: _Runs, rng: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    """Where particles are first reflected diffusely, of those that are, their angles to the wall, and the walls."""
 
     def stopped(distance: Floats) -> Floats:
         """The fraction that meets a wall within the distance."""
         return np.asarray(2.0 * distance / (1.0 + distance + np.sqrt(1.0 + distance**2)))
 
-    # the fraction diffuse^2 k (1 - diffuse)^(k-1) stopped(length/k) is that of particles at k times the place of a
-    # first collision; k is drawn with the factor k or without it, whichever leaves less to reject
+    # particles with k flights are k stopped(length/k) times as many as `entering` draws without the factor k; k is
+    # drawn with the factor or without it, whichever leaves less to reject
     each = float(stopped(np.array(length)))
-    flights = rng.geometric(diffuse, number).astype(np.float64)
-    if diffuse * length >= each:
-        flights += rng.geometric(diffuse, number) - 1.0
-        chance = stopped(length / flights) / each
-    else:
-        chance = flights * stopped(length / flights) / length
-    flights = flights[rng.random(number) < chance]
+    times = runs.stopped * length >= each
+    flights, wall = runs.entering(number, rng, times=times)
+    chance = stopped(length / flights) / each if times else flights * stopped(length / flights) / length
+    taken = rng.random(flights.size) < chance
+    flights, wall = flights[taken], wall[taken]
     # the fraction that is stopped before x is uniform between 0 and its value at the end
     fraction = stopped(length / flights) * rng.random(flights.size)
     x = 0.5 * fraction * (2.0 - fraction) / (1.0 - fraction)
     # at x the cosine of the angle is uniform above that of the ray from the opposite corner
-    return flights * x, 2.0 * np.arcsin(np.sqrt(rng.random(x.size) * GEOMETRIES["channel"].beyond(x)))
+    return flights * x, 2.0 * np.arcsin(np.sqrt(rng.random(x.size) * GEOMETRIES["channel"].beyond(x))), wall
 
 
-def _turn(law: Law, diffuse: float, rng: np.random.Generator, angle: Floats) -> tuple[Floats, Floats]:
-    outgoing = reflected(law, np.pi - angle, rng)
-    return rng.geometric(diffuse, outgoing.shape) / np.tan(outgoing), outgoing
+def _turn(
+    laws: Sequence[Law], runs: _Runs, rng: np.random.Generator, angle: Floats, wall: Floats
+) -> tuple[Floats, Floats, Floats]:
+    outgoing = reflected(laws, np.pi - angle, wall, rng)
+    flights, after = runs.after(wall, rng)
+    return flights / np.tan(outgoing), outgoing, after
 
 
 # Directions in space have components along the axis, across it in the wall, and along the normal into the interior.
-def _entered_in_channel(number: int, length: float, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Where particles are first reflected diffusely, and their directions; those that are not are left out."""
-    along, across, normal, flights = _entering(number, diffuse, rng)
-    x = flights * along * rng.random(number) / np.abs(normal)
-    return x[x < length], np.stack((along, across, -np.abs(normal)), axis=1)[x < length]
+def _entered_in_channel(
+    number: int, length: float, runs: _Runs, rng: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    """Where particles are first reflected diffusely, their directions, and the walls; of the others none."""
+    along, across, normal, flights, wall = _entering(number, runs, rng)
+    x = flights * along * rng.random(flights.size) / np.abs(normal)
+    inside = x < length
+    return x[inside], np.stack((along, across, -np.abs(normal)), axis=1)[inside], wall[inside]
 
 
-def _entered_in_tube(number: int, length: float, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    along, y, z, flights = _entering(number, diffuse, rng)
+def _entered_in_tube(
+    number: int, length: float, runs: _Runs, rng: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    along, y, z, flights, wall = _entering(number, runs, rng)
     # from the point (radius, 0) of the opening along (y, z) to the point (1 in length) of the wall
     radius, square = np.sqrt(rng.random(number)), y * y + z * z
     time = (np.sqrt(square * (1.0 - radius) * (1.0 + radius) + (radius * y) ** 2) - radius * y) / square
     x, at_y, at_z = flights * along * time, radius + time * y, time * z
     direction = np.stack((along, at_y * z - at_z * y, -(at_y * y + at_z * z)), axis=1)
-    return x[x < length], direction[x < length]
+    return x[x < length], direction[x < length], wall[x < length]
 
 
-def _entering(number: int, diffuse: float, rng: np.random.Generator) -> tuple[Floats, Floats, Floats, Floats]:
-    """Directions of the cosine law about the axis, the component along it and two others; then numbers of flights.
+def _entering(number: int, runs: _Runs, rng: np.random.Generator) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Directions of the cosine law about the axis, the component along it and two others; numbers of flights; walls.
 
-    The place of the first diffuse reflection is k times that of the first collision, with the probability
-    diffuse^2 k (1 - diffuse)^(k-1): of flights of equal length s both are uniform between multiples of s.
+    The place of the first diffuse reflection is k times that of the first collision: of flights of equal length s both
+    are uniform between multiples of s.
     """
-    square, turn = rng.random(number), 2.0 * np.pi * rng.random(number)
-    flights = rng.geometric(diffuse, (2, number)).sum(axis=0) - 1.0
-    return np.sqrt(1.0 - square), np.sqrt(square) * np.cos(turn), np.sqrt(square) * np.sin(turn), flights
+    flights, wall = runs.entering(number, rng, times=True)
+    square, turn = rng.random(flights.size), 2.0 * np.pi * rng.random(flights.size)
+    return np.sqrt(1.0 - square), np.sqrt(square) * np.cos(turn), np.sqrt(square) * np.sin(turn), flights, wall
 
 
 ENTRIES = {"channel": _entered_in_channel, "tube": _entered_in_tube}
 
 
 def _leave(
-    law: DirectionLaw, section: Section, diffuse: float, rng: np.random.Generator, arriving: Floats
-) -> tuple[Floats, Floats]:
-    """Displacements along the axis after a reflection, and the directions in the frame of the next place."""
-    outgoing = law.sample(arriving, rng)
+    laws: Sequence[DirectionLaw], section: Section, runs: _Runs, rng: np.random.Generator, arriving: Floats,
+    wall: Floats,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """Displacements along the axis after a reflection, the directions in the frame of the next place, its wall."""
+    outgoing = sampled(laws, arriving, wall, rng)
     along, across, normal = outgoing.T
     # the chord of a circle meets it at both ends with the same components, but for the sign of the normal one
     time = 1.0 / normal if section == "channel" else 2.0 * normal / (across**2 + normal**2)
-    return rng.geometric(diffuse, time.size) * along * time, outgoing * [1.0, 1.0, -1.0]
+    flights, after = runs.after(wall, rng)
+    return flights * along * time, outgoing * [1.0, 1.0, -1.0], after

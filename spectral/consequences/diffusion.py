@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import get_args
 
@@ -17,7 +19,7 @@ from ...core.rounding import EPS
 from ...kernels import Law
 from ..bounds.contraction import refuse_unless_invariant
 from ..essential.edge import grazing_symbol
-from .channel import Arrangement, in_paper_frame, refuse_kept_sines, simulated_times
+from .channel import Arrangement, in_paper_frame, laws_of_walls, refuse_kept_sines, simulated_times
 
 # Sign of the displacement of rays that leave near theta = 0 and near theta = pi.
 DIRECTION = np.array([1.0, -1.0])
@@ -192,6 +194,7 @@ def channel_diffusivity(
     radius: float = 1.0,
     speed: float = 1.0,
     arrangement: Arrangement = "mirror",
+    other: Law | None = None,
 ) -> ChannelDiffusivity:
     """The diffusivity L^2/(2 tau) of channels of given lengths between two rough walls, by simulated exit times tau.
 
@@ -201,7 +204,7 @@ def channel_diffusivity(
     Parameters
     ----------
     law : Law
-        The law of the walls, in either convention.
+        The law of both walls, or of the lower one, in either convention.
     lengths : array_like
         Increasing values of L, half of the distance between the ends, in the unit of ``radius``.
     particles : int
@@ -211,6 +214,9 @@ def channel_diffusivity(
         Half the width of the channel, and the speed of the particles.
     arrangement : {"mirror", "half-turn"}
         The upper wall is the mirror image of the lower one, or is rotated by pi.
+    other : Law, optional
+        The law of the upper wall, as it is when this wall lies below, in the same convention. Half of the particles
+        start at each wall, and ``onset`` is the larger one of both laws.
 
     Returns
     -------
@@ -238,11 +244,18 @@ def channel_diffusivity(
     >>> shallow = spec.channel_diffusivity(ker.CircularArcLaw(0.3), [20.0], rng=1)
     >>> print(*shallow.values.round(2), round(shallow.onset))
     3.63 36
+
+    A smooth wall doubles a channel: its image is a channel of twice the radius with the other wall on both sides.
+
+    >>> half = spec.channel_diffusivity(ker.lambertian(), [40.0], rng=1, other=ker.specular())
+    >>> double = spec.channel_diffusivity(ker.lambertian(), [40.0], rng=2, radius=2.0)
+    >>> bool(abs(half.values[0] - double.values[0]) < half.errors[0] + double.errors[0])
+    True
     """
-    found = simulated_times(law, lengths, particles, rng, radius, speed, arrangement, {}, least=1)
+    found = simulated_times(law, other, lengths, particles, rng, radius, speed, arrangement, {}, least=1)
     errors = NORMAL_95 * found.times.std(axis=0, ddof=1) / np.sqrt(len(found.times))
     try:
-        onset = logarithmic_slope(law, found.radius, found.speed, arrangement).onset
+        onset = _onset_in_channel(laws_of_walls(law, other), found.radius)
     except AsperityError:
         onset = np.inf
     return ChannelDiffusivity(
@@ -290,6 +303,19 @@ def logarithmic_slope(law: Law, radius: float, speed: float, arrangement: Arrang
     return Diffusivity(
         eta * scale, eta_error * scale, kind, method, eta, eta_error, zeta, uncertainty, arrangement, onset
     )
+
+
+def _onset_in_channel(laws: Sequence[Law], radius: float) -> float:
+    """The larger onset of the laws of both walls; an AsperityError if they keep the direction of grazing flights."""
+    if len(laws) == 1:
+        return logarithmic_slope(laws[0], radius, 1.0, "mirror").onset
+    zetas = []
+    for law in laws:
+        refuse_unless_invariant(law, "L^2/tau has no slope in ln L; the other fields are simulated")
+        zetas.append(float(-0.5 * DIRECTION @ grazing_symbol(law).matrix @ DIRECTION))
+    if min(zetas) >= 1.0 - BALLISTIC:
+        return math.inf
+    return 2.0 * radius * max(_onset(law, zeta) for law, zeta in zip(laws, zetas, strict=True))
 
 
 def _onset(law: Law, zeta: float) -> float:

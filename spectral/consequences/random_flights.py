@@ -149,13 +149,14 @@ def channel_paths(
     speed: float = 1.0,
     bend: float = math.inf,
     arrangement: Arrangement = "mirror",
+    other: Law | None = None,
 ) -> ChannelPaths:
     r"""Simulate the flights of particles between two rough walls.
 
     Parameters
     ----------
     law : Law
-        The law of both walls, in either convention.
+        The law of both walls, or of the lower or inner one, in either convention.
     times : array_like, shape (n,)
         At least three increasing positive times.
     particles : int
@@ -167,6 +168,8 @@ def channel_paths(
         channel is straight.
     arrangement : {"mirror", "half-turn"}
         The upper or outer wall is the mirror image of the other one, or is rotated by pi.
+    other : Law, optional
+        The law of the upper or outer wall, as it is when this wall lies below, in the same convention.
 
     Returns
     -------
@@ -200,7 +203,7 @@ def channel_paths(
     >>> bool(np.allclose(smooth.positions[:, 2], 4.0 * smooth.positions[:, 0]))
     True
     """
-    paper, moments = checked(law, "times", times, arrangement, particles)
+    laws, moments = checked(law, other, "times", times, arrangement, particles)
     half, pace = positive_number("radius", radius), positive_number("speed", speed)
     middle = math.inf if isinstance(bend, float) and bend == math.inf else positive_number("bend", bend)
     if not middle > half:
@@ -211,5 +214,5 @@ def channel_paths(
         raise InputError(f"times: expected at most {latest:.3g} ({MOST_FLIGHTS} flights), got {moments[-1]:.3g}")
     source = generator(rng)
     outer = source.random(particles) < (0.5 if channel.is_straight else 0.5 * (1.0 + half / middle))
-    positions = channel.crossings(paper, pace * moments, outer.astype(np.float64), source, of_x=False)
+    positions = channel.crossings(laws, pace * moments, outer.astype(np.float64), source, of_x=False)
     return ChannelPaths(frozen(moments), frozen(positions), half, pace, middle)

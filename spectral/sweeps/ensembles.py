@@ -21,7 +21,7 @@ from ...core.tables import data_frame
 from ...kernels import Basis, KernelMatrix, discretise
 from ...kernels.bases.basis import checked_basis
 from ...kernels.sampling.counts import half_width
-from .running import Family, UserQuantity, in_words, law_of, name_of, sweep
+from .running import SEED, Family, UserQuantity, in_words, law_of, name_of, sweep
 from .table import SweepTable, csv_text
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 # What ``rng=None`` stands for: an ensemble without seed is the same each time, so that it goes on from its checkpoint.
 SEED_WITHOUT_RNG = 0
-# The parameter of a family that makes its walls differ.
-SEED = "rng"
 
 
 @dataclass(frozen=True, repr=False)

@@ -37,6 +37,8 @@ from .table import SweepTable
 
 # Walls of a sweep, evenly spread over its points, by which a checkpoint tells it from others.
 TOLD_APART = 1000
+# The parameter of a family that makes its walls differ.
+SEED = "rng"
 Family: TypeAlias = Callable[..., Wall | Law | CollisionLaw]
 
 
@@ -198,7 +200,8 @@ def _all_rows(study: _Study, grid: Grid, leading: str, engine: Engine, progress:
                 store = stack.enter_context(Checkpoint(path, study.identity(grid, key is not None), key=key))
                 known = dict(store.parts(partial(study.read, parameters=grid.names)))
             workers = stack.enter_context(connected(engine["client"]))
-            bar = stack.enter_context(progress_bar(grid.size, "point", "sweep", shown=progress))
+            words = ("realisation", "ensemble") if grid.names == (SEED,) else ("point", "sweep")
+            bar = stack.enter_context(progress_bar(grid.size, *words, shown=progress))
             for portion in grid.portions(value):
                 points += portion
                 found |= {one: known[one] for one in map(key_of, portion) if one in known}

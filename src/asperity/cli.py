@@ -116,6 +116,30 @@ def surface_law_of(text: str, spacing: str | None, orientation: str | None) -> A
     return SurfaceLaw(surface_from_text(text, apart[0] if apart and len(apart) == 1 else apart), turn)
 
 
+# Pictures for which nothing is traced.
+EARLY = {"kernel", "spectrum"}
+
+
+class _Early:
+    """The lines and pictures of a wall, which come before those of the disk."""
+
+    def __init__(self, pictures: list[Path], dpi: float, how: dict[str, bool]) -> None:
+        self.pictures, self._dpi, self._how, self._lines = pictures, dpi, how, list[str]()
+
+    def tell(self, study: Any) -> None:
+        """Print the lines before those of the disk, and draw the pictures."""
+        lines = study.summary(**self._how).splitlines()
+        self._lines = lines[: next((k for k, line in enumerate(lines) if line.startswith("disk")), len(lines))]
+        click.echo("\n".join(self._lines))
+        for path in study._drawn(self.pictures, self._dpi):
+            click.echo(f"wrote      {path}")
+
+    def finish(self, study: Any) -> None:
+        """Print the lines of the disk."""
+        for line in study.summary(**self._how).splitlines()[len(self._lines) :]:
+            click.echo(line)
+
+
 @click.group(cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
 @click.version_option(__version__, prog_name="asperity")
 def main() -> None:
@@ -211,22 +235,28 @@ def study(
         file, *how = wall.partition(":")
         name = "".join((Path(file).name, *how))
         asked |= {"rng": seed, "progress": not quiet, "incidence_deg": degrees}
+        early = None
         if is_map:
             asked.pop("bins")
+        elif not (quiet or as_json or disk is not None):
+            pictures = [] if out is None else [Path(out, one) for one in names if Path(one).stem in EARLY]
+            early = _Early(pictures, dpi, {"verbose": verbose, "by_angle": degrees is not None})
         report: SavedStudy = (
             study_surface(found, name, **asked)
             if is_map
-            else study_wall(found.wall, name, disk, facets=of_facets, **asked)
+            else study_wall(found.wall, name, disk, facets=of_facets, first=early.tell if early else None, **asked)
         )
-        if not quiet:
-            text = report.to_json() if as_json else report.summary(verbose=verbose, by_angle=degrees is not None)
-            click.echo(text)
+        if early is not None:
+            early.finish(report)
+        elif not quiet:
+            click.echo(report.to_json() if as_json else report.summary(verbose=verbose, by_angle=degrees is not None))
         if table is not None and not quiet:
             reached = f"distribution error {written.distribution_error:.2g}, {written.tolerance:g} wanted"
             missed = f" ({reached})" * (written.distribution_error > written.tolerance)
             click.echo(f"wrote      {table}{missed}", err=as_json)
         if out is not None:
-            for path in report.save(out, overwrite=force, picture_format=picture_format, dpi=dpi):
+            drawn = early.pictures if early else []
+            for path in report.save(out, overwrite=force, picture_format=picture_format, dpi=dpi, drawn=drawn):
                 if not quiet:
                     click.echo(f"wrote      {path}", err=as_json)
 
@@ -430,7 +460,7 @@ def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, 
 
 
 @main.command(epilog=WALL_HELP)
-@click.argument("wall", default="triangular-teeth")
+@click.argument("wall", default="focusing-arcs")
 @click.option("--port", type=click.IntRange(0, 65535), default=5006, help="0 for any that is free.")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @click.option("--out", type=NEW_FOLDER, help="Write what is saved into this folder.")

@@ -16,6 +16,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench import problems as collision_quantities
 from asperity.bench import problems as uniform_disk
+from asperity.bench import standard_set
 from asperity.bench.problems import OWN_QUANTITIES, QUANTITIES, methods_of, problem_names
 from asperity.bench.quantities.laws import LAW_BASIS, eta_at, matrix_methods, resistance_of
 from asperity.bench.quantities.walls import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
@@ -239,7 +240,10 @@ def test_a_plan_is_kept_whatever_the_parts_take(monkeypatch):
 
 def test_the_time_of_a_run_is_kept_and_what_it_left_out_is_said(tmp_path):
     effort = dataclasses.replace(QUICK, total_seconds=0.01)
-    (report,) = run_problems(["triangular-teeth/collision"], effort, tmp_path, lambda line: None)
+    said = []
+    (report,) = run_problems(["triangular-teeth/collision"], effort, tmp_path, said.append)
+    assert ", without a result: " in said[0] and "left out, the time planned for this method was spent" in said[0]
+    assert "left out: the time planned for this method was spent" in standard_set.summary([report])
     assert {(row.status, row.note) for row in report.rows} <= {
         ("left out", "the time planned for this method was spent"),
         ("left out", "a smaller budget met the time limit"),

@@ -55,6 +55,18 @@ def test_a_bar_appears_on_a_terminal_after_two_seconds_and_nowhere_else(monkeypa
     assert not shown() and terminal.getvalue() == ""
 
 
+def test_the_bar_of_an_ensemble_and_of_a_sweep_say_what_they_are(monkeypatch):
+    def family(rng=1, fraction=0.5):
+        return ker.maxwell(np.random.default_rng(rng).uniform() * fraction)
+
+    terminal = written(monkeypatch, Terminal())
+    spec.ensemble(family, 4, "gap", progress=True)
+    assert "ensemble" in terminal.getvalue() and "sweep" not in terminal.getvalue()
+    terminal = written(monkeypatch, Terminal())
+    spec.sweep(family, {"fraction": [0.1, 0.2]}, "gap", progress=True)
+    assert "sweep" in terminal.getvalue() and "ensemble" not in terminal.getvalue()
+
+
 def test_in_a_notebook_a_bar_is_shown_although_standard_error_is_no_terminal(monkeypatch):
     stream = written(monkeypatch, io.StringIO())
     notebook = ModuleType("tqdm.notebook")

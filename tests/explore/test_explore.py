@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from asperity import cli
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
@@ -362,6 +363,34 @@ def test_a_refused_file_is_read_again_when_its_options_change_or_it_is_sent_agai
     page.choice.value = "koch"
     page.options.value = "seam=mirror"
     waited(page, lambda: page.question.name == "koch" and not page._awaited)
+
+
+def test_the_page_opens_on_a_wall_that_has_a_gap():
+    (default,) = (one.default for one in cli.explore.params if one.name == "wall")
+    assert spec.spectral_gap(ker.WallLaw(geo.wall_from_text(default)), 1e-2).verdict == "isolated"
+
+
+def test_a_gap_of_which_no_digit_is_known_is_shown_as_an_interval():
+    pytest.importorskip("panel", reason="the page needs asperity[explore]")
+    from asperity.explore.page import answer_as_html
+
+    coarse = first_answer(Question(geo.focusing_arcs(1.2), "arcs"))
+    assert coarse.gap.verdict == "undecided" and coarse.gap.error >= coarse.gap.value
+    assert f"<b>0 to {2.0 * coarse.gap.value:.2g}</b>, undecided" in answer_as_html(coarse)
+
+
+def test_separator_decimal_sign_and_encoding_of_a_profile_are_fields(page):
+    text = "x;höhe\n0;0,0\n1;-0,5\n2;-0,1\n3;-0,4\n"
+    page.reading["decimal"].value = "."
+    page.file.filename, page.file.value = "profile.txt", text.encode("latin-1")
+    waited(page, lambda: page.message)
+    for key, value in (("delimiter", "semicolon"), ("encoding", "latin-1"), ("decimal", "comma")):
+        page.reading[key].value = value
+    waited(page, lambda: page.question.name == "profile" and not page.message)
+    assert page.question.wall.depth == pytest.approx(0.5)
+    # they are none of a wall file
+    page.file.filename, page.file.value = "wall.toml", wall_as_toml(TEETH)
+    waited(page, lambda: page.question.name == "wall" and not page.message)
 
 
 @pytest.mark.parametrize("name", geo.WALLS)

@@ -214,8 +214,6 @@ def test_a_deeply_nested_table_is_refused(read):
 # nothing is lost
 
 
-# numpy 2.0 leaves the archive open whose writing failed, and Python then warns of it; later versions close it
-@pytest.mark.filterwarnings("ignore:.*ZipFile.__del__:pytest.PytestUnraisableExceptionWarning")
 def test_a_full_disk_leaves_an_old_wall_matrix_and_study_as_they_are(tmp_path):
     geo.flat().save(tmp_path / "wall.toml")
     EXACT.save(tmp_path / "kernel.npz")

@@ -125,6 +125,10 @@ REMEDIES = {
         lambda: ker.distance(LAW, SPECULAR),
         lambda: ker.distance(LAW.in_specular_frame(), SPECULAR),
     ),
+    "take section='channel'": (
+        lambda: spec.transmission(LAW, 1.0, "tube", other=ker.specular()),
+        lambda: spec.transmission(LAW, 1.0, other=ker.specular()),
+    ),
     "call in_specular_frame() on one of them": (lambda: LAW @ SPECULAR, lambda: LAW @ SPECULAR.in_specular_frame()),
     "use in_specular_frame() on both or on neither": (
         lambda: P + P.in_specular_frame(),

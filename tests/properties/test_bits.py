@@ -334,6 +334,7 @@ CHANGED = [
     (exits, {"rng": 8}, "seed: "),
     (exits, {"lengths": [2.0, 4.0, 9.0]}, "lengths: "),
     (exits, {"speed": 2.0}, "speed: "),
+    (exits, {"other": ker.specular()}, "other: "),
     (exits, {"arrangement": "half-turn"}, "arrangement: "),
     (played, {"laws": ker.CollisionLaw.from_wall(geo.focusing_arcs(0.8), DISK)}, "laws: "),
     (played, {"position": np.full((200, 2), 0.25)}, "position: "),

@@ -460,7 +460,16 @@ REFUSED = {
             ({"law": 2.0 * DIFFUSE}, "weights"),
             ({"law": 0.5 * ker.HemisphereLaw(ARC), "section": "tube"}, "weights"),
             ({"law": ker.CollisionLaw(ARC, DISK)}, "law: expected a Law"),
+            ({"other": DIFFUSE, "section": "tube"}, "other: a tube has one wall.*take section='channel'"),
+            ({"other": ker.HemisphereLaw(ARC)}, "other: expected a Law such as"),
+            ({"other": ARC, "law": ker.HemisphereLaw(ARC)}, "other: expected a DirectionLaw such as ker.HemisphereLaw"),
             ({"rng": -1}, "rng: expected"))),
+        *((lambda call=call: call(ARC, [1.0, 2.0, 4.0], 10, other=DIFFUSE.in_specular_frame()),
+           r"other: expected a law in the convention of the first, .*; call in_specular_frame\(\) on one of them")
+          for call in (spec.channel_paths, spec.channel_diffusivity, spec.exit_times, lambda law, *_, other:
+                       spec.transmission(law, 1.0, other=other))),
+        *((lambda call=call: call(CREVICES, [1.0, 2.0, 4.0], 10, other=COIN), "every ray keeps its angle")
+          for call in (spec.channel_diffusivity, spec.exit_times)),
     ],
     "laws of directions": [
         (lambda: ker.HemisphereLaw(FLAT), "law: expected a Law"),

@@ -13,7 +13,9 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, FileExistsRefusal, InputError
+from asperity.kernels import discretise
 from asperity.study import DATA, PICTURES, check_tracer, pictures, study_wall
+from asperity.study import study as study_module
 from asperity.study.pictures import draw_study_wall
 from wall_shapes import over_floor, square
 
@@ -90,11 +92,32 @@ def test_a_polygon_has_no_gap_and_the_summary_says_so(teeth):
     assert text.count("0 no gap") == 3 and "they belong to the grid" in text
 
 
+def test_a_study_makes_one_matrix_that_of_the_wall(monkeypatch):
+    """That of the foreshortened wall, which no report has, took three quarters of a first study to compile."""
+    made = []
+    monkeypatch.setattr(
+        study_module, "discretise", lambda law, *how, **more: made.append(law) or discretise(law, *how, **more)
+    )
+    found = study_wall(geo.focusing_arcs(1.2), bins=8, tolerance=0.1, progress=False)
+    assert made == [ker.WallLaw(geo.focusing_arcs(1.2))]
+    assert (
+        found.as_dict()["collision"].keys() >= {"gap", "foreshortening"} and "law" not in found.as_dict()["collision"]
+    )
+
+
+def test_the_study_of_the_wall_is_told_before_the_collision_of_the_disk(monkeypatch):
+    told = []
+    monkeypatch.setattr(study_module, "_conservation", lambda *_: told.append("disk") or dict(study_module.UNKNOWN))
+    whole = study_wall(geo.focusing_arcs(1.2), bins=8, tolerance=0.1, progress=False, first=told.append)
+    part, after = told
+    assert after == "disk" and part.collision_gap is None and whole.collision_gap is not None
+    cut = part.summary().index("\ndisk ")
+    assert whole.summary()[:cut] == part.summary()[:cut] and "gap " in part.summary()[:cut]
+
+
 def test_the_summary_names_method_error_tolerance_and_both_conventions(arcs):
     text = arcs.summary(verbose=True)
     assert "Bins(32) by quadrature, Frobenius error" in text and text.count("tolerance 0.01 met") == 3
-    # the foreshortened arc is elliptic and has no closed form
-    assert f"{arcs.collision_matrix.samples} rays" in text and "against the sampling noise" in text
     assert all(line in text for gap in (arcs.gap, arcs.specular_gap) for line in (gap.method, *gap.evidence))
 
 
@@ -280,6 +303,18 @@ def test_momentum_and_resistance_are_those_of_the_library(which, request):
     # two different methods
     assert abs(report.resistance.value - drag.value) <= report.resistance.error + drag.error < 1e-6
     assert report.as_dict()["resistance"]["error"] == report.resistance.error
+
+
+def test_pictures_are_titled_by_the_wall_and_its_parameters_without_the_options_of_a_reader(teeth):
+    long = "line.txt:seam=step,units=um/nm,delimiter=semicolon,decimal=comma,usecols=0/2,skiprows=3,encoding=latin-1"
+    for name, title in (
+        (long, "line.txt"),
+        ("koch:generations=2", "koch, generations = 2"),
+        ("ratio 1:2", "ratio 1:2"),
+    ):
+        ax = Figure().subplots()
+        draw_study_wall(replace(teeth, name=name), ax)
+        assert ax.get_title().splitlines()[0] == title
 
 
 @pytest.mark.parametrize(("kind", "start"), [("svg", b"<?xml"), ("pdf", b"%PDF")])

@@ -48,6 +48,16 @@ def test_the_command_prints_a_study_of_a_map_and_writes_its_files(map_file, tmp_
     assert "--force" in refused("study", text, *options[:-4], "--out", tmp_path / "a")
 
 
+def test_a_study_says_that_a_map_was_mirrored_and_its_pictures_are_small(map_file, tmp_path):
+    mirrored = geo.read_surface(map_file, 0.5, ("um", "nm"))
+    report = study_surface(ker.SurfaceLaw(mirrored), "map.txt:units=um/nm,degree=0", tolerance=0.3, progress=False)
+    words = "followed by its mirror images in both directions"
+    assert words in report.summary(verbose=True) and words not in repr(geo.Surface(FIELD))
+    assert mirrored.is_mirrored and not geo.Surface(FIELD).is_mirrored and not geo.Surface([[0.0, 1.0]]).is_mirrored
+    picture = next(path for path in report.save(tmp_path) if path.name == "surface.png")
+    assert 20_000 < picture.stat().st_size < 150_000
+
+
 def test_grooves_at_a_fixed_orientation_have_no_gap_and_a_tensor_of_what_they_keep():
     law = ker.SurfaceLaw(geo.Surface([[0.0], [0.9], [0.3]]), orientation=0.0)
     report = study_surface(law, tolerance=0.1, incidence_deg=[40.0], progress=False)

@@ -157,7 +157,7 @@ def _cells(report: WorkReport) -> tuple[str, ...]:
     rows = [row for row in _chosen(report) if row.is_done]
     front = ", ".join(dict.fromkeys(row.method for row in report.front()))
     if not rows:
-        states = ", ".join(dict.fromkeys(row.status for row in _chosen(report)))
+        states = "; ".join(dict.fromkeys(f"{row.status}: {row.note}" for row in _chosen(report)))
         words = states or ("not run" if report.auto in report.methods else "nothing to choose")
         return report.problem, words, *"----", front
     best = min(rows, key=lambda row: row.error or 0.0)
@@ -262,8 +262,15 @@ def run_problems(
                 if report is None:
                     say(f"{name}: left out, no independent reference is known")
                 else:
-                    say(f"{name}: {len(report.rows)} rows")
+                    say(f"{name}: {len(report.rows)} rows{_without_result(report)}")
                     yield report
+
+
+def _without_result(report: WorkReport) -> str:
+    """Which rows have no result, and why."""
+    missing = (f"{row.method} at {row.budget:g} {row.status}, {row.note}" for row in report.rows if not row.is_done)
+    words = "; ".join(missing)
+    return words and f", without a result: {words}"
 
 
 def _run(name: str, effort: Effort, folder: Path | None, child: ChildProcess, whole: TimePlan) -> WorkReport | None:
@@ -283,15 +290,15 @@ def _run(name: str, effort: Effort, folder: Path | None, child: ChildProcess, wh
     if not methods:
         return None
     ends: dict[str, float] = {}
+    weights = {method.name: AUTO_WEIGHT if method.name == AUTO else 1.0 for method in methods}
 
     def runner(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
         if method.name not in ends:
             if plan.remaining >= LEAST_SECONDS:
                 # the start counts for the problem, not for the method
                 child.start()
-            weight = AUTO_WEIGHT if method.name == problem.auto else 1.0
-            ends[method.name] = time.monotonic() + plan.next_fraction(weight)
-        limit = min(effort.row_seconds, ends[method.name] - time.monotonic())
+            ends[method.name] = time.monotonic() + plan.next_fraction(weights[method.name])
+        limit = min(effort.row_seconds * weights[method.name], ends[method.name] - time.monotonic())
         if limit < LEAST_SECONDS:
             return WorkRow(method.name, budget, "left out", note="the time planned for this method was spent")
         more = RANDOM_FACTOR * repeats if method.is_random else repeats

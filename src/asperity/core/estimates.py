@@ -160,6 +160,11 @@ class Estimate(Summary):
         # the method says why nothing is known
         return {**super()._facts(), **({"method": self.method} if math.isinf(self.error) else {})}
 
+    def _headline(self) -> str:
+        # the method says why
+        missing = math.isnan(self.value)
+        return f"not known: {self.method.removeprefix('not known: ')}" if missing else super()._headline()
+
     def __str__(self) -> str:
         return with_error(self.value, self.error)
 
@@ -175,6 +180,8 @@ def with_error(value: float, error: float) -> str:
     >>> with_error(0.63297743, 0.00022), with_error(1.5e-9, 4e-11), with_error(123456, 400.0), with_error(0.5, math.inf)
     ('0.63298(23)', '1.50(4)e-09', '123500(500)', '0.5(inf)')
     """
+    if math.isnan(value):
+        return "not known"
     # numpy's numbers have another repr
     value, error = float(value), float(error)
     if error == 0.0 or not (math.isfinite(value) and math.isfinite(error)):

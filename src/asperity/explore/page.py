@@ -16,6 +16,7 @@ from bokeh.events import PanEnd, PanStart
 from ..core.checks import number_between
 from ..core.errors import AsperityError
 from ..geometry import WALLS, Disk, Wall, wall_from_text
+from ..geometry.cells.profile import ENCODINGS, SEPARATORS
 from ..study.result import resistance_from
 from . import drawing
 from .answers import MOST_HANDLES, Answer, Question, draggable_vertices, pinned, with_new_vertex
@@ -33,6 +34,12 @@ RANGES = {
     "generations": (1, 4), "amplitude": (0.02, 2.0), "diffuse_fraction": (0.0, 1.0),
 }  # fmt: skip
 DRAWN = "a polygon of your own"
+# How a profile is read, by the parameters of `wall_from_text`: their titles and words.
+READING: dict[str, tuple[str, dict[str, str]]] = {
+    "delimiter": ("Separator", {word: word for word in SEPARATORS}),
+    "decimal": ("Decimal sign", {"point": ".", "comma": "comma"}),
+    "encoding": ("Encoding", {word: word for word in ENCODINGS}),
+}
 CONVENTIONS = {"retroreflection = identity": "paper", "specular = identity": "specular"}
 STRETCH: dict[str, Any] = {"sizing_mode": "stretch_width"}
 # As many columns of figures as fit.
@@ -112,12 +119,17 @@ class Page:
         self.foreshortened = pn.widgets.Toggle(name="Foreshorten: the wall as the disk feels it", **STRETCH)
         self.file = pn.widgets.FileInput(name="Wall file or profile", **STRETCH)
         self.options = pn.widgets.TextInput(name="Options of a profile", placeholder="seam=step,units=um/nm", **STRETCH)
+        self.reading = {
+            key: pn.widgets.Select(name=f"{title} of a profile", options={"as found": "", **words}, value="", **STRETCH)
+            for key, (title, words) in READING.items()
+        }
         self.status, self.table, self.saved = (pn.pane.HTML("", stylesheets=[TEXT], **STRETCH) for _ in range(3))
         self._make_saving()
         self._make_sliders(parameters)
         self.choice.param.watch(lambda _: self._wall_chosen(), "value")
         self.file.param.watch(lambda _: self._file_sent(), "value")
-        self.options.param.watch(lambda _: self._open_file(), "value")
+        for field in (self.options, *self.reading.values()):
+            field.param.watch(lambda _: self._open_file(), "value")
         for widget in (self.mass, self.inertia_ratio, self.diffuse, self.convention, self.foreshortened):
             widget.param.watch(lambda _: self._ask_again(), "value")
 
@@ -153,7 +165,7 @@ class Page:
         panes = [pn.pane.Bokeh(figure.plot, margin=4, **STRETCH) for figure in figures]
         controls = pn.Column(
             self.choice, self.sliders, self.mass, self.inertia_ratio, self.diffuse, self.foreshortened, self.convention,
-            self.options, self.file, self.save, self.study, self.take, self.saved,
+            self.file, *self.reading.values(), self.options, self.save, self.study, self.take, self.saved,
             styles={"flex": "1 1 240px", "min-width": "240px"}, margin=4,
         )  # fmt: skip
         title = pn.pane.HTML("<h2 style='margin: 4px 0'>asperity explore</h2>", stylesheets=[TEXT])
@@ -201,7 +213,9 @@ class Page:
         """Ask for the file that came last with the options as they are now, unless another wall was chosen since."""
         if self._sent is not None:
             name, content = self._sent
-            self.ask(partial(opened, name, content, str(self.options.value or "")), Path(name).stem)
+            chosen = [f"{key}={field.value}" for key, field in self.reading.items() if field.value]
+            options = "" if name.lower().endswith(".toml") else ",".join(filter(None, [self.options.value, *chosen]))
+            self.ask(partial(opened, name, content, options), Path(name).stem)
 
     def _choose(self, choice: str) -> None:
         """Set the choice without asking for its wall."""
@@ -408,7 +422,11 @@ def answer_as_html(answer: Answer) -> str:
         rows["gap"] = f"<b>0</b>, no gap ({html.escape(gap.evidence[0])}); {gap.convention} convention"
     elif gap is not None:
         name = "" if gap.self_adjoint else "1 - norm on functions of mean 0: "
-        value = f"{name}<b>{html.escape(str(gap))}</b>"
+        # a value of which no digit is known is shown as the interval
+        known = (
+            str(gap) if gap.error < gap.value else f"{max(gap.value - gap.error, 0.0):g} to {gap.value + gap.error:.2g}"
+        )
+        value = f"{name}<b>{html.escape(known)}</b>"
         rows["gap"] = f"{value}, {gap.verdict}, error {gap.error:.1e} ({gap.kind}); {gap.convention} convention"
         rows["by"] = html.escape(gap.method)
     if momentum is not None:

@@ -6,6 +6,7 @@ import os
 import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, TypeAlias
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 # Dots per inch: pictures stay below 150 kB and are legible at the width of a page.
 RESOLUTION = 100
+# Larger pictures are written with 256 colours.
+LARGEST_PNG = 150_000
 TITLE_WIDTH = 64
 RAYS, MOST_BOUNCES = 5, 12
 # Tried in this order for every ray until one leaves after few enough bounces, and so that both sides are lit.
@@ -57,7 +60,16 @@ def save_pictures(drawings: Drawings, paths: Sequence[Path], dpi: float = RESOLU
     def write(path: Path, draw: Callable[..., object], size: tuple[float, float], stream: IO[bytes]) -> None:
         figure = Figure(figsize=size)
         draw(figure.subplots())
-        figure.savefig(stream, dpi=dpi, format=path.suffix[1:], bbox_inches="tight")
+        drawn, kind = BytesIO(), path.suffix[1:]
+        figure.savefig(drawn, dpi=dpi, format=kind, bbox_inches="tight")
+        if kind == "png" and drawn.tell() > LARGEST_PNG:
+            from PIL import Image
+
+            # a relief has more colours than eyes tell apart; those of the few points on rays stay
+            few = Image.open(drawn).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+            few.save(stream, format="png", optimize=True, dpi=(dpi, dpi))
+        else:
+            stream.write(drawn.getvalue())
 
     return [
         path for path, drawing in zip(paths, drawings, strict=True) if draw_whole(path, partial(write, path, *drawing))

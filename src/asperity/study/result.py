@@ -15,7 +15,7 @@ from ..core.errors import AsperityError
 from ..core.estimates import NORMAL_95, Estimate, Summary, estimate_as_dict, finite, with_error
 from ..core.rounding import EPS
 from ..core.version import __version__
-from ..geometry import Disk, Wall
+from ..geometry import WALLS, Disk, Wall
 from ..kernels import CollisionLaw, KernelMatrix, Law
 from ..spectral import SpectralGap, Spectrum, mean_squared_slope
 from ..spectral.bounds.enclosure import Enclosures
@@ -87,8 +87,6 @@ class StudyResult(Summary):
     enclosures : Enclosures or None
         Intervals that hold eigenvalues of P~ itself; None where ``refusals`` says why.
     collision : CollisionLaw
-    collision_matrix : KernelMatrix
-        P~ of the foreshortened wall, in bins.
     collision_gap : SpectralGap or None
     conservation : dict
         Largest relative change of the kinetic energy and of the rolling momentum in sampled collisions.
@@ -113,7 +111,6 @@ class StudyResult(Summary):
     spectrum: Spectrum | None
     enclosures: Enclosures | None
     collision: CollisionLaw
-    collision_matrix: KernelMatrix
     collision_gap: SpectralGap | None
     conservation: Mapping[str, float]
     refusals: Mapping[str, str]
@@ -122,13 +119,29 @@ class StudyResult(Summary):
 
     @property
     def title(self) -> str:
-        """The name of the wall, with the law of facets that are no mirrors."""
-        return self.name if self.facets is None else f"{self.name}, facets {self.facets!r}"
+        """The name of the wall with its parameters, and the law of facets that are no mirrors."""
+        name = title_of(self.name)
+        return name if self.facets is None else f"{name}, facets {self.facets!r}"
 
     @property
     def resistance(self) -> Estimate | None:
         """That of a tumbling body with this wall, where a smooth one has 1; None where accommodation is."""
         return None if self.accommodation is None else resistance_from(self.accommodation)
+
+
+def title_of(name: str) -> str:
+    """What pictures call a wall: of a named one its parameters too, of a file none of the options of its reader.
+
+    Examples
+    --------
+    >>> title_of("focusing-arcs:half_angle=0.9"), title_of("line.txt:seam=step,units=um/nm"), title_of("a: b")
+    ('focusing-arcs, half_angle = 0.9', 'line.txt', 'a: b')
+    """
+    file, _, options = name.partition(":")
+    parts = [part.partition("=") for part in options.split(",")]
+    if not all(equals for _, equals, _ in parts):
+        return name
+    return ", ".join([file, *(f"{key} = {value}" for key, _, value in parts if file in WALLS)])
 
 
 def resistance_from(found: Accommodation) -> Estimate:
@@ -251,8 +264,7 @@ def report_of(study: StudyResult, by_angle: bool, verbose: bool) -> str:
             f"mass {disk.mass:g}, inertia ratio {disk.inertia_ratio:g}, radius {disk.radius:g}: feels the wall "
             f"{1.0 / disk.foreshortening:.4g} times as deep"
         ],
-        "collision": gap_lines(study, "collision_gap", "gap of that wall ")
-        + [f"law of that wall {line}" for line in matrix_lines(study.collision_matrix)],
+        "collision": gap_lines(study, "collision_gap", "gap of that wall "),
         "conserved": [
             f"energy to {study.conservation['energy_defect']:.0e}, rolling momentum to "
             f"{study.conservation['rolling_momentum_defect']:.0e}"
@@ -449,8 +461,7 @@ def study_as_dict(study: StudyResult) -> dict[str, Any]:
         "enclosures": study.enclosures and enclosures_as_list(study.enclosures),
         "collision": {
             "mass": disk.mass, "inertia_ratio": disk.inertia_ratio, "radius": disk.radius,
-            "foreshortening": disk.foreshortening, "law": matrix_as_dict(study.collision_matrix), "gap": gaps[2],
-            **study.conservation,
+            "foreshortening": disk.foreshortening, "gap": gaps[2], **study.conservation,
         },
         "consequences": study.consequences.as_dict(),
         "accommodation": study.accommodation and _accommodation(study.accommodation),

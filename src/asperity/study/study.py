@@ -7,7 +7,7 @@ import math
 import os
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
@@ -46,6 +46,8 @@ ENCLOSED = 3
 FIRST_SAMPLES, MOST_SAMPLES = 2**20, 2**24
 PICTURES = ("wall.png", "kernel.png", "spectrum.png", "collision.png")
 FORMATS = ("png", "svg", "pdf")
+# Of a disk whose collisions are not computed yet.
+UNKNOWN = {"energy_defect": math.nan, "rolling_momentum_defect": math.nan}
 DATA = ("kernel.npz", "study.json")
 
 
@@ -82,9 +84,18 @@ class SavedStudy(Summary):
         """The study as JSON."""
         return json.dumps(self.as_dict(), indent=2, allow_nan=False)
 
+    def _drawn(self, paths: Sequence[Path], dpi: float) -> list[Path]:
+        """Write the pictures of these names."""
+        stems = [Path(name).stem for name in self.pictures]
+        chosen = [
+            drawing for stem, drawing in zip(stems, self._drawings(), strict=True) if stem in {p.stem for p in paths}
+        ]
+        return save_pictures(chosen, paths, dpi)
+
     def save(
-        self, folder: str | Path, *, overwrite: bool = False, picture_format: str = "png", dpi: float = RESOLUTION
-    ) -> list[Path]:
+        self, folder: str | Path, *, overwrite: bool = False, picture_format: str = "png", dpi: float = RESOLUTION,
+        drawn: Sequence[Path] = (),
+    ) -> list[Path]:  # fmt: skip
         """Write the matrix with its metadata, the study as JSON, and the pictures; returns the paths.
 
         A picture that cannot be drawn is missing, with a warning.
@@ -98,6 +109,8 @@ class SavedStudy(Summary):
         picture_format : {"png", "svg", "pdf"}
         dpi : float
             Dots per inch of pictures in pixels.
+        drawn : sequence of Path
+            Pictures in the folder that stay as they are.
 
         Raises
         ------
@@ -108,7 +121,9 @@ class SavedStudy(Summary):
         """
         positive_number("dpi", dpi)
         names = picture_names(picture_format, self.pictures)
-        target = prepare_folder(folder, names, overwrite=overwrite)
+        target = prepare_folder(
+            folder, [name for name in names if Path(folder, name) not in drawn], overwrite=overwrite
+        )
         try:
             with moved_when_complete(target) as beside:
                 self.matrix.save(beside / DATA[0])
@@ -116,7 +131,7 @@ class SavedStudy(Summary):
         except OSError as reason:
             raise InputError(f"{target}: cannot write there ({reason}); choose another folder") from reason
         return [
-            *save_pictures(self._drawings(), [target / name for name in names], dpi),
+            *self._drawn([target / name for name in names if target / name not in drawn], dpi),
             *(target / name for name in DATA),
         ]
 
@@ -160,6 +175,7 @@ def study_wall(
     rng: Rng = None,
     progress: bool = True,
     incidence_deg: ArrayLike | None = None,
+    first: Callable[[Study], object] | None = None,
 ) -> Study:
     """Study a wall: trace it, make its law and matrix, test the symmetry, find the gap, collide a disk with it.
 
@@ -182,6 +198,9 @@ def study_wall(
         Whether a bar is shown on a terminal after two seconds.
     incidence_deg : array_like, optional
         Angles of the accommodation of momentum, in degrees from the normal: see `accommodation`.
+    first : callable, optional
+        Called with the study of the wall alone, before the collision of the disk, for which a first study compiles
+        more.
 
     Returns
     -------
@@ -212,7 +231,7 @@ def study_wall(
         from_degrees(incidence_deg)
     given, disk = disk is not None, disk or Disk()
     refusals: dict[str, str] = {}
-    with progress_bar(9, "part", name, shown=progress) as bar:
+    with progress_bar(8, "part", name, shown=progress) as bar:
         tracer = check_tracer(wall, rng) if wall.hollows else None
         bar.update()
         matrix = _matrix(law, basis, tolerance, rng)
@@ -223,22 +242,25 @@ def study_wall(
         bar.update()
         enclosed = _or_refusal(lambda: _enclosures(law, gap, tolerance), refusals, "enclosures", reason=AsperityError)
         bar.update()
-        collision = CollisionLaw(law_of(wall.foreshorten(disk), facets), disk)
-        # only the detailed report mentions it
-        collision_matrix = _matrix(collision.law, basis, tolerance, rng, most=FIRST_SAMPLES)
-        bar.update()
-        collision_gap = _or_refusal(lambda: spectral_gap(collision.law, tolerance, rng), refusals, "collision_gap")
-        bar.update()
         consequences = consequences_of(wall, law, gap, specular_gap, found)
-        conservation = _conservation(collision, rng)
         momentum = _or_refusal(
             lambda: accommodation(law, tolerance, rng=rng, incidence_deg=incidence_deg), refusals, "accommodation"
         )
+        collision = CollisionLaw(law_of(wall.foreshorten(disk), facets), disk)
+        of_wall = Study(
+            name, wall, facets, disk, given, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed,
+            collision, None, MappingProxyType(UNKNOWN),
+            MappingProxyType(refusals | {"collision_gap": "not computed yet"}), consequences, momentum,
+        )  # fmt: skip
+        if first is not None:
+            first(of_wall)
+        collision_gap = _or_refusal(lambda: spectral_gap(collision.law, tolerance, rng), refusals, "collision_gap")
         bar.update()
-    return Study(
-        name, wall, facets, disk, given, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed,
-        collision, collision_matrix, collision_gap, MappingProxyType(conservation), MappingProxyType(refusals),
-        consequences, momentum,
+        conservation = _conservation(collision, rng)
+        bar.update()
+    return replace(
+        of_wall, collision_gap=collision_gap, conservation=MappingProxyType(conservation),
+        refusals=MappingProxyType(refusals),
     )  # fmt: skip
 
 
@@ -304,17 +326,15 @@ def _enclosures(law: Law, gap: SpectralGap | None, tolerance: float) -> Enclosur
     return enclosures(law, ENCLOSED, tolerance=MATRIX_FRACTION * tolerance)
 
 
-def _matrix(
-    law: Law, basis: Bins, tolerance: float, rng: np.random.Generator, most: int = MOST_SAMPLES
-) -> KernelMatrix:
-    """In bins; where rays are needed, as many as the error of a first sample asks for, and at most ``most``."""
+def _matrix(law: Law, basis: Bins, tolerance: float, rng: np.random.Generator) -> KernelMatrix:
+    """In bins; where rays are needed, as many as the error of a first sample asks for, and at most `MOST_SAMPLES`."""
     wanted = tolerance * float(np.sqrt(basis.size))
     found = discretise(law, basis, tolerance=wanted, samples=FIRST_SAMPLES, rng=rng)
-    if not found.samples or found.tolerance_met or most <= FIRST_SAMPLES:
+    if not found.samples or found.tolerance_met:
         return found
     # the error falls at least like the root of their number
     more = 2 ** math.ceil(2.0 * math.log2(float(found.error) / wanted))
-    return discretise(law, basis, tolerance=wanted, samples=min(FIRST_SAMPLES * more, most), rng=rng)
+    return discretise(law, basis, tolerance=wanted, samples=min(FIRST_SAMPLES * more, MOST_SAMPLES), rng=rng)
 
 
 def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:

@@ -27,6 +27,7 @@ from .result import (
     matrix_lines,
     ray_lines,
     rows_of,
+    title_of,
 )
 from .study import CHECK_RAYS, TOLERANCE, SavedStudy, tracer_check
 
@@ -102,6 +103,7 @@ class SurfaceStudy(SavedStudy):
         blocks = {
             "surface": [
                 f"{self.name}: {n} x {m} heights, periods {width:g} x {length:g}{unit}, {turn}",
+                *(["followed by its mirror images in both directions, to be periodic"] if surface.is_mirrored else []),
                 f"rms height {surface.rms_height:.6g}{unit}, rms slope {surface.rms_slope:.6g}",
             ],
             "rays": ray_lines(self.tracer),
@@ -123,7 +125,7 @@ class SurfaceStudy(SavedStudy):
         """The map with rays that come from three sides."""
         surface, rays = self.law.surface, [[0.96, 0.3, -1.0], [-0.74, 0.68, -1.0], [-0.21, -0.98, -1.0]]
         surface.plot(np.outer([0.25, 0.45, 0.7], surface.periods), rays, ax)
-        ax.set_title(verbatim(f"{self.name}\ndot: a ray enters, ring: it leaves"), fontsize=11)
+        ax.set_title(verbatim(f"{title_of(self.name)}\ndot: a ray enters, ring: it leaves"), fontsize=11)
 
     def _draw_directions(self, ax: Axes) -> None:
         self.law.plot([np.sin(np.radians(DRAWN)), 0.0, -np.cos(np.radians(DRAWN))], ax)

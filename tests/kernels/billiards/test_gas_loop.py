@@ -203,6 +203,7 @@ def test_a_torus_keeps_the_momentum_and_has_the_pressure_of_its_collisions():
 def test_numbers_that_are_not_known_say_why():
     short = play(ker.specular(), None, 50, velocity=VELOCITY * [1.0, 1.0, 0.0]).statistics()
     assert "an error needs 384, 64 per disk" in short.temperature.method and math.isinf(short.temperature.error)
+    assert "self_diffusion    not known: 32 intervals in a torus have displacements" in repr(short)
     assert "no disk spins" in short.spin_kurtosis.method and "torus" in short.self_diffusion.method
     strip = geo.Container.strip(6.0)
     still = ker.play_gas(strip, pair_of(ker.specular()), [[0, 1]], [[0, 1, 0]], 5).statistics()
@@ -242,6 +243,39 @@ def test_pictures_of_a_torus_show_one_period():
     record = play(ker.specular(), None, 400, geo.Torus(9.0, 6.1), every=20)
     axes = record.animate(frames=3)._fig.axes[0]
     assert axes.get_xlim()[1] < 9.0 + 1.3 and np.ptp(record.position[..., 0]) > 18.0
+
+
+def test_a_disk_at_the_edge_of_a_torus_has_images():
+    pair, torus = pair_of(ker.specular()), geo.Torus(9.0, 7.0)
+    still = ker.play_gas(torus, pair, [[0.2, 6.9], [4.0, 6.9]], [[0, 0, 0], [-1.0, 0, 0]], 1)
+    for place, centres in (
+        ([4.0, 3.0], [(4, 3)]),
+        ([8.5, 3.0], [(8.5, 3), (-0.5, 3)]),
+        ([0.2, 6.9], [(0.2, 6.9), (9.2, 6.9), (0.2, -0.1), (9.2, -0.1)]),
+    ):
+        assert {tuple(one) for one in still._images(np.array(place)).round(9).tolist()} == set(centres)
+    # the corner between two images is not drawn: the disk does not reach it
+    assert len(still._images(np.array([0.9, 0.9]))) == 3
+    axes = still.animate(frames=2)._fig.axes[0]
+    edge, spoke = (line.get_xydata() for line in axes.lines[-5:-3])
+    assert np.isnan(edge[:, 0]).sum() == np.isnan(spoke[:, 0]).sum() == 3
+    assert axes.get_xlim() == (-1.2, 10.2) and axes.get_ylim() == (-1.2, 8.2)
+
+
+def test_states_for_which_there_is_no_memory_are_refused_before_the_run(monkeypatch):
+    from asperity.kernels.billiards import gas as module
+
+    made = []
+    monkeypatch.setattr(module._Store, "fill", lambda *_: made.append(1))
+    with pytest.raises(InputError, match=r"^duration over interval: the record takes .* GB of memory"):
+        play(ker.specular(), None, 10**6, interval=1e-9)
+    assert not made
+
+
+def test_the_events_that_predict_the_number_of_states_change_no_bit():
+    law = 0.5 * ker.lambertian() + 0.5 * ker.retroreflection()
+    plain, timed = (play(law, ker.specular(), 300, **more) for more in ({"every": 300}, {"interval": 50.0}))
+    assert np.array_equal(plain.position[-1], timed.position[-1]) and plain.time[-1, 0] == timed.time[-1, 0]
 
 
 def test_a_phase_portrait_shows_the_collisions_with_walls():

@@ -1,6 +1,7 @@
 """Distances between laws and between matrices, their errors, and the test of difference."""
 
 import itertools
+import re
 from dataclasses import replace
 
 import mpmath
@@ -20,7 +21,7 @@ from asperity.kernels.distances import conditional as distributions
 from asperity.kernels.distances import joint as joint_distance
 from asperity.kernels.distances.cell_transport import DIAGONAL, Cells, transport_bounds
 from asperity.kernels.distances.conditional import ConditionalDistance, cells_and_atoms, terms_of
-from asperity.kernels.distances.distances import flux_means
+from asperity.kernels.distances.distances import Distance, flux_means
 from asperity.kernels.distances.flows import flow_cost, potential_value
 from asperity.kernels.distances.transport import absolute_area, grid_wasserstein, wasserstein
 from asperity.kernels.expectations.conditionals import Distributions
@@ -511,3 +512,16 @@ def test_a_smooth_maximum_between_the_nodes_of_a_supremum_is_within_the_error():
     skew = ker.WallLaw(geo.Wall.from_vertices([(0, 0), (0.23673106976050273, -0.1527209626305445), (1, 0)]))
     found = ker.distance(skew, ker.TriangularTeethLaw(1.5178682830588024), 1, "sup", tolerance=1e-5)
     assert abs(found.value - 1.390262547) <= found.error < 1e-5
+
+
+def test_a_distance_that_is_not_told_from_0_names_the_tolerance_that_tells():
+    near = ker.CircularArcLaw(1.2), ker.CircularArcLaw(1.199)
+    rough = ker.distance(*near, tolerance=0.5)
+    asked = re.search(r"not told from 0: ask for tolerance=(\S+)$", str(rough))
+    assert asked and float(asked[1]) < 0.01 and str(rough) in repr(rough)
+    fine = ker.distance(*near, tolerance=float(asked[1]))
+    assert 0.0 < fine.error < fine.value and "told" not in str(fine)
+    samples = [ker.discretise(ker.lambertian(), ker.Bins(4), "monte-carlo", samples=1000, rng=seed) for seed in (0, 1)]
+    assert "difference_test decides between samples" in str(ker.distance(*samples))
+    assert "the tolerance 0.1 was not reached" in str(Distance(1.0, 2.0, "estimate", "", tolerance=0.1))
+    assert str(Distance(0.0, 0.0, "bound", "", tolerance=0.1)) == "0"

@@ -11,6 +11,8 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 
+# it does not preserve the measure of the angles
+DRIFTING = ker.MatrixLaw(np.array([[0.9, 0.1], [0.5, 0.5]]))
 LEANING = ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.2, -0.5), (1, 0)]))
 
 
@@ -81,8 +83,8 @@ def test_the_mean_square_in_a_straight_channel_grows_twice_as_fast_as_the_varian
     assert abs(slopes[-1] * math.pi / (4.0 * 0.5 * 2.0) - 1.0) < 0.05
 
 
-def paths_in_the_plane(law, bend, upper, time, n, rng):
-    """X_t by vectors in the plane, for channels around the origin."""
+def paths_in_the_plane(law, bend, upper, time, n, rng, second=None):
+    """X_t by vectors in the plane, for channels around the origin, perhaps with another law of the outer wall."""
     outer = rng.random(n) < 0.5 * (1.0 + 1.0 / bend)
     place = np.stack([np.zeros(n), np.where(outer, bend + 1.0, bend - 1.0)], axis=1)
     angle = np.arccos(1.0 - 2.0 * rng.random(n))
@@ -113,7 +115,10 @@ def paths_in_the_plane(law, bend, upper, time, n, rng):
         tangent = along * np.where(outer, upper, 1.0)[:, None]
         level = np.sum(-u * tangent, axis=1)
         incoming = np.where(left > 0.0, np.arccos(np.clip(level, -1.0, 1.0)), 1.0)
-        angle = law.sample(np.clip(incoming, 1e-12, np.pi - 1e-12), rng)
+        incoming = np.clip(incoming, 1e-12, np.pi - 1e-12)
+        angle = law.sample(incoming, rng)
+        if second is not None:
+            angle = np.where(outer, second.sample(incoming, rng), angle)
 
 
 @pytest.mark.parametrize(("arrangement", "upper"), [("mirror", 1.0), ("half-turn", -1.0)])
@@ -135,3 +140,60 @@ def test_retroreflected_particles_stay_on_one_chord():
     found = spec.channel_paths(ker.retroreflection(), [5.0, 50.0, 500.0], 500, 0, bend=2.0)
     # the longest chord touches the inner circle
     assert np.all(np.abs(found.positions) <= 2.0 * 2.0 * math.acos(1.0 / 3.0) + 1e-9)
+
+
+# ---- a lower and an upper law --------------------------------------------------------------------------------------
+def same_means(one, two, powers=(1, 2, 3), sigmas=4.0):
+    for power in powers:
+        first, second = one**power, two**power
+        spread = np.hypot(first.std() / math.sqrt(len(first)), second.std() / math.sqrt(len(second)))
+        assert abs(first.mean() - second.mean()) < sigmas * spread
+
+
+@pytest.mark.parametrize(("arrangement", "upper"), [("mirror", 1.0), ("half-turn", -1.0)])
+def test_paths_between_two_laws_agree_with_vectors_in_the_plane(arrangement, upper):
+    n, time, other = 20_000, 12.0, ker.maxwell(0.3)
+    for inner, outer in ((LEANING, other), (other, LEANING)):
+        plain = paths_in_the_plane(inner, 2.5, upper, time, n, np.random.default_rng(1), outer)
+        found = spec.channel_paths(inner, [1.0, 2.0, time], n, 2, bend=2.5, arrangement=arrangement, other=outer)
+        same_means(plain, found.positions[:, -1])
+
+
+def test_walls_of_a_straight_channel_may_be_exchanged_and_each_counts():
+    times, n = [1.0, 5.0, 20.0], 20_000
+    paths = [
+        spec.channel_paths(first, times, n, seed, other=second).positions[:, -1]
+        for seed, (first, second) in enumerate([(LEANING, ker.maxwell(0.3)), (ker.maxwell(0.3), LEANING)])
+    ]
+    same_means(*paths)
+    alike = spec.channel_paths(LEANING, times, n, 3).positions[:, -1]
+    assert abs((paths[0] ** 2).mean() - (alike**2).mean()) > 10.0 * (alike**2).std() / math.sqrt(n)
+
+
+def test_particles_between_a_rough_and_a_smooth_wall_are_those_of_a_channel_twice_as_wide():
+    law = 0.5 * LEANING + 0.5 * ker.lambertian()
+    for first, second in ((law, ker.specular()), (ker.specular(), law)):
+        half = spec.channel_diffusivity(first, [5.0, 20.0], 2000, 1, other=second)
+        double = spec.channel_diffusivity(law, [5.0, 20.0], 2000, 2, radius=2.0)
+        assert np.all(np.abs(half.values - double.values) < 1.5 * np.hypot(half.errors, double.errors))
+
+
+def test_the_onset_of_two_laws_is_the_larger_one():
+    deep, shallow = ker.lambertian(), ker.CircularArcLaw(0.3)
+    onsets = [
+        spec.channel_diffusivity(law, [5.0], 2, 0, other=other).onset
+        for law, other in ((deep, None), (shallow, None), (deep, shallow), (shallow, deep), (deep, ker.specular()))
+    ]
+    assert onsets[2] == onsets[3] == onsets[1] > onsets[0] == onsets[4]
+    assert spec.channel_diffusivity(shallow, [5.0], 2, 0, other=DRIFTING).onset == math.inf
+
+
+def test_twice_the_same_law_and_both_conventions_give_the_same_bits():
+    for law in (ker.lambertian(), LEANING):
+        one = spec.channel_paths(law, [1.0, 2.0, 4.0], 50, 1)
+        two = spec.channel_paths(law.in_specular_frame(), [1.0, 2.0, 4.0], 50, 1, other=law.in_specular_frame())
+        assert np.array_equal(one.positions, two.positions)
+    first, second = LEANING, ker.maxwell(0.3)
+    paper = spec.exit_times(first, [1.0, 2.0, 4.0], 50, 1, other=second)
+    turned = spec.exit_times(first.in_specular_frame(), [1.0, 2.0, 4.0], 50, 1, other=second.in_specular_frame())
+    assert np.array_equal(paper.times, turned.times)

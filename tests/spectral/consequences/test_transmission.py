@@ -1,6 +1,7 @@
 """Transmission of channels and tubes, against plain simulations and what is known of it."""
 
 import math
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -172,8 +173,13 @@ def test_long_diffuse_channels_and_tubes_pass_as_diffusion_says(length, relative
 
 
 def by_flights(length, rng, tolerance=0.01, law=None, diffuse=1.0):
-    turn = partial(clausing._turn, law or ker.lambertian(), diffuse, rng)
-    return clausing._by_flights("channel", length, tolerance, rng, clausing._entered_in_plane, turn, diffuse)
+    return flown_between((law or ker.lambertian(),), (diffuse,), length, rng, tolerance)
+
+
+def flown_between(laws, diffuse, length, rng, tolerance):
+    runs = clausing._Runs(diffuse)
+    enter = partial(clausing._entered_in_plane, runs=runs, rng=rng)
+    return clausing._by_flights("channel", length, tolerance, runs, enter, partial(clausing._turn, laws, runs, rng))
 
 
 @pytest.mark.parametrize("length", [0.5, 3.0])
@@ -256,7 +262,7 @@ def test_flights_end_at_once_where_polynomials_are_better(monkeypatch):
 def test_a_matrix_with_too_large_an_error_leaves_the_transmission_of_the_one_before(monkeypatch):
     law, solve = ker.henyey_greenstein(0.8), clausing._in_polynomials
     monkeypatch.setattr(clausing, "LEVELS", ((4, 4), *clausing.LEVELS[:3]))
-    finest = clausing._by_polynomials(law, 3.0, 1e-12, np.random.default_rng(0))
+    finest = clausing._by_polynomials((law,), 3.0, 1e-12, np.random.default_rng(0))
     assert "32 polynomials" in finest.method
 
     def noisy(matrix, length, size, nodes):
@@ -264,7 +270,7 @@ def test_a_matrix_with_too_large_an_error_leaves_the_transmission_of_the_one_bef
         return (value + 0.1, 0.1) if size == 32 else (value, noise)
 
     monkeypatch.setattr(clausing, "_in_polynomials", noisy)
-    found = clausing._by_polynomials(law, 3.0, 1e-12, np.random.default_rng(0))
+    found = clausing._by_polynomials((law,), 3.0, 1e-12, np.random.default_rng(0))
     assert abs(float(found) - float(finest)) < found.error < 0.05 and "16 polynomials" in found.method
 
 
@@ -286,7 +292,7 @@ def test_polynomials_agree_with_flights_and_their_error_holds(law, length):
 @pytest.mark.parametrize("diffuse", [0.55, 0.8])
 def test_polynomials_agree_with_the_integral_equation_of_diffuse_walls(diffuse):
     exact = float(spec.transmission(ker.maxwell(diffuse), 3.0))
-    found = clausing._by_polynomials(ker.maxwell(diffuse), 3.0, 1e-5, np.random.default_rng(0))
+    found = clausing._by_polynomials((ker.maxwell(diffuse),), 3.0, 1e-5, np.random.default_rng(0))
     assert abs(float(found) - exact) < found.error < 5e-5
 
 
@@ -304,7 +310,7 @@ def test_the_error_by_the_rays_of_the_matrix_is_their_spread():
     law, found = ker.WallLaw(geo.dispersing_arcs(2.0)), []
     for seed in range(10):
         matrix = ker.discretise(law, ker.Legendre(8), "qmc", samples=2**14, rng=seed)
-        found.append(clausing._in_polynomials(matrix, 2.0, 8, 6))
+        found.append(clausing._in_polynomials([matrix], 2.0, 8, 6))
     value, noise = np.array(found).T
     assert np.sum(np.abs(value - value.mean()) > noise) <= 2
     assert 0.3 < 2.0 * value.std(ddof=1) / np.median(noise) < 1.5
@@ -319,4 +325,128 @@ def test_one_small_change_is_not_taken_for_convergence():
 
 def test_laws_that_keep_functions_of_all_degrees_are_left_to_flights():
     for law in (ker.retroreflection(), SAW, ker.RectangularTeethLaw(1.0)):
-        assert clausing._by_polynomials(law, 4.0, 1e-2, np.random.default_rng(0)).error == math.inf
+        assert clausing._by_polynomials((law,), 4.0, 1e-2, np.random.default_rng(0)).error == math.inf
+
+
+# ---- a floor and a ceiling -----------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class OneForm(ker.Law):
+    """A law of a user: angles as of a diffuse wall, but in a tenth of the reflections back where the ray came from."""
+
+    def _sample(self, theta, rng):
+        return np.where(rng.random(theta.shape) < 0.1, theta, np.arccos(1.0 - 2.0 * rng.random(theta.shape)))
+
+    def _conditionals(self, theta, *wanted):
+        return (0.1 * ker.retroreflection() + 0.9 * ker.lambertian())._conditionals(theta, *wanted)
+
+
+def diffuse_wall(fraction):
+    return Case(0, "", ker.maxwell(fraction), None, fraction, 0.0)
+
+
+def in_plane(floor, ceiling, length, particles, rng):
+    """The fraction that passes, by places and velocities in the strip 0 < y < 1, and its standard deviation."""
+    sine = 2.0 * rng.random(particles) - 1.0
+    x, y, v = np.zeros(particles), rng.random(particles), np.stack((np.sqrt(1.0 - sine**2), sine))
+    through = 0
+    while x.size:
+        rises = v[1] > 0.0
+        x = x + np.where(rises, 1.0 - y, -y) / v[1] * v[0]
+        through += np.count_nonzero(x >= length)
+        inside = (x > 0.0) & (x < length)
+        x, v, rises = x[inside], v[:, inside], rises[inside]
+        y = np.where(rises, 1.0, 0.0)
+        for case, here, way in ((floor, ~rises, 1.0), (ceiling, rises, -1.0)):
+            along, across = case.reflect(v[0, here], np.abs(v[1, here]), rng)
+            v[:, here] = along, way * across
+    return through / particles, math.sqrt(through * (1.0 - through / particles)) / particles
+
+
+PAIRS = {
+    "diffuse and partly": (diffuse_wall(1.0), diffuse_wall(0.3), 3.0),
+    "both partly": (diffuse_wall(0.2), diffuse_wall(0.7), 5.0),
+    "nearly smooth": (diffuse_wall(0.5), diffuse_wall(0.02), 10.0),
+    "arcs and diffuse": (Case(0, "", ARCS, geo.focusing_arcs(1.2), 0.0, 0.0), diffuse_wall(1.0), 3.0),
+    "saw and arcs": (Case(0, "", SAW, SAW.wall, 0.0, 0.0), Case(0, "", ARCS, geo.focusing_arcs(1.2), 0.0, 0.0), 1.5),
+    "saw and partly": (Case(0, "", SAW, SAW.wall, 0.0, 0.0), diffuse_wall(0.3), 2.0),
+    "saw and smooth": (Case(0, "", SAW, SAW.wall, 0.0, 0.0), diffuse_wall(0.0), 2.0),
+}
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+def test_a_channel_with_two_laws_passes_as_many_particles_as_a_simulation_in_the_plane(kind):
+    floor, ceiling, length = PAIRS[kind]
+    seen, sigma = in_plane(floor, ceiling, length, 60_000, np.random.default_rng(11))
+    found = spec.transmission(floor.law, length, tolerance=4e-3, rng=1, other=ceiling.law)
+    assert found.error <= 4e-3 and abs(float(found) - seen) < found.error + 3.5 * sigma
+    # floor and ceiling may be exchanged, in either convention
+    laws = ceiling.law.in_specular_frame(), floor.law.in_specular_frame()
+    turned = spec.transmission(laws[0], length, tolerance=4e-3, rng=2, other=laws[1])
+    assert abs(float(turned) - float(found)) <= 1.2 * (found.error + turned.error)
+    # and both laws count
+    for law in (floor.law, ceiling.law):
+        alike = spec.transmission(law, length, tolerance=4e-3, rng=3)
+        assert abs(float(alike) - seen) > 3.0 * (found.error + alike.error)
+
+
+def test_errors_of_two_laws_hold(monkeypatch):
+    exact = spec.transmission(ker.maxwell(0.8), 3.0, other=ker.maxwell(0.3))
+    assert exact.error < 1e-12
+    laws, rests = (ker.maxwell(0.8), ker.maxwell(0.3)), (ker.lambertian(), ker.lambertian())
+    misses = 0
+    for seed in range(20):
+        flown = flown_between(rests, (0.8, 0.3), 3.0, np.random.default_rng(seed), 8e-3)
+        misses += abs(float(flown) - float(exact)) > flown.error
+        assert flown.error <= 8e-3
+    assert misses <= 3
+    rough = ker.henyey_greenstein(0.3), ker.henyey_greenstein(-0.85)
+    fine = clausing._by_polynomials(rough, 3.0, 1e-7, np.random.default_rng(0))
+    monkeypatch.setattr(clausing, "LEVELS", ((4, 4), *clausing.LEVELS[:2]))
+    coarse = clausing._by_polynomials(rough, 3.0, 1e-7, np.random.default_rng(0))
+    assert 0.0 < abs(float(coarse) - float(fine)) + fine.error < coarse.error < 0.02
+    smooth = clausing._by_polynomials((laws[0], ker.lambertian()), 3.0, 1e-5, np.random.default_rng(0))
+    known = spec.transmission(ker.maxwell(0.8), 3.0, other=ker.lambertian())
+    assert abs(float(smooth) - float(known)) < smooth.error < 2e-4
+
+
+@pytest.mark.parametrize("law", [ker.lambertian(), ker.maxwell(0.4), ARCS, SAW, OneForm(), ker.HemisphereLaw(ARCS)])
+def test_twice_the_same_law_is_one_law(law):
+    one = spec.transmission(law, 2.0, tolerance=5e-3, rng=1)
+    assert spec.transmission(law, 2.0, tolerance=5e-3, rng=1, other=law) == one
+
+
+def test_the_equations_of_two_walls_of_one_law_have_its_solution():
+    geometry, runs = clausing.GEOMETRIES["channel"], [clausing._Runs(part) for part in ((0.4,), (0.4, 0.4))]
+    first, second = (clausing._by_integral_equation(geometry, part, 7.0) for part in runs)
+    assert first.value == pytest.approx(second.value, rel=1e-13)
+    same, twice = (clausing._by_polynomials((ARCS,) * n, 3.0, 1e-4, np.random.default_rng(0)) for n in (1, 2))
+    assert same.value == pytest.approx(twice.value, rel=1e-12)
+
+
+def test_a_smooth_ceiling_is_a_symmetry_plane():
+    for law in (ker.lambertian(), ker.maxwell(0.3), ARCS, OneForm()):
+        wide, half = (spec.transmission(law, 6.0, rng=1, tolerance=1e-3, other=ker.specular()),
+                      spec.transmission(law, 3.0, rng=1, tolerance=1e-3))  # fmt: skip
+        assert wide == half
+    assert float(spec.transmission(ker.retroreflection(), 4.0, rng=0, other=ker.specular())) == pytest.approx(
+        direct(2.0), rel=1e-12
+    )
+    # to which nearly smooth ceilings tend
+    near = [float(spec.transmission(ker.lambertian(), 4.0, other=ker.maxwell(a))) for a in (1e-4, 1e-8, 1e-12)]
+    limit = float(spec.transmission(ker.lambertian(), 2.0))
+    assert 0.0 < limit - near[0] < 1e-3 and abs(near[1] - limit) < 1e-7 and abs(near[2] - limit) < 1e-11
+    assert float(spec.transmission(ker.specular(), 9.0, other=ker.specular())) == 1.0
+
+
+def test_laws_in_space_at_floor_and_ceiling_pass_as_many_particles_as_the_planar_laws():
+    across = [ker.HemisphereLaw(law, np.pi / 2.0) for law in (ARCS, ker.maxwell(0.4))]
+    found = spec.transmission(across[0], 3.0, tolerance=1e-2, rng=1, other=across[1])
+    planar = spec.transmission(ARCS, 3.0, tolerance=5e-3, rng=2, other=ker.maxwell(0.4))
+    assert abs(float(found) - float(planar)) < 1.2 * (found.error + planar.error)
+
+
+def test_a_law_of_a_user_stands_at_the_floor_or_at_the_ceiling():
+    law, same = OneForm(), 0.1 * ker.retroreflection() + 0.9 * ker.lambertian()
+    values = [spec.transmission(one, 2.0, tolerance=4e-3, rng=1, other=ker.maxwell(0.5)) for one in (law, same)]
+    values.append(spec.transmission(ker.maxwell(0.5), 2.0, tolerance=4e-3, rng=2, other=law))
+    assert max(map(float, values)) - min(map(float, values)) < 1.2 * sum(one.error for one in values[:2])
