@@ -29,6 +29,7 @@ from ...kernels.sampling.chunks import RaySums, count_long
 from ...kernels.sampling.counts import missed_fraction
 from ...kernels.sampling.sobol import PARTS, SOBOL_BITS, SobolRays, random_shifts
 from ...kernels.walls.conditionals import UNRESOLVED_TOLERANCE
+from ..essential.edge import without_lambertian
 from .images import is_traced
 from .trial_space import Rank
 
@@ -66,6 +67,10 @@ def values_by_rays(law: Law) -> tuple[Floats, Floats]:
 
     No bound is given if rays do not escape.
     """
+    fraction, rest = without_lambertian(law)
+    if fraction < 1.0:
+        above, below = values_by_rays(rest)
+        return fraction * above, fraction * below
     try:
         *_, last = islice(_levels(law, np.random.default_rng(0), np.inf, 0.0, np.abs), SHOWING)
     except AccuracyError:

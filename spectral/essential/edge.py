@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 
@@ -236,8 +236,26 @@ def without_identity(law: Law) -> tuple[float, Law]:
     >>> without_identity(0.75 * ker.retroreflection() + 0.25 * ker.henyey_greenstein(0.5))
     (0.25, henyey_greenstein(0.5))
     """
+    return _without(law, is_identity)
+
+
+def without_lambertian(law: Law) -> tuple[float, Law]:
+    """The weight 1 - a and the law R in P = a L + (1 - a) R, if P is a sum with a Lambertian term; else 1 and P.
+
+    Off the constants P is (1 - a) R.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> without_lambertian(0.75 * ker.lambertian() + 0.25 * ker.henyey_greenstein(0.5))
+    (0.25, henyey_greenstein(0.5))
+    """
+    return _without(law, lambda term: term.is_lambertian)
+
+
+def _without(law: Law, is_left_out: Callable[[Law], bool]) -> tuple[float, Law]:
     terms = [(weight, in_frame(term, law.frame)) for weight, term in in_frame(law, "paper").parts]
-    rest = [(weight, term) for weight, term in terms if not is_identity(term)]
+    rest = [(weight, term) for weight, term in terms if not is_left_out(term)]
     if len(rest) in (0, len(terms)):
         return 1.0, law
     fraction = math.fsum(weight for weight, _ in rest)

@@ -24,9 +24,9 @@ from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.rays_on_panels import Top, suits_rays, tops_by_rays, values_by_rays
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import Rank
-from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, matrix_spectrum
+from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, Verdict, matrix_spectrum
 from ..essential.compact import compact_matrix
-from ..essential.edge import EssentialEdge, essential_edge, without_identity
+from ..essential.edge import EssentialEdge, essential_edge, without_identity, without_lambertian
 from .grooves import gap_of_grooves
 from .methods import gap_of_power, law_eigenvalues
 from .refinement import EIGENVALUES, HOW, refined
@@ -258,6 +258,9 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
     if near is not None and (near is matrix or float(near.error) <= tolerance):
         refuse_unless_self_adjoint(law)
         return gap_of_exact(near, modulus=True)
+    fraction, rest = without_lambertian(law)
+    if fraction < 1.0 and is_traced(law):
+        return _off_constants(modulus_gap(rest, tolerance / fraction, rng, time_limit=time_limit), fraction)
     small = _shallow_modulus(law, tolerance)
     if small is not None:
         return small
@@ -321,6 +324,10 @@ def _by_refinement(law: Law, tolerance: float, rng: np.random.Generator, seconds
     if fraction < 1.0:
         own = gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, rng, seconds)
         return _scaled(own, fraction)
+    fraction, rest = without_lambertian(law)
+    if fraction < 1.0 and is_traced(law):
+        own = gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, rng, seconds)
+        return _off_constants(own, fraction)
     compact = compact_matrix(law) if law.eigenvalue_ratio is None else None
     if compact is None:
         return _by_edge(law, tolerance, rng, seconds)
@@ -341,6 +348,14 @@ def _by_edge(law: Law, tolerance: float, rng: np.random.Generator, seconds: floa
     if found.verdict == "isolated" and found.kind == "estimate":
         found = held_against_oscillations(law, found)
     return small if small is not None and small.error < found.error else found
+
+
+def _off_constants(found: SpectralGap, fraction: float) -> SpectralGap:
+    """The gap of a L + (1 - a) R with a Lambertian L and 1 - a = fraction, from the gap of R."""
+    reason = f"off the constants the law is R times {fraction:.6g}, for the other fraction is Lambertian"
+    value, error = 1.0 - fraction * (1.0 - found.value), fraction * found.error + 4.0 * EPS
+    verdict: Verdict = "essential edge" if found.verdict == "no gap" else found.verdict
+    return replace(found, value=value, error=error, verdict=verdict, evidence=(reason, *found.evidence), spectrum=None)
 
 
 def _scaled(found: SpectralGap, fraction: float) -> SpectralGap:

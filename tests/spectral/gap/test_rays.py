@@ -8,10 +8,10 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError
 from asperity.kernels.laws.law import DrivenLaw
-from asperity.spectral.bounds.rays_on_panels import suits_rays, tops_by_rays
+from asperity.spectral.bounds.rays_on_panels import suits_rays, tops_by_rays, values_by_rays
 from asperity.spectral.essential.edge import EssentialEdge, essential_edge
 from asperity.spectral.gap import gap as module
-from asperity.spectral.gap.gap import gap_by_rays
+from asperity.spectral.gap.gap import gap_by_rays, modulus_gap
 
 # Eigenvalues of the arc of half angle 1.2 in both conventions, from enclosures to 1e-9.
 ARC, IN_SPECULAR, LEAST = 0.3670253152, 0.311346443, -0.311346443
@@ -94,3 +94,21 @@ def test_rays_that_do_not_escape_are_refused():
 
     with pytest.raises(AccuracyError, match="did not escape"):
         tops(Losing(), 0, 0.2)
+
+
+def test_a_lambertian_fraction_scales_what_rays_show_of_the_rest():
+    rest = ker.WallLaw(island_wall())
+    mixed = 0.25 * ker.lambertian() + 0.75 * rest
+    for of_rest, of_mixed in zip(values_by_rays(rest), values_by_rays(mixed), strict=True):
+        assert np.array_equal(of_mixed, 0.75 * of_rest)
+    for gap in (spec.spectral_gap, modulus_gap):
+        own, scaled = gap(rest, 4e-3 / 0.75), gap(mixed, 4e-3)
+        assert scaled.value == pytest.approx(0.25 + 0.75 * own.value, abs=1e-12)
+        assert scaled.error == pytest.approx(0.75 * own.error, abs=1e-12) and scaled.verdict == own.verdict
+
+
+def test_a_traced_law_with_more_randomness_has_its_values_from_independent_rays():
+    law = 0.5 * ker.specular() + 0.5 * ker.WallLaw(island_wall())
+    assert law.random_map() is None and suits_rays(law)
+    first, second = (tops(law, seed, 1.0)[-1] for seed in (0, 1))
+    assert abs(first.value - second.value) <= first.error + second.error < 0.1
