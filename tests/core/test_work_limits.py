@@ -1,5 +1,6 @@
 """Limits on work: samples bound the time, a time limit leads to a larger error, and matrices fit into memory."""
 
+import sys
 import time
 import tracemalloc
 
@@ -106,6 +107,12 @@ def test_a_matrix_is_computed_in_the_memory_of_six(law: ker.Law, method: str) ->
     # what rays, nodes and blocks of rows take does not grow with the matrix; sums of small ones keep replicates
     more = peak_of(law, many, method) - peak_of(law, few, method)
     assert more < MATRICES * 8 * (many**2 - few**2)
+
+
+def test_without_the_module_of_limits_as_on_windows_no_call_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "resource", None)
+    monkeypatch.delattr(checks.os, "sysconf")
+    checks.check_memory("n", "a matrix", 10**15)
 
 
 def test_what_exceeds_the_memory_is_refused_with_its_size(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numbers as kinds_of_numbers
 import os
 import re
+import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -294,8 +295,10 @@ def check_memory(name: str, what: str, numbers: int) -> None:
 
 def memory_left() -> int:
     """Bytes that this process can still have: of the machine, of its container and of a limit of its own."""
-    import resource
-
+    try:
+        import resource
+    except ImportError:  # Windows, where numpy refuses what does not fit
+        return sys.maxsize
     page = os.sysconf("SC_PAGE_SIZE")
     found = [os.sysconf("SC_PHYS_PAGES") * page]
     with suppress(OSError, ValueError, IndexError):  # not Linux, or no container
