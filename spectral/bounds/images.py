@@ -17,7 +17,7 @@ from ...kernels.expectations.conditionals import Means, functions_of, height_of,
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.matrix_law import ENTRY_ROUNDING, MatrixLaw, uniform_on_bins
 from ...kernels.laws.structure import holds_of_all
-from ...kernels.walls.conditionals import WallConditionals, is_chaotic, is_few, traced_conditionals
+from ...kernels.walls.conditionals import MANY_SEGMENTS, WallConditionals, is_chaotic, is_few, traced_conditionals
 
 # Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays.
 ANGLES_AT_ONCE, NODE_TIME = 512, 3e-7
@@ -49,9 +49,9 @@ def is_traced(law: Law) -> bool:
     return not holds_of_all(law, lambda part: part.traced_wall is None)
 
 
-def is_costly(law: Law) -> bool:
-    """Whether a thousand angles take minutes, because a hollow is chaotic."""
-    return not holds_of_all(law, lambda part: part.traced_wall is None or not is_chaotic(part.traced_wall))
+def is_costly(law: Law, segments: int = MANY_SEGMENTS) -> bool:
+    """Whether a thousand angles take minutes, because a hollow is chaotic: rays take more than so many segments."""
+    return not holds_of_all(law, lambda part: part.traced_wall is None or not is_chaotic(part.traced_wall, segments))
 
 
 def expectations(law: Law, basis: Basis) -> Means:

@@ -49,6 +49,8 @@ LARGEST_MISS = {True: 1e-4, False: 2e-3}
 # Tolerance that rays on panels reach, and fraction of the time limit for enclosures which are tried before them then;
 # fractions for these rays, after enclosures and where there are none.
 OF_RAYS, BEFORE_RAYS, AFTER_ENCLOSURES, ALONE = 5e-5, 0.4, 1.1, 1.5
+# With so many ray segments per angle, rays on panels are faster than enclosures.
+SLOW = 8_000
 # The same for laws near a matrix, relative to the gap.
 COMPACT_MISS = 1e-3
 # Tolerance of the planar gaps that bound the gap of a law on the half sphere.
@@ -66,7 +68,7 @@ def enclosed_gap(
     best: SpectralGap | None = None
     if law.has_density:
         return _of_density(law, tolerance, edge, seconds)
-    if suits_panels(law) and not is_costly(law):
+    if suits_panels(law) and not is_costly(law, SLOW):
         allowed = BEFORE_RAYS if tolerance >= OF_RAYS and suits_rays(law) else 1.0
         with suppress(OutOfTime), time_limited(allowed * seconds):
             for gap in _on_panels(law, tolerance, edge, rank):
