@@ -26,6 +26,7 @@ from asperity.spectral.essential.edge import essential_edge
 from asperity.spectral.gap.gap import gap_by_rays
 from campaigns.cases.random_curved_walls import COUNT, random_curved_wall
 from campaigns.engine import Campaign, Judged
+from campaigns.judges.textbook_tracer import outgoing_angles
 from campaigns.spectra import verdicts
 
 WALLS, KINDS = 200, 8
@@ -105,14 +106,16 @@ def reach_in_bins(wall: geo.Wall, mirrored: bool, modulus: bool) -> float:
     mass = -0.5 * np.diff(np.cos(edges))
     row = np.repeat(np.arange(BINS), RAYS_OF_BIN)
     theta = np.arccos(np.cos(edges[row]) - 2.0 * mass[row] * rng.random(row.size))
-    out = verdicts.rays_out(wall, rng.random(row.size), theta)
-    out = np.pi - out if mirrored else out
+    out = outgoing_angles(wall, rng.random(row.size) * wall.period, theta)
+    lost = np.isnan(out)
+    out = np.where(lost, theta, np.pi - out if mirrored else out)
     column = np.clip(np.searchsorted(edges, out) - 1, 0, BINS - 1)
     root = np.sqrt(mass)
 
     def matrix(part: NDArray[np.intp]) -> Floats:
         hits = np.zeros((BINS, BINS))
-        np.add.at(hits, (row[part], column[part]), 1.0)
+        # a ray that is lost counts as little as any can
+        np.add.at(hits, (row[part], column[part]), np.where(lost[part], -1.0, 1.0))
         flux = (hits + hits.T) / (part.size / BINS) / (1.0 / mass[:, None] + 1.0 / mass)
         return flux / np.outer(root, root) - np.outer(root, root)
 

@@ -7,7 +7,7 @@ eigenfunctions in narrow intervals of angles, which fall between the nodes of qu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import islice
@@ -52,6 +52,8 @@ UNRESOLVED = 0.1
 POINTS_AT_ONCE = 2**14
 # Eigenfunctions that the panels follow on levels of few points; then that of the highest rank.
 FOLLOWED, FEW_POINTS = 3, 2**15
+# Earlier levels whose spread counts in the sampling error.
+POOLED = 3
 # Levels that show the largest values of a law, number of these values, and margin in standard errors.
 SHOWING, LARGEST, SIGMAS = 3, 6, 6.0
 
@@ -121,6 +123,7 @@ def _levels(law: Law, rng: np.random.Generator, seconds: float, edge: float, ran
     """Twice as many rays on finer panels each, or more on the same ones, whatever the time."""
     edges, share = _first_edges(), None
     rays, points, spent = None, FIRST_POINTS, 0.0
+    spreads: list[float] = []
     while True:
         rays = _PanelSums(law, edges, share, rng) if rays is None else rays
         spent += RAY_TIME * PARTS * (points - rays.points)
@@ -128,7 +131,8 @@ def _levels(law: Law, rng: np.random.Generator, seconds: float, edge: float, ran
             return
         rays.extend(points)
         with one_blas_thread():
-            level = _Level(rays, rank, edge)
+            level = _Level(rays, rank, edge, spreads)
+            spreads.append(level.spread)
             yield level
             finer = level.divided()
             if points < MANY_POINTS or (level.unseen > level.noise and len(finer) > len(edges)):
@@ -234,8 +238,8 @@ class _PanelSums:
 class _Level:
     """Quotients of eigenvectors of each half of the sequences by the other half, and how well panels resolve them."""
 
-    def __init__(self, rays: _PanelSums, rank: Rank, edge: float) -> None:
-        self.rays, self.rank, self.edge = rays, rank, edge
+    def __init__(self, rays: _PanelSums, rank: Rank, edge: float, before: Sequence[float]) -> None:
+        self.rays, self.rank, self.edge, self.before = rays, rank, edge, tuple(before[-POOLED:])
         matrices = rays.matrices()
         self.halves, self.whole = (matrices[::2], matrices[1::2]), matrices.mean(axis=0)
         self.values, self.vectors = self._leading(self.whole, rank)
@@ -262,9 +266,18 @@ class _Level:
         return self.rank(np.concatenate(each))
 
     @cached_property
+    def spread(self) -> float:
+        """The standard deviation of the quotients, times the root of the number of points."""
+        return float(np.std(self.quotients, ddof=1) * np.sqrt(self.rays.points))
+
+    @cached_property
     def noise(self) -> float:
-        """The sampling error."""
-        return student_95(PARTS) * float(np.std(self.quotients, ddof=1) / np.sqrt(PARTS))
+        """The sampling error, from the spreads of this level and of those before it.
+
+        Of eight quotients alone it would often be too small where a level is taken for its small error.
+        """
+        spread = np.sqrt(np.mean(np.square([*self.before, self.spread])))
+        return float(student_95(PARTS) * spread / np.sqrt(PARTS * self.rays.points))
 
     @cached_property
     def room(self) -> float:
