@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ..curves import columns as c
-from ..scene.structs import Struct
+from ..curves.columns import Struct
 from ..walls.wall import Wall
 from .compiled.pieces.records import FLYING, NO_STATES, OPENING, States
 from .threads import in_blocks
@@ -51,8 +51,8 @@ class FacetRays:
 
     def advance(self, who: NDArray[np.int64], threads: int | None = None) -> NDArray[np.int64]:
         """Let some rays fly to their next facet, and return those that are on one, for any number of threads."""
-        from .compiled.facets import next_facets
-        from .compiled.pieces.pointers import checked
+        from .compiled.blocks import next_facets
+        from .compiled.pieces.late import checked
         from .compiled.rays import SLOTS
 
         if not len(who):

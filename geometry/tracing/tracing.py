@@ -301,7 +301,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
 
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         from .compiled.blocks import CROSSINGS, RAYS, UNDECIDED, room_for, trace_hollows
-        from .compiled.pieces.pointers import checked
+        from .compiled.pieces.late import checked
 
         tables = scene.tables.address
         # of an earlier block, if another thread does not use it

@@ -35,8 +35,7 @@ from ...double_double.numbers import (
     where,
 )
 from .formulas import curve_ends, near_end
-from .options import inlined, inner, linked, linked_allocating
-from .pointers import call_late
+from .late import call_late, inlined, inner, linked, linked_allocating
 from .records import ARC
 
 # Of this type, because numba compiles a function again for a literal argument.

@@ -34,8 +34,7 @@ from ...double_double.numbers import (
     where,
 )
 from .formulas import curve_ends, near_end, side
-from .options import inlined, inner, linked, linked_allocating
-from .pointers import call_late
+from .late import call_late, inlined, inner, linked, linked_allocating
 from .records import BEZIER
 
 ROOT_STEPS = 80

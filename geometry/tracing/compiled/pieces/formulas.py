@@ -9,7 +9,7 @@ from ....curves import columns as c
 from ....curves.columns import JOINT_ULPS
 from ....curves.curve import Curve
 from ...double_double.numbers import dot, rounded, scaled, where
-from .options import inlined, linked
+from .late import inlined, linked
 from .records import NO_PIECE, OPENING, SIDE
 
 # In place of a hollow's number: a flat top, and a corner at an end of an opening.

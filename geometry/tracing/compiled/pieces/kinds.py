@@ -17,8 +17,8 @@ from ...double_double.numbers import DoubleDouble, extended
 from . import arcs, beziers, lines
 from .beziers import STEPS
 from .formulas import mirror
+from .late import inlined, inner, linked, linked_allocating
 from .lines import height_over_line, line_ends
-from .options import inlined, inner, linked, linked_allocating
 from .records import FIRST_CURVE, NO_PIECE, OPENING, Hit
 
 # Curves in the order of their tables, and all kinds.

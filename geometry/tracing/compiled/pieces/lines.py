@@ -17,7 +17,7 @@ from ....curves import columns as c
 from ....curves.columns import NEARBY_SLACKS
 from ...double_double.numbers import dot, root, two_product, two_sum, where
 from .formulas import side
-from .options import inlined, linked, linked_allocating
+from .late import inlined, linked, linked_allocating
 from .records import LINE
 
 # Least absolute value of a fraction from a line's end, so that it is negative even if the ray meets that end.

@@ -1,4 +1,9 @@
-"""Calls of compiled functions by their address, and the flag that ends a long one. Loads numba.
+"""How functions are compiled for tracing, and called by their address. Loads numba.
+
+The caller owns all arrays during a call. Counting references to arrays, an atomic operation in each function that
+receives one, would cost a quarter of the time of a disk's collision. So these functions are compiled without numba's
+run time: they allocate nothing, and they return arrays only to callers that count no references either. Passing an
+array costs ten arguments, so small functions are inlined.
 
 numba copies all called functions into a function and optimises them again, at every level. A large function that is
 called from many places, or seldom, is compiled once instead and called by its address. A function that few walls need
@@ -17,7 +22,17 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from .....core.compilation import is_stored
+from .....core.compilation import is_stored, jit
+
+compiled = jit(_nrt=False)
+# For functions that only compiled functions call.
+inner = jit(_nrt=False, no_cpython_wrapper=True)
+inlined = jit(_nrt=False, forceinline=True)
+# With numba's run time, for functions that allocate; numba applies the option to all called functions.
+allocating = jit(_nrt=True, no_cpython_wrapper=True)
+# Functions that no call by address reaches become machine code within their callers only.
+linked = jit(_nrt=False, linked=True)
+linked_allocating = jit(_nrt=True, linked=True)
 
 Result = TypeVar("Result")
 
