@@ -206,7 +206,7 @@ def table_of(rows: list[Floats], columns: int) -> Floats:
 
 
 class Struct:
-    """A named tuple of numbers, arrays, structs and named tuples, laid out in memory; see `compiled.tables`.
+    """A named tuple of numbers, arrays, structs and named tuples, laid out in memory; see `scene/compiled`.
 
     The numbers in an array may change, the tuple may not.
 

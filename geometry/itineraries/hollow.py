@@ -84,7 +84,7 @@ def first_nodes(theta: float, left: float, right: float, goal: float) -> Floats:
 
 def compiled_result(call: Callable[[], Result]) -> Result:
     """Return the result of a compiled call that may take seconds."""
-    from ..tracing.compiled.pieces.late import checked
+    from ..scene.compiled.compiling import checked
     from ..tracing.threads import interruptibly
 
     return interruptibly(lambda: checked(call))

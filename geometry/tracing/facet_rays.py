@@ -51,8 +51,8 @@ class FacetRays:
 
     def advance(self, who: NDArray[np.int64], threads: int | None = None) -> NDArray[np.int64]:
         """Let some rays fly to their next facet, and return those that are on one, for any number of threads."""
+        from ..scene.compiled.compiling import checked
         from .compiled.blocks import next_facets
-        from .compiled.pieces.late import checked
         from .compiled.rays import SLOTS
 
         if not len(who):

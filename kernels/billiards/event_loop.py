@@ -17,8 +17,8 @@ from ...geometry import Container, Disk, Torus
 from ...geometry.collisions.compiled import gas as g
 from ...geometry.curves import columns as c
 from ...geometry.curves.columns import Struct
+from ...geometry.scene.compiled.compiling import checked
 from ...geometry.tables.boundary import FlightStatus
-from ...geometry.tracing.compiled.pieces.late import checked
 from ...geometry.tracing.compiled.pieces.records import NO_DETAILS, Rays, results_for
 from ...geometry.tracing.compiled.rays import SLOTS, TRACE
 from ..collisions.collision_law import CollisionLaw

@@ -167,7 +167,7 @@ def test_after_the_warm_up_a_study_compiles_nothing():
 
 
 def test_ctrl_c_during_a_late_compilation_is_not_lost():
-    from asperity.geometry.tracing.compiled.pieces import late
+    from asperity.geometry.scene.compiled import compiling as late
 
     class Interrupted:
         def compile(self, kinds):

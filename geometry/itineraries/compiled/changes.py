@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...curves.columns import LEFT, POINT_X, POINT_Y, RIGHT, Struct
-from ...scene.compiled.tables import ROW, named, reader_of
+from ...scene.compiled.compiling import ROW, call_late, compiled, inlined, linked, named, reader_of
 from ...scene.scene import Scene
-from ...tracing.compiled.pieces.late import call_late, compiled, inlined, linked
 from ...tracing.compiled.pieces.records import Rays, details_for, results_for
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, TRACE, details_at, rays_at
 

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...curves import columns as c
-from ...scene.compiled.tables import ROW, kind_of, reader_of
+from ...scene.compiled.compiling import ROW, Late, call_late, compiled, inlined, inner, kind_of, reader_of
 from .pieces.formulas import TOP_CORNER, exit_time, last_hollow, opening_at, with_length_one
 from .pieces.kinds import reflect
-from .pieces.late import Late, call_late, compiled, inlined, inner
 from .pieces.records import BEZIER, FLYING, NO_PIECE, NO_STATES, OPENING, SIDE, Hit, Own
 from .rays import (
     BOUNCE_LIMIT,

@@ -20,7 +20,22 @@ from numba import types
 from ...curves import columns as c
 from ...curves.columns import NEARBY_SLACKS, Struct
 from ...scene.closed_forms import BOXES, CONTENT, TREE_COLUMNS
-from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
+from ...scene.compiled.compiling import (
+    ROW,
+    Late,
+    Table,
+    allocating,
+    call_late,
+    checked,
+    compiled,
+    inlined,
+    inner,
+    is_raised,
+    kind_of,
+    linked,
+    named,
+    reader_of,
+)
 from ...scene.scene import no_tables
 from ..double_double.numbers import extended
 from .pieces import arcs, beziers, records
@@ -38,7 +53,6 @@ from .pieces.kinds import (
     piece_nearby,
     reflect,
 )
-from .pieces.late import Late, allocating, call_late, checked, compiled, inlined, inner, is_raised, linked
 from .pieces.lines import is_ahead, joint_side, line_at, line_hit
 from .pieces.records import ARC, BEZIER, FIRST_CURVE, LINE, NO_DETAILS, NO_PIECE, NO_RAYS, OPENING, SIDE, Hit, Own, Rays
 from .runs import skip_chords, skip_crossings

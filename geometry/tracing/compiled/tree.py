@@ -17,8 +17,8 @@ from numba.extending import intrinsic
 from ...curves import columns as c
 from ...curves.columns import NEARBY_SLACKS
 from ...scene.closed_forms import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, ESCAPE_ROOM, OTHER_X, OTHER_Y, PARENT
+from ...scene.compiled.compiling import inlined, inner
 from .pieces.formulas import side
-from .pieces.late import inlined, inner
 from .pieces.lines import is_ahead, joint_side, line_at, line_hit, line_sides
 from .pieces.records import Tree
 

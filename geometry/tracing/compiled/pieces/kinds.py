@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .....core.checks import Floats
+from ....scene.compiled.compiling import inlined, inner, linked, linked_allocating
 from ...double_double.numbers import DoubleDouble, extended
 from . import arcs, beziers, lines
 from .beziers import STEPS
 from .formulas import mirror
-from .late import inlined, inner, linked, linked_allocating
 from .lines import height_over_line, line_ends
 from .records import FIRST_CURVE, NO_PIECE, OPENING, Hit
 
