@@ -52,7 +52,7 @@ FLOORS = [
     *("spectral.sweeps", "spectral.work_diagrams", "spectral"),
     # the ledger's index finds the files of its folders without naming them
     *("ledger", "ledger.plane", "ledger.disk", "ledger.proof"),
-    *("study", "bench.quantities", "bench", "explore"),
+    *("study", "bench", "explore"),
 ]
 # Pictures are drawn by the classes that they show, and asperity itself holds its front door.
 DRAWN_ANYWHERE = "spectral.plotting"
@@ -122,7 +122,7 @@ def test_tests_lie_where_their_sources_lie():
     folders = {name.replace(".", "/") for name in FLOORS}
     tested = {str(path.parent.relative_to(TREE / "tests")) for path in (TREE / "tests").rglob("test_*.py")}
     assert tested - folders == {"front", "house", "properties"}
-    inside = {name for name in folders if set(name.split("/")) & {*COMPILED, "ledger", "quantities"} - {name}}
+    inside = {name for name in folders if set(name.split("/")) & {*COMPILED, "ledger"} - {name}}
     assert folders - tested - inside == set(ROOMS)
 
 
