@@ -1,4 +1,4 @@
-"""W_p between the conditional distributions of two laws, as atoms and masses of cells: at angles, and over all angles."""
+"""W_p between the conditional distributions of two laws, as atoms and masses of cells, and its mean and supremum."""
 
 from __future__ import annotations
 
