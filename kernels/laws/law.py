@@ -301,6 +301,11 @@ class Law(Value, ABC):
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """`conditionals` for checked arguments, of which it gets copies; called by `conditionals` only."""
 
+    @cached_property
+    def _probe(self) -> Conditionals:
+        """The conditional distribution at one incoming angle, for functions that are constant."""
+        return self.conditionals(PROBE, PROBE_TOLERANCE, 0)
+
     def _distinct(self, theta: Floats) -> tuple[Floats, NDArray[np.intp]]:
         """Angles among those given that have all their conditional distributions, and which of them each angle has."""
         if self.is_lambertian:
@@ -759,7 +764,7 @@ class _Chain(Law):
     @cached_property
     def _error_of_atoms(self) -> float:
         """The sum of the errors of the laws, if all are made of isometries."""
-        return sum(float(_probe(law).error[0]) for law in self.factors())
+        return sum(float(law._probe.error[0]) for law in self.factors())
 
     @cached_property
     def _atomic_factors(self) -> int:
@@ -993,11 +998,7 @@ def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
 
 def knows_errors(law: Law) -> bool:
     """Whether the errors of conditional distributions are known, as one incoming angle shows."""
-    return not np.isnan(_probe(law).error).any()
-
-
-def _probe(law: Law) -> Conditionals:
-    return law.conditionals(PROBE, PROBE_TOLERANCE, 0)
+    return not np.isnan(law._probe.error).any()
 
 
 def _means_of(law: Law, given: Piecewise, theta: Floats) -> Floats:
