@@ -17,10 +17,10 @@ from ..bases.assembly import add_masses, add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.measure import gauss_on_intervals
 from ..bases.partitions import Panels
-from ..laws.branches import preimages
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import Law
 from ..laws.structure import Rules, fold
+from ..laws.sums import preimages
 from ..matrices.matrix import KernelMatrix
 from ..walls.rectangular import crevice_nodes, crevice_pieces, first_crossing
 from .method import Budget, computed, rounding
