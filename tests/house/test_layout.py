@@ -54,8 +54,6 @@ FLOORS = [
     *("ledger", "ledger.plane", "ledger.disk", "ledger.proof"),
     *("study", "bench", "explore"),
 ]
-# Pictures are drawn by the classes that they show, and asperity itself holds its front door.
-DRAWN_ANYWHERE = "spectral.plotting"
 COMPILED = ("compiled", "double_double")
 
 
@@ -103,9 +101,9 @@ def test_no_file_imports_itself_by_way_of_others():
 
 def test_imports_go_down():
     for name, targets in IMPORTS.items():
-        for target in targets & MODULES.keys() - {DRAWN_ANYWHERE}:
+        for target in targets & MODULES.keys():
             own, other = folder_of(name), folder_of(target)
-            if own and other and name != DRAWN_ANYWHERE:
+            if own and other:
                 assert FLOORS.index(other) <= FLOORS.index(own), f"{name} imports {target}, which lies above it"
 
 
