@@ -30,7 +30,7 @@ import asperity
 from asperity.geometry.disk import disk, rolling
 from asperity.kernels.walls import circular_arc, polygons
 from asperity.ledger import Entry
-from asperity.ledger import index as ledger
+from asperity.ledger import entry as ledger
 from campaigns.cases.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 
 from .pages import print_table

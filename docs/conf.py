@@ -14,7 +14,7 @@ from sphinx.environment import BuildEnvironment
 
 import asperity
 from asperity.ledger import entries
-from asperity.ledger.index import page_of
+from asperity.ledger.entry import page_of
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))

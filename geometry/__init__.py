@@ -20,12 +20,11 @@ from typing import TYPE_CHECKING, Any
 from ..verification.identity import verify
 from .cells.measured import Profile
 from .cells.profile import read_profile
-from .collisions.amplification import DiskStatus
 from .collisions.configuration_space import ConfigurationSpace, collision_path
 from .collisions.cylinder import collide_cylinder, collide_modified
 from .collisions.encounter import collide_rim
 from .collisions.pair import collide_pair
-from .collisions.rigid import collide
+from .collisions.rigid import DiskStatus, collide
 from .collisions.transversality import good_fraction, shadow
 from .curves.arc import Arc
 from .curves.bezier import Bezier

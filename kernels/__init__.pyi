@@ -39,6 +39,7 @@ from .inverse.exchange_wall import exchange_hollow as exchange_hollow
 from .inverse.wall_for_law import collision_for as collision_for
 from .inverse.wall_for_law import wall_for as wall_for
 from .laws.density import DensityLaw as DensityLaw
+from .laws.density import henyey_greenstein as henyey_greenstein
 from .laws.density import lambertian as lambertian
 from .laws.density import maxwell as maxwell
 from .laws.deterministic import IntervalExchangeLaw as IntervalExchangeLaw
@@ -48,7 +49,6 @@ from .laws.law import Law as Law
 from .laws.law import retroreflection as retroreflection
 from .laws.law import specular as specular
 from .laws.matrix_law import MatrixLaw as MatrixLaw
-from .laws.phase_function import henyey_greenstein as henyey_greenstein
 from .matrices.matrix import KernelMatrix as KernelMatrix
 from .matrices.matrix import load_matrix as load_matrix
 from .positions.position_law import PositionLaw as PositionLaw

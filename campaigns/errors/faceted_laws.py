@@ -15,7 +15,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.checks import Floats
-from asperity.geometry.tracing.facet_rays import follow_facets
+from asperity.kernels.walls.faceted_law import follow_facets
 from campaigns.engine import Campaign, Judged
 from campaigns.judges.plain_facets import diffuse_arc, diffuse_groove, reflected
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.bench.quantities.walls import wall_of
+from asperity.bench.quantities import wall_of
 from asperity.core.checks import Floats
 
 from .reference_rays import NETS, Found, sampled_sums

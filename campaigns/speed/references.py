@@ -21,8 +21,7 @@ import numpy as np
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.bench.problems import DISK, correlation_of, problem_names
-from asperity.bench.quantities.laws import DIFFUSE, LAW_BASIS, LENGTH, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
-from asperity.bench.quantities.walls import wall_of
+from asperity.bench.quantities import DIFFUSE, LAW_BASIS, LENGTH, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of, wall_of
 from asperity.bench.standard_set import FILE
 from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from asperity import geometry as geo
-from asperity.bench.quantities.walls import wall_of
+from asperity.bench.quantities import wall_of
 from campaigns.cases.random_curved_walls import arc_over
 
 from .timing import least_time

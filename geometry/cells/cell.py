@@ -220,7 +220,7 @@ class Cell:
 
 
 def _vertices(path: Sequence[Curve]) -> Floats:
-    return frozen(point_array([*(p.start for p in path), path[-1].end]))
+    return frozen(point_array([*[p.start for p in path], path[-1].end]))
 
 
 @dataclass(frozen=True)
@@ -322,7 +322,7 @@ def merged(path: tuple[Curve, ...], is_loop: bool = False) -> tuple[Curve, ...]:
     (Segment(start=(0.0, 0.0), end=(3.0, -3.0)), Segment(start=(3.0, -3.0), end=(4.0, 0.0)))
     """
     straight, before = straight_in(path), np.arange(-1, len(path) - 1)
-    starts, ends = (point_array(getattr(piece, name) for piece in path) for name in ("start", "end"))
+    starts, ends = point_array([piece.start for piece in path]), point_array([piece.end for piece in path])
     size = np.maximum(np.abs(starts).max(axis=0), np.abs(ends[-1]))
     level = straight & (starts[before, 1] == 0.0) & (ends[:, 1] == 0.0)
     able = (straight == straight[before]) & (level | (starts[:, 1] != 0.0))
@@ -352,7 +352,7 @@ def _whole(parts: tuple[Curve, ...], size: Floats) -> list[Curve]:
     """Return the curve whose consecutive parts are the given pieces of one kind; an empty list if there is none."""
     start, end = parts[0].start, parts[-1].end
     if parts[0].is_straight:
-        joints = point_array(piece.start for piece in parts[1:])
+        joints = point_array([piece.start for piece in parts[1:]])
         return [Segment(start, end)] if _between(np.array([start]), joints, np.array([end]), size).all() else []
     if end < start:
         # in one direction of the two, so that coincident faces stay coincident

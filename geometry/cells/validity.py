@@ -136,7 +136,7 @@ def _curves(given: Sequence[Curve], name: str) -> Pieces:
 
 
 def _end_points(pieces: Pieces) -> tuple[Floats, Floats]:
-    return point_array(p.start for p in pieces), point_array(p.end for p in pieces)
+    return point_array([p.start for p in pieces]), point_array([p.end for p in pieces])
 
 
 def _size(starts: Floats, ends: Floats, period: float) -> Floats:

@@ -13,9 +13,8 @@ from ..disk.disk import Disk
 from ..disk.satellites import RollingCharts
 from ..tracing.tracing import MAX_COLLISIONS
 from ..walls.wall import Wall
-from .amplification import DiskCounts
 from .configuration_space import ConfigurationSpace
-from .rigid import check_kinds, checked_states, collide, collide_ring, rolling_ring
+from .rigid import DiskCounts, check_kinds, checked_states, collide, collide_ring, rolling_ring
 
 # Newton steps on a convex function: at worst a step halves the error, near the root it squares the error.
 LANDING_STEPS = 80

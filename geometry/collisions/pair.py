@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, finite_array, instance, read_only, whole_number
 from ...core.errors import InputError
 from ..disk.disk import Features, SatelliteDisk
-from .amplification import DiskCounts, DiskStatus, fewest_contacts, mark_amplified
 from .encounter import MAX_CONTACTS, TOUCHING, Encounter, largest_bend_of
+from .rigid import DiskCounts, DiskStatus, fewest_contacts, mark_amplified
 
 
 @dataclass(frozen=True, repr=False)

@@ -14,8 +14,20 @@ from ...core.checks import Floats, number_between, positive_number
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from . import columns as c
-from .curve import LARGEST_COORDINATE, ROUNDED, Bools, Curve, Point, as_point, inverted, parameters, stretch_factors
-from .reading import Table, check_keys, pair_of
+from .curve import (
+    LARGEST_COORDINATE,
+    ROUNDED,
+    Bools,
+    Curve,
+    Point,
+    Table,
+    as_point,
+    check_keys,
+    inverted,
+    pair_of,
+    parameters,
+    stretch_factors,
+)
 
 # Up to this span (radians) the points of an arc are computed from its chord and semi-axes. The difference of two
 # angles near pi/2 has an error of eps, so the angles give a span of 1e-8 with 8 digits only, the chord with 16.

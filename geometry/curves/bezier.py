@@ -16,8 +16,20 @@ from ...core.checks import Floats, number_between, positive_number, sequence, wh
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from . import columns as c
-from .curve import ROUNDED, Bools, Curve, Point, as_point, cubic_roots, inverted, parameters, stretch_factors
-from .reading import Table, check_keys, points_of
+from .curve import (
+    ROUNDED,
+    Bools,
+    Curve,
+    Point,
+    Table,
+    as_point,
+    check_keys,
+    cubic_roots,
+    inverted,
+    parameters,
+    points_of,
+    stretch_factors,
+)
 
 # Distance (in the parameter) from the minimum of the speed to [0, 1] above which the closed formula for the length of
 # a quadratic curve cancels. There 24 Gauss nodes are exact to rounding: the branch points are at least as far away.

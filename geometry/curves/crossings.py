@@ -156,7 +156,7 @@ def _turns(
 
 def directions_of(path: Sequence[Curve]) -> tuple[Floats, Floats]:
     """Return the unit tangents of every piece at its end and at its start."""
-    chords = np.diff(point_array([*(piece.start for piece in path), path[-1].end]), axis=0)
+    chords = np.diff(point_array([*[piece.start for piece in path], path[-1].end]), axis=0)
     straight = straight_in(path)
     chords[straight] /= np.hypot(chords[straight, 0], chords[straight, 1])[:, np.newaxis]
     into, out = chords, chords.copy()
@@ -192,7 +192,7 @@ def _without_repeats(points: Floats) -> Floats:
 
 def _flatten(pieces: Sequence[Curve], size: tuple[float, float], first_label: int) -> _Loop:
     if straight_in(pieces).all():
-        points = point_array([*(piece.start for piece in pieces), pieces[-1].end]) / size
+        points = point_array([*[piece.start for piece in pieces], pieces[-1].end]) / size
         return _Loop(points, np.arange(first_label, first_label + len(pieces)))
     chunks, labels = [], []
     for i, piece in enumerate(pieces):

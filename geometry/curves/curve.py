@@ -1,10 +1,10 @@
-"""The base class of Segment, Arc and Bezier: points, tangents, lengths, boxes and images."""
+"""The base class of Segment, Arc and Bezier: points, tangents, lengths, boxes, images, and tables of wall files."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from itertools import chain
 from typing import Any, ClassVar, Self
@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, finite_array, finite_number, numbers, shortened
 from ...core.errors import InputError, WallError
 from ...core.rounding import EPS
-from .reading import Table, check_keys
 
 # Of a coordinate; products of three lengths stay far below the largest double.
 LARGEST_COORDINATE = 1e100
@@ -32,6 +31,7 @@ INNER, ROUNDED = np.array([0.25, 0.5, 0.75]), 64.0 * EPS
 
 Bools = NDArray[np.bool_]
 Point = tuple[float, float]
+Table = dict[str, Any]
 Box = tuple[float, float, float, float]
 
 
@@ -250,7 +250,7 @@ class Curve(ABC):
         return xmin, ymin, xmax, ymax
 
 
-def point_array(points: Iterable[Point]) -> Floats:
+def point_array(points: Sequence[Point]) -> Floats:
     """Return points as an array of shape (n, 2), twice as fast as numpy does."""
     return np.fromiter(chain.from_iterable(points), np.float64).reshape(-1, 2)
 
@@ -330,3 +330,40 @@ def cubic_roots(c: Floats, low: float, high: float) -> Floats:
         following = np.where((newton > left) & (newton < right), newton, middle) if step % 4 else middle
         s = np.where(settled, s, following)
     return np.asarray(np.where(crossed, s, np.nan).T)
+
+
+def check_keys(table: Table, required: set[str], optional: set[str]) -> None:
+    missing, unknown = sorted(required - set(table)), sorted(set(table) - required - optional)
+    if missing:
+        raise InputError(f"missing key {missing[0]!r}")
+    if unknown:
+        raise InputError(f"unknown key {unknown[0]!r}; expected {', '.join(sorted(required | optional))}")
+
+
+def tables_of(name: str, value: Any) -> list[Table]:
+    if not isinstance(value, list) or not all(isinstance(table, dict) for table in value):
+        raise InputError(f"key {name!r}: expected an array of tables ([[{name}]]), got {value!r}")
+    return value
+
+
+def points_of(name: str, value: Any) -> list[Point]:
+    if not isinstance(value, list) or not value:
+        raise InputError(f"key {name!r}: expected a list of points, got {value!r}")
+    return [pair_of(f"{name}[{i}]", point) for i, point in enumerate(value)]
+
+
+def pair_of(name: str, value: Any) -> Point:
+    if not isinstance(value, list) or len(value) != 2:
+        raise InputError(f"key {name!r}: expected two numbers [a, b], got {value!r}")
+    return number_of(name, value[0]), number_of(name, value[1])
+
+
+def number_of(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"key {name!r}: expected a number, got {value!r}")
+    try:
+        return float(value)
+    except OverflowError as reason:
+        raise InputError(
+            f"key {name!r}: expected a number below 1e308, got one of {len(str(value))} digits"
+        ) from reason

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, shaped
 from ...core.errors import WallError
 from . import columns as c
-from .curve import Bools, Box, Curve, Point, as_point, parameters, stretch_factors
-from .reading import Table, check_keys, pair_of
+from .curve import Bools, Box, Curve, Point, Table, as_point, check_keys, pair_of, parameters, stretch_factors
 
 
 @dataclass(frozen=True)

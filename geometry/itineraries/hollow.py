@@ -15,8 +15,8 @@ from ...core.long_runs import count_time
 from ..curves.columns import LEFT, RIGHT, RUN_SINE
 
 if TYPE_CHECKING:
+    from ..curves.columns import Struct
     from ..scene.scene import Scene
-    from ..scene.structs import Struct
 
 Result = TypeVar("Result")
 # A ray is unresolved after MOST_COLLISIONS collisions.
@@ -84,7 +84,7 @@ def first_nodes(theta: float, left: float, right: float, goal: float) -> Floats:
 
 def compiled_result(call: Callable[[], Result]) -> Result:
     """Return the result of a compiled call that may take seconds."""
-    from ..tracing.compiled.pieces.pointers import checked
+    from ..scene.compiled.compiling import checked
     from ..tracing.threads import interruptibly
 
     return interruptibly(lambda: checked(call))

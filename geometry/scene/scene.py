@@ -23,11 +23,10 @@ from ..cells.hollow_shape import distinct_hollows
 from ..curves import columns as c
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
-from ..curves.columns import SMOOTH_JOINT, row_of, table_of
+from ..curves.columns import SMOOTH_JOINT, Struct, row_of, table_of
 from ..curves.crossings import directions_of, straight_in
 from ..curves.curve import Curve, Point
 from .closed_forms import MOST_PIECES, TREE_COLUMNS, closed_form_of, escape_sectors, facing_pairs, tree_of
-from .structs import Struct
 
 # Number of chords from which on a run along an arc pays for its two arctangents and one sincos.
 RUN_CHORDS = 8.0

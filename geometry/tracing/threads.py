@@ -2,7 +2,7 @@
 
 Python handles signals between its own instructions, in the main thread only. So long compiled functions run on other
 threads, while the main thread waits in short intervals. A function that may take long reads a flag, a one-element
-array, at intervals (`is_raised` in `compiled/pieces/pointers`), and ends when the flag is raised.
+array, at intervals (`is_raised` in `scene/compiled/compiling`), and ends when the flag is raised.
 """
 
 from __future__ import annotations

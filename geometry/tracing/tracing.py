@@ -300,8 +300,8 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
     rooms: list[Any] = []
 
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
+        from ..scene.compiled.compiling import checked
         from .compiled.blocks import CROSSINGS, RAYS, UNDECIDED, room_for, trace_hollows
-        from .compiled.pieces.pointers import checked
 
         tables = scene.tables.address
         # of an earlier block, if another thread does not use it

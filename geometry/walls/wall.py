@@ -17,9 +17,8 @@ from ...core.estimates import html_table
 from ..cells.cell import Cell
 from ..cells.hollow_shape import has_mirror_axis
 from ..cells.measured import Profile
-from ..cells.miniature import wall_miniature
+from ..cells.output import read_wall, save_wall, wall_miniature
 from ..cells.profile import Seam, rolled, vertices_of_profile
-from ..cells.toml import read_wall, save_wall
 from ..cells.validity import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
 from ..curves.curve import LARGEST_COORDINATE, Curve
 from ..curves.segment import Segment

@@ -98,7 +98,7 @@ class AngularMeasure:
 
         Returns flat arrays. The weights contain the density and sum to the measure of the whole interval.
         """
-        angle, weight = gauss_rule(edges, whole_number("order", order, 1))
+        angle, weight = gauss_rule(shaped("edges", edges, "n"), whole_number("order", order, 1))
         return angle, weight * self.density(angle)
 
 
@@ -110,18 +110,17 @@ def _gauss_on_unit_interval(order: int) -> tuple[Floats, Floats]:
     return nodes, weights
 
 
-def gauss_rule(edges: ArrayLike, order: int) -> tuple[Floats, Floats]:
+def gauss_rule(edges: Floats, order: int) -> tuple[Floats, Floats]:
     """Gauss-Legendre rule for d angle, ``order`` nodes between each two neighbouring edges; flat arrays.
 
     The nodes are clipped to the open interval (0, pi).
 
     Examples
     --------
-    >>> angle, weight = gauss_rule([0.0, 1.0, 3.0], 2)
+    >>> angle, weight = gauss_rule(np.array([0.0, 1.0, 3.0]), 2)
     >>> angle.shape, round(float(weight @ angle), 12)
     ((4,), 4.5)
     """
-    edges = shaped("edges", edges, "n")
     return gauss_on_intervals(edges[:-1], edges[1:], order)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, check_memory, finite_array, frozen, instance, number_between, shaped, whole_number
 from ...core.long_runs import slices
+from .angles import cell_among
 from .basis import Basis, checked_edges
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
@@ -141,7 +142,7 @@ class Panels(Basis):
 
     def positions(self, angle: Floats) -> tuple[NDArray[np.int64], Floats]:
         """The panel of each angle, and its position there from -1 to 1; angles beyond the ends count as these."""
-        panel = self._cells.index(angle)
+        panel = cell_among(self.edges, angle)
         low, high = self.edges[panel], self.edges[panel + 1]
         return panel, np.asarray((2.0 * np.clip(angle, low, high) - low - high) / (high - low))
 
@@ -161,11 +162,10 @@ class Panels(Basis):
         return np.asarray(np.matmul(self._coefficients, table.reshape(-1, self.degree + 1, table.shape[1])))
 
     def evaluate(self, angle: ArrayLike) -> Floats:
-        angle = finite_array("angle", angle)
         panel, local = self.local(angle)
-        values = np.zeros((*angle.shape, self._cells.size, self.degree + 1))
+        values = np.zeros((*panel.shape, self._cells.size, self.degree + 1))
         np.put_along_axis(values, panel[..., None, None], local[..., None, :], axis=-2)
-        return values.reshape((*angle.shape, self.size))
+        return values.reshape((*panel.shape, self.size))
 
     def nonzero(self, angle: Floats) -> Floats:
         return self.local(angle)[1]

@@ -19,7 +19,8 @@ from ...geometry import Container, Disk
 from ...geometry.tables.boundary import FlightStatus, Touch
 from ..collisions.collision_law import CollisionLaw
 from ..collisions.satellite_law import SatelliteLaw
-from ..laws.law import Law, outcomes_of
+from ..laws.law import Law
+from ..laws.sums import outcomes_of
 from ..positions.position_law import PositionLaw
 from .record import BilliardRecord
 

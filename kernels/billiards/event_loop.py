@@ -16,9 +16,9 @@ from ...core.errors import AccuracyError
 from ...geometry import Container, Disk, Torus
 from ...geometry.collisions.compiled import gas as g
 from ...geometry.curves import columns as c
-from ...geometry.scene.structs import Struct
+from ...geometry.curves.columns import Struct
+from ...geometry.scene.compiled.compiling import checked
 from ...geometry.tables.boundary import FlightStatus
-from ...geometry.tracing.compiled.pieces.pointers import checked
 from ...geometry.tracing.compiled.pieces.records import NO_DETAILS, Rays, results_for
 from ...geometry.tracing.compiled.rays import SLOTS, TRACE
 from ..collisions.collision_law import CollisionLaw

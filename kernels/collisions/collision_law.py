@@ -36,8 +36,9 @@ from ..bases.assembly import reflection_matrix
 from ..bases.basis import Basis
 from ..bases.polynomials import Legendre
 from ..discretisation.discretisation import discretise
-from ..laws.law import Law, as_weight, check_paper_frame, outcomes_of, retroreflection, specular
+from ..laws.law import Law, check_paper_frame, retroreflection, specular
 from ..laws.structure import Discretiser, TensorLaw, Term, checked_pair
+from ..laws.sums import WEIGHT_TOLERANCE, as_weight, outcomes_of
 from ..matrices.defects import SymmetryDefect
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw, isometries
@@ -46,8 +47,6 @@ from .operator import CollisionOperator, isometry_matrix
 # Pairs of angles are evaluated as a grid if the grid of their distinct values has at most this many points per pair.
 GRID_EXCESS = 4
 DEFECT_SIZES = (32, 8)
-# Decimal weights sum to 1 within a few roundings.
-WEIGHT_TOLERANCE = 1e-12
 
 VelocityFunction = Callable[[Floats, Floats], Floats]
 StateFunction = Callable[[Floats, Floats, Floats], Floats]

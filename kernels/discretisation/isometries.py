@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.long_runs import NUMBERS_AT_ONCE, slices
-from ..bases.angles import between_cuts, clipped_inside, edges_inside
+from ...core.rounding import EPS
+from ..bases.angles import between_cuts, cell_among, clipped_inside, edges_inside
 from ..bases.assembly import add_masses, add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.measure import gauss_on_intervals
 from ..bases.partitions import Panels
-from ..bases.polynomials import Displacement
-from ..laws.branches import preimages
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import Law
 from ..laws.structure import Rules, fold
+from ..laws.sums import preimages
 from ..matrices.matrix import KernelMatrix
 from ..walls.rectangular import crevice_nodes, crevice_pieces, first_crossing
 from .method import Budget, computed, rounding
@@ -88,10 +88,8 @@ def branch_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, flo
 
 def _add_cuts(law: Law, basis: Basis, middle: Floats, displacement: Displacement) -> None:
     probability, outgoing = law.branches(middle)
-    density, source = np.sin(middle), basis.index(middle)
     for slot in range(outgoing.shape[-1]):
-        image = outgoing[:, slot]
-        displacement.add(middle, image, density * probability[:, slot], source, basis.index(image))
+        displacement.add(middle, outgoing[:, slot], np.sin(middle) * probability[:, slot])
 
 
 def _add_pieces(law: Law, basis: Basis, low: Floats, high: Floats, order: int, total: Floats, pieces: int) -> None:
@@ -142,8 +140,7 @@ def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
     if basis.is_polynomial:
         # Polynomials are smooth, so only the ends of pieces are cuts.
         for end, density in ((table.low, table.start), (table.high, table.end)):
-            image = table.images(end)
-            displacement.add(end, image, 0.5 * density, basis.index(end), basis.index(image))
+            displacement.add(end, table.images(end), 0.5 * density)
     moved = 2.0 * table.unresolved
     begin = first_crossing(basis)
     for crevice in table.crevices:
@@ -175,11 +172,11 @@ def _add_table(table: IsometryTable, basis: Basis, total: Floats, displacement: 
         piece, low, high = _cut(table, basis, np.arange(begin, min(begin + step, table.low.size)))
         middle = 0.5 * (low + high)
         density, image = table.density(middle, piece), table.images(middle, piece)
-        source, target = basis.index(middle), basis.index(image)
         if not basis.is_polynomial:
-            displacement.add(middle, image, density, source, target)
+            displacement.add(middle, image, density)
         if basis.is_partition:
             # The integral of a sinusoid is its value in the middle times 2 sin(width/2).
+            source, target = cell_among(basis.edges, middle), cell_among(basis.edges, image)
             add_masses(total, basis, source, target, density * np.sin(0.5 * (high - low)))
         else:
             _add_nodes(table, basis, piece, low, high, total)
@@ -192,8 +189,7 @@ def add_mirrored_edges(basis: Basis, displacement: Displacement) -> None:
     mirror = IsometryTable.flat(1.0)
     piece, low, high = _cut(mirror, basis, np.arange(mirror.low.size))
     middle = 0.5 * (low + high)
-    image = mirror.images(middle, piece)
-    displacement.add(middle, image, np.sin(middle), basis.index(middle), basis.index(image))
+    displacement.add(middle, mirror.images(middle, piece), np.sin(middle))
 
 
 def _cut(table: IsometryTable, basis: Basis, piece: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats, Floats]:
@@ -248,3 +244,39 @@ def _nodes_for(reach: Floats) -> NDArray[np.int64]:
     for limit, nodes in reversed(SHORT):
         number = np.where(reach <= limit, nodes, number)
     return np.asarray(number, dtype=np.int64)
+
+
+# Bound of the rounding error of an angle at which an integral is cut: edges, offsets of isometries and the angles that
+# these map to edges are sums of a few numbers below pi.
+CUT = np.pi * EPS
+
+
+class Displacement:
+    r"""A bound of the change of a matrix <e_i, P e_j> by the rounding of the angles at which its integrals are cut.
+
+    A cut that is displaced by h moves the mass h sin(theta)/2 p(theta) from one product e_i(theta) e_j(theta') to
+    another. The changes of a row's interval are added; those of different intervals are orthogonal, so their squares
+    are added. ``offset_error`` bounds the displacement by other causes than rounding.
+    """
+
+    def __init__(self, basis: Basis, offset_error: float = 0.0) -> None:
+        self._basis, self._cut = basis, CUT + offset_error
+        self._largest, self._weighted = basis.magnitudes()
+        self._rows = np.zeros(self._largest.size)
+
+    def add(self, incoming: Floats, outgoing: Floats, density: Floats) -> None:
+        """Add pieces between two cuts: an angle inside each, its image, and p sin(theta)."""
+        source, target = cell_among(self._basis.edges, incoming), cell_among(self._basis.edges, outgoing)
+        change = self._cut * density * self._size(source, incoming) * self._size(target, outgoing)
+        self._rows += np.bincount(source, weights=change, minlength=self._rows.size)
+
+    def bound(self) -> float:
+        """The bound, in the Frobenius norm."""
+        return float(np.linalg.norm(self._rows))
+
+    def _size(self, cell: NDArray[np.intp], angle: Floats) -> Floats:
+        """A bound of the root of the sum of e_i^2 at the angles."""
+        if self._basis.is_partition:
+            return np.asarray(self._largest[cell])
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.minimum(self._largest[cell], self._weighted[cell] / np.sqrt(np.abs(np.sin(angle)))))

@@ -14,7 +14,6 @@ from ...geometry import Segment, Wall, trace
 from ...geometry.curves import columns as c
 from ...geometry.curves.curve import Curve
 from ...geometry.tracing.compiled.pieces.records import FIRST_CURVE, LINE, States
-from ...geometry.tracing.facet_rays import MOST_HITS, FacetRays
 from ...geometry.tracing.tracing import Status
 from ..bases.angles import clipped_inside
 from ..bases.assembly import add_products, is_mirror_symmetric, largest_square_sum, mirror_image
@@ -26,7 +25,7 @@ from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..sampling.counts import half_width, keep_constant
 from ..sampling.sobol import PARTS, random_shifts, shifted_points, sobol_sequence, whole_sequences
 from ..walls.conditionals import UNRESOLVED_TOLERANCE
-from ..walls.faceted_law import FacetedLaw
+from ..walls.faceted_law import MOST_HITS, FacetedLaw, FacetRays
 from .method import DEFAULT_SAMPLES, SEED_WITHOUT_RNG, Budget, rounding
 
 # Pairs of cells into which the boundary is divided, at least one for each piece, and limit on the pieces.

@@ -23,8 +23,8 @@ from ..laws.law import Law
 from ..laws.matrix_law import check_law
 from ..laws.structure import TensorLaw, Term
 from ..matrices.matrix import KernelMatrix, joint_kind
+from .conditional import law_distance, matrix_distance
 from .joint import joint_law_distance, joint_matrix_distance
-from .rowwise import law_distance, matrix_distance
 from .transport import check_comparable, noise_floor, wasserstein_order
 
 Kind = Literal["rows", "sup", "joint", "pseudometric"]

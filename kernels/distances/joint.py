@@ -22,9 +22,8 @@ from ..discretisation.discretisation import discretise
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error, joint_kind
 from ..sampling.streams import estimate
-from .cell_transport import DIAGONAL, Cells, transport_bounds
+from .cell_transport import DIAGONAL, Cells, flow_cost, potential_value, transport_bounds
 from .conditional import CellsAndAtoms, Term, Terms, cells_and_atoms, terms_of
-from .flows import flow_cost, potential_value
 from .transport import cell_middles, matrices_error, stochastic_rows
 
 # Limits on the pairs of occupied cells, at 100 bytes and some microseconds per pair, and on the cells along a side.

@@ -37,8 +37,9 @@ from ..bases.spaces import Zernike, zernike_functions
 from ..discretisation.discretisation import discretise
 from ..discretisation.method import SEED_WITHOUT_RNG
 from ..discretisation.radiosity import UnscatteredRays
-from ..laws.law import Law, as_weight, drawn_terms, in_frame, used_terms
+from ..laws.law import Law, in_frame
 from ..laws.structure import Discretiser, SpatialLaw, holds_of_all
+from ..laws.sums import as_weight, drawn_terms, used_terms
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..matrices.output import COLOUR_POWER
 from ..walls.faceted_law import FacetedLaw

@@ -8,11 +8,10 @@ from types import MappingProxyType
 
 from ...core.errors import InputError
 from ...geometry import wall_from_text
-from ..laws.density import lambertian, maxwell
+from ..laws.density import henyey_greenstein, lambertian, maxwell
 from ..laws.deterministic import LeastResistanceLaw
 from ..laws.law import Law, retroreflection, specular
 from ..laws.matrix_law import MatrixLaw
-from ..laws.phase_function import henyey_greenstein
 from ..matrices.matrix import KernelMatrix, load_matrix
 from ..walls.wall_law import WallLaw
 

@@ -25,7 +25,7 @@ from ...core.estimates import ErrorKind, Estimate, Summary
 from ...core.long_runs import reported
 from ...core.rounding import EPS
 from ...geometry import Disk, Wall, draw_wall, join_walls
-from ...geometry.cells.miniature import wall_miniature
+from ...geometry.cells.output import wall_miniature
 from ..bases.measure import SINE
 from ..bases.polynomials import Legendre
 from ..collisions.collision_law import CollisionLaw

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,8 +41,20 @@ from ..bases.angles import cell_among, clipped_inside, mirrored_angle
 from ..bases.basis import AngleFunction, Frame
 from ..expectations.conditionals import Conditionals
 from ..expectations.piecewise import INTERVALS_OF_MEANS, MOST_OF_MEANS, SEEN, Piecewise
-from .branches import MOST_BRANCHES, chained, chained_breakpoints, joined, merged
 from .isometry_table import IsometryTable
+from .sums import (
+    MOST_BRANCHES,
+    WEIGHT_TOLERANCE,
+    as_weight,
+    chained,
+    chained_breakpoints,
+    drawn_terms,
+    joined,
+    merged,
+    outcomes_of,
+    total_weight,
+    used_terms,
+)
 from .tables import Table, WithAtoms, tabulated
 
 if TYPE_CHECKING:
@@ -50,8 +62,6 @@ if TYPE_CHECKING:
 
 # Smallest and largest float64 in (0, 1), up to subnormal numbers.
 SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
-# Decimal weights such as 0.1, ..., 0.4 sum to 1 within a few roundings; a sum with a forgotten term differs by more.
-WEIGHT_TOLERANCE = 1e-12
 # Limit on the outgoing angles of a composition at all incoming angles. A density takes some 200 ns for each, and eight
 # times as long with the polynomial that it is multiplied by.
 MOST_VALUES, WITH_POLYNOMIAL = 10**8, 8
@@ -301,6 +311,11 @@ class Law(Value, ABC):
     def _conditionals(self, theta: Floats, tolerance: float, degree: int, edges: Floats) -> Conditionals:
         """`conditionals` for checked arguments, of which it gets copies; called by `conditionals` only."""
 
+    @cached_property
+    def _probe(self) -> Conditionals:
+        """The conditional distribution at one incoming angle, for functions that are constant."""
+        return self.conditionals(PROBE, PROBE_TOLERANCE, 0)
+
     def _distinct(self, theta: Floats) -> tuple[Floats, NDArray[np.intp]]:
         """Angles among those given that have all their conditional distributions, and which of them each angle has."""
         if self.is_lambertian:
@@ -537,49 +552,6 @@ def checked_conditionals(found: Conditionals, theta: Floats, law: Law) -> Condit
     return found._replace(nodes=clipped_inside(found.nodes))
 
 
-def as_weight(weight: object) -> float | None:
-    """The factor of a law as a float; None for what is no number, with which Python raises a TypeError."""
-    is_number = isinstance(weight, (int, float, np.integer, np.floating)) and not isinstance(weight, bool)
-    return float(numbers("weight", weight)) if is_number else None  # type: ignore[arg-type]
-
-
-def total_weight(terms: Sequence[tuple[float, object]]) -> float:
-    """The sum of the weights of terms."""
-    return math.fsum(weight for weight, _ in terms)
-
-
-def used_terms(terms: Sequence[tuple[float, T]], whole: object) -> tuple[tuple[float, T], ...]:
-    """The terms with a positive weight; raises InputError if one is negative or the sum is not 1 within 1e-12."""
-    for index, (weight, law) in enumerate(terms):
-        if weight < 0.0:
-            raise InputError(f"weights: expected non-negative ones, got {weight!r} for term {index}, {law!r}")
-    total = total_weight(terms)
-    if abs(total - 1.0) > WEIGHT_TOLERANCE:
-        raise InputError(
-            f"weights: expected a sum of 1, got {total!r} for {whole!r}; scale the weights or add the missing law"
-        )
-    return tuple(term for term in terms if term[0])
-
-
-def drawn_terms(
-    terms: Sequence[tuple[float, object]], shape: tuple[int, ...], rng: np.random.Generator
-) -> NDArray[np.intp]:
-    """Indices of terms, each drawn with the probability that is its weight."""
-    cumulative = np.cumsum([weight for weight, _ in terms])
-    choice = np.searchsorted(cumulative, rng.random(shape) * cumulative[-1], side="right")
-    return np.asarray(np.minimum(choice, len(terms) - 1))
-
-
-def outcomes_of(laws: Sequence[Any], choice: NDArray[np.intp], incoming: Floats, rng: np.random.Generator) -> Floats:
-    """Draw what becomes of incoming angles or velocities, each by the law that is chosen for it."""
-    outgoing = np.empty(incoming.shape)
-    for index, law in enumerate(laws):
-        chosen = choice == index
-        if chosen.any():
-            outgoing[chosen] = law.sample(incoming[chosen], rng)
-    return outgoing
-
-
 def entry_inside(x: Floats) -> Floats:
     """Clip uniform numbers to the open interval (0, 1)."""
     return np.asarray(np.clip(x, SMALLEST, LARGEST))
@@ -759,7 +731,7 @@ class _Chain(Law):
     @cached_property
     def _error_of_atoms(self) -> float:
         """The sum of the errors of the laws, if all are made of isometries."""
-        return sum(float(_probe(law).error[0]) for law in self.factors())
+        return sum(float(law._probe.error[0]) for law in self.factors())
 
     @cached_property
     def _atomic_factors(self) -> int:
@@ -993,11 +965,7 @@ def _breakpoints_of_start(laws: Sequence[Law]) -> Floats:
 
 def knows_errors(law: Law) -> bool:
     """Whether the errors of conditional distributions are known, as one incoming angle shows."""
-    return not np.isnan(_probe(law).error).any()
-
-
-def _probe(law: Law) -> Conditionals:
-    return law.conditionals(PROBE, PROBE_TOLERANCE, 0)
+    return not np.isnan(law._probe.error).any()
 
 
 def _means_of(law: Law, given: Piecewise, theta: Floats) -> Floats:

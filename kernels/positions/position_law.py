@@ -32,7 +32,8 @@ from ..bases.measure import SINE
 from ..bases.polynomials import Legendre
 from ..discretisation.discretisation import discretise
 from ..distances.distances import flux_means
-from ..laws.law import Combination, Law, check_paper_frame, outcomes_of
+from ..laws.law import Combination, Law, check_paper_frame
+from ..laws.sums import outcomes_of
 
 PositionFunction = Callable[[Floats, Floats], Floats]
 

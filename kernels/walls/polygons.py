@@ -18,9 +18,9 @@ from ...geometry.cells.hollow_shape import HollowShape, distinct_hollows
 from ...geometry.polygons.beams import Beams, beams_of
 from ..bases.angles import MOST_BREAKPOINTS, clipped_inside, mirrored_angle, mixed_arccos, without_extremal
 from ..expectations.conditionals import Conditionals
-from ..laws.branches import merged
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, entries
+from ..laws.sums import merged
 from .conditionals import if_escaped, traced_reflection
 
 BEAM_TOLERANCE, MOST_BEAMS = 1e-13, 200_000

@@ -12,11 +12,11 @@ from ...core.rounding import EPS
 from ...kernels import Basis, CircularArcLaw, Law, Panels
 from ...kernels.bases.angles import cell_among
 from ...kernels.bases.assembly import is_mirror_symmetric, reflection_matrix
-from ...kernels.expectations.arcs import ArcMeans
 from ...kernels.expectations.conditionals import Means, functions_of, height_of, weighted_means
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.matrix_law import ENTRY_ROUNDING, MatrixLaw, uniform_on_bins
 from ...kernels.laws.structure import holds_of_all
+from ...kernels.walls.circular_arc import ArcMeans
 from ...kernels.walls.conditionals import MANY_SEGMENTS, WallConditionals, is_chaotic, is_few, traced_conditionals
 
 # Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays.

@@ -112,7 +112,11 @@ def grazing_limit(law: Law) -> GrazingLimit:
     >>> grazing_limit(ker.WallLaw(geo.dispersing_arcs(1e-9))).root
     0.0
     """
-    return _limit(law, Grazed())
+    try:
+        hash(law)
+    except TypeError:  # of a user's law with arrays
+        return _limit(law, Grazed())
+    return _limit_of_any(law)
 
 
 @dataclass(frozen=True)
@@ -122,6 +126,11 @@ class Grazed:
     parts: tuple[tuple[tuple[float, float], ...], ...] = (((0.0, 1.0),), ((0.0, 1.0),))
     flat: float = 0.0
     scale: float | None = None
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _limit_of_any(law: Law) -> GrazingLimit:
+    return _limit(law, Grazed())
 
 
 @grazing_limit.register(CircularArcLaw)

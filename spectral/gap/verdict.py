@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.estimates import Estimate, with_error
-from ..eigenvalues.spectra import EIGENVALUE, Spectrum, Verdict
+from ..eigenvalues.spectra import EIGENVALUE, Spectrum, Verdict, draw_eigenvalues
 from ..essential.edge import EssentialEdge
-from ..plotting import draw_eigenvalues
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -546,7 +546,7 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
 
     from .core.long_runs import progress_bar
     from .ledger import findings, selected
-    from .ledger.index import finding_as_dict, latex_of, table_of
+    from .ledger.entry import finding_as_dict, latex_of, table_of
 
     chosen = selected(ids)
     if as_latex:

@@ -18,8 +18,17 @@ from asperity.bench import problems as collision_quantities
 from asperity.bench import problems as uniform_disk
 from asperity.bench import standard_set
 from asperity.bench.problems import OWN_QUANTITIES, QUANTITIES, methods_of, problem_names
-from asperity.bench.quantities.laws import LAW_BASIS, eta_at, matrix_methods, resistance_of
-from asperity.bench.quantities.walls import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
+from asperity.bench.quantities import (
+    LAW_BASIS,
+    RANDOM_WALLS,
+    eta_at,
+    matrix_methods,
+    random_wall,
+    resistance_of,
+    scenes,
+    standard_names,
+    wall_of,
+)
 from asperity.bench.standard_set import (
     FINEST,
     QUICK,

@@ -167,17 +167,17 @@ def test_after_the_warm_up_a_study_compiles_nothing():
 
 
 def test_ctrl_c_during_a_late_compilation_is_not_lost():
-    from asperity.geometry.tracing.compiled.pieces import pointers
+    from asperity.geometry.scene.compiled import compiling
 
     class Interrupted:
         def compile(self, kinds):
             raise KeyboardInterrupt
 
-    late = pointers.Late(Interrupted())
+    late = compiling.Late(Interrupted())
     # compiled code gets 0 from this call, and goes on
     with pytest.raises(KeyboardInterrupt):
-        pointers.checked(lambda: late.load())
-    assert pointers.Late.failures == []
+        compiling.checked(lambda: late.load())
+    assert compiling.Late.failures == []
 
 
 def test_an_inner_function_is_refused_from_python_and_called_by_compiled_ones():

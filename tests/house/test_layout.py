@@ -52,10 +52,8 @@ FLOORS = [
     *("spectral.sweeps", "spectral.work_diagrams", "spectral"),
     # the ledger's index finds the files of its folders without naming them
     *("ledger", "ledger.plane", "ledger.disk", "ledger.proof"),
-    *("study", "bench.quantities", "bench", "explore"),
+    *("study", "bench", "explore"),
 ]
-# Pictures are drawn by the classes that they show, and asperity itself holds its front door.
-DRAWN_ANYWHERE = "spectral.plotting"
 COMPILED = ("compiled", "double_double")
 
 
@@ -103,9 +101,9 @@ def test_no_file_imports_itself_by_way_of_others():
 
 def test_imports_go_down():
     for name, targets in IMPORTS.items():
-        for target in targets & MODULES.keys() - {DRAWN_ANYWHERE}:
+        for target in targets & MODULES.keys():
             own, other = folder_of(name), folder_of(target)
-            if own and other and name != DRAWN_ANYWHERE:
+            if own and other:
                 assert FLOORS.index(other) <= FLOORS.index(own), f"{name} imports {target}, which lies above it"
 
 
@@ -122,7 +120,7 @@ def test_tests_lie_where_their_sources_lie():
     folders = {name.replace(".", "/") for name in FLOORS}
     tested = {str(path.parent.relative_to(TREE / "tests")) for path in (TREE / "tests").rglob("test_*.py")}
     assert tested - folders == {"front", "house", "properties"}
-    inside = {name for name in folders if set(name.split("/")) & {*COMPILED, "ledger", "quantities"} - {name}}
+    inside = {name for name in folders if set(name.split("/")) & {*COMPILED, "ledger"} - {name}}
     assert folders - tested - inside == set(ROOMS)
 
 

@@ -10,8 +10,8 @@ from campaigns.cases.equivalent_mutants import EQUIVALENT
 
 from asperity import InputError
 from asperity.ledger import by_reading, row
-from asperity.ledger import index as ledger
-from asperity.ledger.index import latex_of, page_of, table_of
+from asperity.ledger import entry as ledger
+from asperity.ledger.entry import latex_of, page_of, table_of
 from asperity.verification import Verdict, agreement
 from commands import run
 
@@ -136,7 +136,7 @@ def double(printed, corrected):
 )
 def test_a_row_is_as_stated_only_if_both_verdicts_are(entry, as_stated, monkeypatch):
     assert entry.run().as_stated is as_stated
-    monkeypatch.setattr("asperity.ledger.index.entries", lambda: (entry,))
+    monkeypatch.setattr("asperity.ledger.entry.entries", lambda: (entry,))
     result = run("verify")
     assert result.exit_code == (0 if as_stated else 1)
     assert ("NOT AS STATED" in result.stdout) is not as_stated

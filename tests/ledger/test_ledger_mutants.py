@@ -9,7 +9,7 @@ from campaigns.cases.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIB
 from campaigns.ledger_mutants import changes, in_place, judged, library, noticed
 
 from asperity.geometry.disk import disk, rolling
-from asperity.ledger import index as ledger
+from asperity.ledger import entry as ledger
 from asperity.ledger import row
 from asperity.verification import agreement
 

@@ -340,8 +340,8 @@ HOSTILE = (r"$\frac{$", "$x$ $", r"\$y$", "$$", "100 %_#^&~{}", "half a pair: \u
 def test_every_picture_shows_the_texts_of_users_letter_by_letter(teeth, text, tmp_path):
     from matplotlib.figure import Figure
 
-    from asperity.spectral.sweeps.extremum import draw_curves
     from asperity.spectral.sweeps.points import SweepRow
+    from asperity.spectral.sweeps.table import draw_curves
 
     wall = geo.Wall.from_vertices(teeth.wall.vertices, unit=text)
     points = [{f"b{text}": 0.1 * k, "wall": text} for k in range(3)]

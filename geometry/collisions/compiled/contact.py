@@ -36,11 +36,11 @@ from ...curves import columns as c
 from ...curves.arc import Arc
 from ...curves.bezier import Bezier
 from ...curves.columns import range_of
+from ...scene.compiled.compiling import compiled, inlined, inner
 from ...tracing.compiled.pieces.arcs import arc_form, arc_normal, end_excess
 from ...tracing.compiled.pieces.formulas import near_end
 from ...tracing.compiled.pieces.kinds import Arrival, Face, in_front_at
 from ...tracing.compiled.pieces.lines import line_at
-from ...tracing.compiled.pieces.options import compiled, inlined, inner
 from ...tracing.compiled.pieces.records import ARC, BEZIER, LINE, NO_PIECE, SIDE
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.double_double.numbers import extended

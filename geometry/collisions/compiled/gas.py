@@ -15,10 +15,8 @@ from numba import types
 
 from ....core.rounding import EPS
 from ...curves import columns as c
-from ...scene.compiled.tables import Table, named, reader_of
+from ...scene.compiled.compiling import Table, call_late, compiled, inlined, linked, named, reader_of
 from ...tables.compiled.flights import FLYING, frame, next_wall
-from ...tracing.compiled.pieces.options import compiled, inlined, linked
-from ...tracing.compiled.pieces.pointers import call_late
 from ...tracing.compiled.rays import ESCAPED
 from ...tracing.compiled.trigonometry import LAST_ANGLE
 

@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...curves import columns as c
+from ...scene.compiled.compiling import compiled, inlined, inner, is_raised
 from ...tracing.compiled.pieces.arcs import arc_form, arc_point
 from ...tracing.compiled.pieces.formulas import opening_at
 from ...tracing.compiled.pieces.lines import LEAST_FRACTION, line_at, line_point
-from ...tracing.compiled.pieces.options import compiled, inlined, inner
-from ...tracing.compiled.pieces.pointers import is_raised
 from ...tracing.compiled.pieces.records import ARC, BEZIER, NO_PIECE, SIDE
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from . import contact

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ....core.rounding import EPS
 from ...curves import columns as c
-from ...tracing.compiled.pieces.options import inlined
+from ...scene.compiled.compiling import inlined
 from . import graph_table as g
 
 # Limit on Newton steps for the parameter at an abscissa; a bisection would need 53.

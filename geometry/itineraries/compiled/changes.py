@@ -17,12 +17,9 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
-from ...curves.columns import LEFT, POINT_X, POINT_Y, RIGHT
-from ...scene.compiled.tables import ROW, named, reader_of
+from ...curves.columns import LEFT, POINT_X, POINT_Y, RIGHT, Struct
+from ...scene.compiled.compiling import ROW, call_late, compiled, inlined, linked, named, reader_of
 from ...scene.scene import Scene
-from ...scene.structs import Struct
-from ...tracing.compiled.pieces.options import compiled, inlined, linked
-from ...tracing.compiled.pieces.pointers import call_late
 from ...tracing.compiled.pieces.records import Rays, details_for, results_for
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, TRACE, details_at, rays_at
 

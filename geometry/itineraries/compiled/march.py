@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
-from ...curves.columns import LEFT, RIGHT, SIZE
-from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
-from ...scene.structs import Struct
-from ...tracing.compiled.pieces.options import compiled, linked
+from ...curves.columns import LEFT, RIGHT, SIZE, Struct
+from ...scene.compiled.compiling import ROW, Table, compiled, kind_of, linked, named, reader_of
 from ...tracing.compiled.rays import rays_at
 from . import changes
 from .changes import BLOCK, FIRST_LABEL, MOST_SAMPLES, Chain

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
-from ...tracing.compiled.pieces.options import compiled, linked
+from ...scene.compiled.compiling import compiled, linked
 from .changes import cell_of
 
 # Steps towards a crossing of an edge, and towards an extremum of the outgoing angle.

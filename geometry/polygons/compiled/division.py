@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
-from ...tracing.compiled.pieces.options import compiled, inlined
+from ...scene.compiled.compiling import compiled, inlined
 from ...tracing.compiled.trigonometry import PI
 from ...tracing.double_double.numbers import double_double
 from . import columns as c

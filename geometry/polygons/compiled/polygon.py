@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.compilation import jit
 from ....core.rounding import EPS
-from ...tracing.compiled.pieces.options import inlined
+from ...scene.compiled.compiling import inlined
 from ...tracing.compiled.trigonometry import PI, PI_REST
 from ...tracing.double_double.numbers import double_double, scaled
 from . import columns as c

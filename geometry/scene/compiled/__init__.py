@@ -1,1 +1,1 @@
-"""Tables and named tuples in compiled functions."""
+"""How functions are compiled that trace rays, and the tables that they read."""

@@ -14,8 +14,7 @@ import math
 
 import numpy as np
 
-from ...tracing.compiled.pieces.options import compiled, inlined, linked
-from ...tracing.compiled.pieces.pointers import is_raised
+from ...scene.compiled.compiling import compiled, inlined, is_raised, linked
 
 ESCAPED, GRAZING, BOUNCE_LIMIT = 0, 2, 3
 # Columns that a ray may cross, 10 ms of work. Level rays in a straight valley, and some grazing ones over slopes of

@@ -18,11 +18,25 @@ import numpy as np
 from numba import types
 
 from ...curves import columns as c
-from ...curves.columns import NEARBY_SLACKS
+from ...curves.columns import NEARBY_SLACKS, Struct
 from ...scene.closed_forms import BOXES, CONTENT, TREE_COLUMNS
-from ...scene.compiled.tables import ROW, Table, kind_of, named, reader_of
+from ...scene.compiled.compiling import (
+    ROW,
+    Late,
+    Table,
+    allocating,
+    call_late,
+    checked,
+    compiled,
+    inlined,
+    inner,
+    is_raised,
+    kind_of,
+    linked,
+    named,
+    reader_of,
+)
 from ...scene.scene import no_tables
-from ...scene.structs import Struct
 from ..double_double.numbers import extended
 from .pieces import arcs, beziers, records
 from .pieces.arcs import arc_form, arc_normal, on_smooth_end
@@ -40,8 +54,6 @@ from .pieces.kinds import (
     reflect,
 )
 from .pieces.lines import is_ahead, joint_side, line_at, line_hit
-from .pieces.options import allocating, compiled, inlined, inner, linked
-from .pieces.pointers import Late, call_late, checked, is_raised
 from .pieces.records import ARC, BEZIER, FIRST_CURVE, LINE, NO_DETAILS, NO_PIECE, NO_RAYS, OPENING, SIDE, Hit, Own, Rays
 from .runs import skip_chords, skip_crossings
 from .tree import NO_LINE_HIT, first_boxes, nearest_line_in_boxes, next_leaf, tree_of

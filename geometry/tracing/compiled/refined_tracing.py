@@ -27,6 +27,7 @@ import math
 import numpy as np
 
 from ...curves import columns as c
+from ...scene.compiled.compiling import compiled, linked
 from ..double_double.numbers import (
     LOCAL_ERROR,
     cross,
@@ -42,7 +43,6 @@ from .pieces import arcs
 from .pieces.formulas import TOP_CORNER, bounds_of, exit_time, mirror, opening_at, with_length_one
 from .pieces.kinds import Arrival, in_front_at, line_in_front_of_line, refined_face, refined_hit, refined_surface
 from .pieces.lines import line_ends, orientation
-from .pieces.options import compiled, linked
 from .pieces.records import ARC, BEZIER, FIRST_CURVE, LINE, NO_PIECE, OPENING, SIDE, Hit, RefinedScope, Sizes
 from .runs import LAST_REFINED_HITS, refined_crossings, skip_refined_chords
 

@@ -12,9 +12,9 @@ import math
 import numpy as np
 
 from ...curves import columns as c
+from ...scene.compiled.compiling import inlined, linked
 from ..double_double.numbers import cross, direction_angle, dot, extended, rounded, scaled, sine_cosine, two_sum
 from .pieces.arcs import arc_form, arc_normal, refined_form
-from .pieces.options import inlined, linked
 
 # Least number of hits in a run, which costs about one arctangent and three sines; not tuned.
 SHORTEST_RUN = 4.0

@@ -17,9 +17,9 @@ from numba.extending import intrinsic
 from ...curves import columns as c
 from ...curves.columns import NEARBY_SLACKS
 from ...scene.closed_forms import ANCHOR_X, ANCHOR_Y, BOXES, CONTENT, ESCAPE_ROOM, OTHER_X, OTHER_Y, PARENT
+from ...scene.compiled.compiling import inlined, inner
 from .pieces.formulas import side
 from .pieces.lines import is_ahead, joint_side, line_at, line_hit, line_sides
-from .pieces.options import inlined, inner
 from .pieces.records import Tree
 
 # No hit on a line, for `nearest_line`.

@@ -18,10 +18,10 @@ import numpy as np
 from ....core.rounding import EPS
 from ...curves import columns as c
 from ...curves.columns import NEARBY, NEARBY_SLACKS, TANGENT_ULPS
+from ...scene.compiled.compiling import inlined, inner, linked
 from ..double_double.numbers import where
 from . import work as w
 from .pieces import arcs, beziers, formulas, lines
-from .pieces.options import inlined, inner, linked
 from .pieces.records import ARC, LINE, Hit, Own
 from .rays import scope_of, skip_run
 from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine

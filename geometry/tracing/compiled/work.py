@@ -5,7 +5,7 @@ The columns have constant distances, so the compiler knows that they do not over
 
 from __future__ import annotations
 
-from .pieces.options import inlined
+from ...scene.compiled.compiling import inlined
 
 # Rays of a wave, and the distance of columns: not close to each other modulo 4 kB, where the processor takes a number
 # that it reads for one that it has just written.

@@ -18,7 +18,7 @@ from ..spectral import ReferenceValue, WorkMethod, WorkProblem
 from ..spectral.work_diagrams.problem import on_one_core
 from ..spectral.work_diagrams.report import WorkRow
 from ..spectral.work_diagrams.runs import measure, parts_of, solve_once
-from .quantities.laws import (
+from .quantities import (
     AUTO,
     DIFFUSE,
     DIFFUSIVITY,
@@ -34,8 +34,10 @@ from .quantities.laws import (
     Methods,
     Quantity,
     diffuse_methods,
+    scenes,
+    standard_names,
+    wall_of,
 )
-from .quantities.walls import scenes, standard_names, wall_of
 
 
 def _collision_methods(wall: geo.Wall) -> Methods:

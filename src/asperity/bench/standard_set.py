@@ -29,8 +29,7 @@ from ..spectral.bounds.images import is_traced
 from ..spectral.work_diagrams.problem import OrderVerdict
 from ..spectral.work_diagrams.report import WorkRow
 from .problems import measured, methods_of, prepare, value_of
-from .quantities.laws import AUTO, BEAMS, CLOSED_FORM, FLIGHTS, QMC, ROWS
-from .quantities.walls import scenes, wall_of
+from .quantities import AUTO, BEAMS, CLOSED_FORM, FLIGHTS, QMC, ROWS, scenes, wall_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

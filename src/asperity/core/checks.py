@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import numbers as kinds_of_numbers
 import os
 import re
@@ -139,6 +140,8 @@ def shaped(name: str, value: ArrayLike, *axes: int | str) -> Floats:
 
 def finite_number(name: str, value: Any) -> float:
     """Return ``value`` as a finite float."""
+    if type(value) is float and math.isfinite(value):
+        return value
     return one_number(name, finite_array(name, value))
 
 

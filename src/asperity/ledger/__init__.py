@@ -1,7 +1,6 @@
 """The ledger of formulas: its index, its text, and its entries on the plane, the disk and the proof."""
 
-from .entry import Entry, Finding, by_reading, row
-from .index import entries, findings, selected
+from .entry import Entry, Finding, by_reading, entries, findings, row, selected
 
 __all__ = [
     "Entry",

@@ -22,7 +22,7 @@ from ..spectral.bounds.enclosure import Enclosures
 from ..spectral.consequences.diffusion import Diffusivity, logarithmic_slope
 from ..spectral.consequences.mixing import relaxation_time, slem_from_gap
 from ..spectral.consequences.momentum_accommodation import WEIGHTS, Accommodation
-from ..spectral.plotting import CONVENTIONS
+from ..spectral.eigenvalues.spectra import CONVENTIONS
 
 
 @dataclass(frozen=True, repr=False)

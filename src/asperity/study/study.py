@@ -22,7 +22,7 @@ from ..core.estimates import NORMAL_95, Estimate, Summary
 from ..core.files import moved_when_complete
 from ..core.long_runs import progress_bar
 from ..geometry import Disk, Wall, trace
-from ..geometry.cells.miniature import wall_miniature
+from ..geometry.cells.output import wall_miniature
 from ..geometry.tracing.tracing import StatusCounts
 from ..kernels import Bins, CollisionLaw, FacetedLaw, KernelMatrix, Law, WallLaw, discretise
 from ..kernels.bases.measure import SINE

@@ -6,7 +6,7 @@ from campaigns.rays.amplified_collisions import WALLS
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry.collisions.amplification import fewest_contacts
+from asperity.geometry.collisions.rigid import fewest_contacts
 
 AMPLIFIED = geo.DiskStatus.AMPLIFIED
 

@@ -9,7 +9,7 @@ from campaigns.judges.differentiation import complex_steps
 from asperity import geometry as geo
 from asperity.geometry.disk import rolling
 from asperity.geometry.disk.rolling import SERIES_ANGLE
-from asperity.ledger import index as ledger
+from asperity.ledger import entry as ledger
 
 CHARTS = [geo.RollingCharts(2 * np.pi / 40), geo.RollingCharts(2 * np.pi / 9000, scale=1e-8)]
 IN_UNITS = pytest.mark.parametrize("charts", CHARTS, ids=["unzoomed", "zoomed"])

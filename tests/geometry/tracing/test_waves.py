@@ -10,10 +10,10 @@ from llvmlite import binding
 from numba import njit, types
 
 from asperity import geometry as geo
+from asperity.geometry.scene.compiled.compiling import Late
 from asperity.geometry.tracing import tracing
 from asperity.geometry.tracing.compiled import blocks, waves
 from asperity.geometry.tracing.compiled.pieces import lines
-from asperity.geometry.tracing.compiled.pieces.pointers import Late
 from asperity.geometry.tracing.compiled.trigonometry import mirrored
 from asperity.geometry.tracing.threads import new_flag
 

@@ -6,7 +6,7 @@ from campaigns.cases.random_curved_walls import random_curved_wall
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.bench.quantities.walls import wall_of
+from asperity.bench.quantities import wall_of
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import FIRST_RAYS, traced_matrix
 from asperity.kernels.sampling.sobol import SobolSampler

@@ -19,10 +19,9 @@ from asperity import kernels as ker
 from asperity.estimates import Estimate
 from asperity.kernels.distances import conditional as distributions
 from asperity.kernels.distances import joint as joint_distance
-from asperity.kernels.distances.cell_transport import DIAGONAL, Cells, transport_bounds
+from asperity.kernels.distances.cell_transport import DIAGONAL, Cells, flow_cost, potential_value, transport_bounds
 from asperity.kernels.distances.conditional import ConditionalDistance, cells_and_atoms, terms_of
 from asperity.kernels.distances.distances import Distance, flux_means
-from asperity.kernels.distances.flows import flow_cost, potential_value
 from asperity.kernels.distances.transport import absolute_area, grid_wasserstein, wasserstein
 from asperity.kernels.expectations.conditionals import Distributions
 from asperity.kernels.laws.law import DrivenLaw

@@ -170,7 +170,7 @@ MOST_VALUES, MOST_BRANCHES, LONGEST = 10**6, 16, 20.0
 @pytest.mark.parametrize("exponents", [(2, 3), (2**31 - 1,)], ids=str)
 def test_powers_end_soon_or_are_refused(law, exponents, monkeypatch):
     monkeypatch.setattr("asperity.kernels.laws.law.MOST_VALUES", MOST_VALUES)
-    monkeypatch.setattr("asperity.kernels.laws.branches.MOST_BRANCHES", MOST_BRANCHES)
+    monkeypatch.setattr("asperity.kernels.laws.sums.MOST_BRANCHES", MOST_BRANCHES)
     for exponent in exponents:
         law = law**exponent
     for name, method in METHODS.items():

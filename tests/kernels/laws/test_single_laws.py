@@ -14,7 +14,7 @@ from asperity import kernels as ker
 from asperity.errors import AccuracyError, InputError
 from asperity.estimates import Estimate
 from asperity.kernels.bases.polynomials import Directions
-from asperity.kernels.laws.phase_function import HenyeyGreensteinLaw
+from asperity.kernels.laws.density import HenyeyGreensteinLaw
 
 THETA = np.array([1e-12, 1e-4, 0.2, 0.9, math.pi / 2, 2.2, 3.0, math.pi - 1e-4, math.pi - 1e-12])
 EXACT = Estimate(0.0, 0.0, "bound", "given")

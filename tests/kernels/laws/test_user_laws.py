@@ -13,6 +13,8 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
+from asperity.kernels.laws.law import knows_errors
+from asperity.spectral.essential.grazing import grazing_limit
 
 THETA = np.array([0.4, 1.3, 2.6])
 
@@ -410,3 +412,24 @@ def test_atoms_average_any_function_exactly():
 def test_the_campaign_draws_laws_that_are_broken_on_purpose():
     kinds = {own_laws.draw(number).kind for number in range(200)}
     assert kinds == set(own_laws.KINDS) and any(own_laws.draw(number).broken for number in range(10))
+
+
+@dataclass(frozen=True)
+class Noted(OwnLaw):
+    note: Any = ()
+
+
+@pytest.mark.parametrize("note", [(), []], ids=["with a hash", "without"])
+def test_what_is_known_of_a_law_is_asked_once(note):
+    asked = []
+
+    def distribution(theta, *_):
+        asked.append(theta.size)
+        return ker.Conditionals.of_atoms((np.pi - theta)[:, None], np.ones((theta.size, 1)), 0.0)
+
+    law = Noted(distribution=distribution, note=note)
+    assert knows_errors(law) and knows_errors(law) and len(asked) == 1
+    first, number = grazing_limit(law), len(asked)
+    assert np.array_equal(grazing_limit(law).matrix, first.matrix)
+    # without a hash nothing tells that the law is the same
+    assert (len(asked) == number) == (note == ())

@@ -7,11 +7,10 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.itineraries.compiled.patches import Cells, Grid, masses_of_patches, masses_of_rows, room_for
 from asperity.geometry.itineraries.hollow import Pieces
-from asperity.geometry.itineraries.patches import common_pieces, interpolation, positions
 from asperity.kernels.bases.measure import SINE
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import traced_matrix
-from asperity.kernels.walls.cell_masses import _PLACES, _WEIGHTS
+from asperity.kernels.walls.cell_masses import _PLACES, _WEIGHTS, common_pieces, interpolation, positions
 
 # Laws with an exact matrix; the walls are traced nevertheless.
 WALLS = {

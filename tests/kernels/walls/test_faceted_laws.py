@@ -9,8 +9,8 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import AccuracyError, InputError
-from asperity.geometry.tracing.facet_rays import follow_facets
 from asperity.kernels.discretisation.radiosity import has_radiosity
+from asperity.kernels.walls.faceted_law import follow_facets
 from wall_shapes import CLOSED
 
 ARCS, TEETH, RIGHT = geo.focusing_arcs(1.0), geo.triangular_teeth(0.9), geo.triangular_teeth(np.pi / 2.0)

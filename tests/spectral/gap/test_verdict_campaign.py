@@ -14,7 +14,7 @@ from asperity.errors import AccuracyError
 from asperity.kernels.laws.law import Composition
 from asperity.spectral.bounds.contraction import self_adjoint_elsewhere
 from asperity.spectral.eigenvalues.spectra import matrix_spectrum
-from asperity.spectral.essential.straight_pieces import straight_part
+from asperity.spectral.essential.edge import straight_part
 from asperity.spectral.gap.refinement import Refinement
 from commands import run
 

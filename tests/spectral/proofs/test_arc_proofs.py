@@ -12,7 +12,8 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import ProofError
-from asperity.spectral.proofs import checker, search
+from asperity.spectral.proofs import checker
+from asperity.spectral.proofs import proof as search
 from asperity.spectral.proofs.checker import FocusingArcs, Pieces, Refused, arb, ball, ctx, exact
 
 EDGES, POWERS = ["0.4", "1.1"], [["0.3", "1.0"], ["-0.2", "0.5", "2.0"], ["1.0", "-0.7"]]

@@ -16,7 +16,8 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError, ProofError
 from asperity.estimates import Estimate
-from asperity.spectral.proofs import checker, search
+from asperity.spectral.proofs import checker
+from asperity.spectral.proofs import proof as search
 from asperity.spectral.proofs.checker import Bumps, Refused, Trial, acb, arb, exact
 
 CHECKER = Path(checker.__file__)

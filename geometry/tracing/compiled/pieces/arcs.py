@@ -21,6 +21,7 @@ from .....core.rounding import EPS
 from ....curves import columns as c
 from ....curves.arc import Arc
 from ....curves.columns import NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
+from ....scene.compiled.compiling import call_late, inlined, inner, linked, linked_allocating
 from ...double_double.numbers import (
     LOCAL_ERROR,
     cross,
@@ -35,8 +36,6 @@ from ...double_double.numbers import (
     where,
 )
 from .formulas import curve_ends, near_end
-from .options import inlined, inner, linked, linked_allocating
-from .pointers import call_late
 from .records import ARC
 
 # Of this type, because numba compiles a function again for a literal argument.

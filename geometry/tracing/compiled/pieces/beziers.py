@@ -20,6 +20,7 @@ from .....core.rounding import EPS
 from ....curves import columns as c
 from ....curves.bezier import Bezier
 from ....curves.columns import JOINT_ULPS, NEARBY, NEARBY_MARGIN, SMOOTH_JOINT, TANGENT_ULPS
+from ....scene.compiled.compiling import call_late, inlined, inner, linked, linked_allocating
 from ...double_double.numbers import (
     DOUBLE_DOUBLE,
     LOCAL_ERROR,
@@ -34,8 +35,6 @@ from ...double_double.numbers import (
     where,
 )
 from .formulas import curve_ends, near_end, side
-from .options import inlined, inner, linked, linked_allocating
-from .pointers import call_late
 from .records import BEZIER
 
 ROOT_STEPS = 80

@@ -8,8 +8,8 @@ from .....core.rounding import EPS
 from ....curves import columns as c
 from ....curves.columns import JOINT_ULPS
 from ....curves.curve import Curve
+from ....scene.compiled.compiling import inlined, linked
 from ...double_double.numbers import dot, rounded, scaled, where
-from .options import inlined, linked
 from .records import NO_PIECE, OPENING, SIDE
 
 # In place of a hollow's number: a flat top, and a corner at an end of an opening.

@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .....core.checks import Floats
+from ....scene.compiled.compiling import inlined, inner, linked, linked_allocating
 from ...double_double.numbers import DoubleDouble, extended
 from . import arcs, beziers, lines
 from .beziers import STEPS
 from .formulas import mirror
 from .lines import height_over_line, line_ends
-from .options import inlined, inner, linked, linked_allocating
 from .records import FIRST_CURVE, NO_PIECE, OPENING, Hit
 
 # Curves in the order of their tables, and all kinds.

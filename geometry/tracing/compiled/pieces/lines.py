@@ -15,9 +15,9 @@ from .....core.compilation import jit
 from .....core.rounding import EPS, UNIT_ROUNDOFF
 from ....curves import columns as c
 from ....curves.columns import NEARBY_SLACKS
+from ....scene.compiled.compiling import inlined, linked, linked_allocating
 from ...double_double.numbers import dot, root, two_product, two_sum, where
 from .formulas import side
-from .options import inlined, linked, linked_allocating
 from .records import LINE
 
 # Least absolute value of a fraction from a line's end, so that it is negative even if the ray meets that end.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .....core.checks import Floats
 from ....curves.arc import Arc
 from ....curves.bezier import Bezier
-from ....scene.structs import Struct
+from ....curves.columns import Struct
 
 # Kinds of obstacles; OPENING is the opening of the hollow, SIDE a side of an open wall. That of a curve is FIRST_CURVE
 # plus its table.

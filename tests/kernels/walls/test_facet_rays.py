@@ -5,9 +5,9 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry.tracing import facet_rays
-from asperity.geometry.tracing.facet_rays import FacetRays, follow_facets
 from asperity.geometry.tracing.tracing import Status
+from asperity.kernels.walls import faceted_law
+from asperity.kernels.walls.faceted_law import FacetRays, follow_facets
 from conftest import made
 from wall_shapes import CLOSED, OPEN
 
@@ -25,7 +25,7 @@ def rays_over(wall: geo.Wall, number: int = RAYS) -> tuple[np.ndarray, np.ndarra
 def test_facets_that_are_mirrors_reflect_as_the_wall_does_and_retroreflectors_send_back(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(facet_rays, "MOST_HITS", 30)
+    monkeypatch.setattr(faceted_law, "MOST_HITS", 30)
     wall = made((CLOSED | OPEN)[name])
     x, theta = rays_over(wall)
     rays = geo.trace(wall, x, theta)
@@ -53,7 +53,7 @@ def test_a_ray_does_not_depend_on_the_threads() -> None:
 
 
 def test_rays_that_stay_longer_than_the_limit_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(facet_rays, "MOST_HITS", 2)
+    monkeypatch.setattr(faceted_law, "MOST_HITS", 2)
     wall = geo.triangular_teeth(0.3)
     x, theta = rays_over(wall)
     outgoing, hits, status = follow_facets(wall, x, theta, lambda angle, _: np.pi - angle)

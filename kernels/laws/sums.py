@@ -1,24 +1,76 @@
-"""Finite lists of branches: merging equal branches, composing laws, and the breakpoints of compositions."""
+"""Weighted sums: weights that sum to 1, draws of their terms, and lists of branches, merged and composed.
+
+The terms are laws of any kind: of angles, of directions, or of velocities.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...core.checks import Floats
+from ...core.checks import Floats, numbers
+from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside, edges_inside
 
+# Decimal weights such as 0.1, ..., 0.4 sum to 1 within a few roundings; a sum with a forgotten term differs by more.
+WEIGHT_TOLERANCE = 1e-12
 # Angles of the same isometry computed by different formulas differ by a few roundings of numbers up to 2 pi.
 SAME_ANGLE = 16.0 * EPS
 # Merging compares all pairs, and the number of branches of a composition grows exponentially unless they merge.
 MOST_BRANCHES = 64
 
+T = TypeVar("T")
 # Probabilities and outgoing angles, shape theta.shape + (branches,); None if there are no branches, or too many.
 Branches = Callable[[Floats], "tuple[Floats, Floats] | None"]
+
+
+def as_weight(weight: object) -> float | None:
+    """The factor of a law as a float; None for what is no number, with which Python raises a TypeError."""
+    is_number = isinstance(weight, (int, float, np.integer, np.floating)) and not isinstance(weight, bool)
+    return float(numbers("weight", weight)) if is_number else None  # type: ignore[arg-type]
+
+
+def total_weight(terms: Sequence[tuple[float, object]]) -> float:
+    """The sum of the weights of terms."""
+    return math.fsum(weight for weight, _ in terms)
+
+
+def used_terms(terms: Sequence[tuple[float, T]], whole: object) -> tuple[tuple[float, T], ...]:
+    """The terms with a positive weight; raises InputError if one is negative or the sum is not 1 within 1e-12."""
+    for index, (weight, law) in enumerate(terms):
+        if weight < 0.0:
+            raise InputError(f"weights: expected non-negative ones, got {weight!r} for term {index}, {law!r}")
+    total = total_weight(terms)
+    if abs(total - 1.0) > WEIGHT_TOLERANCE:
+        raise InputError(
+            f"weights: expected a sum of 1, got {total!r} for {whole!r}; scale the weights or add the missing law"
+        )
+    return tuple(term for term in terms if term[0])
+
+
+def drawn_terms(
+    terms: Sequence[tuple[float, object]], shape: tuple[int, ...], rng: np.random.Generator
+) -> NDArray[np.intp]:
+    """Indices of terms, each drawn with the probability that is its weight."""
+    cumulative = np.cumsum([weight for weight, _ in terms])
+    choice = np.searchsorted(cumulative, rng.random(shape) * cumulative[-1], side="right")
+    return np.asarray(np.minimum(choice, len(terms) - 1))
+
+
+def outcomes_of(laws: Sequence[Any], choice: NDArray[np.intp], incoming: Floats, rng: np.random.Generator) -> Floats:
+    """Draw what becomes of incoming angles or velocities, each by the law that is chosen for it."""
+    outgoing = np.empty(incoming.shape)
+    for index, law in enumerate(laws):
+        chosen = choice == index
+        if chosen.any():
+            outgoing[chosen] = law.sample(incoming[chosen], rng)
+    return outgoing
 
 
 def joined(parts: Sequence[tuple[Floats, float]]) -> tuple[Floats, float]:

@@ -1,20 +1,25 @@
-"""Walls as TOML files: written exactly, read with an error that names the file and the key."""
+"""Walls outside of the package: TOML files, written exactly and read with errors that name file and key, and pictures.
+
+The pictures are small, for notebooks, and drawn without a plotting library.
+"""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
+from ...core.checks import Floats
 from ...core.errors import InputError
 from ...core.files import ending_in, text_of, write_whole
 from ...core.long_runs import counted
-from ..curves.curve import Curve
-from ..curves.reading import Table, check_keys, number_of, points_of, tables_of
+from ..curves.curve import Curve, Table, check_keys, number_of, points_of, tables_of
 from .cell import Cell
 
 FORMAT = "asperity wall 1"
@@ -91,3 +96,37 @@ def _pieces(name: str, value: Any) -> list[Curve]:
         except InputError as reason:
             raise type(reason)(f"{name}[{i}]: {reason}") from reason
     return pieces
+
+
+# Pixels; curves and long polygons are drawn to a quarter of one.
+WIDTH, MOST_HEIGHT, LEAST_HEIGHT, MARGIN, ACCURACY = 280.0, 160.0, 40.0, 4.0, 0.25
+
+
+def wall_miniature(wall: Cell) -> str:
+    """One period as SVG, its solid in grey; shallow walls are stretched to a visible height, deep ones compressed."""
+    paths = [_points(path, wall.period) for path in (wall.pieces, *wall.islands)]
+    low, high = np.min([p.min(axis=0) for p in paths], axis=0), np.max([p.max(axis=0) for p in paths], axis=0)
+    across = WIDTH / (high[0] - low[0])
+    down = float(np.clip(across * (high[1] - low[1]), LEAST_HEIGHT, MOST_HEIGHT))
+    scale = np.array([across, -down / (high[1] - low[1]) if high[1] > low[1] else -1.0])
+    drawn = [(p - (low[0], high[1])) * scale + MARGIN for p in paths]
+    bottom = down + 4.0 * MARGIN
+    closed = [np.concatenate([drawn[0], [(drawn[0][-1, 0], bottom), (drawn[0][0, 0], bottom)]]), *drawn[1:]]
+    shapes = "".join(f'<path d="{_path(points)}Z" fill="#ddd"/>' for points in closed)
+    lines = "".join(f'<path d="{_path(points)}" fill="none" stroke="#444"/>' for points in drawn)
+    size = f'width="{WIDTH + 2 * MARGIN:g}" height="{bottom:g}"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size} style="display:block">{shapes}{lines}</svg>'
+
+
+def _points(path: Sequence[Curve], period: float) -> Floats:
+    """The path as a polyline with no more points than can be seen."""
+    from shapely import LineString, get_coordinates
+
+    seen = ACCURACY * period / WIDTH
+    chunks = [piece.flattened(seen) for piece in path]
+    line = LineString(np.concatenate([*(chunk[:-1] for chunk in chunks), chunks[-1][-1:]]))
+    return np.asarray(get_coordinates(line.simplify(seen, preserve_topology=False)))
+
+
+def _path(points: Floats) -> str:
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points.tolist())

@@ -1,1 +1,0 @@
-"""The quantities and walls of the standard set."""
