@@ -33,7 +33,7 @@ WALLS, KINDS = 200, 8
 # Tolerances with their time limits; those of every eighth wall, the second of them the judge's; time limit of the rays
 # that judge, and the seconds by which gaps are counted.
 LIMITS, FINE, EVERY = {1e-3: 10.0, 1e-4: 10.0}, {1e-6: 60.0, 1e-7: 60.0}, 8
-RAYS_LIMIT, STEPS = 4.0, (1, 2, 4, 15, 60, 120)
+RAYS_LIMIT, STEPS = 2.0, (1, 2, 4, 15, 60, 120)
 # Bins of the second judge, and rays from each.
 BINS, RAYS_OF_BIN = 400, 1024
 PROFILE = geo.HeightCorrelation(0.2)
@@ -111,13 +111,15 @@ def reach_in_bins(wall: geo.Wall, mirrored: bool, modulus: bool) -> float:
     out = np.where(lost, theta, np.pi - out if mirrored else out)
     column = np.clip(np.searchsorted(edges, out) - 1, 0, BINS - 1)
     root = np.sqrt(mass)
+    # functions are 0 where the textbook loses rays
+    known = ~np.isin(np.arange(BINS), row[lost])
 
     def matrix(part: NDArray[np.intp]) -> Floats:
         hits = np.zeros((BINS, BINS))
-        # a ray that is lost counts as little as any can
-        np.add.at(hits, (row[part], column[part]), np.where(lost[part], -1.0, 1.0))
+        np.add.at(hits, (row[part], column[part]), 1.0)
         flux = (hits + hits.T) / (part.size / BINS) / (1.0 / mass[:, None] + 1.0 / mass)
-        return flux / np.outer(root, root) - np.outer(root, root)
+        whole = flux / np.outer(root, root) - np.outer(root, root)
+        return np.where(known[:, None] & known, whole, 0.0)
 
     first, *others = (matrix(part) for part in _parts(row.size))
     values, vectors = np.linalg.eigh(first)

@@ -43,7 +43,7 @@ NARROWEST, MOST_PANELS = 1e-5, 120
 # Fractions of the rays that begin by the modulus of the eigenfunction, by the invariant measure, and by panels.
 SHARES = 0.65, 0.2, 0.15
 # Points of each of the sequences of the first level, twice as many on every next one; nominal seconds of a ray.
-FIRST_POINTS, RAY_TIME = 2**13, 1e-6
+FIRST_POINTS, RAY_TIME = 2**13, 7e-7
 # From so many points of a sequence on panels are divided only if what they do not resolve is more than the noise.
 MANY_POINTS = 2**17
 # Panels are divided until the rest of the effect on the eigenvalue is this fraction of its error.
@@ -81,10 +81,11 @@ def values_by_rays(law: Law) -> tuple[Floats, Floats]:
 
 
 class Top(NamedTuple):
-    """The eigenvalue of highest rank off the constants with its error, and what the panels reach of it."""
+    """The eigenvalue of highest rank off the constants with its error, and the interval that panels reach of it."""
 
     value: float
     error: float
+    least: float
     reached: float
     panels: int
     rays: int
@@ -310,8 +311,8 @@ class _Level:
         raised = max(float(self.values[0]) - mean, 0.0)
         lost = 2.0 * self.rays.unresolved * float(np.max(self.vectors[:, 0] ** 2)) + 2.0 * missed_fraction(number)
         error = self.noise + raised / 3.0 + self.unseen + lost
-        value, reached = mean + 2.0 / 3.0 * raised + 0.5 * self.unseen, mean + raised + self.noise
-        return Top(value, error, reached, len(self.rays.share), number)
+        value = mean + 2.0 / 3.0 * raised + 0.5 * self.unseen
+        return Top(value, error, mean - self.noise, mean + raised + self.noise, len(self.rays.share), number)
 
     def divided(self) -> Floats:
         """More edges: the middles of the panels with the largest effects, until the rest is a fraction of the error."""

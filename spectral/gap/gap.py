@@ -409,21 +409,30 @@ def gap_by_rays(
     above, below = values_by_rays(law)
     shown = max([0.0, *above[:1], *(below[:1] if rank is np.abs else ())])
     tops: list[Top] = []
-    best: Top | None = None
+    best: SpectralGap | None = None
+    how = "quotients of an eigenfunction by rays from panels; sampling error + error of the eigenfunction"
     for top in tops_by_rays(law, rng, seconds, edge.high, rank):
         tops.append(top)
-        if top.rays >= AT_EDGE and max(top.reached, shown) < edge.low:
-            least = f"{top.reached:.6g} is the largest by {top.rays} rays"
-            evidence = (*map(str, tops), f"no eigenvalue beyond the edge {edge.value:.8g}: {least}")
-            return gap_between(0.0, 0.0, edge, OF_EDGE, evidence, law.frame)
-        if top.value + top.error >= shown and (best is None or top.error < best.error):
-            best = top
-            if best.error <= tolerance:
-                break
-    how = "quotients of an eigenfunction by rays from panels; sampling error + error of the eigenfunction"
-    evidence = (*map(str, tops), f"rays show an eigenvalue of at least {shown:.3g}")
-    low, high = (shown, 1.0) if best is None else (best.value - best.error, min(best.value + best.error, 1.0))
-    return gap_between(low, high, edge, how, evidence, law.frame)
+        at_edge = edge.low > 0.0 and max(top.least, shown) <= edge.high
+        if best is not None and best.verdict == "essential edge" and not at_edge:
+            best = None
+        if at_edge and top.rays >= AT_EDGE:
+            # no panel shows an eigenvalue beyond the edge, but for noise
+            least = f"no eigenvalue beyond the edge {edge.value:.8g}: {top.reached:.6g} is the largest by rays"
+            found = gap_between(0.0, top.reached, edge, OF_EDGE, (least,), law.frame)
+            found = replace(found, verdict="essential edge" if edge.high < 1.0 else "undecided")
+        elif not at_edge and top.value + top.error >= shown:
+            found = gap_between(top.value - top.error, min(top.value + top.error, 1.0), edge, how, (), law.frame)
+        else:
+            continue
+        best = found if best is None or found.error < best.error else best
+        if best.error <= max(tolerance, edge.error * (best.verdict == "essential edge")):
+            break
+    best = gap_between(shown, 1.0, edge, how, (), law.frame) if best is None else best
+    evidence = (*map(str, tops), f"rays show an eigenvalue of at least {shown:.3g}", *best.evidence)
+    if best.verdict == "undecided":
+        evidence = (*evidence, "the panels do not resolve the function that reaches the largest value")
+    return replace(best, evidence=evidence)
 
 
 def _by_polynomials(
