@@ -53,7 +53,7 @@ POINTS_AT_ONCE = 2**14
 # Eigenfunctions that the panels follow on levels of few points; then that of the highest rank.
 FOLLOWED, FEW_POINTS = 3, 2**15
 # Earlier levels whose spread counts in the sampling error.
-POOLED = 3
+POOLED = 2
 # Levels that show the largest values of a law, number of these values, and margin in standard errors.
 SHOWING, LARGEST, SIGMAS = 3, 6, 6.0
 
@@ -89,6 +89,11 @@ class Top(NamedTuple):
     reached: float
     panels: int
     rays: int
+
+    @property
+    def centre(self) -> float:
+        """The middle of what panels reach."""
+        return 0.5 * (self.least + self.reached)
 
     def __str__(self) -> str:
         return f"{with_error(self.value, self.error)} by {self.rays} rays on {self.panels} panels of degree {DEGREE}"

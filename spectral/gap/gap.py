@@ -412,6 +412,8 @@ def gap_by_rays(
     best: SpectralGap | None = None
     how = "quotients of an eigenfunction by rays from panels; sampling error + error of the eigenfunction"
     for top in tops_by_rays(law, rng, seconds, edge.high, rank):
+        # finer panels reach more
+        growth = max(top.centre - tops[-1].centre, 0.0) if tops else np.inf
         tops.append(top)
         at_edge = edge.low > 0.0 and max(top.least, shown) <= edge.high
         if best is not None and best.verdict == "essential edge" and not at_edge:
@@ -419,7 +421,7 @@ def gap_by_rays(
         if at_edge and top.rays >= AT_EDGE:
             # no panel shows an eigenvalue beyond the edge, but for noise
             least = f"no eigenvalue beyond the edge {edge.value:.8g}: {top.reached:.6g} is the largest by rays"
-            found = gap_between(0.0, top.reached, edge, OF_EDGE, (least,), law.frame)
+            found = gap_between(0.0, min(top.reached + growth, 1.0), edge, OF_EDGE, (least,), law.frame)
             found = replace(found, verdict="essential edge" if edge.high < 1.0 else "undecided")
         elif not at_edge and top.value + top.error >= shown:
             found = gap_between(top.value - top.error, min(top.value + top.error, 1.0), edge, how, (), law.frame)
