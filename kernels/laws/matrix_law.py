@@ -294,6 +294,13 @@ def check_law(name: str, value: object, expected: str, *others: type) -> None:
     """Refuse what is neither a law nor of one of the other kinds, with what makes a law of it."""
     if not isinstance(value, (Law, *others)):
         raise InputError(f"{name}: expected {expected}, got {given(value, Law)}")
+    try:
+        hash(value if isinstance(value, Law) else name)
+    except TypeError as reason:
+        raise InputError(
+            f"{name}: expected a law that can be hashed, because what is computed of it is remembered, got one of the "
+            f"class {type(value).__name__}; write @dataclass(frozen=True), with eq=False where a field is an array"
+        ) from reason
 
 
 def _bin_edges(basis: Basis, size: int) -> Floats:

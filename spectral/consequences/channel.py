@@ -19,7 +19,6 @@ from ...core.checks import (
     finite_array,
     frozen,
     generator,
-    instance,
     number_between,
     shortened,
     whole_number,
@@ -32,6 +31,7 @@ from ...kernels.bases.angles import joined_lists
 from ...kernels.bases.measure import SINE
 from ...kernels.hemisphere.hemisphere_law import DirectionLaw
 from ...kernels.laws.law import in_frame
+from ...kernels.laws.matrix_law import check_law
 from ...kernels.laws.structure import holds_of_all
 
 Arrangement = Literal["mirror", "half-turn"]
@@ -187,7 +187,7 @@ def simulated_times(
 
 def in_paper_frame(law: Law) -> Law:
     """The law in the paper's convention; an InputError if it is no law."""
-    instance("law", law, Law, "ker.WallLaw(wall)")
+    check_law("law", law, "a Law such as ker.WallLaw(wall)")
     return in_frame(law, "paper")
 
 
@@ -196,7 +196,7 @@ def laws_of_walls(law: Law, other: Law | None) -> tuple[Law, ...]:
     paper = in_paper_frame(law)
     if other is None:
         return (paper,)
-    instance("other", other, Law, "ker.WallLaw(wall)")
+    check_law("other", other, "a Law in the plane such as ker.WallLaw(wall), as the first is")
     if other.frame != law.frame:
         raise InputError(
             f"other: expected a law in the convention of the first, {law!r}, got {other!r}; call in_specular_frame() "

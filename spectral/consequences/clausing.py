@@ -214,7 +214,7 @@ def _laws_of_walls(law: Law | DirectionLaw, other: Law | DirectionLaw | None, se
     if isinstance(law, DirectionLaw):
         if other is None:
             return (law,)
-        instance("other", other, DirectionLaw, "ker.HemisphereLaw(law)")
+        instance("other", other, DirectionLaw, "ker.HemisphereLaw(law), in space as the first is")
         return tuple(dict.fromkeys((law, other)))
     second: Any = other
     return laws_of_walls(law, second)

@@ -280,6 +280,8 @@ POINTS, FINE_POINTS, HALVINGS = 256, 2048, 24
 ANGLES, LAYERS, MOST_NODES = 96, 6, 60
 # Search near the largest values: peaks, levels, levels with all entry points, angles per peak, ratio of spacings.
 PEAKS, LEVELS, FINE_LEVELS, NEARBY_ANGLES, NEARER = 4, 5, 2, 9, 6.0
+# Least and largest angle of an orbit.
+LIMITS = 1e-6, np.pi - 1e-6
 # Error as a multiple of the change by the last level plus the last layer.
 BEYOND = 2.0
 CHANGE_WIDTH = 1e-9
@@ -377,21 +379,46 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
         # more straight rays would be a smaller fraction than the entry points resolve
         return StraightPart(fraction, flat, min(flat + 2.0 / POINTS, 1.0))
     spacing, best = np.pi / ANGLES, found
-    candidates, values = angle, found.roots
+    candidates, values, axes = angle, found.roots, _axes(law, angle)
     for level in range(LEVELS):
-        peaks = candidates[np.argsort(-values)[: PEAKS if level == 0 else 2]]
+        peaks = _peaks(candidates, values, PEAKS if level == 0 else 2, 1.5 * spacing)
         spacing /= NEARER
         steps = spacing * np.linspace(-NEARER, NEARER, NEARBY_ANGLES)
-        candidates = np.unique(np.clip((peaks[:, None] + steps).ravel(), 1e-6, np.pi - 1e-6))
+        candidates = np.append((peaks[:, None] + steps).ravel(), axes)
+        candidates = np.unique(np.clip(candidates, *LIMITS))
         fine = level >= LEVELS - FINE_LEVELS
         before, best = best, _largest_of_orbits(law, candidates, FINE_POINTS if fine else POINTS, bar, fine)
         values = best.roots
+        axes = _peaks(axes, values[np.searchsorted(candidates, np.clip(axes, *LIMITS))], PEAKS, 0.0)
     low = max(float(best.roots.max()), fraction, flat)
     change = abs(float(best.roots.max()) - float(before.roots.max()))
     high = low + BEYOND * (change + float(best.missing[np.argmax(best.roots)])) + CHANGE_WIDTH
     return StraightPart(
         fraction, low - CHANGE_WIDTH, float(min(high, max(found.fractions.max() + 2.0 / POINTS, low), 1.0))
     )
+
+
+def _axes(law: WallLaw, starts: Floats) -> Floats:
+    """Angles that an isometry c - theta keeps: c/2, where rays hit a straight piece at right angles, and others found.
+
+    There an orbit and its mirror image meet, so that the largest eigenvalue has a cusp.
+    """
+    pieces = [piece for loop in (law.wall.pieces, *law.wall.islands) for piece in loop]
+    sides = [np.subtract(piece.end, piece.start) for piece in pieces if piece.is_straight]
+    normals = [float(np.mod(np.arctan2(y, x) + 0.5 * np.pi, np.pi)) for x, y in sides]
+    reached = _conditionals(law, [(_node(theta), float(theta)) for theta in starts], POINTS, False)
+    halves = np.concatenate([0.5 * (theta + np.unique(reached[_node(theta)][1])) for theta in starts])
+    _, first, count = np.unique(np.rint(halves / SAME_NODE), return_index=True, return_counts=True)
+    return np.append(halves[first[count > 1]], normals)
+
+
+def _peaks(candidates: Floats, values: Floats, number: int, apart: float) -> Floats:
+    """The angles of the largest values, no two of them closer than ``apart``."""
+    chosen: list[float] = []
+    for angle in candidates[np.argsort(-values, kind="stable")].tolist():
+        if len(chosen) < number and all(abs(angle - other) > apart for other in chosen):
+            chosen.append(angle)
+    return np.array(chosen)
 
 
 class _Orbits(NamedTuple):

@@ -166,6 +166,7 @@ REMEDIES = {
 }  # fmt: skip
 # Advice that names no call to be run as it stands, or that other tests run.
 EXPLAINED = {
+    "write @dataclass(frozen=True), with eq=False": "test_rays.py does it",
     "pass spacing=1.0, or (dx, dy)": "test_reading.py of surfaces runs it",
     "Give units, for example units=": "test_profiles.py runs it",
     "give the gap a width": "no call",

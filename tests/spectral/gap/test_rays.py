@@ -1,12 +1,14 @@
 """Gaps by rays from graded panels, against closed forms, enclosures and other rays."""
 
+from dataclasses import dataclass, field
+
 import numpy as np
 import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.errors import AccuracyError
+from asperity.errors import AccuracyError, InputError
 from asperity.kernels.laws.law import DrivenLaw
 from asperity.spectral.bounds.rays_on_panels import suits_rays, tops_by_rays, values_by_rays
 from asperity.spectral.essential.edge import EssentialEdge, essential_edge
@@ -112,3 +114,24 @@ def test_a_traced_law_with_more_randomness_has_its_values_from_independent_rays(
     assert law.random_map() is None and suits_rays(law)
     first, second = (tops(law, seed, 1.0)[-1] for seed in (0, 1))
     assert abs(first.value - second.value) <= first.error + second.error < 0.1
+
+
+def test_a_law_that_cannot_be_hashed_is_refused_with_what_to_write():
+    @dataclass
+    class Loose(ker.Law):
+        weights: np.ndarray
+
+    @dataclass(frozen=True)
+    class WithArray(ker.Law):
+        weights: np.ndarray
+
+    @dataclass(frozen=True, eq=False)
+    class Advised(ker.TriangularTeethLaw):
+        weights: np.ndarray = field(default_factory=lambda: np.ones(2))
+
+    for law in (Loose, WithArray):
+        law.__abstractmethods__ = frozenset()
+        for call in (spec.spectral_gap, lambda one: spec.transmission(one, 1.0)):
+            with pytest.raises(InputError, match=r"frozen=True.*eq=False"):
+                call(law(np.ones(2)))
+    assert spec.spectral_gap(Advised(0.9)).verdict == "no gap"

@@ -170,6 +170,26 @@ def test_the_edge_of_an_isometric_law_needs_no_grazing_rays(monkeypatch):
         assert found.low == found.high == 1.0 and found.kind == "bound" and found.reasons
 
 
+@pytest.mark.parametrize("period", [1.0, 1.25])
+def test_rays_square_to_a_steep_side_are_in_the_essential_spectrum(period):
+    """From atan(d/D) - u all rays into the hollow leave at atan(d/D) + u, and back: the edge is 1.
+
+    A flat top reflects them to the mirror image, where the other side does the same.
+    """
+    d, depth = 0.198, 0.483
+    bottom = geo.Bezier([(d, -depth), (0.5, -depth - 0.08), (1 - d, -depth)])
+    sides = [geo.Segment((0, 0), (d, -depth)), bottom, geo.Segment((1 - d, -depth), (1, 0))]
+    wall = geo.Wall(sides if period == 1.0 else [*sides, geo.Segment((1, 0), (period, 0))], period)
+    law = ker.WallLaw(wall)
+    for u in (1e-3, 1e-5):
+        out = law.reflect((np.arange(1000) + 0.5) / 1000 / period, np.full(1000, np.arctan(d / depth) - u))
+        assert np.mean(np.abs(out - np.arctan(d / depth) - u) < 1e-9) > 1.0 - 2.0 * u
+    edge = essential_edge(law)
+    assert edge.low > 1.0 - 1e-6
+    mixed = spec.spectral_gap(0.3 * ker.lambertian() + 0.7 * law, 1e-3)
+    assert abs(mixed.value - 0.3) <= mixed.error + 1e-9 and mixed.error <= 1e-3
+
+
 def test_what_cannot_be_told_is_undecided(monkeypatch):
     from asperity.spectral.essential import grazing
 
