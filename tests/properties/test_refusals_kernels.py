@@ -461,7 +461,7 @@ REFUSED = {
             ({"law": 0.5 * ker.HemisphereLaw(ARC), "section": "tube"}, "weights"),
             ({"law": ker.CollisionLaw(ARC, DISK)}, "law: expected a Law"),
             ({"other": DIFFUSE, "section": "tube"}, "other: a tube has one wall.*take section='channel'"),
-            ({"other": ker.HemisphereLaw(ARC)}, "other: expected a Law such as"),
+            ({"other": ker.HemisphereLaw(ARC)}, "other: expected a Law in the plane such as"),
             ({"other": ARC, "law": ker.HemisphereLaw(ARC)}, "other: expected a DirectionLaw such as ker.HemisphereLaw"),
             ({"rng": -1}, "rng: expected"))),
         *((lambda call=call: call(ARC, [1.0, 2.0, 4.0], 10, other=DIFFUSE.in_specular_frame()),
