@@ -334,6 +334,23 @@ class RaySums:
         """Count the rays that did not escape."""
         self.unresolved += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
 
+    def fraction_unresolved(self, used: int) -> float:
+        """The fraction of so many rays that did not escape.
+
+        Raises
+        ------
+        AccuracyError
+            If it is more than 1e-4.
+        """
+        fraction = self.unresolved / used
+        if fraction > UNRESOLVED_TOLERANCE:
+            raise AccuracyError(
+                f"{self.law!r}: {fraction:.2g} of {used} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}; "
+                "geometry.trace(wall, x, theta).counts() says how they ended, of a surface that of surface.trace(x, v)",
+                fraction,
+            )
+        return fraction
+
     def matrix(self, *, symmetrise: bool, mirrored: bool = False) -> KernelMatrix:
         """The matrix; if ``mirrored``, every ray counts with its mirror image.
 
@@ -346,13 +363,7 @@ class RaySums:
             If more than 1e-4 of the rays did not escape, or a bin has no ray.
         """
         used = len(self.tables) * self.each
-        fraction = self.unresolved / used
-        if fraction > UNRESOLVED_TOLERANCE:
-            raise AccuracyError(
-                f"{self.law!r}: {fraction:.2g} of {used} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}; "
-                "geometry.trace(wall, x, theta).counts() says how they ended, of a surface that of surface.trace(x, v)",
-                fraction,
-            )
+        fraction = self.fraction_unresolved(used)
         if self.basis.is_partition:
             parts = [_Counts(table, mirrored) for table in self.tables]
             found = matrix_from_counts(parts, self.basis, symmetrise=symmetrise, independent=len(parts) == 1)

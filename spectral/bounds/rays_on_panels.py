@@ -28,7 +28,6 @@ from ...kernels.laws.law import outgoing_angles
 from ...kernels.sampling.chunks import RaySums, count_long
 from ...kernels.sampling.counts import missed_fraction
 from ...kernels.sampling.sobol import PARTS, SOBOL_BITS, SobolRays, random_shifts
-from ...kernels.walls.conditionals import UNRESOLVED_TOLERANCE
 from ..essential.edge import without_lambertian
 from .images import is_traced
 from .trial_space import Rank
@@ -203,7 +202,7 @@ class _PanelSums:
         self.share = np.full(len(edges) - 1, 1.0 / (len(edges) - 1)) if share is None else share
         self.seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
         self.shifts = random_shifts(self.seed, _PanelRays.dimension)
-        self.sums, self.points = RaySums(law, self.basis, PARTS), 0
+        self.sums, self.points, self.unresolved = RaySums(law, self.basis, PARTS), 0, 0.0
 
     def extend(self, points: int) -> None:
         """Add rays until each sequence has so many points."""
@@ -212,14 +211,7 @@ class _PanelSums:
             self.law, self.basis, *self.shifts, self.seed, False, self.points, points, cumulative=cumulative
         )
         count_long(self.sums, rays, {})
-        self.points = points
-        if self.unresolved > UNRESOLVED_TOLERANCE:
-            raise AccuracyError(f"{self.law!r}: {self.unresolved:.2g} of the rays did not escape", self.unresolved)
-
-    @property
-    def unresolved(self) -> float:
-        """The fraction of rays that did not escape."""
-        return self.sums.unresolved / (PARTS * self.points)
+        self.points, self.unresolved = points, self.sums.fraction_unresolved(PARTS * points)
 
     def matrices(self) -> Floats:
         """The symmetric matrices of all sequences off the constants, shape (PARTS, n, n)."""

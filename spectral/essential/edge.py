@@ -379,17 +379,16 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
         # more straight rays would be a smaller fraction than the entry points resolve
         return StraightPart(fraction, flat, min(flat + 2.0 / POINTS, 1.0))
     spacing, best = np.pi / ANGLES, found
-    candidates, values, axes = angle, found.roots, _axes(law, angle)
+    candidates, values, axes = angle, found.roots, _axes(law.wall, angle, found.reached)
     for level in range(LEVELS):
         peaks = _peaks(candidates, values, PEAKS if level == 0 else 2, 1.5 * spacing)
         spacing /= NEARER
         steps = spacing * np.linspace(-NEARER, NEARER, NEARBY_ANGLES)
-        candidates = np.append((peaks[:, None] + steps).ravel(), axes)
-        candidates = np.unique(np.clip(candidates, *LIMITS))
+        candidates = np.union1d(np.clip(peaks[:, None] + steps, *LIMITS), axes)
         fine = level >= LEVELS - FINE_LEVELS
         before, best = best, _largest_of_orbits(law, candidates, FINE_POINTS if fine else POINTS, bar, fine)
         values = best.roots
-        axes = _peaks(axes, values[np.searchsorted(candidates, np.clip(axes, *LIMITS))], PEAKS, 0.0)
+        axes = _peaks(axes, values[np.searchsorted(candidates, axes)], PEAKS, 0.0)
     low = max(float(best.roots.max()), fraction, flat)
     change = abs(float(best.roots.max()) - float(before.roots.max()))
     high = low + BEYOND * (change + float(best.missing[np.argmax(best.roots)])) + CHANGE_WIDTH
@@ -398,18 +397,17 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     )
 
 
-def _axes(law: WallLaw, starts: Floats) -> Floats:
+def _axes(wall: Wall, starts: Floats, reached: list[Floats]) -> Floats:
     """Angles that an isometry c - theta keeps: c/2, where rays hit a straight piece at right angles, and others found.
 
     There an orbit and its mirror image meet, so that the largest eigenvalue has a cusp.
     """
-    pieces = [piece for loop in (law.wall.pieces, *law.wall.islands) for piece in loop]
+    pieces = [piece for loop in (wall.pieces, *wall.islands) for piece in loop]
     sides = [np.subtract(piece.end, piece.start) for piece in pieces if piece.is_straight]
     normals = [float(np.mod(np.arctan2(y, x) + 0.5 * np.pi, np.pi)) for x, y in sides]
-    reached = _conditionals(law, [(_node(theta), float(theta)) for theta in starts], POINTS, False)
-    halves = np.concatenate([0.5 * (theta + np.unique(reached[_node(theta)][1])) for theta in starts])
+    halves = np.concatenate([0.5 * (theta + np.unique(out)) for theta, out in zip(starts, reached, strict=True)])
     _, first, count = np.unique(np.rint(halves / SAME_NODE), return_index=True, return_counts=True)
-    return np.append(halves[first[count > 1]], normals)
+    return np.asarray(np.clip(np.append(halves[first[count > 1]], normals), *LIMITS))
 
 
 def _peaks(candidates: Floats, values: Floats, number: int, apart: float) -> Floats:
@@ -422,11 +420,15 @@ def _peaks(candidates: Floats, values: Floats, number: int, apart: float) -> Flo
 
 
 class _Orbits(NamedTuple):
-    """For each initial angle the largest eigenvalue of its orbit, its change by the last layer, and the fraction."""
+    """For each initial angle the largest eigenvalue of its orbit, its change by the last layer, and its straight rays.
+
+    Of these rays the fraction and the outgoing angles.
+    """
 
     roots: Floats
     missing: Floats
     fractions: Floats
+    reached: list[Floats]
 
 
 def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, bar: Any, halved: bool = False) -> _Orbits:
@@ -451,8 +453,9 @@ def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, bar: Any, halv
                 fresh += [node for node in new if node not in conditionals]
         fresh = list(dict.fromkeys(fresh))
         bar.update()
-    fractions = np.array([conditionals[_node(theta)][0].sum() for theta in starts])
-    return _Orbits(roots[-1], roots[-1] - roots[-2], fractions)
+    straight = [conditionals[_node(theta)] for theta in starts]
+    fractions = np.array([weights.sum() for weights, _ in straight])
+    return _Orbits(roots[-1], roots[-1] - roots[-2], fractions, [out for _, out in straight])
 
 
 def _node(theta: float) -> int:
