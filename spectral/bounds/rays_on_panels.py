@@ -7,19 +7,19 @@ eigenfunctions in narrow intervals of angles, which fall between the nodes of qu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from numpy.polynomial.legendre import legvander
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
-from ...core.estimates import student_95, with_error
-from ...core.long_runs import progress_bar
+from ...core.estimates import student_95
 from ...kernels import Law, Panels
 from ...kernels.bases.angles import clipped_inside
 from ...kernels.bases.assembly import add_blocks, one_blas_thread
@@ -41,18 +41,16 @@ GRAZING, RATIO, JOIN, INNER = 1e-4, 2.0, 0.15, 24
 NARROWEST, MOST_PANELS = 1e-5, 120
 # Fractions of the rays that begin by the modulus of the eigenfunction, by the invariant measure, and by panels.
 SHARES = 0.65, 0.2, 0.15
-# Points of each of the sequences of the first level, twice as many on every next one; nominal seconds of a ray.
-FIRST_POINTS, RAY_TIME = 2**13, 7e-7
+# Points of each of the sequences of the first level, twice as many on every next one.
+FIRST_POINTS = 2**13
 # From so many points of a sequence on panels are divided only if what they do not resolve is more than the noise.
 MANY_POINTS = 2**17
 # Panels are divided until the rest of the effect on the eigenvalue is this fraction of its error.
 UNRESOLVED = 0.1
 # Points of a sequence at a time.
-POINTS_AT_ONCE = 2**14
-# Eigenfunctions that the panels follow on levels of few points; then that of the highest rank.
+POINTS_AT_ONCE = 2**16
+# Eigenfunctions that the panels follow at least on levels of few points; then those that are asked for.
 FOLLOWED, FEW_POINTS = 3, 2**15
-# Earlier levels whose spread counts in the sampling error.
-POOLED = 2
 # Levels that show the largest values of a law, number of these values, and margin in standard errors.
 SHOWING, LARGEST, SIGMAS = 3, 6, 6.0
 
@@ -73,33 +71,14 @@ def values_by_rays(law: Law) -> tuple[Floats, Floats]:
         above, below = values_by_rays(rest)
         return fraction * above, fraction * below
     try:
-        *_, last = islice(_levels(law, np.random.default_rng(0), np.inf, 0.0, np.abs), SHOWING)
+        *_, last = islice(levels(law, np.random.default_rng(0), 0.0, np.abs), SHOWING)
     except AccuracyError:
         return np.empty(0), np.empty(0)
     return last.lower_bounds(1.0), last.lower_bounds(-1.0)
 
 
-class Top(NamedTuple):
-    """The eigenvalue of highest rank off the constants with its error, and the interval that panels reach of it."""
-
-    value: float
-    error: float
-    least: float
-    reached: float
-    panels: int
-    rays: int
-
-    @property
-    def centre(self) -> float:
-        """The middle of what panels reach."""
-        return 0.5 * (self.least + self.reached)
-
-    def __str__(self) -> str:
-        return f"{with_error(self.value, self.error)} by {self.rays} rays on {self.panels} panels of degree {DEGREE}"
-
-
-def tops_by_rays(law: Law, rng: np.random.Generator, seconds: float, edge: float, rank: Rank) -> Iterator[Top]:
-    """The top of the spectrum from more and more rays, until the time is over.
+def levels(law: Law, rng: np.random.Generator, edge: float, rank: Rank, number: int = 1) -> Iterator[Level]:
+    """Twice as many rays on finer panels each, or on the same ones when these resolve what the rays show.
 
     Parameters
     ----------
@@ -108,44 +87,28 @@ def tops_by_rays(law: Law, rng: np.random.Generator, seconds: float, edge: float
     edge : float
         The essential spectrum is below.
     rank : callable
-        np.positive for the largest eigenvalue, np.abs for the largest modulus.
+        np.positive for the largest eigenvalues, np.abs for the largest moduli.
+    number : int
+        Of eigenfunctions that the panels resolve.
 
     Notes
     -----
     A ray from the panel p to the panel q counts 1/(d_p + d_q) in both directions, where d is the density of the rays
     relative to the invariant measure, because a reversible law has the same flux in both. Half of eight Sobol sequences
-    gives an eigenvector, whose quotient by the other half is below the eigenvalue of the panels by twice what the
-    eigenvalue of all rays is above it. What the panels do not resolve is as large as the last coefficients on each.
+    gives eigenvectors, whose quotients by the other half are below the eigenvalues of the panels by twice what the
+    eigenvalues of all rays are above them. What the panels do not resolve is as large as the last coefficients on each.
     """
-    with progress_bar(None, "step", "gap by rays") as bar:
-        for level in _levels(law, rng, seconds, edge, rank):
-            yield level.top
-            bar.describe(f"error {level.top.error:.1g}")
-            bar.update()
-
-
-def _levels(law: Law, rng: np.random.Generator, seconds: float, edge: float, rank: Rank) -> Iterator[_Level]:
-    """Twice as many rays on finer panels each, or more on the same ones, whatever the time."""
-    edges, share = _first_edges(), None
-    rays, points, spent = None, FIRST_POINTS, 0.0
-    spreads: list[float] = []
+    edges, share, rays, points = _first_edges(), None, None, FIRST_POINTS
     while True:
-        rays = _PanelSums(law, edges, share, rng) if rays is None else rays
-        spent += RAY_TIME * PARTS * (points - rays.points)
-        if spent > seconds and points > FIRST_POINTS:
-            return
+        rays = PanelSums(law, edges, share, rng) if rays is None else rays
         rays.extend(points)
         with one_blas_thread():
-            level = _Level(rays, rank, edge, spreads)
-            spreads.append(level.spread)
-            yield level
+            level = Level(rays, rank, edge, number)
             finer = level.divided()
-            if points < MANY_POINTS or (level.unseen > level.noise and len(finer) > len(edges)):
-                share = level.share(finer)
-                edges, rays = finer, None
-        # by powers of two, and from many points on by the numbers in the middle also
-        odd = points & (points - 1)
-        points = points * 4 // 3 if odd else points * 3 // 2 if points >= MANY_POINTS and rays else points * 2
+        yield level
+        if points < MANY_POINTS or (np.any(level.unseen > level.noise) and len(finer) > len(edges)):
+            edges, share, rays = finer, level.share(finer), None
+        points *= 2
 
 
 def _first_edges() -> Floats:
@@ -154,12 +117,12 @@ def _first_edges() -> Floats:
     return np.concatenate([[0.0], graded, inner, np.pi - graded[::-1], [np.pi]])
 
 
-def _masses(edges: Floats) -> Floats:
+def masses(edges: Floats) -> Floats:
     return SINE.mass(edges[:-1], edges[1:])
 
 
 @dataclass(frozen=True, eq=False)
-class _PanelRays(SobolRays):
+class PanelRays(SobolRays):
     """Rays of which each panel of the basis has a share; ``cumulative`` has the sums of the shares, from 0 to 1."""
 
     basis: Panels
@@ -187,39 +150,57 @@ class _PanelRays(SobolRays):
         return theta, outgoing_angles(outgoing, theta, self.law)
 
     def incoming(self, u: Floats) -> Floats:
+        u = 0.5 * u if self.halved else u
         panel = np.clip(np.searchsorted(self.cumulative, u, side="right") - 1, 0, len(self.cumulative) - 2)
-        mass = _masses(self.basis.edges)
+        mass = masses(self.basis.edges)
         inside = (u - self.cumulative[panel]) / np.diff(self.cumulative)[panel]
         below = np.append(0.0, np.cumsum(mass))[panel] + mass[panel] * inside
         return clipped_inside(SINE.quantile(np.clip(below, 0.0, 1.0)))
 
 
-class _PanelSums:
-    """Sums of rays on panels, which can be continued."""
+class PanelSums:
+    """Sums of rays on panels, which can be continued; if the law is ``mirrored``, each counts with its mirror image."""
 
     def __init__(self, law: Law, edges: Floats, share: Floats | None, rng: np.random.Generator) -> None:
-        self.law, self.basis = law, Panels(edges, DEGREE)
+        self.law, self.basis, self.mirrored = law, Panels(edges, DEGREE), law.mirror_symmetric is True
         self.share = np.full(len(edges) - 1, 1.0 / (len(edges) - 1)) if share is None else share
         self.seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
-        self.shifts = random_shifts(self.seed, _PanelRays.dimension)
+        self.shifts = random_shifts(self.seed, PanelRays.dimension)
         self.sums, self.points, self.unresolved = RaySums(law, self.basis, PARTS), 0, 0.0
+
+    def rays(self, start: int, end: int) -> PanelRays:
+        """These rays of each sequence."""
+        cumulative = np.append(0.0, np.cumsum(self.share))
+        return PanelRays(
+            self.law, self.basis, *self.shifts, self.seed, self.mirrored, start, end, cumulative=cumulative
+        )
 
     def extend(self, points: int) -> None:
         """Add rays until each sequence has so many points."""
-        cumulative = np.append(0.0, np.cumsum(self.share))
-        rays = _PanelRays(
-            self.law, self.basis, *self.shifts, self.seed, False, self.points, points, cumulative=cumulative
-        )
-        count_long(self.sums, rays, {})
+        count_long(self.sums, self.rays(self.points, points), {})
         self.points, self.unresolved = points, self.sums.fraction_unresolved(PARTS * points)
+
+    @property
+    def density(self) -> Floats:
+        """Of the rays on each panel, relative to the invariant measure."""
+        return np.asarray(self.share / masses(self.basis.edges))
+
+    @property
+    def mirror(self) -> tuple[NDArray[np.intp], Floats]:
+        """The number of the function that is the mirror image of each function, and the sign that it takes."""
+        image = np.arange(self.basis.size).reshape(-1, DEGREE + 1)[::-1].ravel()
+        return image, (-1.0) ** (image % (DEGREE + 1))
 
     def matrices(self) -> Floats:
         """The symmetric matrices of all sequences off the constants, shape (PARTS, n, n)."""
         width, size = DEGREE + 1, self.basis.size
-        density = np.repeat(self.share / _masses(self.basis.edges), width)
+        density = np.repeat(self.density, width)
         rows = self.basis.of_legendre(self.sums.tables.reshape(PARTS, size, -1, width))
         both = self.basis.of_legendre(np.swapaxes(rows, 1, 2).reshape(PARTS, size, -1, width))
         both = both + np.swapaxes(both, 1, 2)
+        if self.mirrored:
+            image, sign = self.mirror
+            both = 0.5 * (both + sign[:, None] * both[:, image][:, :, image] * sign)
         # at grazing polynomials are large where few rays are, so that the panels at the ends have constants only
         ends = [*range(1, width), *range(1 - width, 0)]
         both[:, ends] = both[:, :, ends] = 0.0
@@ -233,104 +214,124 @@ class _PanelSums:
         )  # fmt: skip
 
 
-class _Level:
-    """Quotients of eigenvectors of each half of the sequences by the other half, and how well panels resolve them."""
+class Level:
+    """The leading eigenfunctions of rays on panels, and how well these and the rays show them.
 
-    def __init__(self, rays: _PanelSums, rank: Rank, edge: float, before: Sequence[float]) -> None:
-        self.rays, self.rank, self.edge, self.before = rays, rank, edge, tuple(before[-POOLED:])
+    Attributes
+    ----------
+    rays : PanelSums
+    number : int
+        Of the functions to resolve. On levels of few points the panels follow at least FOLLOWED.
+    values : array of shape (followed,)
+        Their ranks, decreasing.
+    vectors : array of shape (n, followed)
+    """
+
+    def __init__(self, rays: PanelSums, rank: Rank, edge: float, number: int) -> None:
+        self.rays, self.rank, self.edge, self.number = rays, rank, edge, number
         matrices = rays.matrices()
         self.halves, self.whole = (matrices[::2], matrices[1::2]), matrices.mean(axis=0)
-        self.values, self.vectors = self._leading(self.whole, rank)
+        self.values, self.vectors = self._leading(self.whole, rank, max(number, FOLLOWED))
 
-    @staticmethod
-    def _leading(matrix: Floats, rank: Rank, number: int = FOLLOWED) -> tuple[Floats, Floats]:
-        """The highest ranks of eigenvalues, decreasing, and their eigenvectors."""
-        values, vectors = np.linalg.eigh(matrix)
+    def _leading(self, matrix: Floats, rank: Rank, number: int) -> tuple[Floats, Floats]:
+        """The highest ranks of eigenvalues, decreasing, and their eigenvectors, of either parity if mirrored."""
+        if self.rays.mirrored:
+            image, sign = (each[: len(matrix) // 2] for each in self.rays.mirror)
+            own, other = matrix[: len(image), : len(image)], sign * matrix[: len(image), image]
+            (even, first), (odd, second) = np.linalg.eigh(own + other), np.linalg.eigh(own - other)
+            values, vectors = np.append(even, odd), np.empty(matrix.shape)
+            vectors[: len(image)] = np.sqrt(0.5) * np.concatenate([first, second], axis=1)
+            vectors[image] = np.sqrt(0.5) * sign[:, None] * np.concatenate([first, -second], axis=1)
+        else:
+            values, vectors = np.linalg.eigh(matrix)
         order = np.argsort(-rank(values), kind="stable")[:number]
         return rank(values)[order], vectors[:, order]
 
+    @property
+    def followed(self) -> int:
+        """Functions that the panels of the next level follow."""
+        return len(self.values) if self.rays.points < FEW_POINTS else self.number
+
     @cached_property
     def of_halves(self) -> tuple[Floats, Floats]:
-        """Eigenvectors of one half, and their projections on those of the other, shape (n, FOLLOWED)."""
-        (_, first), (_, second) = (self._leading(half.mean(axis=0), self.rank) for half in self.halves)
+        """Eigenvectors of one half, and their projections on those of the other, shape (n, followed)."""
+        (_, first), (_, second) = (
+            self._leading(half.mean(axis=0), self.rank, len(self.values)) for half in self.halves
+        )
         alike = second @ (second.T @ first)
         return first, alike / np.linalg.norm(alike, axis=0)
 
     @cached_property
     def quotients(self) -> Floats:
-        """Those of the highest rank, shape (PARTS,)."""
+        """Of each sequence, by the eigenvectors of the other half, shape (PARTS, followed)."""
         pairs = zip(self.of_halves, self.halves[::-1], strict=True)
-        each = [np.einsum("i,pij,j->p", vectors[:, 0], half, vectors[:, 0]) for vectors, half in pairs]
-        return self.rank(np.concatenate(each))
+        return self.rank(
+            np.concatenate([np.einsum("ik,pij,jk->pk", vectors, half, vectors) for vectors, half in pairs])
+        )
 
     @cached_property
-    def spread(self) -> float:
-        """The standard deviation of the quotients, times the root of the number of points."""
-        return float(np.std(self.quotients, ddof=1) * np.sqrt(self.rays.points))
+    def noise(self) -> Floats:
+        """The sampling error of their mean."""
+        return np.asarray(student_95(PARTS) * self.quotients.std(axis=0, ddof=1) / np.sqrt(PARTS))
 
     @cached_property
-    def noise(self) -> float:
-        """The sampling error, from the spreads of this level and of those before it.
+    def raised(self) -> Floats:
+        """How far the values are above the eigenvalues of the panels, and quotients of ``vectors`` are below these."""
+        return np.asarray(np.maximum(self.values - self.quotients.mean(axis=0), 0.0) / 3.0)
 
-        Of eight quotients alone it would often be too small where a level is taken for its small error.
+    @cache
+    def _effects(self, last: int) -> tuple[Floats, Floats]:
+        """What the last coefficients on each panel change in each value, and how much of this is noise.
+
+        The resolvent of the rays on the last functions of all panels tells how near these are to each value.
         """
-        spread = np.sqrt(np.mean(np.square([*self.before, self.spread])))
-        return float(student_95(PARTS) * spread / np.sqrt(PARTS * self.rays.points))
+        block = np.flatnonzero(np.arange(len(self.vectors)) % (DEGREE + 1) > DEGREE - last)
+        quotients, basis = np.linalg.eigh(self.whole[np.ix_(block, block)])
+        distance = np.maximum(self.values - self.rank(quotients)[:, None], self.noise)
+        first, second = (each[block] for each in self.of_halves)
+
+        def joint(one: Floats, other: Floats) -> Floats:
+            resolved = basis @ ((basis.T @ other) / distance)
+            return np.asarray((self.values**2 * one * resolved).reshape(-1, last, len(self.values)).sum(axis=1))
+
+        return joint(first, second), np.abs(0.5 * joint(first - second, first - second))
 
     @cached_property
-    def room(self) -> float:
-        """Distance of the top from functions that panels do not resolve, as far as it is more than the noise.
-
-        They are those of the essential spectrum, and the last coefficients on all panels.
-        """
-        vector = self.vectors[:, 0]
-        rough = np.where(np.arange(len(vector)) % (DEGREE + 1) > DEGREE - LAST, vector, 0.0)
-        of_rough = float(self.rank(rough @ self.whole @ rough / (rough @ rough)))
-        return max(float(self.values[0]) - max(of_rough, self.edge, 0.0), self.noise)
-
-    def _effects(self, last: int, number: int = 1) -> tuple[Floats, Floats]:
-        """What the last coefficients on each panel change in the first eigenvalues, and how much of this is noise."""
-        first, second = (each[:, :number].reshape(-1, DEGREE + 1, number)[:, -last:] for each in self.of_halves)
-        scale = float(self.values[0]) ** 2 / self.room
-        return scale * np.sum(first * second, axis=(1, 2)), scale * 0.5 * np.sum((first - second) ** 2, axis=(1, 2))
-
-    @cached_property
-    def unseen(self) -> float:
-        """What the panels do not resolve of the eigenvalue."""
+    def unseen(self) -> Floats:
+        """What the panels do not resolve of each eigenvalue."""
         effects = [self._effects(last) for last in (LAST, MORE)]
-        seen, broad = (max(float(effect.sum()) + float(np.linalg.norm(noise)), 0.0) for effect, noise in effects)
-        return max(seen, broad / BROAD)
+        seen, broad = (np.maximum(each.sum(axis=0) + np.linalg.norm(noise, axis=0), 0.0) for each, noise in effects)
+        return np.asarray(np.maximum(seen, broad / BROAD))
 
-    @cached_property
-    def top(self) -> Top:
-        """The eigenvalue with the errors of sampling, of the eigenvector, and of the panels."""
-        mean, number = float(self.quotients.mean()), PARTS * self.rays.points
-        raised = max(float(self.values[0]) - mean, 0.0)
-        lost = 2.0 * self.rays.unresolved * float(np.max(self.vectors[:, 0] ** 2)) + 2.0 * missed_fraction(number)
-        error = self.noise + raised / 3.0 + self.unseen + lost
-        value = mean + 2.0 / 3.0 * raised + 0.5 * self.unseen
-        return Top(value, error, mean - self.noise, mean + raised + self.noise, len(self.rays.share), number)
+    @property
+    def lost(self) -> float:
+        """The effect of rays that do not escape, and of what none of the rays met."""
+        most = float(np.max(self.vectors[:, : self.number] ** 2))
+        return 2.0 * self.rays.unresolved * most + 2.0 * missed_fraction(PARTS * self.rays.points)
 
     def divided(self) -> Floats:
         """More edges: the middles of the panels with the largest effects, until the rest is a fraction of the error."""
-        edges, number = self.rays.basis.edges, FOLLOWED if self.rays.points < FEW_POINTS else 1
-        (seen, noise), (broad, broad_noise) = (self._effects(last, number) for last in (LAST, MORE))
+        edges = self.rays.basis.edges
+        (seen, noise), (broad, broad_noise) = (
+            (part[:, : self.followed].sum(axis=1) for part in self._effects(last)) for last in (LAST, MORE)
+        )
         effect = np.maximum(seen, broad / BROAD)
         order = np.argsort(effect)
         chosen = np.zeros(len(effect), dtype=bool)
-        chosen[order] = np.cumsum(np.maximum(effect[order], 0.0)) > UNRESOLVED * self.noise
+        chosen[order] = np.cumsum(np.maximum(effect[order], 0.0)) > UNRESOLVED * self.noise[: self.number].min()
         chosen &= ((seen > noise) | (broad > 2.0 * broad_noise)) & (np.diff(edges) > 2.0 * NARROWEST)
         # of too many the worst
         chosen[order[: max(2 * len(effect) - MOST_PANELS, 0)]] = False
+        chosen |= chosen[::-1] & self.rays.mirrored
         return np.union1d(edges, 0.5 * (edges[:-1] + edges[1:])[chosen])
 
     def share(self, finer: Floats) -> Floats:
         """The shares of the rays that begin on each of the finer panels."""
-        edges, number = self.rays.basis.edges, FOLLOWED if self.rays.points < FEW_POINTS else 1
+        edges = self.rays.basis.edges
         inside = np.searchsorted(edges, 0.5 * (finer[:-1] + finer[1:])) - 1
-        mass = _masses(finer)
-        squares = np.sum(self.vectors[:, :number].reshape(len(edges) - 1, -1) ** 2, axis=1)
-        modulus = np.sqrt(squares / _masses(edges))[inside] * mass
+        mass = masses(finer)
+        squares = np.sum(self.vectors[:, : self.followed].reshape(len(edges) - 1, -1) ** 2, axis=1)
+        modulus = np.sqrt(squares / masses(edges))[inside] * mass
         parts = modulus / modulus.sum(), mass, np.full(len(mass), 1.0 / len(mass))
         return np.asarray(sum(weight * part for weight, part in zip(SHARES, parts, strict=True)))
 

@@ -21,7 +21,8 @@ from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewh
 from ..bounds.enclosure import Enclosures, as_power, enclosed_trial_space, enclosures
 from ..bounds.images import is_costly, is_traced, suits_panels
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
-from ..bounds.rays_on_panels import Top, suits_rays, tops_by_rays, values_by_rays
+from ..bounds.quotients_by_rays import Top, tops_by_rays
+from ..bounds.rays_on_panels import suits_rays, values_by_rays
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import Rank
 from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, Verdict, matrix_spectrum
@@ -48,7 +49,7 @@ SURE = 1e-9, 1e-6
 LARGEST_MISS = {True: 1e-4, False: 2e-3}
 # Tolerance that rays on panels reach, and fraction of the time limit for enclosures which are tried before them then;
 # fractions for these rays, after enclosures and where there are none.
-OF_RAYS, BEFORE_RAYS, AFTER_ENCLOSURES, ALONE = 5e-5, 0.4, 1.1, 1.5
+OF_RAYS, BEFORE_RAYS, AFTER_ENCLOSURES, ALONE = 5e-5, 0.25, 1.25, 1.5
 # With so many ray segments per angle, rays on panels are faster than enclosures.
 SLOW = 8_000
 # The same for laws near a matrix, relative to the gap.
@@ -411,7 +412,7 @@ def gap_by_rays(
     tops: list[Top] = []
     best: SpectralGap | None = None
     how = "quotients of an eigenfunction by rays from panels; sampling error + error of the eigenfunction"
-    for top in tops_by_rays(law, rng, seconds, edge.high, rank):
+    for (top,) in tops_by_rays(law, rng, seconds, edge.high, rank):
         # finer panels reach more
         growth = max(top.centre - tops[-1].centre, 0.0) if tops else np.inf
         tops.append(top)
