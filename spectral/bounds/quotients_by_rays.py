@@ -24,8 +24,8 @@ from ...kernels.sampling.sobol import PARTS, SOBOL_BITS, sobol_sequence
 from .rays_on_panels import DEGREE, Level, PanelSums, levels
 from .trial_space import Rank
 
-# Cells in each direction, replicates of each, and points of the net of each replicate in the first round. Two replicates
-# have the longest nets; the variance of a cell is then smoothed over its neighbours, by so many cells, and over rounds.
+# Cells in each direction, replicates of each, and points of the net of each replicate in the first round. Two
+# replicates have the longest nets; variances are then smoothed, by so many cells in each direction and over the rounds.
 CELLS, REPLICATES, FIRST_NET = 192, 2, 4
 SMOOTHED, REMEMBERED = 0.8, 0.5
 # Least weight of a cell, relative to the mean, and rays at a time.
@@ -42,12 +42,12 @@ OLD = 0.25
 class Top(NamedTuple):
     """The rank of an eigenvalue with its error, and the interval that panels reach of it."""
 
+    panels: int
+    rays: int
     value: float
     error: float
     least: float
     reached: float
-    panels: int
-    rays: int
 
     @property
     def centre(self) -> float:
@@ -59,8 +59,8 @@ class Top(NamedTuple):
 
 
 def tops_by_rays(
-    law: Law, rng: np.random.Generator, seconds: float, edge: float, rank: Rank, number: int = 1
-) -> Iterator[list[Top]]:
+    law: Law, rng: np.random.Generator, seconds: float, rank: Rank, number: int = 1
+) -> Iterator[tuple[list[Top], Level]]:
     """The eigenvalues of highest rank off the constants from more and more rays, until the time is over.
 
     Notes
@@ -69,18 +69,18 @@ def tops_by_rays(
     as much as the eigenvalue of these rays is above it; half of this counts as error.
     """
     with progress_bar(None, "step", "gap by rays") as bar:
-        for tops in _tops(law, rng, seconds, edge, rank, number):
-            yield tops
+        for tops, level in _tops(law, rng, seconds, rank, number):
+            yield tops, level
             bar.describe(f"error {max(top.error for top in tops):.1g}")
             bar.update()
 
 
 def _tops(
-    law: Law, rng: np.random.Generator, seconds: float, edge: float, rank: Rank, number: int
-) -> Iterator[list[Top]]:
+    law: Law, rng: np.random.Generator, seconds: float, rank: Rank, number: int
+) -> Iterator[tuple[list[Top], Level]]:
     cells: _Cells | None = None
     rounds, spent, before = list[_Round](), 0.0, None
-    for level in levels(law, rng, edge, rank, number):
+    for level in levels(law, rng, rank, number):
         spent += RAY_TIME * PARTS * level.rays.points / (2.0 if level.rays is before else 1.0)
         before = level.rays
         if level.rays.points < TOLD_POINTS:
@@ -93,7 +93,7 @@ def _tops(
                 return
             rounds.append(cells.round(level))
             tops, noise = _joint([one for one in rounds if one.points >= OLD * level.rays.points], level)
-            yield tops
+            yield tops, level
             if np.any(missed > MISSED * noise):
                 break
 
@@ -120,8 +120,8 @@ def _joint(rounds: list[_Round], level: Level) -> tuple[list[Top], Floats]:
     unseen = level.unseen[: len(noise)]
     value, error = quotient + below + 0.5 * unseen, noise + 0.5 * below + unseen + level.lost
     panels, rays = len(level.rays.share), PARTS * level.rays.points + sum(one.rays for one in rounds)
-    ends = quotient - noise, quotient + 2.0 * below + noise
-    return [Top(*map(float, one), panels, rays) for one in zip(value, error, *ends, strict=True)], noise
+    numbers = np.stack([value, error, quotient - noise, quotient + 2.0 * below + noise], axis=1)
+    return [Top(panels, rays, *each) for each in numbers.tolist()], noise
 
 
 class _Cells:
@@ -176,7 +176,10 @@ class _Cells:
         rays, basis = self.sums.rays(0, 0), level.rays.basis
         ends = [angles[0] for angles in rays.traced(RaySums(rays.law, rays.basis, 0), square)]
         series = basis.legendre_series(level.vectors[:, : level.number])
-        weighted = 2.0 / sum(self.sums.density[rays.basis.positions(angle)[0]] for angle in ends)
-        for panel, position in map(basis.positions, ends):
-            weighted = weighted * legval(position, np.moveaxis(series[panel], 0, -1), tensor=False)
+        densities = [self.sums.density[rays.basis.positions(angle)[0]] for angle in ends]
+        first, second = (
+            legval(position, np.moveaxis(series[panel], 0, -1), tensor=False)
+            for panel, position in map(basis.positions, ends)
+        )
+        weighted = first * second * (2.0 / (densities[0] + densities[1]))
         return np.asarray(np.moveaxis(weighted.reshape(level.number, len(cells), REPLICATES, -1).mean(axis=-1), 0, -1))

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from itertools import islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from numpy.polynomial.legendre import legvander
+from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
@@ -51,8 +51,9 @@ UNRESOLVED = 0.1
 POINTS_AT_ONCE = 2**16
 # Eigenfunctions that the panels follow at least on levels of few points; then those that are asked for.
 FOLLOWED, FEW_POINTS = 3, 2**15
-# Levels that show the largest values of a law, number of these values, and margin in standard errors.
-SHOWING, LARGEST, SIGMAS = 3, 6, 6.0
+# Levels that show the largest values of a law, or that none is above a number; how many values, and their margin in
+# standard errors.
+SHOWING, FEWER, LARGEST, SIGMAS = 3, 2, 6, 6.0
 
 
 def suits_rays(law: Law) -> bool:
@@ -60,32 +61,43 @@ def suits_rays(law: Law) -> bool:
     return law.reversible is True and (law.random_map() is not None or is_traced(law))
 
 
-@lru_cache(maxsize=8)
-def values_by_rays(law: Law) -> tuple[Floats, Floats]:
-    """Lower bounds, by some 400,000 rays, of the largest eigenvalues off the constants of a law P, and of those of -P.
+@lru_cache(maxsize=16)
+def values_by_rays(law: Law, number: int = SHOWING, sigmas: float = SIGMAS) -> tuple[Floats, Floats]:
+    """Lower bounds of the largest eigenvalues off the constants of a law P, and of those of -P, by a number of levels.
 
-    No bound is given if rays do not escape.
+    They are quotients less so many standard errors; none are known if rays do not escape.
     """
     fraction, rest = without_lambertian(law)
     if fraction < 1.0:
-        above, below = values_by_rays(rest)
+        above, below = values_by_rays(rest, number, sigmas)
         return fraction * above, fraction * below
     try:
-        *_, last = islice(levels(law, np.random.default_rng(0), 0.0, np.abs), SHOWING)
+        *_, last = islice(levels(law, np.random.default_rng(0), np.abs), number)
     except AccuracyError:
         return np.empty(0), np.empty(0)
-    return last.lower_bounds(1.0), last.lower_bounds(-1.0)
+    return last.lower_bounds(np.positive, sigmas), last.lower_bounds(np.negative, sigmas)
 
 
-def levels(law: Law, rng: np.random.Generator, edge: float, rank: Rank, number: int = 1) -> Iterator[Level]:
+def show_another(law: Law, listed: int, most: float, by_value: bool) -> float | None:
+    """An eigenvalue, or modulus, beyond the first ``listed`` off the constants that is above ``most``, if rays show it.
+
+    Few rays are traced if their quotients are not above it.
+    """
+    for number, sigmas in ((FEWER, 0.0), (SHOWING, SIGMAS)):
+        above, below = values_by_rays(law, number, sigmas)
+        seen = above if by_value else -np.sort(-np.append(above, below))
+        if not np.any(seen[listed : listed + 1] > most):
+            return None
+    return float(seen[listed])
+
+
+def levels(law: Law, rng: np.random.Generator, rank: Rank, number: int = 1) -> Iterator[Level]:
     """Twice as many rays on finer panels each, or on the same ones when these resolve what the rays show.
 
     Parameters
     ----------
     law : Law
         One that `suits_rays`.
-    edge : float
-        The essential spectrum is below.
     rank : callable
         np.positive for the largest eigenvalues, np.abs for the largest moduli.
     number : int
@@ -103,7 +115,7 @@ def levels(law: Law, rng: np.random.Generator, edge: float, rank: Rank, number: 
         rays = PanelSums(law, edges, share, rng) if rays is None else rays
         rays.extend(points)
         with one_blas_thread():
-            level = Level(rays, rank, edge, number)
+            level = Level(rays, rank, number)
             finer = level.divided()
         yield level
         if points < MANY_POINTS or (np.any(level.unseen > level.noise) and len(finer) > len(edges)):
@@ -189,7 +201,7 @@ class PanelSums:
     def mirror(self) -> tuple[NDArray[np.intp], Floats]:
         """The number of the function that is the mirror image of each function, and the sign that it takes."""
         image = np.arange(self.basis.size).reshape(-1, DEGREE + 1)[::-1].ravel()
-        return image, (-1.0) ** (image % (DEGREE + 1))
+        return image, np.where(image % (DEGREE + 1) % 2, -1.0, 1.0)
 
     def matrices(self) -> Floats:
         """The symmetric matrices of all sequences off the constants, shape (PARTS, n, n)."""
@@ -220,32 +232,59 @@ class Level:
     Attributes
     ----------
     rays : PanelSums
+    rank : callable
     number : int
         Of the functions to resolve. On levels of few points the panels follow at least FOLLOWED.
-    values : array of shape (followed,)
-        Their ranks, decreasing.
-    vectors : array of shape (n, followed)
     """
 
-    def __init__(self, rays: PanelSums, rank: Rank, edge: float, number: int) -> None:
-        self.rays, self.rank, self.edge, self.number = rays, rank, edge, number
+    def __init__(self, rays: PanelSums, rank: Rank, number: int) -> None:
+        self.rays, self.rank, self.number = rays, rank, number
         matrices = rays.matrices()
         self.halves, self.whole = (matrices[::2], matrices[1::2]), matrices.mean(axis=0)
-        self.values, self.vectors = self._leading(self.whole, rank, max(number, FOLLOWED))
 
-    def _leading(self, matrix: Floats, rank: Rank, number: int) -> tuple[Floats, Floats]:
-        """The highest ranks of eigenvalues, decreasing, and their eigenvectors, of either parity if mirrored."""
-        if self.rays.mirrored:
-            image, sign = (each[: len(matrix) // 2] for each in self.rays.mirror)
-            own, other = matrix[: len(image), : len(image)], sign * matrix[: len(image), image]
-            (even, first), (odd, second) = np.linalg.eigh(own + other), np.linalg.eigh(own - other)
-            values, vectors = np.append(even, odd), np.empty(matrix.shape)
-            vectors[: len(image)] = np.sqrt(0.5) * np.concatenate([first, second], axis=1)
-            vectors[image] = np.sqrt(0.5) * sign[:, None] * np.concatenate([first, -second], axis=1)
-        else:
-            values, vectors = np.linalg.eigh(matrix)
-        order = np.argsort(-rank(values), kind="stable")[:number]
-        return rank(values)[order], vectors[:, order]
+    def _eigenpairs(self, matrix: Floats) -> tuple[Floats, Floats]:
+        """All eigenvalues, and eigenvectors of either parity if mirrored."""
+        if not self.rays.mirrored:
+            return np.linalg.eigh(matrix)
+        image, sign = (each[: len(matrix) // 2] for each in self.rays.mirror)
+        own, other = matrix[: len(image), : len(image)], sign * matrix[: len(image), image]
+        (even, first), (odd, second) = np.linalg.eigh(own + other), np.linalg.eigh(own - other)
+        vectors = np.empty(matrix.shape)
+        vectors[: len(image)] = np.sqrt(0.5) * np.concatenate([first, second], axis=1)
+        vectors[image] = np.sqrt(0.5) * sign[:, None] * np.concatenate([first, -second], axis=1)
+        return np.append(even, odd), vectors
+
+    @cached_property
+    def pairs_of_halves(self) -> list[tuple[Floats, Floats]]:
+        """The eigenpairs of the means of each half."""
+        return [self._eigenpairs(half.mean(axis=0)) for half in self.halves]
+
+    @cached_property
+    def leading(self) -> tuple[Floats, Floats]:
+        """The highest ranks of eigenvalues of all rays, decreasing, and their eigenvectors, shape (n, followed)."""
+        return _first(*self._eigenpairs(self.whole), self.rank, max(self.number, FOLLOWED))
+
+    @property
+    def values(self) -> Floats:
+        """The ranks of `leading`."""
+        return self.leading[0]
+
+    @property
+    def vectors(self) -> Floats:
+        """The eigenvectors of `leading`."""
+        return self.leading[1]
+
+    @cached_property
+    def signs(self) -> Floats:
+        """The signs of the eigenvalues of ``vectors``."""
+        return np.asarray(np.sign(np.einsum("ik,ij,jk->k", self.vectors, self.whole, self.vectors)))
+
+    @property
+    def parities(self) -> Floats:
+        """The signs that the mirror images of ``vectors`` take; 0 if the law is not mirrored."""
+        image, sign = self.rays.mirror
+        same = np.sign(np.sum(self.vectors * sign[:, None] * self.vectors[image], axis=0))
+        return np.asarray(same if self.rays.mirrored else 0.0 * same)
 
     @property
     def followed(self) -> int:
@@ -255,9 +294,7 @@ class Level:
     @cached_property
     def of_halves(self) -> tuple[Floats, Floats]:
         """Eigenvectors of one half, and their projections on those of the other, shape (n, followed)."""
-        (_, first), (_, second) = (
-            self._leading(half.mean(axis=0), self.rank, len(self.values)) for half in self.halves
-        )
+        (_, first), (_, second) = (_first(*pairs, self.rank, len(self.values)) for pairs in self.pairs_of_halves)
         alike = second @ (second.T @ first)
         return first, alike / np.linalg.norm(alike, axis=0)
 
@@ -279,7 +316,11 @@ class Level:
         """How far the values are above the eigenvalues of the panels, and quotients of ``vectors`` are below these."""
         return np.asarray(np.maximum(self.values - self.quotients.mean(axis=0), 0.0) / 3.0)
 
-    @cache
+    @cached_property
+    def effects(self) -> list[tuple[Floats, Floats]]:
+        """The effects of the last two coefficients on each panel, and of the last four, with their noise."""
+        return [self._effects(last) for last in (LAST, MORE)]
+
     def _effects(self, last: int) -> tuple[Floats, Floats]:
         """What the last coefficients on each panel change in each value, and how much of this is noise.
 
@@ -299,8 +340,9 @@ class Level:
     @cached_property
     def unseen(self) -> Floats:
         """What the panels do not resolve of each eigenvalue."""
-        effects = [self._effects(last) for last in (LAST, MORE)]
-        seen, broad = (np.maximum(each.sum(axis=0) + np.linalg.norm(noise, axis=0), 0.0) for each, noise in effects)
+        seen, broad = (
+            np.maximum(each.sum(axis=0) + np.linalg.norm(noise, axis=0), 0.0) for each, noise in self.effects
+        )
         return np.asarray(np.maximum(seen, broad / BROAD))
 
     @property
@@ -313,7 +355,7 @@ class Level:
         """More edges: the middles of the panels with the largest effects, until the rest is a fraction of the error."""
         edges = self.rays.basis.edges
         (seen, noise), (broad, broad_noise) = (
-            (part[:, : self.followed].sum(axis=1) for part in self._effects(last)) for last in (LAST, MORE)
+            (part[:, : self.followed].sum(axis=1) for part in both) for both in self.effects
         )
         effect = np.maximum(seen, broad / BROAD)
         order = np.argsort(effect)
@@ -335,16 +377,21 @@ class Level:
         parts = modulus / modulus.sum(), mass, np.full(len(mass), 1.0 / len(mass))
         return np.asarray(sum(weight * part for weight, part in zip(SHARES, parts, strict=True)))
 
-    def lower_bounds(self, sign: float) -> Floats:
-        """Lower bounds of the largest eigenvalues of P, or of -P, from quotients in spaces of the other half."""
-        bases = [self._leading(sign * half.mean(axis=0), np.positive, LARGEST)[1] for half in self.halves]
-        bounds = []
+    def lower_bounds(self, rank: Rank, sigmas: float) -> Floats:
+        """Lower bounds of the highest ranks, values or their negatives, by quotients in spaces of other rays."""
+        bases, bounds = [_first(*pairs, rank, LARGEST)[1] for pairs in self.pairs_of_halves], []
         for number in range(1, LARGEST + 1):
             quotients: list[Any] = []
             for basis, half in zip(bases, self.halves[::-1], strict=True):
                 # the least eigenvalue in a space of this dimension is a lower bound of the one of this number
-                each = sign * basis[:, :number].T @ half @ basis[:, :number]
+                each = rank(basis[:, :number].T @ half @ basis[:, :number])
                 least = np.linalg.eigh(each.mean(axis=0))[1][:, 0]
                 quotients.extend(np.einsum("i,pij,j->p", least, each, least))
-            bounds.append(float(np.mean(quotients) - SIGMAS * np.std(quotients, ddof=1) / np.sqrt(PARTS)))
+            bounds.append(float(np.mean(quotients) - sigmas * np.std(quotients, ddof=1) / np.sqrt(PARTS)))
         return np.maximum.accumulate(bounds[::-1])[::-1]
+
+
+def _first(values: Floats, vectors: Floats, rank: Rank, number: int) -> tuple[Floats, Floats]:
+    """The highest ranks, decreasing, and their eigenvectors."""
+    order = np.argsort(-rank(values), kind="stable")[:number]
+    return rank(values)[order], vectors[:, order]

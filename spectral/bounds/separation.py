@@ -17,7 +17,7 @@ from ..essential.compact import compact_matrix
 from ..essential.edge import essential_edge
 from .images import is_traced
 from .oscillations import fast_top
-from .rays_on_panels import suits_rays, values_by_rays
+from .rays_on_panels import show_another, suits_rays
 
 # For a law with eigenvalues g^l the power P^p is chosen with x = g^p near this value. Then the sum of the omitted
 # squares, x^(2 m)/(1 - x^2), is below the last listed square, x^(2 m - 2), and above rounding.
@@ -73,10 +73,11 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float, 
     if fast is not None and fast[0] > next_value:
         return Separation(1.0, "estimate", f"fast oscillations show spectrum near 1, how much is not known: {fast[1]}")
     # rays see eigenfunctions in narrow intervals of angles, between the nodes of panels
-    above, below = values_by_rays(law) if is_traced(law) and suits_rays(law) else (np.empty(0), np.empty(0))
-    seen = above if by_value else -np.sort(-np.append(above, below))
-    if np.any(seen[len(values) - 1 : len(values)] > next_value):
-        shown = f"rays show another eigenvalue, of at least {seen[len(values) - 1]:.3g}"
+    another = None
+    if is_traced(law) and suits_rays(law):
+        another = show_another(law, len(values) - 1, next_value, by_value)
+    if another is not None:
+        shown = f"rays show another eigenvalue, of at least {another:.3g}"
         return Separation(1.0, "estimate", f"{shown}, between the nodes of the basis")
     reason = f"next eigenvalue in the basis, with its residual; essential part at most {edge.high:.3g}"
     return Separation(next_value, "estimate", reason)

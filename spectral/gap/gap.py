@@ -29,7 +29,7 @@ from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, Verdict, matrix_spectrum
 from ..essential.compact import compact_matrix
 from ..essential.edge import EssentialEdge, essential_edge, without_identity, without_lambertian
 from .grooves import gap_of_grooves
-from .methods import gap_of_power, law_eigenvalues
+from .methods import BEFORE_RAYS, OF_RAYS, gap_of_power, law_eigenvalues
 from .refinement import EIGENVALUES, HOW, refined
 from .shallow import shallow_gap
 from .surfaces import gap_of_surface
@@ -47,9 +47,8 @@ SURE = 1e-9, 1e-6
 # A gap that misses its tolerance is held against other methods if its error exceeds this, which they may reach: rays on
 # panels (True), or matrices in polynomials.
 LARGEST_MISS = {True: 1e-4, False: 2e-3}
-# Tolerance that rays on panels reach, and fraction of the time limit for enclosures which are tried before them then;
-# fractions for these rays, after enclosures and where there are none.
-OF_RAYS, BEFORE_RAYS, AFTER_ENCLOSURES, ALONE = 5e-5, 0.25, 1.25, 1.5
+# Fractions of the time limit for rays on panels, after enclosures and where there are none.
+AFTER_ENCLOSURES, ALONE = 1.25, 1.5
 # With so many ray segments per angle, rays on panels are faster than enclosures.
 SLOW = 8_000
 # The same for laws near a matrix, relative to the gap.
@@ -157,9 +156,9 @@ def spectral_gap(
     rng : None, int or numpy.random.Generator
         Source of rays for traced laws; by default ``np.random.default_rng(0)``.
     time_limit : float
-        Limit in seconds for the enclosures of a traced law, of which two fifths are for tolerances of 5e-5 and more.
-        Where they are not within 1e-4 then, rays from panels go on for 1.1 times the limit, or 1.5 times without any
-        enclosures. It is counted as about a million rays with eight million segments, or a million rays without
+        Limit in seconds for the enclosures of a traced law, of which a quarter is for tolerances of 5e-5 and more.
+        Where they are not within 1e-4 then, rays from panels go on for 1.25 times the limit, or 1.5 times without any
+        enclosures. It is counted as about a million rays with eight million segments, or 1.3 million rays without
         quadrature, a second, so that the result does not depend on the machine. A longer limit continues the same
         enclosures and rays, and never makes them worse.
 
@@ -396,7 +395,12 @@ def _by_rays_or(
     if not suits_rays(law):
         return None
     allowed = ALONE if enclosed is None else AFTER_ENCLOSURES
-    sampled = gap_by_rays(law, tolerance, rng, seconds * allowed, edge, rank)
+    try:
+        sampled = gap_by_rays(law, tolerance, rng, seconds * allowed, edge, rank)
+    except AccuracyError:
+        if enclosed is None:
+            raise
+        return enclosed
     return sampled if enclosed is None else min(enclosed, sampled, key=lambda one: one.error)
 
 
@@ -412,7 +416,7 @@ def gap_by_rays(
     tops: list[Top] = []
     best: SpectralGap | None = None
     how = "quotients of an eigenfunction by rays from panels; sampling error + error of the eigenfunction"
-    for (top,) in tops_by_rays(law, rng, seconds, edge.high, rank):
+    for (top,), _ in tops_by_rays(law, rng, seconds, rank):
         # finer panels reach more
         growth = max(top.centre - tops[-1].centre, 0.0) if tops else np.inf
         tops.append(top)

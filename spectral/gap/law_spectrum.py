@@ -64,8 +64,9 @@ def spectrum(
     Notes
     -----
     For walls, arcs, densities, Lambertian reflection and sums of these, eigenvalues are enclosed by residuals of trial
-    functions (`enclosures`); ``errors`` are the half widths. Powers of laws have the powers of the eigenvalues. For
-    other laws Galerkin matrices are used.
+    functions (`enclosures`); ``errors`` are the half widths. Where these take too long, as in chaotic hollows, they are
+    quotients of eigenfunctions by rays from panels. Powers of laws have the powers of the eigenvalues. For other laws
+    Galerkin matrices are used, and quotients by rays if matrices miss the tolerance.
 
     Matrices are compressed exactly to the complement of the constants, and to even and odd functions if the law is
     mirror-symmetric. LAPACK solves small matrices completely. For large ones Lanczos finds the wanted eigenvalues, and

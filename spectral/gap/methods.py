@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, frozen
+from ...core.checks import Floats, Rng, frozen, generator
+from ...core.errors import AccuracyError
 from ...core.long_runs import TIME_LIMIT, OutOfTime, time_limited
 from ...core.rounding import EPS
 from ...kernels import Law, Legendre, discretise
@@ -15,6 +16,9 @@ from ...kernels.laws.matrix_law import finite_matrix
 from ...kernels.walls.wall_law import made_of_isometries
 from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
 from ..bounds.images import is_costly, is_traced, suits_panels
+from ..bounds.quotients_by_rays import tops_by_rays
+from ..bounds.rays_on_panels import suits_rays
+from ..bounds.trial_space import PARITIES
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
 from ..essential.compact import compact_matrix
 
@@ -27,6 +31,8 @@ MATRIX_FRACTION = 0.1
 FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 6, 0.03, 0.5
 # Of traced walls the first enclosures have at least this tolerance.
 COARSE = 1e-2
+# Tolerance that rays on panels reach, and fraction of the time limit for enclosures which are tried before them then.
+OF_RAYS, BEFORE_RAYS = 5e-5, 0.25
 # Limit on the enclosed eigenvalues in the search for the largest one off the constants.
 MOST_ENCLOSED = 24
 
@@ -45,14 +51,68 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng, seconds: float
         matrix = near if near is not None and float(near.error) <= tolerance else None
     if matrix is not None:
         return matrix_spectrum(matrix, k)
-    if not made_of_isometries(law):
-        if law.has_density:
-            return _of_density(law, k, tolerance)
-        if suits_panels(law) and not is_costly(law):
-            enclosed = _enclosed(law, k, tolerance, seconds)
-            if enclosed is not None:
-                return enclosed
-    return _by_matrices(law, k, tolerance, rng)
+    if made_of_isometries(law):
+        return _by_matrices(law, k, tolerance, rng)
+    if law.has_density:
+        return _of_density(law, k, tolerance)
+    return _of_rays(law, k, tolerance, rng, seconds)
+
+
+def _of_rays(law: Law, k: int, tolerance: float, rng: Rng, seconds: float) -> Spectrum:
+    """The first that is accurate, or the best, of enclosures, matrices of laws without rays, and quotients by rays."""
+    found: list[Spectrum] = []
+
+    def missed() -> bool:
+        return all(worst(one) > tolerance for one in found)
+
+    def worst(one: Spectrum) -> float:
+        return float(one.errors.total().max())
+
+    shown = suits_rays(law) and k > 1
+    if suits_panels(law) and not is_costly(law):
+        allowed = BEFORE_RAYS if shown and is_traced(law) and tolerance >= OF_RAYS else 1.0
+        enclosed = _enclosed(law, k, tolerance, allowed * seconds)
+        found += [] if enclosed is None else [enclosed]
+    if missed() and not (shown and is_traced(law)):
+        found.append(_by_matrices(law, k, tolerance, rng))
+    if missed() and shown:
+        try:
+            found.append(_by_rays(law, k, tolerance, rng, seconds))
+        except AccuracyError:
+            if not found:
+                raise
+    return min(found, key=worst)
+
+
+def _by_rays(law: Law, k: int, tolerance: float, rng: Rng, seconds: float) -> Spectrum:
+    """The quotients with the least error of the worst one within the time."""
+    best, error = None, np.inf
+    for tops, level in tops_by_rays(law, generator(rng, 0), seconds, np.abs, k - 1):
+        worst = max(top.error for top in tops)
+        if worst < error:
+            best, error = (tops, level), worst
+        if error <= tolerance:
+            break
+    assert best is not None  # the first quotients have an error
+    tops, level = best
+    values = np.append(1.0, level.signs[: k - 1] * [top.value for top in tops])
+    errors = np.append(0.0, [top.error for top in tops])
+    order = np.append(0, 1 + np.argsort(-values[1:], kind="stable"))
+    vectors = np.column_stack([level.rays.basis.constant, level.vectors[:, : k - 1]])
+    of_matrix = np.append(1.0, level.signs[: k - 1] * level.values[: k - 1])
+    parities = np.append(1.0 if law.mirror_symmetric else 0.0, level.parities[: k - 1])
+    moduli, top = np.abs(values[1:]), float(values[order[1]])
+    # what is not listed has no larger modulus
+    gap_error = max(float(errors[order[1]]), float(np.min(moduli + errors[1:])) - top)
+    return Spectrum(
+        values=frozen(values[order]), vectors=frozen(vectors[:, order]),
+        residuals=frozen(np.abs(of_matrix - values)[order]), errors=discretisation_only(errors[order]),
+        gap=1.0 - top, gap_errors=discretisation_only(np.array([gap_error])), slem=float(moduli.max()),
+        convention=law.frame, basis=level.rays.basis,
+        method=f"quotients of eigenfunctions by {tops[0].rays} rays from panels",
+        parity=tuple(PARITIES[int(parity)] for parity in parities[order]),
+        completeness=f"the largest moduli of a matrix from {tops[0].rays} rays",
+    )  # fmt: skip
 
 
 def _by_matrices(law: Law, k: int, tolerance: float, rng: Rng) -> Spectrum:
