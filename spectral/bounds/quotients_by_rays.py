@@ -81,6 +81,7 @@ def _tops(
     cells: _Cells | None = None
     rounds, spent, before = list[_Round](), 0.0, None
     for level in levels(law, rng, rank, number):
+        # half of the rays on panels that were there before are known
         spent += RAY_TIME * PARTS * level.rays.points / (2.0 if level.rays is before else 1.0)
         before = level.rays
         if level.rays.points < TOLD_POINTS:
@@ -91,7 +92,7 @@ def _tops(
             spent += CELL_TIME * cells.next_rays
             if spent > seconds and rounds:
                 return
-            rounds.append(cells.round(level))
+            rounds.append(cells.next_round(level))
             tops, noise = _joint([one for one in rounds if one.points >= OLD * level.rays.points], level)
             yield tops, level
             if np.any(missed > MISSED * noise):
@@ -140,7 +141,7 @@ class _Cells:
         """Rays of the next round; every second one has twice as many."""
         return CELLS**2 * REPLICATES * FIRST_NET << self.rounds // 2
 
-    def round(self, level: Level) -> _Round:
+    def next_round(self, level: Level) -> _Round:
         """Quotients by `next_rays`, of which each cell has some by the spread that earlier rounds saw there."""
         from scipy.ndimage import gaussian_filter
 

@@ -346,9 +346,14 @@ class Level:
         return np.asarray(np.maximum(seen, broad / BROAD))
 
     @property
+    def squares(self) -> Floats:
+        """The square of each function that is followed on each panel, shape (panels, followed)."""
+        return np.sum(self.vectors[:, : self.followed].reshape(-1, DEGREE + 1, self.followed) ** 2, axis=1)
+
+    @property
     def lost(self) -> float:
         """The effect of rays that do not escape, and of what none of the rays met."""
-        most = float(np.max(self.vectors[:, : self.number] ** 2))
+        most = float(np.max(self.squares / self.rays.share[:, None]))
         return 2.0 * self.rays.unresolved * most + 2.0 * missed_fraction(PARTS * self.rays.points)
 
     def divided(self) -> Floats:
@@ -372,8 +377,7 @@ class Level:
         edges = self.rays.basis.edges
         inside = np.searchsorted(edges, 0.5 * (finer[:-1] + finer[1:])) - 1
         mass = masses(finer)
-        squares = np.sum(self.vectors[:, : self.followed].reshape(len(edges) - 1, -1) ** 2, axis=1)
-        modulus = np.sqrt(squares / masses(edges))[inside] * mass
+        modulus = np.sqrt(self.squares.sum(axis=1) / masses(edges))[inside] * mass
         parts = modulus / modulus.sum(), mass, np.full(len(mass), 1.0 / len(mass))
         return np.asarray(sum(weight * part for weight, part in zip(SHARES, parts, strict=True)))
 

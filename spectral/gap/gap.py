@@ -44,9 +44,9 @@ OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
 TOLERANCES, CLOSER = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), 0.25
 # Where enclosures of densities take too long, these tolerances are tried.
 SURE = 1e-9, 1e-6
-# A gap that misses its tolerance is held against other methods if its error exceeds this, which they may reach: rays on
-# panels (True), or matrices in polynomials.
-LARGEST_MISS = {True: 1e-4, False: 2e-3}
+# An enclosed gap that misses its tolerance is held against rays on panels if its error exceeds the first, and against
+# matrices in polynomials if it exceeds the second: they may reach these.
+MISS_FOR_RAYS, MISS_FOR_MATRICES = 1e-4, 2e-3
 # Fractions of the time limit for rays on panels, after enclosures and where there are none.
 AFTER_ENCLOSURES, ALONE = 1.25, 1.5
 # With so many ray segments per angle, rays on panels are faster than enclosures.
@@ -268,10 +268,8 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None, *, time_limi
         return small
     edge = essential_edge(law)
     if is_traced(law) and edge.high < 1.0 and gap_by_theorem(law) is None:
-        found = enclosed_gap(law, tolerance, edge, time_limit, np.abs)
-        if found is None or found.error > max(tolerance, LARGEST_MISS[suits_rays(law)]):
-            found = _by_rays_or(law, found, tolerance, generator(rng, 0), time_limit, edge, np.abs)
-        if found is not None:
+        found = _by_functions(law, tolerance, generator(rng, 0), time_limit, edge, np.abs)
+        if found is not None and _is_accurate(law, found, tolerance):
             return held_against_oscillations(law, found).cut_at_zero()
         upper = _by_polynomials(law, tolerance, generator(rng, 0), time_limit, edge)
     else:
@@ -375,25 +373,23 @@ def _by_matrices(
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
         # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
-    enclosed = enclosed_gap(law, tolerance, edge, seconds)
-    if enclosed is not None and enclosed.error <= max(tolerance, LARGEST_MISS[suits_rays(law)]):
-        return enclosed
-    found = _by_rays_or(law, enclosed, tolerance, rng, seconds, edge)
-    if found is not None:
+    found = _by_functions(law, tolerance, rng, seconds, edge)
+    if found is not None and _is_accurate(law, found, tolerance):
         return found
     sampled = _by_polynomials(law, tolerance, rng, seconds, edge)
     # the gap of slow functions is an upper bound, which faster ones may refute
-    refuted = enclosed is not None and sampled.value - sampled.error > enclosed.value + enclosed.error
-    return sampled if enclosed is None or (sampled.error < enclosed.error and not refuted) else enclosed
+    refuted = found is not None and sampled.value - sampled.error > found.value + found.error
+    return sampled if found is None or (sampled.error < found.error and not refuted) else found
 
 
-def _by_rays_or(
-    law: Law, enclosed: SpectralGap | None, tolerance: float, rng: np.random.Generator, seconds: float,
-    edge: EssentialEdge, rank: Rank = np.positive,
+def _by_functions(
+    law: Law, tolerance: float, rng: np.random.Generator, seconds: float, edge: EssentialEdge,
+    rank: Rank = np.positive,
 ) -> SpectralGap | None:  # fmt: skip
-    """The better of an enclosed gap and one by rays on panels; None if there is neither."""
-    if not suits_rays(law):
-        return None
+    """The enclosed gap, or the better of it and of one by rays on panels; None if there is neither."""
+    enclosed = enclosed_gap(law, tolerance, edge, seconds, rank)
+    if not suits_rays(law) or (enclosed is not None and enclosed.error <= max(tolerance, MISS_FOR_RAYS)):
+        return enclosed
     allowed = ALONE if enclosed is None else AFTER_ENCLOSURES
     try:
         sampled = gap_by_rays(law, tolerance, rng, seconds * allowed, edge, rank)
@@ -402,6 +398,11 @@ def _by_rays_or(
             raise
         return enclosed
     return sampled if enclosed is None else min(enclosed, sampled, key=lambda one: one.error)
+
+
+def _is_accurate(law: Law, found: SpectralGap, tolerance: float) -> bool:
+    """Whether matrices in polynomials are not expected to be more accurate."""
+    return suits_rays(law) or found.error <= max(tolerance, MISS_FOR_MATRICES)
 
 
 def gap_by_rays(

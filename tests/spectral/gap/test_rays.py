@@ -60,7 +60,7 @@ def test_the_spread_of_rays_in_cells_is_that_of_their_quotients():
     for seed in range(10):
         cells = _Cells(level.rays, np.random.default_rng(seed))
         for _ in range(2):
-            found = cells.round(level)
+            found = cells.next_round(level)
             scores.append((found.quotients - np.diag(exact)) / np.sqrt(found.variances))
     # twenty rounds of two functions: the mean square of the scores is one within three standard deviations
     assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=3.0 * np.sqrt(2.0 / 40))
@@ -149,10 +149,16 @@ def test_an_enclosed_gap_stays_where_rays_do_not_escape(monkeypatch):
         raise AccuracyError("rays did not escape", 1.0)
 
     monkeypatch.setattr(module, "gap_by_rays", lost)
-    law, enclosed = ker.CircularArcLaw(1.2), spec.spectral_gap(ker.CircularArcLaw(1.2), 1e-2)
-    assert module._by_rays_or(law, enclosed, 1e-9, np.random.default_rng(0), 1.0, NO_EDGE) is enclosed
-    with pytest.raises(AccuracyError):
-        module._by_rays_or(law, None, 1e-9, np.random.default_rng(0), 1.0, NO_EDGE)
+    law, rng = ker.CircularArcLaw(1.2), np.random.default_rng(0)
+    enclosed = spec.spectral_gap(law, 1e-2)
+    for known in (enclosed, None):
+        monkeypatch.setattr(module, "enclosed_gap", lambda *_, known=known: known)
+        if known is None:
+            with pytest.raises(AccuracyError):
+                module._by_functions(law, 1e-15, rng, 1.0, NO_EDGE)
+        else:
+            monkeypatch.setattr(module, "MISS_FOR_RAYS", 0.0)
+            assert module._by_functions(law, 1e-15, rng, 1.0, NO_EDGE) is enclosed
 
 
 def test_the_spectrum_by_rays_is_that_of_enclosures():
