@@ -348,7 +348,8 @@ class Level:
     @property
     def squares(self) -> Floats:
         """The square of each function that is followed on each panel, shape (panels, followed)."""
-        return np.sum(self.vectors[:, : self.followed].reshape(-1, DEGREE + 1, self.followed) ** 2, axis=1)
+        parts = self.vectors[:, : self.followed].reshape(-1, DEGREE + 1, self.followed)
+        return np.asarray(np.sum(parts**2, axis=1))
 
     @property
     def lost(self) -> float:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from ...kernels import Bins, FacetedLaw, Law, WallLaw
 from ...kernels.discretisation.radiosity import specular_sums
 from ...kernels.laws.law import in_frame, is_identity, sum_of
 from ...kernels.laws.structure import Rules, fold
+from ...kernels.walls.conditionals import WallConditionals, is_chaotic
 from ...kernels.walls.wall_law import made_of_isometries
 from .grazing import REMEMBERED, SWAP, GrazingLimit, grazing_limit
 
@@ -269,22 +270,25 @@ def _without(law: Law, is_left_out: Callable[[Law], bool]) -> tuple[float, Law]:
     return fraction, sum_of(tuple((weight / fraction, term) for weight, term in rest))
 
 
-# Two rays with entry points this step apart leave at the same angle, to rounding, if all reflections are at straight
-# pieces. A curved piece changes the angle by the step over its radius, 1e-7 or more unless the piece is flat.
-STEP, SAME_ANGLE = 1e-7, 1e-11
-# Outgoing angles closer than this belong to one isometry, or are one node of an orbit.
+# Outgoing angles of two rays of one itinerary that are closer than this are those of an isometry, for a curved piece
+# changes them. Of sampled rays the second one begins this step apart.
+SAME_ANGLE, STEP = 1e-11, 1e-7
+# Outgoing angles closer than this are one node of an orbit.
 SAME_NODE = 1e-8
-# Entry points per angle on the first levels and on the last ones, and bisections of changes on the last ones.
-POINTS, FINE_POINTS, HALVINGS = 256, 2048, 24
+# Errors of conditional distributions on the first levels, on the last ones, and at the largest values; and the numbers
+# of rays where a direction takes more than so many ray segments, so that conditional distributions are slow.
+ROUGH, FINE, FINEST, SLOW = 1e-4, 1e-7, 1e-9, 8_000
+RAYS = {ROUGH: 2**8, FINE: 2**11, FINEST: 2**15}
+# Bisections of the entry points where sampled rays change their isometry.
+HALVINGS = 24
 # Number of initial angles, layers of an orbit, and limit on its nodes.
 ANGLES, LAYERS, MOST_NODES = 96, 6, 60
-# Search near the largest values: peaks, levels, levels with all entry points, angles per peak, ratio of spacings.
-PEAKS, LEVELS, FINE_LEVELS, NEARBY_ANGLES, NEARER = 4, 5, 2, 9, 6.0
+# Search near the largest values: peaks, levels, fine levels, ratio of spacings.
+PEAKS, LEVELS, FINE_LEVELS, NEARER = 4, 5, 2, 6
 # Least and largest angle of an orbit.
 LIMITS = 1e-6, np.pi - 1e-6
-# Error as a multiple of the change by the last level plus the last layer.
-BEYOND = 2.0
-CHANGE_WIDTH = 1e-9
+# Error as a multiple of the change by the last level plus the last layer, and its least value.
+BEYOND, LEAST_ERROR = 2.0, 1e-9
 # Of specular rays between facets: points of each Sobol sequence, its seed, and numbers of bins of trial functions.
 POINTS_OF_FACETS, SEED, CELLS = 2**15, (0,), (1, 32, 128, 512)
 
@@ -326,11 +330,10 @@ def straight_part(law: WallLaw) -> StraightPart:
     >>> straight_part(WallLaw(wall))
     StraightPart(fraction=0.5, low=0.5, high=0.5)
     """
-    wall = law.wall
-    flat = wall.flat_top / wall.period
-    if not _has_straight_pieces_below(wall):
+    flat = law.wall.flat_top / law.wall.period
+    if not _has_straight_pieces_below(law.wall):
         return StraightPart(flat, flat, flat)
-    with progress_bar(LAYERS * (1 + LEVELS), "layer", "essential edge") as bar:
+    with progress_bar(LAYERS * (2 + LEVELS), "layer", "essential edge") as bar:
         return _searched(law, flat, bar)
 
 
@@ -372,42 +375,48 @@ def specular_part(law: FacetedLaw) -> StraightPart:
 
 def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     """The straight part of a wall with straight pieces below its top, of which a fraction is flat."""
+    isometries = _Sampled(law) if is_chaotic(law.wall, SLOW, FINE) else _Distributions(law.wall)
     angle = np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
-    found = _largest_of_orbits(law, angle, POINTS, bar)
-    fraction = float(found.fractions @ np.sin(angle) / np.sin(angle).sum())
-    if np.all(found.fractions <= flat + 2.0 / POINTS):
-        # more straight rays would be a smaller fraction than the entry points resolve
-        return StraightPart(fraction, flat, min(flat + 2.0 / POINTS, 1.0))
-    spacing, best = np.pi / ANGLES, found
-    candidates, values, axes = angle, found.roots, _axes(law.wall, angle, found.reached)
+    candidates = np.append(angle, _square_to_sides(law.wall))
+    found = _largest_of_orbits(isometries, candidates, ROUGH, bar)
+    fraction = float(found.fractions[:ANGLES] @ np.sin(angle) / np.sin(angle).sum())
+    if np.all(found.fractions <= flat + found.errors):
+        # more straight rays would be fewer than the errors
+        return StraightPart(max(fraction, flat), flat, min(flat + float(found.errors.max()), 1.0))
+    spacing, values, axes = np.pi / ANGLES, found.roots, _axes(candidates, found.reached)
     for level in range(LEVELS):
         peaks = _peaks(candidates, values, PEAKS if level == 0 else 2, 1.5 * spacing)
+        # a peak that is steep on one side may be a whole spacing away from the largest value
+        steps = spacing * np.linspace(-1.0, 1.0, 2 * NEARER + 1)
         spacing /= NEARER
-        steps = spacing * np.linspace(-NEARER, NEARER, NEARBY_ANGLES)
         candidates = np.union1d(np.clip(peaks[:, None] + steps, *LIMITS), axes)
-        fine = level >= LEVELS - FINE_LEVELS
-        before, best = best, _largest_of_orbits(law, candidates, FINE_POINTS if fine else POINTS, bar, fine)
-        values = best.roots
+        before, tolerance = values, FINE if level >= LEVELS - FINE_LEVELS else ROUGH
+        found = _largest_of_orbits(isometries, candidates, tolerance, bar)
+        values = found.roots
         axes = _peaks(axes, values[np.searchsorted(candidates, axes)], PEAKS, 0.0)
-    low = max(float(best.roots.max()), fraction, flat)
-    change = abs(float(best.roots.max()) - float(before.roots.max()))
-    high = low + BEYOND * (change + float(best.missing[np.argmax(best.roots)])) + CHANGE_WIDTH
-    return StraightPart(
-        fraction, low - CHANGE_WIDTH, float(min(high, max(found.fractions.max() + 2.0 / POINTS, low), 1.0))
-    )
+    best = _largest_of_orbits(isometries, _peaks(candidates, values, 2, 0.0), FINEST, bar)
+    top = int(np.argmax(best.roots))
+    change = abs(float(values.max() - before.max())) + abs(float(best.roots[top] - values.max()))
+    value, error = float(best.roots[top]), float(best.errors[top]) + LEAST_ERROR
+    low, high = value - error, value + BEYOND * (change + float(best.missing[top])) + error
+    return StraightPart(max(fraction, flat), max(low, flat), min(max(high, flat), 1.0))
 
 
-def _axes(wall: Wall, starts: Floats, reached: list[Floats]) -> Floats:
-    """Angles that an isometry c - theta keeps: c/2, where rays hit a straight piece at right angles, and others found.
+def _square_to_sides(wall: Wall) -> Floats:
+    """The angles at which rays hit a straight piece at right angles."""
+    pieces = [piece for loop in (wall.pieces, *wall.islands) for piece in loop]
+    sides = [np.subtract(piece.end, piece.start) for piece in pieces if piece.is_straight]
+    return np.unique(np.clip([np.mod(np.arctan2(y, x) + 0.5 * np.pi, np.pi) for x, y in sides], *LIMITS))
+
+
+def _axes(starts: Floats, reached: list[Floats]) -> Floats:
+    """Angles that an isometry c - theta keeps: c/2, and those at right angles to a straight piece.
 
     There an orbit and its mirror image meet, so that the largest eigenvalue has a cusp.
     """
-    pieces = [piece for loop in (wall.pieces, *wall.islands) for piece in loop]
-    sides = [np.subtract(piece.end, piece.start) for piece in pieces if piece.is_straight]
-    normals = [float(np.mod(np.arctan2(y, x) + 0.5 * np.pi, np.pi)) for x, y in sides]
     halves = np.concatenate([0.5 * (theta + np.unique(out)) for theta, out in zip(starts, reached, strict=True)])
     _, first, count = np.unique(np.rint(halves / SAME_NODE), return_index=True, return_counts=True)
-    return np.asarray(np.clip(np.append(halves[first[count > 1]], normals), *LIMITS))
+    return np.asarray(np.clip(np.append(halves[first[count > 1]], starts[ANGLES:]), *LIMITS))
 
 
 def _peaks(candidates: Floats, values: Floats, number: int, apart: float) -> Floats:
@@ -422,40 +431,59 @@ def _peaks(candidates: Floats, values: Floats, number: int, apart: float) -> Flo
 class _Orbits(NamedTuple):
     """For each initial angle the largest eigenvalue of its orbit, its change by the last layer, and its straight rays.
 
-    Of these rays the fraction and the outgoing angles.
+    Of the eigenvalue the error by those of conditional distributions; of these rays the fraction and outgoing angles.
     """
 
     roots: Floats
     missing: Floats
+    errors: Floats
     fractions: Floats
     reached: list[Floats]
 
 
-def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, bar: Any, halved: bool = False) -> _Orbits:
-    conditionals: dict[int, tuple[Floats, Floats]] = {}
+class _Isometries(NamedTuple):
+    """The weights and outgoing angles of the straight rays at one angle, with the error of the weights."""
+
+    weights: Floats
+    outgoing: Floats
+    error: float
+
+
+class _Source(Protocol):
+    """What finds the isometries of a wall at some angles, with weights to a tolerance."""
+
+    def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]: ...
+
+
+def _largest_of_orbits(isometries: _Source, starts: Floats, tolerance: float, bar: Any) -> _Orbits:
+    known: dict[int, _Isometries] = {}
     orbits = [[_node(theta)] for theta in starts]
     angles = {_node(theta): float(theta) for theta in starts}
     roots = np.zeros((LAYERS, len(starts)))
     fresh = list(angles)
     for layer in range(LAYERS):
-        conditionals |= _conditionals(law, [(node, angles[node]) for node in fresh], points, halved)
+        if fresh:
+            found = isometries(np.array([angles[node] for node in fresh]), tolerance)
+            known |= zip(fresh, found, strict=True)
         fresh = []
         for k, orbit in enumerate(orbits):
-            roots[layer, k] = _root(orbit, conditionals, angles)
+            roots[layer, k] = _root(orbit, known, angles)
             if layer == LAYERS - 1:
                 continue
-            reached = {_node(out): float(out) for node in orbit for out in conditionals[node][1]}
+            reached = {_node(out): float(out) for node in orbit for out in known[node].outgoing}
             new = [node for node in reached if _index(node, orbit) is None]
             if len(orbit) + len(new) <= MOST_NODES:
                 for node in new:
                     angles.setdefault(node, reached[node])
                     orbit.append(node)
-                fresh += [node for node in new if node not in conditionals]
+                fresh += [node for node in new if node not in known]
         fresh = list(dict.fromkeys(fresh))
         bar.update()
-    straight = [conditionals[_node(theta)] for theta in starts]
-    fractions = np.array([weights.sum() for weights, _ in straight])
-    return _Orbits(roots[-1], roots[-1] - roots[-2], fractions, [out for _, out in straight])
+    straight = [known[_node(theta)] for theta in starts]
+    return _Orbits(
+        roots[-1], roots[-1] - roots[-2], np.array([max(known[node].error for node in orbit) for orbit in orbits]),
+        np.array([each.weights.sum() for each in straight]), [each.outgoing for each in straight],
+    )  # fmt: skip
 
 
 def _node(theta: float) -> int:
@@ -467,67 +495,93 @@ def _index(node: int, orbit: list[int]) -> int | None:
     return next((j for j, other in enumerate(orbit) if abs(other - node) <= 1), None)
 
 
-def _root(orbit: list[int], conditionals: dict[int, tuple[Floats, Floats]], angles: dict[int, float]) -> float:
+def _root(orbit: list[int], known: dict[int, _Isometries], angles: dict[int, float]) -> float:
     """The largest eigenvalue on the nodes of an orbit."""
     matrix = np.zeros((len(orbit), len(orbit)))
     for i, node in enumerate(orbit):
-        for weight, out in zip(*conditionals[node], strict=True):
+        for weight, out in zip(known[node].weights, known[node].outgoing, strict=True):
             if (j := _index(_node(out), orbit)) is not None:
                 matrix[i, j] += weight * np.sqrt(np.sin(angles[node]) / np.sin(angles[orbit[j]]))
     return float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
 
 
-def _conditionals(
-    law: WallLaw, nodes: list[tuple[int, float]], points: int, halved: bool
-) -> dict[int, tuple[Floats, Floats]]:
-    """Weights and outgoing angles of the straight rays for the angle of each node."""
-    theta = np.array([angle for _, angle in nodes])
-    x = np.broadcast_to((np.arange(points) + 0.5) / points, (len(nodes), points))
-    out = _straight(law, x.ravel(), np.repeat(theta, points)).reshape(len(nodes), points)
-    labels = _labels(out)
-    row, entry = np.nonzero(np.abs(np.diff(labels, axis=1)) > 1)
-    low, high = x[row, entry], x[row, entry + 1]
-    if halved:
-        low, high = _changes(law, theta[row], low, high, labels[row, entry], labels[row, entry + 1])
-    middle = 0.5 * (low + high)
-    found = {}
-    for k, (node, _) in enumerate(nodes):
-        own = row == k
-        ends = np.concatenate([[0.0], middle[own], [1.0]])
-        first = np.concatenate([[0], entry[own] + 1])
-        here = out[k, first]
-        finite = np.isfinite(here)
-        found[node] = (np.diff(ends)[finite], here[finite])
-    return found
+class _Distributions:
+    """The parts of conditional distributions from straight pieces: nodes of a rule that agree, and a flat top."""
+
+    def __init__(self, wall: Wall) -> None:
+        self.conditionals = WallConditionals(wall, 1, np.empty(0))
+
+    def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]:
+        found, unresolved = self.conditionals(theta, tolerance)
+        listed = []
+        for k, angle in enumerate(theta.tolist()):
+            own = slice(found.starts[k], found.starts[k + 1])
+            order = np.argsort(found.nodes[own])
+            out, weight = found.nodes[own][order], found.weights[own][order]
+            same = np.diff(out) <= SAME_ANGLE
+            straight = np.append(same, False) | np.append(False, same) | (np.abs(out - (np.pi - angle)) <= SAME_ANGLE)
+            first = np.append(True, ~same)[straight]
+            weights = np.bincount(np.cumsum(first) - 1, weight[straight], minlength=int(first.sum()))
+            error = float(found.error[k] + unresolved[k])
+            # intervals that are too narrow to be decided are in the error
+            wide = weights > error
+            listed.append(_Isometries(weights[wide].astype(np.float64), out[straight][first][wide], error))
+        return listed
+
+
+class _Sampled:
+    """The same by rays, where conditional distributions have too many other itineraries.
+
+    The error is that of itineraries which no ray takes: as many rays as take one alone would take these (Good).
+    """
+
+    def __init__(self, law: WallLaw) -> None:
+        self.law = law
+
+    def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]:
+        points = RAYS[tolerance]
+        x = np.broadcast_to((np.arange(points) + 0.5) / points, (len(theta), points))
+        out = self._straight(x.ravel(), np.repeat(theta, points)).reshape(len(theta), points)
+        labels = _labels(out)
+        row, entry = np.nonzero(np.abs(np.diff(labels, axis=1)) > 1)
+        ends = x[row, entry], x[row, entry + 1], labels[row, entry], labels[row, entry + 1]
+        changes = self._changes(theta[row], *ends)
+        listed = []
+        for k in range(len(theta)):
+            own = row == k
+            first = np.concatenate([[0], entry[own] + 1])
+            here, width = out[k, first], np.diff(np.concatenate([[0.0], changes[own], [1.0]]))
+            alone, finite = int(np.sum(np.diff(np.append(first, points)) == 1)), np.isfinite(here)
+            listed.append(_Isometries(width[finite], here[finite], 2.0 * (1 + alone) / points))
+        return listed
+
+    def _changes(
+        self, theta: Floats, low: Floats, high: Floats, before: NDArray[np.int64], after: NDArray[np.int64]
+    ) -> Floats:
+        """Where the label changes that is ``before`` at ``low``.
+
+        A ray that meets a curved piece has the angle of an isometry with probability 0, so one ray tells a straight
+        label.
+        """
+        curved = before == _labels(np.array([np.nan]))
+        known = np.where(curved, after, before)
+        for _ in range(HALVINGS if low.size else 0):
+            middle = 0.5 * (low + high)
+            same = (np.abs(_labels(self.law.reflect_with_status(middle, theta)[0]) - known) <= 1) != curved
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        return 0.5 * (low + high)
+
+    def _straight(self, x: Floats, theta: Floats) -> Floats:
+        """Outgoing angles of the rays that meet straight pieces only, and nan for other rays."""
+        here, there = (
+            self.law.reflect_with_status(entry, theta)[0] for entry in (x, np.minimum(x + STEP, 1.0 - 2.0**-53))
+        )
+        return np.where(np.abs(here - there) <= SAME_ANGLE, here, np.nan)
 
 
 def _labels(out: Floats) -> NDArray[np.int64]:
     """The nodes of outgoing angles, and one number for all other rays."""
     return np.rint(np.nan_to_num(out, nan=-1.0) / SAME_NODE).astype(np.int64)
-
-
-def _changes(
-    law: WallLaw, theta: Floats, low: Floats, high: Floats, before: NDArray[np.int64], after: NDArray[np.int64]
-) -> tuple[Floats, Floats]:
-    """Intervals, bisected to less than `CHANGE_WIDTH`, in which the label changes that is ``before`` at ``low``.
-
-    A ray that meets a curved piece has the angle of an isometry with probability 0, so one ray tells a straight label.
-    """
-    curved = before == _labels(np.array([np.nan]))
-    known = np.where(curved, after, before)
-    for _ in range(HALVINGS if low.size else 0):
-        middle = 0.5 * (low + high)
-        same = (np.abs(_labels(law.reflect_with_status(middle, theta)[0]) - known) <= 1) != curved
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    return low, high
-
-
-def _straight(law: WallLaw, x: Floats, theta: Floats) -> Floats:
-    """Outgoing angles of the rays that meet straight pieces only, and nan for other rays."""
-    if not x.size:
-        return np.empty(0)
-    here, there = (law.reflect_with_status(entry, theta)[0] for entry in (x, np.minimum(x + STEP, 1.0 - 2.0**-53)))
-    return np.where(np.abs(here - there) <= SAME_ANGLE, here, np.nan)
 
 
 def _has_straight_pieces_below(wall: Wall) -> bool:
