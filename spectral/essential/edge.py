@@ -273,11 +273,13 @@ def _without(law: Law, is_left_out: Callable[[Law], bool]) -> tuple[float, Law]:
 # Outgoing angles of two rays of one itinerary that are closer than this are those of an isometry, for a curved piece
 # changes them. Of sampled rays the second one begins this step apart.
 SAME_ANGLE, STEP = 1e-11, 1e-7
+# Nodes that agree at least on a straight piece, whose rule has nine or more.
+ALIKE = 5
 # Outgoing angles closer than this are one node of an orbit.
 SAME_NODE = 1e-8
 # Errors of conditional distributions on the first levels, on the last ones, and at the largest values; and the numbers
 # of rays where a direction takes more than so many ray segments, so that conditional distributions are slow.
-ROUGH, FINE, FINEST, SLOW = 1e-4, 1e-7, 1e-9, 8_000
+ROUGH, FINE, FINEST, SLOW = 1e-6, 1e-7, 1e-9, 8_000
 RAYS = {ROUGH: 2**8, FINE: 2**11, FINEST: 2**15}
 # Bisections of the entry points where sampled rays change their isometry.
 HALVINGS = 24
@@ -518,14 +520,12 @@ class _Distributions:
             own = slice(found.starts[k], found.starts[k + 1])
             order = np.argsort(found.nodes[own])
             out, weight = found.nodes[own][order], found.weights[own][order]
-            same = np.diff(out) <= SAME_ANGLE
-            straight = np.append(same, False) | np.append(False, same) | (np.abs(out - (np.pi - angle)) <= SAME_ANGLE)
-            first = np.append(True, ~same)[straight]
-            weights = np.bincount(np.cumsum(first) - 1, weight[straight], minlength=int(first.sum()))
+            group = np.cumsum(np.append(True, np.diff(out) > SAME_ANGLE)) - 1
+            weights, first = np.bincount(group, weight), np.searchsorted(group, np.arange(group[-1] + 1))
+            # in intervals that are too narrow to be decided few nodes agree; these are in the error
+            straight = (np.bincount(group) >= ALIKE) | (np.abs(out[first] - (np.pi - angle)) <= SAME_ANGLE)
             error = float(found.error[k] + unresolved[k])
-            # intervals that are too narrow to be decided are in the error
-            wide = weights > error
-            listed.append(_Isometries(weights[wide].astype(np.float64), out[straight][first][wide], error))
+            listed.append(_Isometries(weights[straight], out[first][straight], error))
         return listed
 
 
