@@ -90,6 +90,25 @@ def test_the_parabola_pair_sends_grazing_rays_back_and_has_no_visible_gap():
     assert gap.verdict == "essential edge" and 0.0 <= float(gap) <= 1e-6 and gap.error <= 1e-6
 
 
+def test_the_edge_of_a_side_is_at_the_angle_where_its_rays_begin_to_meet_the_curve():
+    """A cusp, steep on one side: near .51915 and its image all but few rays come back to each other."""
+    curve = geo.Bezier([(0.3, -0.4), (0.5, -0.6), (0.8, -0.2), (1, 0)])
+    wall = geo.Wall([geo.Segment((0, 0), (0.3, -0.4)), curve])
+    edge = essential_edge(ker.WallLaw(wall))
+    # the side turns theta to twice its normal's angle less theta
+    here = np.linspace(0.5191, 0.5192, 11)
+    there = 2.0 * (np.arctan2(-0.4, 0.3) + 0.5 * np.pi) - here
+    x = (np.arange(2**16) + 0.5) / 2**16
+    shares = [
+        np.mean(np.abs(geo.trace(wall, x[:, None], first).theta - second) < 1e-9, axis=0)
+        for first, second in ((here, there), (there, here))
+    ]
+    top = float(np.sqrt(shares[0] * shares[1]).max())
+    assert edge.low - 2e-5 < top < edge.high + 2e-5 and edge.error < 1e-5
+    gap = spec.spectral_gap(ker.WallLaw(wall), 1e-4)
+    assert gap.verdict == "essential edge" and abs(gap.value - (1.0 - edge.value)) <= gap.error < 1e-5
+
+
 def test_a_mushroom_ends_at_an_essential_edge_above_its_fraction_of_flat_tops():
     edge = essential_edge(ker.WallLaw(geo.mushrooms(0.3)))
     assert edge.low > 0.7 and edge.high < 1.0 and edge.error < 1e-6
