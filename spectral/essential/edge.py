@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
+from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -22,7 +23,7 @@ from ...kernels import Bins, FacetedLaw, Law, WallLaw
 from ...kernels.discretisation.radiosity import specular_sums
 from ...kernels.laws.law import in_frame, is_identity, sum_of
 from ...kernels.laws.structure import Rules, fold
-from ...kernels.walls.conditionals import WallConditionals, is_chaotic
+from ...kernels.walls.conditionals import WallConditionals, is_chaotic, is_few
 from ...kernels.walls.wall_law import made_of_isometries
 from .grazing import REMEMBERED, SWAP, GrazingLimit, grazing_limit
 
@@ -283,6 +284,8 @@ ROUGH, FINE, FINEST, SLOW = 1e-6, 1e-7, 1e-9, 8_000
 RAYS = {ROUGH: 2**8, FINE: 2**11, FINEST: 2**15}
 # Bisections of the entry points where sampled rays change their isometry.
 HALVINGS = 24
+# Intervals in each of which the widest pieces that appear or disappear are looked for.
+INTERVALS = 16
 # Number of initial angles, layers of an orbit, and limit on its nodes.
 ANGLES, LAYERS, MOST_NODES = 96, 6, 60
 # Search near the largest values: peaks, levels, fine levels, ratio of spacings.
@@ -377,15 +380,18 @@ def specular_part(law: FacetedLaw) -> StraightPart:
 
 def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     """The straight part of a wall with straight pieces below its top, of which a fraction is flat."""
-    isometries = _Sampled(law) if is_chaotic(law.wall, SLOW, FINE) else _Distributions(law.wall)
+    slow = not is_few(law.wall) or is_chaotic(law.wall, SLOW, FINE)
+    isometries = _Sampled(law) if slow else _Distributions(law.wall)
     angle = np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
     candidates = np.append(angle, _square_to_sides(law.wall))
     found = _largest_of_orbits(isometries, candidates, ROUGH, bar)
-    fraction = float(found.fractions[:ANGLES] @ np.sin(angle) / np.sin(angle).sum())
-    if np.all(found.fractions <= flat + found.errors):
+    fractions = found.fractions
+    fraction = float(fractions[:ANGLES] @ np.sin(angle) / np.sin(angle).sum())
+    if np.all(fractions <= flat + found.errors):
         # more straight rays would be fewer than the errors
         return StraightPart(max(fraction, flat), flat, min(flat + float(found.errors.max()), 1.0))
-    spacing, values, axes = np.pi / ANGLES, found.roots, _axes(candidates, found.reached)
+    spacing, values = np.pi / ANGLES, found.roots
+    axes = np.clip(np.append(_axes(candidates, found.reached), isometries.kinks()), *LIMITS)
     for level in range(LEVELS):
         peaks = _peaks(candidates, values, PEAKS if level == 0 else 2, 1.5 * spacing)
         # a peak that is steep on one side may be a whole spacing away from the largest value
@@ -399,9 +405,15 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     best = _largest_of_orbits(isometries, _peaks(candidates, values, 2, 0.0), FINEST, bar)
     top = int(np.argmax(best.roots))
     change = abs(float(values.max() - before.max())) + abs(float(best.roots[top] - values.max()))
+    # a cusp between two angles is higher by as much as the values next to the largest one are lower
+    peak = int(np.argmax(values))
+    near = np.abs(candidates - candidates[peak]) <= 1.5 * spacing
+    steep = float(values[peak] - values[near].min())
     value, error = float(best.roots[top]), float(best.errors[top]) + LEAST_ERROR
-    low, high = value - error, value + BEYOND * (change + float(best.missing[top])) + error
-    return StraightPart(max(fraction, flat), max(low, flat), min(max(high, flat), 1.0))
+    low, high = value - error, value + BEYOND * (change + float(best.missing[top])) + steep + error
+    # the norm is at most the largest probability of straight rays
+    most = max(float(fractions.max()), float(best.fractions.max())) + 2.0 * error
+    return StraightPart(max(fraction, flat), max(low, flat), max(low, flat, min(high, most, 1.0)))
 
 
 def _square_to_sides(wall: Wall) -> Floats:
@@ -456,6 +468,9 @@ class _Source(Protocol):
 
     def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]: ...
 
+    def kinks(self) -> Floats:
+        """Angles where pieces appear or disappear between angles of earlier calls."""
+
 
 def _largest_of_orbits(isometries: _Source, starts: Floats, tolerance: float, bar: Any) -> _Orbits:
     known: dict[int, _Isometries] = {}
@@ -470,15 +485,9 @@ def _largest_of_orbits(isometries: _Source, starts: Floats, tolerance: float, ba
         fresh = []
         for k, orbit in enumerate(orbits):
             roots[layer, k] = _root(orbit, known, angles)
-            if layer == LAYERS - 1:
-                continue
-            reached = {_node(out): float(out) for node in orbit for out in known[node].outgoing}
-            new = [node for node in reached if _index(node, orbit) is None]
-            if len(orbit) + len(new) <= MOST_NODES:
-                for node in new:
-                    angles.setdefault(node, reached[node])
-                    orbit.append(node)
-                fresh += [node for node in new if node not in known]
+            new = _next_nodes(orbit, known, angles) if layer < LAYERS - 1 else []
+            orbit.extend(new)
+            fresh += [node for node in new if node not in known]
         fresh = list(dict.fromkeys(fresh))
         bar.update()
     straight = [known[_node(theta)] for theta in starts]
@@ -486,6 +495,17 @@ def _largest_of_orbits(isometries: _Source, starts: Floats, tolerance: float, ba
         roots[-1], roots[-1] - roots[-2], np.array([max(known[node].error for node in orbit) for orbit in orbits]),
         np.array([each.weights.sum() for each in straight]), [each.outgoing for each in straight],
     )  # fmt: skip
+
+
+def _next_nodes(orbit: list[int], known: dict[int, _Isometries], angles: dict[int, float]) -> list[int]:
+    """The nodes that an orbit reaches, whose angles become known; none if they are too many."""
+    reached = {_node(out): out for node in orbit for out in known[node].outgoing.tolist()}
+    new = [node for node in reached if _index(node, orbit) is None]
+    if len(orbit) + len(new) > MOST_NODES:
+        return []
+    for node in new:
+        angles.setdefault(node, reached[node])
+    return new
 
 
 def _node(theta: float) -> int:
@@ -513,6 +533,11 @@ class _Distributions:
     def __init__(self, wall: Wall) -> None:
         self.conditionals = WallConditionals(wall, 1, np.empty(0))
 
+    def kinks(self) -> Floats:
+        """The critical angles of the widest pieces, in each of some intervals."""
+        parts = np.linspace(*LIMITS, INTERVALS + 1)
+        return np.concatenate([self.conditionals.critical_angles(low, high) for low, high in pairwise(parts.tolist())])
+
     def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]:
         found, unresolved = self.conditionals(theta, tolerance)
         listed = []
@@ -537,6 +562,10 @@ class _Sampled:
 
     def __init__(self, law: WallLaw) -> None:
         self.law = law
+
+    def kinks(self) -> Floats:
+        """None are known."""
+        return np.empty(0)
 
     def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]:
         points = RAYS[tolerance]
