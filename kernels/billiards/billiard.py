@@ -10,7 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checkpoints import Stored
-from ...core.checks import Floats, Rng, check_memory, finite_array, generator, instance, shaped, shortened, whole_number
+from ...core.checks import (
+    Floats,
+    Rng,
+    check_memory,
+    finite_array,
+    generator,
+    instance,
+    new_seed,
+    shaped,
+    shortened,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.estimates import Summary
 from ...core.given import seed_by_name
@@ -109,7 +120,7 @@ def play(
     >>> (record.position[1:, 0].round(12) + 0.0).tolist()
     [[0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]]
     """
-    root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
+    root = new_seed(generator(rng))
     whole_number("collisions", collisions, 1)
     check_memory("collisions", "the record", 8 * collisions)
     each = laws_of_walls(container, laws, CollisionAlongWall)

@@ -22,6 +22,7 @@ from ...core.checks import (
     check_memory,
     generator,
     instance,
+    new_seed,
     number_between,
     positive_number,
     shaped,
@@ -277,7 +278,7 @@ def play_gas(
     _check_apart(located, container, 2.0 * disk.radius)
     from .event_loop import EventLoop
 
-    root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
+    root = new_seed(generator(rng))
     identity = {
         "computation": "gas", "version": __version__, "container": container, "pair": pair, "walls": tuple(laws),
         "position": located, "velocity": moving, "events": events, "every": every, "interval": wanted,

@@ -22,6 +22,7 @@ from ...core.checks import (
     frozen,
     generator,
     instance,
+    new_seed,
     shaped,
     whole_number,
 )
@@ -207,7 +208,7 @@ def limit_study(
     True
     """
 
-    root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
+    root = new_seed(generator(rng))
     eps = shaped("scales", np.atleast_1d(finite_array("scales", scales)), "n")
     rolls = shaped("psi", np.atleast_1d(angles("psi", psi)), "n")
     if not rolls.size:

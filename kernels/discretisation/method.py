@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ...core.checks import Floats, choice, finite_number, read_only, whole_number
+from ...core.checks import Floats, choice, finite_number, new_seed, read_only, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind
 from ...core.long_runs import Engine
@@ -154,7 +154,7 @@ def by_independent_rays(law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
     A chunk of rays depends only on numbers drawn from ``budget.rng``, its part and its own index. Workers count or add
     up the rays and a checkpoint stores the sums, which are the same to the last bit.
     """
-    root = tuple(int(word) for word in budget.rng.integers(0, 2**63, size=2))
+    root = new_seed(budget.rng)
     most = LARGEST_REPLICATES // (np.dtype(np.float64).itemsize * basis.size**2)
     parts = 1 if basis.is_partition else BATCHES if most >= BATCHES else PARTS
     sums = RaySums(law, basis, parts)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats
+from ...core.checks import Floats, new_seed
 from ...core.errors import InputError
 from ...core.long_runs import Engine
 from ..bases.angles import clipped_inside
@@ -138,8 +138,17 @@ def random_shifts(seed: tuple[int, ...], dimension: int) -> tuple[NDArray[np.uin
 
 def shifted_points(sequence: Sobol, number: int, shifts: NDArray[np.uint64], beyond: Floats) -> Floats:
     """The next points of a sequence in each part, shape (PARTS, number, dimension)."""
-    digits = (sequence.random(number) * 2.0**SOBOL_BITS).astype(np.uint64)
-    return np.asarray((digits ^ shifts[:, None]) * 2.0**-SOBOL_BITS + beyond[:, None])
+    return shifted(next_digits(sequence, number), shifts, beyond)
+
+
+def next_digits(sequence: Sobol, number: int) -> NDArray[np.uint64]:
+    """The digits of the next points of a sequence, shape (number, dimension)."""
+    return np.asarray((sequence.random(number) * 2.0**SOBOL_BITS).astype(np.uint64))
+
+
+def shifted(digits: NDArray[np.uint64], shifts: NDArray[np.uint64], beyond: Floats) -> Floats:
+    """Points with these digits after each shift of shape (..., dimension), shape (..., number, dimension)."""
+    return np.asarray((digits ^ shifts[..., None, :]) * 2.0**-SOBOL_BITS + beyond[..., None, :])
 
 
 def whole_sequences(samples: int) -> int:
@@ -181,7 +190,7 @@ class SobolSampler:
             )
         self.sums, self.rays = RaySums(law, basis, PARTS), rays
         self.halved = law.mirror_symmetric is True and is_mirror_symmetric(basis)
-        self.seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
+        self.seed = new_seed(rng)
         self.shifts, self.beyond = random_shifts(self.seed, rays.dimension)
 
     def sampled(self, samples: int, *, symmetrise: bool, engine: Engine | None = None) -> KernelMatrix:

@@ -15,18 +15,18 @@ import numpy as np
 from numpy.polynomial.legendre import legval
 from numpy.typing import NDArray
 
-from ...core.checks import Floats
+from ...core.checks import Floats, new_seed
 from ...core.estimates import NORMAL_95, with_error
 from ...core.long_runs import progress_bar
 from ...kernels import Law
 from ...kernels.sampling.chunks import RaySums
-from ...kernels.sampling.sobol import PARTS, SOBOL_BITS, sobol_sequence
+from ...kernels.sampling.sobol import PARTS, SOBOL_BITS, next_digits, shifted, sobol_sequence
 from .rays_on_panels import DEGREE, Level, PanelSums, levels
 from .trial_space import Rank
 
 # Cells in each direction, replicates of each, and points of the net of each replicate in the first round. Two
 # replicates have the longest nets; variances are then smoothed, by so many cells in each direction and over the rounds.
-CELLS, REPLICATES, FIRST_NET = 192, 2, 4
+CELLS, REPLICATES, FIRST_POINTS = 192, 2, 4
 SMOOTHED, REMEMBERED = 0.8, 0.5
 # Least weight of a cell, relative to the mean, and rays at a time.
 LEAST, RAYS_AT_ONCE = 0.05, 2**18
@@ -139,7 +139,7 @@ class _Cells:
     @property
     def next_rays(self) -> int:
         """Rays of the next round; every second one has twice as many."""
-        return CELLS**2 * REPLICATES * FIRST_NET << self.rounds // 2
+        return CELLS**2 * REPLICATES * FIRST_POINTS << self.rounds // 2
 
     def next_round(self, level: Level) -> _Round:
         """Quotients by `next_rays`, of which each cell has some by the spread that earlier rounds saw there."""
@@ -147,12 +147,11 @@ class _Cells:
 
         rays, points = self.next_rays, self._points()
         parts = np.empty((CELLS**2, REPLICATES, level.number))
-        seed = tuple(int(word) for word in self.rng.integers(0, 2**63, size=2))
-        net = (sobol_sequence(seed, 0).random(points.max()) * 2.0**SOBOL_BITS).astype(np.uint64)
+        digits = next_digits(sobol_sequence(new_seed(self.rng), 0), int(points.max()))
         for each in np.unique(points):
             same = np.flatnonzero(points == each)
             for some in np.array_split(same, -(-same.size * REPLICATES * each // RAYS_AT_ONCE)):
-                parts[some] = self._means(level, some, net[:each])
+                parts[some] = self._means(level, some, digits[:each])
         variances = parts.var(axis=1, ddof=1)
         seen = gaussian_filter((points * variances.sum(axis=1)).reshape(CELLS, CELLS), SMOOTHED).ravel()
         self.variances = seen if self.rounds == 0 else REMEMBERED * self.variances + (1.0 - REMEMBERED) * seen
@@ -167,11 +166,11 @@ class _Cells:
         wanted = self.next_rays / REPLICATES * weight / weight.sum()
         return np.asarray(1 << np.maximum(np.round(np.log2(wanted)), 0.0).astype(np.int64))
 
-    def _means(self, level: Level, cells: NDArray[np.intp], net: NDArray[np.uint64]) -> Floats:
+    def _means(self, level: Level, cells: NDArray[np.intp], digits: NDArray[np.uint64]) -> Floats:
         """Means over a net of products of each function at both ends, shape (cells, REPLICATES, number)."""
-        size = len(cells), REPLICATES, 1, 2
+        size = len(cells), REPLICATES, 2
         shifts, beyond = self.rng.integers(0, 2**SOBOL_BITS, size=size, dtype=np.uint64), self.rng.random(size)
-        inside = (net ^ shifts) * 2.0**-SOBOL_BITS + beyond * 2.0**-SOBOL_BITS
+        inside = shifted(digits, shifts, beyond * 2.0**-SOBOL_BITS)
         corner = np.stack([cells % CELLS, cells // CELLS], axis=-1)[:, None, None]
         square = ((corner + inside) / CELLS).reshape(1, -1, 2)
         rays, basis = self.sums.rays(0, 0), level.rays.basis

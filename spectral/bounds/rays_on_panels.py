@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 
-from ...core.checks import Floats
+from ...core.checks import Floats, new_seed
 from ...core.errors import AccuracyError
 from ...core.estimates import student_95
 from ...kernels import Law, Panels
@@ -129,7 +129,7 @@ def _first_edges() -> Floats:
     return np.concatenate([[0.0], graded, inner, np.pi - graded[::-1], [np.pi]])
 
 
-def masses(edges: Floats) -> Floats:
+def _masses(edges: Floats) -> Floats:
     return SINE.mass(edges[:-1], edges[1:])
 
 
@@ -164,7 +164,7 @@ class PanelRays(SobolRays):
     def incoming(self, u: Floats) -> Floats:
         u = 0.5 * u if self.halved else u
         panel = np.clip(np.searchsorted(self.cumulative, u, side="right") - 1, 0, len(self.cumulative) - 2)
-        mass = masses(self.basis.edges)
+        mass = _masses(self.basis.edges)
         inside = (u - self.cumulative[panel]) / np.diff(self.cumulative)[panel]
         below = np.append(0.0, np.cumsum(mass))[panel] + mass[panel] * inside
         return clipped_inside(SINE.quantile(np.clip(below, 0.0, 1.0)))
@@ -176,7 +176,7 @@ class PanelSums:
     def __init__(self, law: Law, edges: Floats, share: Floats | None, rng: np.random.Generator) -> None:
         self.law, self.basis, self.mirrored = law, Panels(edges, DEGREE), law.mirror_symmetric is True
         self.share = np.full(len(edges) - 1, 1.0 / (len(edges) - 1)) if share is None else share
-        self.seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
+        self.seed = new_seed(rng)
         self.shifts = random_shifts(self.seed, PanelRays.dimension)
         self.sums, self.points, self.unresolved = RaySums(law, self.basis, PARTS), 0, 0.0
 
@@ -195,7 +195,7 @@ class PanelSums:
     @property
     def density(self) -> Floats:
         """Of the rays on each panel, relative to the invariant measure."""
-        return np.asarray(self.share / masses(self.basis.edges))
+        return np.asarray(self.share / _masses(self.basis.edges))
 
     @property
     def mirror(self) -> tuple[NDArray[np.intp], Floats]:
@@ -377,8 +377,8 @@ class Level:
         """The shares of the rays that begin on each of the finer panels."""
         edges = self.rays.basis.edges
         inside = np.searchsorted(edges, 0.5 * (finer[:-1] + finer[1:])) - 1
-        mass = masses(finer)
-        modulus = np.sqrt(self.squares.sum(axis=1) / masses(edges))[inside] * mass
+        mass = _masses(finer)
+        modulus = np.sqrt(self.squares.sum(axis=1) / _masses(edges))[inside] * mass
         parts = modulus / modulus.sum(), mass, np.full(len(mass), 1.0 / len(mass))
         return np.asarray(sum(weight * part for weight, part in zip(SHARES, parts, strict=True)))
 

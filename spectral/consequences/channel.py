@@ -19,6 +19,7 @@ from ...core.checks import (
     finite_array,
     frozen,
     generator,
+    new_seed,
     number_between,
     shortened,
     whole_number,
@@ -179,7 +180,7 @@ def simulated_times(
     refuse_kept_sines(*laws)
     half = number_between("radius", radius, 1.0 / LARGEST, LARGEST)
     pace = number_between("speed", speed, 1.0 / LARGEST, LARGEST)
-    root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
+    root = new_seed(generator(rng))
     job = _Particles(laws[0], laws[-1], levels, particles, root, half, pace, arrangement)
     parts = all_parts(job.times, -(-particles // TOGETHER), identity_of("exit times", job), engine, job.stored)
     return ExitTimes(frozen(levels), frozen(np.concatenate([part["times"] for part in parts])), half, pace)

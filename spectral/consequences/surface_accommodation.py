@@ -9,7 +9,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, frozen
+from ...core.checks import Floats, finite_array, frozen, new_seed
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import FEW, Estimate, student_95, with_error
 from ...kernels import SurfaceLaw
@@ -189,7 +189,7 @@ def _means(
     dimension: int, values: Callable[[Floats], Floats], each: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """Means over eight shifted Sobol sequences, with half widths of 95 % by Student's distribution."""
-    seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
+    seed = new_seed(rng)
     sequence, shifts = sobol_sequence(seed, 0, dimension), random_shifts(seed, dimension)
     sums: list[Floats] = []
     for start in range(0, each, CHUNK):

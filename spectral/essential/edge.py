@@ -391,7 +391,7 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
         # more straight rays would be fewer than the errors
         return StraightPart(max(fraction, flat), flat, min(flat + float(found.errors.max()), 1.0))
     spacing, values = np.pi / ANGLES, found.roots
-    axes = np.clip(np.append(_axes(candidates, found.reached), isometries.kinks()), *LIMITS)
+    axes = np.clip(np.append(_axes(candidates, found.reached), isometries.critical_angles()), *LIMITS)
     for level in range(LEVELS):
         peaks = _peaks(candidates, values, PEAKS if level == 0 else 2, 1.5 * spacing)
         # a peak that is steep on one side may be a whole spacing away from the largest value
@@ -468,7 +468,7 @@ class _Source(Protocol):
 
     def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]: ...
 
-    def kinks(self) -> Floats:
+    def critical_angles(self) -> Floats:
         """Angles where pieces appear or disappear between angles of earlier calls."""
 
 
@@ -533,7 +533,7 @@ class _Distributions:
     def __init__(self, wall: Wall) -> None:
         self.conditionals = WallConditionals(wall, 1, np.empty(0))
 
-    def kinks(self) -> Floats:
+    def critical_angles(self) -> Floats:
         """The critical angles of the widest pieces, in each of some intervals."""
         parts = np.linspace(*LIMITS, INTERVALS + 1)
         return np.concatenate([self.conditionals.critical_angles(low, high) for low, high in pairwise(parts.tolist())])
@@ -563,7 +563,7 @@ class _Sampled:
     def __init__(self, law: WallLaw) -> None:
         self.law = law
 
-    def kinks(self) -> Floats:
+    def critical_angles(self) -> Floats:
         """None are known."""
         return np.empty(0)
 

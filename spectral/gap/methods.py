@@ -63,10 +63,7 @@ def _of_rays(law: Law, k: int, tolerance: float, rng: Rng, seconds: float) -> Sp
     found: list[Spectrum] = []
 
     def missed() -> bool:
-        return all(worst(one) > tolerance for one in found)
-
-    def worst(one: Spectrum) -> float:
-        return float(one.errors.total().max())
+        return all(_worst(one) > tolerance for one in found)
 
     shown = suits_rays(law) and k > 1
     if suits_panels(law) and not is_costly(law):
@@ -81,7 +78,11 @@ def _of_rays(law: Law, k: int, tolerance: float, rng: Rng, seconds: float) -> Sp
         except AccuracyError:
             if not found:
                 raise
-    return min(found, key=worst)
+    return min(found, key=_worst)
+
+
+def _worst(found: Spectrum) -> float:
+    return float(found.errors.total().max())
 
 
 def _by_rays(law: Law, k: int, tolerance: float, rng: Rng, seconds: float) -> Spectrum:
@@ -119,9 +120,9 @@ def _by_matrices(law: Law, k: int, tolerance: float, rng: Rng) -> Spectrum:
     best = None
     for degree in DEGREES:
         found = matrix_spectrum(discretise(law, Legendre(degree), tolerance=MATRIX_FRACTION * tolerance, rng=rng), k)
-        if best is None or found.errors.total().max() < best.errors.total().max():
+        if best is None or _worst(found) < _worst(best):
             best = found
-        if made_of_isometries(law) or best.errors.total().max() <= tolerance:
+        if made_of_isometries(law) or _worst(best) <= tolerance:
             break
     assert best is not None  # there are degrees
     return best

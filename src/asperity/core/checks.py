@@ -378,6 +378,11 @@ def generator(rng: Rng, default: int | None = None) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
+def new_seed(rng: np.random.Generator) -> tuple[int, ...]:
+    """The words of a seed of its own for one computation, whose parts then have seeds that depend on their number."""
+    return tuple(int(word) for word in rng.integers(0, 2**63, size=2))
+
+
 def frozen(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
     """Return a read-only copy, or the array itself if it owns its numbers and nobody can write to it."""
     if isinstance(array, np.ndarray) and array.dtype == dtype and array.flags.owndata and not array.flags.writeable:
