@@ -385,9 +385,8 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     angle = np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
     candidates = np.append(angle, _square_to_sides(law.wall))
     found = _largest_of_orbits(isometries, candidates, ROUGH, bar)
-    fractions = found.fractions
-    fraction = float(fractions[:ANGLES] @ np.sin(angle) / np.sin(angle).sum())
-    if np.all(fractions <= flat + found.errors):
+    fraction = float(found.fractions[:ANGLES] @ np.sin(angle) / np.sin(angle).sum())
+    if np.all(found.fractions <= flat + found.errors):
         # more straight rays would be fewer than the errors
         return StraightPart(max(fraction, flat), flat, min(flat + float(found.errors.max()), 1.0))
     spacing, values = np.pi / ANGLES, found.roots
@@ -411,9 +410,7 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     steep = float(values[peak] - values[near].min())
     value, error = float(best.roots[top]), float(best.errors[top]) + LEAST_ERROR
     low, high = value - error, value + BEYOND * (change + float(best.missing[top])) + steep + error
-    # the norm is at most the largest probability of straight rays
-    most = max(float(fractions.max()), float(best.fractions.max())) + 2.0 * error
-    return StraightPart(max(fraction, flat), max(low, flat), max(low, flat, min(high, most, 1.0)))
+    return StraightPart(max(fraction, flat), max(low, flat), min(max(high, flat), 1.0))
 
 
 def _square_to_sides(wall: Wall) -> Floats:
