@@ -329,6 +329,14 @@ class Pieces(NamedTuple):
         position = 0.5 * (high[number] + low[number + 1])
         return Pieces(angle, low, high, label, out, matters, key[number], position, number)
 
+    def escaped(self) -> tuple[Floats, Floats]:
+        """The widths of the pieces whose rays escape, with half of the gaps beside them, and their outgoing angles."""
+        from .compiled.changes import FIRST_LABEL
+
+        ends = np.concatenate([self.low[:1], 0.5 * (self.low[1:] + self.high[:-1]), self.high[-1:]])
+        left = (self.label >= FIRST_LABEL) & (self.out >= 0.0)
+        return np.diff(ends)[left], self.out[left]
+
     def middles(self, least: float, known: NDArray[np.int64] | None = None) -> Floats:
         """The middles of the pieces wider than ``least``, unless the changes at both ends are among the known ones."""
         ends = np.zeros(len(self.low) + 1, dtype=np.bool_)

@@ -51,7 +51,8 @@ def corners_of(pieces: Sequence[Curve]) -> NDArray[np.bool_]:
 class Tables(NamedTuple):
     """The tables of a wall as arguments of compiled functions; tables of absent primitives are empty.
 
-    ``curves`` has a table for each of `Curve.traced`, and ``closed`` has one column.
+    ``curves`` has a table for each of `Curve.traced`, and ``closed`` has one column. Where ``curves_absorb``, the hit
+    by hit tracer ends rays on curves; no wall's own tables do.
     """
 
     hollows: Floats
@@ -64,6 +65,7 @@ class Tables(NamedTuple):
     hollow_count: int
     cell: float
     is_open: bool
+    curves_absorb: bool
 
 
 class Scene(Tables):
@@ -277,7 +279,7 @@ class _Tables:
     def scene(self) -> Scene:
         hollows, curves = table_of(self.hollows, self._width), tuple(block.whole() for block in self.curves)
         joints, lines, *rest = (b.whole() for b in (self.joints, self.lines, self.pairs, self.boxes, self.closed))
-        return Scene._make((hollows, joints, lines, curves, *rest, len(hollows), self.cell, self.is_open))
+        return Scene._make((hollows, joints, lines, curves, *rest, len(hollows), self.cell, self.is_open, False))
 
 
 class _Blocks:

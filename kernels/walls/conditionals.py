@@ -48,6 +48,8 @@ class WallConditionals:
         Limit on the ray segments for one angle in one hollow; the error includes the intervals undecided at the limit.
     sizes : array, optional
         Bounds of the functions between the edges, or of the norm if they are vectors; 1 by default.
+    curves_absorb : bool
+        Whether rays end on curved pieces, so that the other rays are found in less time; `isometries` has these.
 
     Attributes
     ----------
@@ -79,8 +81,10 @@ class WallConditionals:
         least_level: int = 0,
         most_segments: int = NO_LIMIT,
         sizes: Floats | None = None,
+        curves_absorb: bool = False,
     ) -> None:
         self.wall = wall.cell
+        self.curves_absorb = curves_absorb
         self.degree = degree
         self.most_segments = most_segments
         self.least_level = least_level
@@ -99,8 +103,9 @@ class WallConditionals:
                 (wall.hollows.index(hollows[0]), sum(hollow.width for hollow in hollows) / wall.period)
                 for _, hollows in distinct_hollows(wall)
             ]
+        scene = wall.scene._replace(curves_absorb=self.curves_absorb)
         task = self.degree, self.edges, self.sizes, self.least_level, self.most_segments
-        return [(HollowConditionals(wall.scene, number, *task), fraction) for number, fraction in shapes]
+        return [(HollowConditionals(scene, number, *task), fraction) for number, fraction in shapes]
 
     @property
     def flat_fraction(self) -> float:
@@ -140,6 +145,15 @@ class WallConditionals:
             error[group],
         )
         return found, unresolved[group]
+
+    def escaped(self, theta: float) -> tuple[Floats, Floats]:
+        """The probabilities and first outgoing angles of the pieces of a known angle whose rays escape."""
+        probabilities, outgoing = [np.full(1, self.flat_fraction)], [np.full(1, np.pi - theta)]
+        for conditionals, fraction in self.hollows:
+            widths, out = conditionals.pieces(theta).escaped()
+            probabilities.append(fraction / conditionals.width * widths)
+            outgoing.append(out)
+        return np.concatenate(probabilities), np.concatenate(outgoing)
 
     def spent(self) -> tuple[int, int]:
         """Rays and ray segments so far."""

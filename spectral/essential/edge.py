@@ -10,10 +10,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from itertools import pairwise
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.checks import Floats, instance
 from ...core.estimates import ErrorKind, Summary, student_95, with_error
@@ -23,7 +22,7 @@ from ...kernels import Bins, FacetedLaw, Law, WallLaw
 from ...kernels.discretisation.radiosity import specular_sums
 from ...kernels.laws.law import in_frame, is_identity, sum_of
 from ...kernels.laws.structure import Rules, fold
-from ...kernels.walls.conditionals import WallConditionals, is_chaotic, is_few
+from ...kernels.walls.conditionals import WallConditionals
 from ...kernels.walls.wall_law import made_of_isometries
 from .grazing import REMEMBERED, SWAP, GrazingLimit, grazing_limit
 
@@ -271,29 +270,26 @@ def _without(law: Law, is_left_out: Callable[[Law], bool]) -> tuple[float, Law]:
     return fraction, sum_of(tuple((weight / fraction, term) for weight, term in rest))
 
 
-# Outgoing angles of two rays of one itinerary that are closer than this are those of an isometry, for a curved piece
-# changes them. Of sampled rays the second one begins this step apart.
-SAME_ANGLE, STEP = 1e-11, 1e-7
-# Nodes that agree at least on a straight piece, whose rule has nine or more.
-ALIKE = 5
 # Outgoing angles closer than this are one node of an orbit.
 SAME_NODE = 1e-8
-# Errors of conditional distributions on the first levels, on the last ones, and at the largest values; and the numbers
-# of rays where a direction takes more than so many ray segments, so that conditional distributions are slow.
-ROUGH, FINE, FINEST, SLOW = 1e-6, 1e-7, 1e-9, 8_000
-RAYS = {ROUGH: 2**8, FINE: 2**11, FINEST: 2**15}
-# Bisections of the entry points where sampled rays change their isometry.
-HALVINGS = 24
+# Errors of the weights on the first levels, on the last ones, and at the largest values.
+ROUGH, FINE, FINEST = 1e-6, 1e-7, 1e-9
 # Intervals in each of which the widest pieces that appear or disappear are looked for.
 INTERVALS = 16
+# Limit on the directions of lines through two joints, up to which all of the next neighbours are added.
+MOST_DIRECTIONS = 128
 # Number of initial angles, layers of an orbit, and limit on its nodes.
 ANGLES, LAYERS, MOST_NODES = 96, 6, 60
-# Search near the largest values: peaks, levels, fine levels, ratio of spacings.
-PEAKS, LEVELS, FINE_LEVELS, NEARER = 4, 5, 2, 6
+# Isometries at an angle, in the mean, from which on orbits are not followed; then angles of the grid, iterations, and
+# the least value of a function beside its largest.
+MANY_ISOMETRIES, FINE_ANGLES, ITERATIONS, LEAST_VALUE = 8, 384, 64, 1e-3
+# Search near the largest values: peaks, levels, rough levels, ratio of spacings, and the change that ends the search.
+PEAKS, LEVELS, ROUGH_LEVELS, NEARER, SMALL_CHANGE = 4, 8, 3, 6, 1e-9
 # Least and largest angle of an orbit.
 LIMITS = 1e-6, np.pi - 1e-6
-# Error as a multiple of the change by the last level plus the last layer, and its least value.
-BEYOND, LEAST_ERROR = 2.0, 1e-9
+# Error as a multiple of the change by the last level plus the last layer, and its least value. In a chain of equal
+# weights the layers beyond the sixth add 2.3 times as much as the sixth.
+BEYOND, LEAST_ERROR = 3.0, 1e-9
 # Of specular rays between facets: points of each Sobol sequence, its seed, and numbers of bins of trial functions.
 POINTS_OF_FACETS, SEED, CELLS = 2**15, (0,), (1, 32, 128, 512)
 
@@ -380,16 +376,54 @@ def specular_part(law: FacetedLaw) -> StraightPart:
 
 def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     """The straight part of a wall with straight pieces below its top, of which a fraction is flat."""
-    slow = not is_few(law.wall) or is_chaotic(law.wall, SLOW, FINE)
-    isometries = _Sampled(law) if slow else _Distributions(law.wall)
+    isometries = _Straight(law.wall)
     angle = np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
-    candidates = np.append(angle, _square_to_sides(law.wall))
+    axes = np.clip(np.append(_square_to_sides(law.wall), _along_joints(law.wall)), *LIMITS)
+    first = isometries(angle, ROUGH)
+    fraction = float(np.sin(angle) @ [each.weights.sum() for each in first] / np.sin(angle).sum())
+    if np.mean([len(each.weights) for each in first]) > MANY_ISOMETRIES:
+        low, high = _by_iteration(isometries, axes)
+    else:
+        low, high = _by_orbits(isometries, angle, axes, flat, bar)
+    return StraightPart(max(fraction, flat), max(low, flat), min(max(high, low, flat), 1.0))
+
+
+def _by_iteration(isometries: _Straight, others: Floats) -> tuple[float, float]:
+    """An interval for the top of Q where orbits have too many nodes: <v, Q v>/<v, v> and sup Q v/v, for v = Q^n 1.
+
+    Every such quotient is a lower bound, every such supremum an upper bound (Collatz and Wielandt); here they are those
+    of a grid and of ``others``, with v linear in between.
+    """
+    grid = np.pi * (np.arange(FINE_ANGLES) + 0.5) / FINE_ANGLES
+    theta = np.union1d(grid, others)
+    on_grid = np.searchsorted(theta, grid)
+    found = isometries(theta, ROUGH)
+    owner = np.repeat(np.arange(len(theta)), [len(each.weights) for each in found])
+    weights = np.concatenate([each.weights for each in found])
+    outgoing = np.concatenate([each.outgoing for each in found])
+    errors = np.array([each.error for each in found])
+    v, low, high = np.ones(len(theta)), 0.0, np.inf
+    for _ in range(ITERATIONS):
+        image = np.bincount(owner, weights * np.interp(outgoing, theta, v), len(theta))
+        high = min(high, float(np.max((image + errors) / v)))
+        mass = np.sin(grid) * v[on_grid]
+        whole, *halves = (
+            float(mass[part] @ image[on_grid][part] / (mass[part] @ v[on_grid][part]))
+            for part in (slice(None), slice(0, None, 2), slice(1, None, 2))
+        )
+        low = max(low, whole - abs(halves[0] - halves[1]) - float(errors.max()))
+        v = image / image.max() + LEAST_VALUE
+    return low, high
+
+
+def _by_orbits(isometries: _Straight, angle: Floats, others: Floats, flat: float, bar: Any) -> tuple[float, float]:
+    """An interval for the top of Q from the orbits of a grid, of other angles, and of angles near the largest roots."""
+    candidates = np.append(angle, others)
     found = _largest_of_orbits(isometries, candidates, ROUGH, bar)
-    fraction = float(found.fractions[:ANGLES] @ np.sin(angle) / np.sin(angle).sum())
     if np.all(found.fractions <= flat + found.errors):
         # more straight rays would be fewer than the errors
-        return StraightPart(max(fraction, flat), flat, min(flat + float(found.errors.max()), 1.0))
-    spacing, values = np.pi / ANGLES, found.roots
+        return flat, flat + float(found.errors.max())
+    spacing, values, is_cut = np.pi / ANGLES, found.roots, found.is_cut
     axes = np.clip(np.append(_axes(candidates, found.reached), isometries.critical_angles()), *LIMITS)
     for level in range(LEVELS):
         peaks = _peaks(candidates, values, PEAKS if level == 0 else 2, 1.5 * spacing)
@@ -397,27 +431,43 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
         steps = spacing * np.linspace(-1.0, 1.0, 2 * NEARER + 1)
         spacing /= NEARER
         candidates = np.union1d(np.clip(peaks[:, None] + steps, *LIMITS), axes)
-        before, tolerance = values, FINE if level >= LEVELS - FINE_LEVELS else ROUGH
-        found = _largest_of_orbits(isometries, candidates, tolerance, bar)
-        values = found.roots
+        before = values.max()
+        found = _largest_of_orbits(isometries, candidates, ROUGH if level < ROUGH_LEVELS else FINE, bar)
+        values, is_cut = found.roots, is_cut or found.is_cut
         axes = _peaks(axes, values[np.searchsorted(candidates, axes)], PEAKS, 0.0)
+        # a cusp between two angles is higher by as much as the values next to the largest one are lower
+        peak = int(np.argmax(values))
+        steep = float(values[peak] - values[np.abs(candidates - candidates[peak]) <= 1.5 * spacing].min())
+        change = abs(float(values[peak] - before))
+        if level >= ROUGH_LEVELS and change + steep <= SMALL_CHANGE:
+            break
     best = _largest_of_orbits(isometries, _peaks(candidates, values, 2, 0.0), FINEST, bar)
     top = int(np.argmax(best.roots))
-    change = abs(float(values.max() - before.max())) + abs(float(best.roots[top] - values.max()))
-    # a cusp between two angles is higher by as much as the values next to the largest one are lower
-    peak = int(np.argmax(values))
-    near = np.abs(candidates - candidates[peak]) <= 1.5 * spacing
-    steep = float(values[peak] - values[near].min())
     value, error = float(best.roots[top]), float(best.errors[top]) + LEAST_ERROR
+    change += abs(value - float(values[peak]))
     low, high = value - error, value + BEYOND * (change + float(best.missing[top])) + steep + error
-    return StraightPart(max(fraction, flat), max(low, flat), min(max(high, flat), 1.0))
+    if is_cut:
+        least, most = _by_iteration(isometries, others)
+        low, high = max(low, least), max(high, most)
+    return low, high
 
 
 def _square_to_sides(wall: Wall) -> Floats:
     """The angles at which rays hit a straight piece at right angles."""
     pieces = [piece for loop in (wall.pieces, *wall.islands) for piece in loop]
     sides = [np.subtract(piece.end, piece.start) for piece in pieces if piece.is_straight]
-    return np.unique(np.clip([np.mod(np.arctan2(y, x) + 0.5 * np.pi, np.pi) for x, y in sides], *LIMITS))
+    return np.unique(np.mod(np.arctan2(*np.transpose(sides)[::-1]) + 0.5 * np.pi, np.pi))
+
+
+def _along_joints(wall: Wall) -> Floats:
+    """The directions of lines through two joints, first of neighbours: a deep channel is open for few angles only."""
+    joints = np.concatenate([wall.cell.vertices, *wall.cell.island_vertices])
+    found = [np.empty(0)]
+    for apart in range(1, len(joints)):
+        if sum(map(len, found)) > MOST_DIRECTIONS:
+            break
+        found.append(np.mod(np.arctan2(*(joints[apart:] - joints[:-apart]).T[::-1]), np.pi))
+    return np.unique(np.concatenate(found))
 
 
 def _axes(starts: Floats, reached: list[Floats]) -> Floats:
@@ -442,7 +492,8 @@ def _peaks(candidates: Floats, values: Floats, number: int, apart: float) -> Flo
 class _Orbits(NamedTuple):
     """For each initial angle the largest eigenvalue of its orbit, its change by the last layer, and its straight rays.
 
-    Of the eigenvalue the error by those of conditional distributions; of these rays the fraction and outgoing angles.
+    Of the eigenvalue the error by those of the weights; of these rays the fraction and outgoing angles. Whether an
+    orbit has too many nodes.
     """
 
     roots: Floats
@@ -450,6 +501,7 @@ class _Orbits(NamedTuple):
     errors: Floats
     fractions: Floats
     reached: list[Floats]
+    is_cut: bool
 
 
 class _Isometries(NamedTuple):
@@ -460,154 +512,91 @@ class _Isometries(NamedTuple):
     error: float
 
 
-class _Source(Protocol):
-    """What finds the isometries of a wall at some angles, with weights to a tolerance."""
-
-    def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]: ...
-
-    def critical_angles(self) -> Floats:
-        """Angles where pieces appear or disappear between angles of earlier calls."""
-
-
-def _largest_of_orbits(isometries: _Source, starts: Floats, tolerance: float, bar: Any) -> _Orbits:
+def _largest_of_orbits(isometries: _Straight, starts: Floats, tolerance: float, bar: Any) -> _Orbits:
     known: dict[int, _Isometries] = {}
-    orbits = [[_node(theta)] for theta in starts]
-    angles = {_node(theta): float(theta) for theta in starts}
-    roots = np.zeros((LAYERS, len(starts)))
-    fresh = list(angles)
+    orbits = [_Orbit(float(theta)) for theta in starts]
     for layer in range(LAYERS):
+        fresh = {node: angle for orbit in orbits for node, angle in orbit.last_layer() if node not in known}
         if fresh:
-            found = isometries(np.array([angles[node] for node in fresh]), tolerance)
+            found = isometries(np.array(list(fresh.values())), tolerance)
             known |= zip(fresh, found, strict=True)
-        fresh = []
-        for k, orbit in enumerate(orbits):
-            roots[layer, k] = _root(orbit, known, angles)
-            new = _next_nodes(orbit, known, angles) if layer < LAYERS - 1 else []
-            orbit.extend(new)
-            fresh += [node for node in new if node not in known]
-        fresh = list(dict.fromkeys(fresh))
+        if layer < LAYERS - 1:
+            for orbit in orbits:
+                orbit.grow(known)
         bar.update()
+    roots, before = (np.array([orbit.root(known, layers) for orbit in orbits]) for layers in (LAYERS, LAYERS - 1))
     straight = [known[_node(theta)] for theta in starts]
     return _Orbits(
-        roots[-1], roots[-1] - roots[-2], np.array([max(known[node].error for node in orbit) for orbit in orbits]),
+        roots, roots - before, np.array([max(known[node].error for node in orbit.places) for orbit in orbits]),
         np.array([each.weights.sum() for each in straight]), [each.outgoing for each in straight],
+        any(orbit.is_cut for orbit in orbits),
     )  # fmt: skip
 
 
-def _next_nodes(orbit: list[int], known: dict[int, _Isometries], angles: dict[int, float]) -> list[int]:
-    """The nodes that an orbit reaches, whose angles become known; none if they are too many."""
-    reached = {_node(out): out for node in orbit for out in known[node].outgoing.tolist()}
-    new = [node for node in reached if _index(node, orbit) is None]
-    if len(orbit) + len(new) > MOST_NODES:
-        return []
-    for node in new:
-        angles.setdefault(node, reached[node])
-    return new
+class _Orbit:
+    """The nodes that isometries reach from one angle: their angles, and how many there are after each layer."""
+
+    def __init__(self, angle: float) -> None:
+        self.places, self.angles, self.sizes, self.is_cut = {_node(angle): 0}, [angle], [0, 1], False
+
+    def last_layer(self) -> list[tuple[int, float]]:
+        """The nodes of the last layer, and their angles."""
+        return list(zip(self.places, self.angles, strict=True))[self.sizes[-2] :]
+
+    def grow(self, known: dict[int, _Isometries]) -> None:
+        """Add the nodes that the last layer reaches, with those of the largest weights first if they are too many."""
+        reached: dict[int, tuple[float, float]] = {}
+        for node, _ in self.last_layer():
+            for weight, out in zip(known[node].weights.tolist(), known[node].outgoing.tolist(), strict=True):
+                if self._place(out) is None:
+                    reached[_node(out)] = reached.get(_node(out), (0.0, out))[0] + weight, out
+        room = MOST_NODES - len(self.places)
+        self.is_cut |= len(reached) > room
+        for node, (_, angle) in sorted(reached.items(), key=lambda item: -item[1][0])[:room]:
+            if self._place(angle) is None:
+                self.places[node] = len(self.angles)
+                self.angles.append(angle)
+        self.sizes.append(len(self.angles))
+
+    def root(self, known: dict[int, _Isometries], layers: int) -> float:
+        """The largest eigenvalue on the nodes of the first layers."""
+        size = self.sizes[layers]
+        matrix = np.zeros((size, size))
+        roots = np.sqrt(np.sin(self.angles))
+        for node, i in list(self.places.items())[:size]:
+            for weight, out in zip(known[node].weights.tolist(), known[node].outgoing.tolist(), strict=True):
+                if (j := self._place(out)) is not None and j < size:
+                    matrix[i, j] += weight * roots[i] / roots[j]
+        return float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
+
+    def _place(self, angle: float) -> int | None:
+        """The place of the node that is within rounding of an angle."""
+        node = _node(angle)
+        return next((self.places[other] for other in (node, node - 1, node + 1) if other in self.places), None)
 
 
 def _node(theta: float) -> int:
-    return round(float(theta) / SAME_NODE)
+    return round(theta / SAME_NODE)
 
 
-def _index(node: int, orbit: list[int]) -> int | None:
-    """The index of the first node of an orbit that is within rounding of a node."""
-    return next((j for j, other in enumerate(orbit) if abs(other - node) <= 1), None)
-
-
-def _root(orbit: list[int], known: dict[int, _Isometries], angles: dict[int, float]) -> float:
-    """The largest eigenvalue on the nodes of an orbit."""
-    matrix = np.zeros((len(orbit), len(orbit)))
-    for i, node in enumerate(orbit):
-        for weight, out in zip(known[node].weights, known[node].outgoing, strict=True):
-            if (j := _index(_node(out), orbit)) is not None:
-                matrix[i, j] += weight * np.sqrt(np.sin(angles[node]) / np.sin(angles[orbit[j]]))
-    return float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
-
-
-class _Distributions:
-    """The parts of conditional distributions from straight pieces: nodes of a rule that agree, and a flat top."""
+class _Straight:
+    """The rays of a wall that meet straight pieces only: tracing ends at the first curve."""
 
     def __init__(self, wall: Wall) -> None:
-        self.conditionals = WallConditionals(wall, 1, np.empty(0))
+        self.conditionals = WallConditionals(wall, 0, np.empty(0), curves_absorb=True)
 
     def critical_angles(self) -> Floats:
-        """The critical angles of the widest pieces, in each of some intervals."""
+        """Angles where the widest pieces appear or disappear between angles of earlier calls, of some intervals."""
         parts = np.linspace(*LIMITS, INTERVALS + 1)
         return np.concatenate([self.conditionals.critical_angles(low, high) for low, high in pairwise(parts.tolist())])
 
     def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]:
+        """The isometries at some angles, with weights to a tolerance."""
         found, unresolved = self.conditionals(theta, tolerance)
-        listed = []
-        for k, angle in enumerate(theta.tolist()):
-            own = slice(found.starts[k], found.starts[k + 1])
-            order = np.argsort(found.nodes[own])
-            out, weight = found.nodes[own][order], found.weights[own][order]
-            group = np.cumsum(np.append(True, np.diff(out) > SAME_ANGLE)) - 1
-            weights, first = np.bincount(group, weight), np.searchsorted(group, np.arange(group[-1] + 1))
-            # in intervals that are too narrow to be decided few nodes agree; these are in the error
-            straight = (np.bincount(group) >= ALIKE) | (np.abs(out[first] - (np.pi - angle)) <= SAME_ANGLE)
-            error = float(found.error[k] + unresolved[k])
-            listed.append(_Isometries(weights[straight], out[first][straight], error))
-        return listed
-
-
-class _Sampled:
-    """The same by rays, where conditional distributions have too many other itineraries.
-
-    The error is that of itineraries which no ray takes: as many rays as take one alone would take these (Good).
-    """
-
-    def __init__(self, law: WallLaw) -> None:
-        self.law = law
-
-    def critical_angles(self) -> Floats:
-        """None are known."""
-        return np.empty(0)
-
-    def __call__(self, theta: Floats, tolerance: float) -> list[_Isometries]:
-        points = RAYS[tolerance]
-        x = np.broadcast_to((np.arange(points) + 0.5) / points, (len(theta), points))
-        out = self._straight(x.ravel(), np.repeat(theta, points)).reshape(len(theta), points)
-        labels = _labels(out)
-        row, entry = np.nonzero(np.abs(np.diff(labels, axis=1)) > 1)
-        ends = x[row, entry], x[row, entry + 1], labels[row, entry], labels[row, entry + 1]
-        changes = self._changes(theta[row], *ends)
-        listed = []
-        for k in range(len(theta)):
-            own = row == k
-            first = np.concatenate([[0], entry[own] + 1])
-            here, width = out[k, first], np.diff(np.concatenate([[0.0], changes[own], [1.0]]))
-            alone, finite = int(np.sum(np.diff(np.append(first, points)) == 1)), np.isfinite(here)
-            listed.append(_Isometries(width[finite], here[finite], 2.0 * (1 + alone) / points))
-        return listed
-
-    def _changes(
-        self, theta: Floats, low: Floats, high: Floats, before: NDArray[np.int64], after: NDArray[np.int64]
-    ) -> Floats:
-        """Where the label changes that is ``before`` at ``low``.
-
-        A ray that meets a curved piece has the angle of an isometry with probability 0, so one ray tells a straight
-        label.
-        """
-        curved = before == _labels(np.array([np.nan]))
-        known = np.where(curved, after, before)
-        for _ in range(HALVINGS if low.size else 0):
-            middle = 0.5 * (low + high)
-            same = (np.abs(_labels(self.law.reflect_with_status(middle, theta)[0]) - known) <= 1) != curved
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
-        return 0.5 * (low + high)
-
-    def _straight(self, x: Floats, theta: Floats) -> Floats:
-        """Outgoing angles of the rays that meet straight pieces only, and nan for other rays."""
-        here, there = (
-            self.law.reflect_with_status(entry, theta)[0] for entry in (x, np.minimum(x + STEP, 1.0 - 2.0**-53))
-        )
-        return np.where(np.abs(here - there) <= SAME_ANGLE, here, np.nan)
-
-
-def _labels(out: Floats) -> NDArray[np.int64]:
-    """The nodes of outgoing angles, and one number for all other rays."""
-    return np.rint(np.nan_to_num(out, nan=-1.0) / SAME_NODE).astype(np.int64)
+        return [
+            _Isometries(*self.conditionals.escaped(angle), float(found.error[k] + unresolved[k]))
+            for k, angle in enumerate(theta.tolist())
+        ]
 
 
 def _has_straight_pieces_below(wall: Wall) -> bool:

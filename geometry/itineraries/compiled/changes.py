@@ -21,7 +21,7 @@ from ...curves.columns import LEFT, POINT_X, POINT_Y, RIGHT, Struct
 from ...scene.compiled.compiling import ROW, call_late, compiled, inlined, linked, named, reader_of
 from ...scene.scene import Scene
 from ...tracing.compiled.pieces.records import Rays, details_for, results_for
-from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, TRACE, details_at, rays_at
+from ...tracing.compiled.rays import ABSORBED, ESCAPED, HASH_FACTOR, SLOTS, TRACE, details_at, rays_at
 
 # Start integers as np.int64(0): a literal 0 has its own type in numba, and each function that receives it would be
 # compiled twice.
@@ -37,7 +37,9 @@ LEAST_SPREAD = 0.01
 # above the error of the interpolation where the outgoing angle has a curvature of at most 16 slopes over the opening.
 BEYOND_EDGE = 2.0
 # Labels below this number are statuses of rays that did not escape.
-FIRST_LABEL = np.uint64(4)
+FIRST_LABEL = np.uint64(5)
+# Instead of an outgoing angle, of rays that end on a curve.
+NO_ANGLE = -1.0
 # Number of rays traced in one call.
 BLOCK = 32
 # Where runs of hits are computed in one step, the segments of a ray that count in full, and the number beyond which one
@@ -145,6 +147,8 @@ def outcome(k, setting):
     if setting.has_runs:
         steps = min(steps, DEAR_STEPS) + max(steps - MANY_STEPS, 0) // CHEAP_STEPS
     setting.spent[0] += steps
+    if rays.status[k] == ABSORBED:
+        return NO_ANGLE, HASH_FACTOR * (details.itinerary[k] + np.uint64(16))
     if rays.status[k] != ESCAPED:
         return rays.theta[k], np.uint64(rays.status[k])
     # clipped for a ray along y = 0 within rounding

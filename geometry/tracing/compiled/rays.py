@@ -134,7 +134,8 @@ def hit_nearby(scope, own, px, py, vx, vy):
     return found
 
 
-ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
+# The last one, of rays that end on curves, only where `Tables` say so.
+ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, ABSORBED = 0, 1, 2, 3, 4
 # Limit on the segments of a ray, 20 to 100 ms of work. A run of hits counts as one segment.
 MOST_STEPS = 1_000_000
 # An odd number without pattern, so that itineraries with the same pieces in another order differ.
@@ -303,6 +304,8 @@ def trace_ray(scope, entry, theta, limit, labelled, with_path, path):
             return shift + px, vx, vy, bounces, BOUNCE_LIMIT, label, steps
         if labelled:
             label = HASH_FACTOR * label + call_late(scope.slots.label, label, (scope.tables, hit, vx))
+        if scope.tables.curves_absorb and hit.kind >= FIRST_CURVE:
+            return shift + px, vx, vy, bounces, ABSORBED, label, steps
         if hit.kind == SIDE:
             # the two ends of the wall are the same point, and a ray passes a side above this point
             py = max(py + hit.time * vy, scope.tables.joints[scope.joints[0], c.JOINT_Y])
