@@ -112,8 +112,8 @@ class Cell:
 
     @cached_property
     def is_polygonal(self) -> bool:
-        """Whether every piece is a Segment."""
-        return all(p.is_straight for path in (self.pieces, *self.islands) for p in path)
+        """Whether every piece is a Segment, or straight to rounding."""
+        return all(p.is_straight for path in (self.cell.pieces, *self.cell.islands) for p in path)
 
     @cached_property
     def _highest(self) -> HighestPoint | None:
@@ -314,16 +314,20 @@ SHORTEST = 1e-12
 def merged(path: tuple[Curve, ...], is_loop: bool = False) -> tuple[Curve, ...]:
     """Return the path without the joints at which nothing changes; the path itself if there are none.
 
-    Joints at height 0 stay, because hollows end there, except between level segments.
+    Joints at height 0 stay, because hollows end there, except between level segments. A curve that is straight to
+    rounding becomes a segment.
 
     Examples
     --------
     >>> merged((Segment((0, 0), (1, -1)), Segment((1, -1), (3, -3)), Segment((3, -3), (4, 0))))
     (Segment(start=(0.0, 0.0), end=(3.0, -3.0)), Segment(start=(3.0, -3.0), end=(4.0, 0.0)))
     """
-    straight, before = straight_in(path), np.arange(-1, len(path) - 1)
     starts, ends = point_array([piece.start for piece in path]), point_array([piece.end for piece in path])
     size = np.maximum(np.abs(starts).max(axis=0), np.abs(ends[-1]))
+    chords = [k for k, piece in enumerate(path) if not piece.is_straight and _is_chord(piece, size)]
+    if chords:
+        path = tuple(Segment(piece.start, piece.end) if k in chords else piece for k, piece in enumerate(path))
+    straight, before = straight_in(path), np.arange(-1, len(path) - 1)
     level = straight & (starts[before, 1] == 0.0) & (ends[:, 1] == 0.0)
     able = (straight == straight[before]) & (level | (starts[:, 1] != 0.0))
     able[0] &= is_loop
@@ -336,6 +340,15 @@ def merged(path: tuple[Curve, ...], is_loop: bool = False) -> tuple[Curve, ...]:
     path, firsts = path[first:] + path[:first], np.flatnonzero(~np.roll(able, -first)).tolist() or [0]
     groups = [path[low:high] for low, high in pairwise([*firsts, len(path)])]
     return tuple(piece for group in groups for piece in _whole(group, size) or group)
+
+
+def _is_chord(piece: Curve, size: Floats) -> bool:
+    """Return whether a curve is the straight line between its ends, to rounding."""
+    hull = point_array(piece.hull(piece.start, piece.end))
+    step, whole = hull - piece.start, np.subtract(piece.end, piece.start)
+    near = np.abs(step[:, 0] * whole[1] - step[:, 1] * whole[0]) <= ON_SIDE * float(np.abs(whole) @ size[::-1])
+    along, rounded = step @ whole, SHORTEST * float(size.max()) * float(np.hypot(*whole))
+    return bool(np.all(near & (along >= -rounded) & (along <= whole @ whole + rounded)) and whole.any())
 
 
 def _between(start: Floats, points: Floats, end: Floats, size: Floats) -> NDArray[np.bool_]:
