@@ -33,7 +33,7 @@ LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
 MATRIX_TOLERANCE = 1e-8
 # Fraction of the width of an enclosure for squared residuals, and for errors of quotients, of adapted trial functions;
 # limits on the incoming angles for the quotients, for traced laws and for closed forms.
-TRIAL_FRACTION, MOST_TRACED_ANGLES, MOST_EXACT_ANGLES = 0.3, 4_000, 40_000
+TRIAL_FRACTION, QUOTIENT_FRACTION, MOST_TRACED_ANGLES, MOST_EXACT_ANGLES = 0.3, 0.65, 6_000, 40_000
 # Rounding of a Rayleigh quotient, a pairwise sum of some hundred products.
 QUOTIENT_ROUNDING = 4.0 * EPS
 
@@ -243,7 +243,7 @@ def enclosed_trial_space(
         both = residuals(
             law, basis, np.column_stack([vectors, space.following]), np.append(values, space.following_values),
             MOST_TRACED_ANGLES if is_traced(law) else MOST_EXACT_ANGLES,
-            mirrored=space.mirrored, quotient_error=TRIAL_FRACTION * tolerance, leading=len(values),
+            mirrored=space.mirrored, quotient_error=QUOTIENT_FRACTION * tolerance, leading=len(values),
             expected=space.square,
         )  # fmt: skip
         found, after = both.split(len(values))

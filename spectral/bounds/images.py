@@ -22,8 +22,9 @@ from ...kernels.walls.conditionals import MANY_SEGMENTS, WallConditionals, is_ch
 # Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays.
 ANGLES_AT_ONCE, NODE_TIME = 512, 3e-7
 # From this tolerance on, rules of 15 nodes suffice on pieces within a panel: functions of degree 6 have errors below
-# 5e-4 times their last coefficients, which are small in eigenfunctions. With more nodes tracing takes twice as long.
-ROUGH, ROUGH_LEVEL = 1e-6, 1
+# 5e-4 times their last coefficients, which are small in eigenfunctions. With more nodes tracing takes twice as long; at
+# tolerances of 5e-7 and 2e-6 the errors of 15 were below a hundredth of the reported ones, those of 7 above them.
+ROUGH, ROUGH_LEVEL = 1e-8, 1
 
 
 def suits_panels(law: Law) -> bool:
