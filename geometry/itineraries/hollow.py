@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
@@ -105,6 +105,7 @@ class HollowConditionals:
     sizes: Floats
     least_level: int
     most_segments: int = NO_LIMIT
+    cuts: Floats = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         self.rays, self.segments = 0, 0
@@ -175,7 +176,7 @@ class HollowConditionals:
         # the width whose error is one tolerance
         least = tolerances * self.width / self._size
         seeds = [self._seeds(angle, width) for angle, width in zip(theta.tolist(), least.tolist(), strict=True)]
-        rules = nested_rules(self.least_level)
+        rules = nested_rules(self.least_level, self.cuts)
         marched = compiled_result(lambda: marched_angles(theta, tolerances, self._setting, rules, seeds))
         rays = sum(found.rays for found in marched)
         segments = sum(found.segments for found in marched)

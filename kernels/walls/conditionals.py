@@ -48,6 +48,9 @@ class WallConditionals:
         Limit on the ray segments for one angle in one hollow; the error includes the intervals undecided at the limit.
     sizes : array, optional
         Bounds of the functions between the edges, or of the norm if they are vectors; 1 by default.
+    cuts : array, optional
+        Outgoing angles between which functions are polynomials that hardly jump there: between the rays of a piece
+        outgoing angles are interpolated, so that cuts cost no rays. The functions change by at most 1 a radian.
     curves_absorb : bool
         Whether rays end on curved pieces, so that the other rays are found in less time; `isometries` has these.
 
@@ -81,9 +84,11 @@ class WallConditionals:
         least_level: int = 0,
         most_segments: int = NO_LIMIT,
         sizes: Floats | None = None,
+        cuts: Floats | None = None,
         curves_absorb: bool = False,
     ) -> None:
         self.wall = wall.cell
+        self.cuts = np.empty(0) if cuts is None else np.array(cuts, dtype=np.float64)
         self.curves_absorb = curves_absorb
         self.degree = degree
         self.most_segments = most_segments
@@ -104,7 +109,7 @@ class WallConditionals:
                 for _, hollows in distinct_hollows(wall)
             ]
         scene = wall.scene._replace(curves_absorb=self.curves_absorb)
-        task = self.degree, self.edges, self.sizes, self.least_level, self.most_segments
+        task = self.degree, self.edges, self.sizes, self.least_level, self.most_segments, self.cuts
         return [(HollowConditionals(scene, number, *task), fraction) for number, fraction in shapes]
 
     @property
@@ -148,7 +153,8 @@ class WallConditionals:
 
     def escaped(self, theta: float) -> tuple[Floats, Floats]:
         """The probabilities and first outgoing angles of the pieces of a known angle whose rays escape."""
-        probabilities, outgoing = [np.full(1, self.flat_fraction)], [np.full(1, np.pi - theta)]
+        flat = [self.flat_fraction] * (self.flat_fraction > 0.0)
+        probabilities, outgoing = [np.array(flat)], [np.full(len(flat), np.pi - theta)]
         for conditionals, fraction in self.hollows:
             widths, out = conditionals.pieces(theta).escaped()
             probabilities.append(fraction / conditionals.width * widths)

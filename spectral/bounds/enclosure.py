@@ -31,9 +31,9 @@ Label = Literal["indexed", "contains-spectrum"]
 # Size of the Legendre basis: at least LEAST_DEGREE and 2 k + MORE_DEGREES. EXTRA more functions show the next values.
 LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
 MATRIX_TOLERANCE = 1e-8
-# Fraction of the width of an enclosure for squared residuals, and for errors of quotients, of adapted trial functions;
-# limits on the incoming angles for the quotients, for traced laws and for closed forms.
-TRIAL_FRACTION, QUOTIENT_FRACTION, MOST_TRACED_ANGLES, MOST_EXACT_ANGLES = 0.3, 0.65, 6_000, 40_000
+# Fraction of the width of an enclosure for squared residuals of adapted trial functions; for traced laws and for closed
+# forms the fraction for errors of quotients, and the limit on their incoming angles.
+TRIAL_FRACTION, OF_TRACED, OF_EXACT = 0.3, (0.65, 6_000), (0.3, 40_000)
 # Rounding of a Rayleigh quotient, a pairwise sum of some hundred products.
 QUOTIENT_ROUNDING = 4.0 * EPS
 
@@ -239,11 +239,11 @@ def enclosed_trial_space(
     if basis is None and suits_panels(law):
         space = adapted_trial_space(law, k, TRIAL_FRACTION * tolerance, rank, start)
         basis, values, vectors, names = space.basis, space.values, space.vectors, space.parities
+        fraction, most_angles = OF_TRACED if is_traced(law) else OF_EXACT
         # conditional expectations dominate the cost, so the following functions use the same incoming angles
         both = residuals(
             law, basis, np.column_stack([vectors, space.following]), np.append(values, space.following_values),
-            MOST_TRACED_ANGLES if is_traced(law) else MOST_EXACT_ANGLES,
-            mirrored=space.mirrored, quotient_error=QUOTIENT_FRACTION * tolerance, leading=len(values),
+            most_angles, mirrored=space.mirrored, quotient_error=fraction * tolerance, leading=len(values),
             expected=space.square,
         )  # fmt: skip
         found, after = both.split(len(values))

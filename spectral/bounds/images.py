@@ -12,6 +12,7 @@ from ...core.rounding import EPS
 from ...kernels import Basis, CircularArcLaw, Law, Panels
 from ...kernels.bases.angles import cell_among
 from ...kernels.bases.assembly import is_mirror_symmetric, reflection_matrix
+from ...kernels.bases.measure import SINE
 from ...kernels.expectations.conditionals import Means, functions_of, height_of, weighted_means
 from ...kernels.laws.law import Composition, Power, SpecularFrame, knows_errors, sum_of
 from ...kernels.laws.matrix_law import ENTRY_ROUNDING, MatrixLaw, uniform_on_bins
@@ -21,10 +22,11 @@ from ...kernels.walls.conditionals import MANY_SEGMENTS, WallConditionals, is_ch
 
 # Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays.
 ANGLES_AT_ONCE, NODE_TIME = 512, 3e-7
-# From this tolerance on, rules of 15 nodes suffice on pieces within a panel: functions of degree 6 have errors below
-# 5e-4 times their last coefficients, which are small in eigenfunctions. With more nodes tracing takes twice as long; at
-# tolerances of 5e-7 and 2e-6 the errors of 15 were below a hundredth of the reported ones, those of 7 above them.
-ROUGH, ROUGH_LEVEL = 1e-8, 1
+# From this tolerance on, outgoing angles are interpolated for polynomials on panels, which hardly jump at the edges:
+# errors were a twentieth to a thousandth of the reported ones, and rays a seventh of those for rules between the edges.
+ROUGH = 1e-8
+# Places in a panel between which a slope is taken.
+SLOPE_PROBES = np.linspace(1e-3, 1.0 - 1e-3, 9)
 
 
 def suits_panels(law: Law) -> bool:
@@ -81,6 +83,9 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
     if isinstance(law, CircularArcLaw) and isinstance(basis, Panels):
         return ArcMeans(law.half_angle, basis, vectors)
     height, each = height_of(basis, vectors), expectations(law, basis)
+    if law.traced_wall is not None and isinstance(basis, Panels):
+        # outgoing angles have errors too
+        height = max(height, _slope(basis, vectors))
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         finer = tolerance / max(height, 1.0)
@@ -89,6 +94,14 @@ def expectations_of(law: Law, basis: Basis, vectors: Floats) -> Means:
         return images, height * np.concatenate([error for _, error in parts])
 
     return means
+
+
+def _slope(basis: Panels, vectors: Floats) -> float:
+    """The largest root mean square slope of the functions with these coefficients."""
+    theta = basis.edges[:-1, None] + np.diff(basis.edges)[:, None] * SLOPE_PROBES
+    step, middle = np.diff(theta, axis=1), 0.5 * (theta[:, 1:] + theta[:, :-1])
+    changes = np.diff((basis.evaluate(theta.ravel()) @ vectors).reshape(*theta.shape, -1), axis=1)
+    return float(np.sqrt(np.sum((SINE.density(middle) / step)[..., None] * changes**2, axis=(0, 1)).max()))
 
 
 def _of_nodes(law: Law, basis: Basis) -> Means:
@@ -101,7 +114,7 @@ def _of_nodes(law: Law, basis: Basis) -> Means:
     def shared(rough: bool) -> WallConditionals | None:
         if few is None:
             return None
-        return WallConditionals(few, 1, edges, ROUGH_LEVEL) if rough else traced_conditionals(few, degree, edges)
+        return WallConditionals(few, 1, np.empty(0), cuts=edges) if rough else traced_conditionals(few, degree, edges)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         images, errors = [np.empty((0, basis.size))], [np.empty(0)]

@@ -35,8 +35,8 @@ ROUNDS, ITERATIONS, LEAST_VALUE = 6, 32, 1e-3
 # Least and largest angle of an orbit.
 LIMITS = 1e-6, np.pi - 1e-6
 # Error as a multiple of the change by the last level plus the last layer, and its least value. In a chain of equal
-# weights the layers beyond the sixth add 2.3 times as much as the sixth.
-BEYOND, LEAST_ERROR = 3.0, 1e-9
+# weights the layers beyond the sixth add 2.3 times as much as the sixth. If they may add more than that, Q is iterated.
+BEYOND, LEAST_ERROR, MUCH_MISSING = 3.0, 1e-9, 1e-6
 # Of specular rays between facets: points of each Sobol sequence, its seed, and numbers of bins of trial functions.
 POINTS_OF_FACETS, SEED, CELLS = 2**15, (0,), (1, 32, 128, 512)
 
@@ -189,15 +189,15 @@ def _by_orbits(straight: _Straight, grid: Floats, axes: Floats, bar: Any) -> tup
         change = abs(float(values[peak] - before))
         if level >= ROUGH_LEVELS and change + steep <= SMALL_CHANGE:
             break
-    best = _roots_of_orbits(straight, _peaks(candidates, values, 2, 0.0), FINEST, MOST_NODES, bar)
+    best = _roots_of_orbits(straight, _peaks(candidates, values, PEAKS, 0.0), FINEST, MOST_NODES, bar)
     top = int(np.argmax(best.roots))
     value, error = float(best.roots[top]), float(best.errors[top]) + LEAST_ERROR
-    change += abs(value - float(values[peak]))
-    low, high = value - error, value + BEYOND * (change + float(best.missing[top])) + steep + error
-    if is_cut or best.is_cut:
-        least, most = _by_iteration(straight, grid, np.append(axes, candidates), bar)
-        low, high = max(low, least), max(high, most)
-    return low, high
+    missing = BEYOND * float(best.missing[top])
+    if not (is_cut or best.is_cut or missing > MUCH_MISSING):
+        return value - error, value + BEYOND * change + steep + missing + error
+    # at the nodes of an orbit the supremum is at least its eigenvalue
+    least, most = _by_iteration(straight, grid, np.concatenate([axes, candidates, *best.nodes]), bar)
+    return max(value - error, least), max(value + error, most)
 
 
 def _around(peaks: Floats, spacing: float) -> Floats:
@@ -249,7 +249,8 @@ def _by_iteration(straight: _Straight, grid: Floats, special: Floats, bar: Any) 
         found = [(found + nearer)[k] for k in order]
         theta, v = np.append(theta, more)[order], np.append(v, np.interp(more, theta, v))[order]
         bar.update()
-    high = float(_applied(found, theta, v)[1].max()) + BEYOND * growth
+    of_one = max(float(each.weights.sum()) + each.error for each in found)
+    high = min(float(_applied(found, theta, v)[1].max()) + BEYOND * growth, of_one)
     orbits = _roots_of_orbits(straight, peaks, FINE, MOST_NODES, bar)
     return max(low - ROUGH, float((orbits.roots - orbits.errors).max())), high
 
@@ -294,12 +295,13 @@ class _Straight:
 class _Orbits(NamedTuple):
     """For each initial angle the largest eigenvalue of its orbit, its change by the last layer, and its error.
 
-    Then whether any orbit has too many nodes.
+    Then the nodes, and whether any orbit has too many.
     """
 
     roots: Floats
     missing: Floats
     errors: Floats
+    nodes: list[Floats]
     is_cut: bool
 
 
@@ -318,7 +320,8 @@ def _roots_of_orbits(straight: _Straight, starts: Floats, tolerance: float, most
     (roots, errors), (before, _) = (
         np.array([orbit.root(known, layers) for orbit in orbits]).T for layers in (LAYERS, LAYERS - 1)
     )
-    return _Orbits(roots, np.maximum(roots - before, 0.0), errors, any(orbit.is_cut for orbit in orbits))
+    nodes = [np.array(orbit.angles) for orbit in orbits]
+    return _Orbits(roots, np.maximum(roots - before, 0.0), errors, nodes, any(orbit.is_cut for orbit in orbits))
 
 
 class _Orbit:

@@ -27,7 +27,7 @@ from ...tracing.compiled.rays import ABSORBED, ESCAPED, HASH_FACTOR, SLOTS, TRAC
 # compiled twice.
 
 # Limit on the samples of one angle; the gaps that remain count as error.
-MOST_SAMPLES = 1 << 15
+MOST_SAMPLES = 1 << 14
 MOST_ROUNDS = 200
 # Gaps with an error below this fraction of the worst gap's wait for a later round.
 WORST_FRACTION = 0.1

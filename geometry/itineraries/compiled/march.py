@@ -2,7 +2,8 @@
 
 The nodes are those of nested rules between two neighbouring changes of itinerary: Fejér's second rules in s with
 x = a + (b - a) s^2 (3 - 2 s), in which square roots at tangencies are analytic at both ends. A node with another label
-than its piece reveals a missed change of itinerary; it is added to the samples.
+than its piece reveals a missed change of itinerary; it is added to the samples. For functions with many cuts in the
+outgoing angle this is interpolated between the nodes, and Gauss's rule has nodes between the cuts, without more rays.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from .changes import BLOCK, FIRST_LABEL, MOST_SAMPLES, Chain
 LEVELS = 5
 MOST_POSITIONS = 2 ** (LEVELS + 1) - 1
 # Limit on the nodes of one incoming angle.
-MOST_NODES = 1 << 17
+MOST_NODES = 1 << 18
 # Least ratio of differences in the error estimate of a rule, 2 x last difference x last ratio of differences:
 # smaller ratios, which also occur by chance, underestimate the error.
 LEAST_RATIO = 0.03
@@ -48,17 +49,29 @@ ROUNDING, EDGE_ROUNDING = 1024.0 * EPS, 64.0 * EPS
 RULE_FRACTION, GAP_FRACTION = 0.5, 0.25
 # Fraction of the tolerance of the gaps for the gaps at a missed change.
 LATE_FRACTION = 0.05
+# Gauss's rule between cuts on (0, 1), and secant steps to a cut, at which functions jump by little.
+GAUSS_NODES, GAUSS_WEIGHTS = 0.5 * (np.polynomial.legendre.leggauss(5) + np.array([[1.0], [0.0]]))
+SECANT_STEPS = 12
+# Distance from a node at which its value is that of the interpolation.
+AT_NODE = 1e-14
 
 
 class Rules(NamedTuple):
     """Nested rules: the positions in (0, 1) of the finest, the weights of every rule, and the number of the first rule.
 
-    The rule of number ``level`` has the first 2^(level + 2) - 1 positions.
+    The rule of number ``level`` has the first 2^(level + 2) - 1 positions. At ``places`` are the positions in s, in
+    which a rule interpolates by its ``barycentric`` weights; ``order`` has the numbers of its increasing positions.
+    Outgoing angles are interpolated if there are ``cuts``.
     """
 
     positions: Floats
     weights: Floats
     least: int
+    places: Floats
+    barycentric: Floats
+    order: Floats
+    cuts: Floats
+    cut_count: int
 
 
 class Nodes(NamedTuple):
@@ -68,12 +81,14 @@ class Nodes(NamedTuple):
     masses: Floats
 
 
-rules_at = reader_of(named(Rules, ROW, Table(MOST_POSITIONS), types.int64))
+TABLE = Table(MOST_POSITIONS)
+rules_at = reader_of(named(Rules, ROW, TABLE, types.int64, ROW, TABLE, TABLE, ROW, types.int64))
 
 
-def nested_rules(least: int) -> Struct:
-    """Return the rules after the substitution, to be used from number ``least`` on."""
-    positions, weights = np.empty(0), np.zeros((LEVELS, MOST_POSITIONS))
+def nested_rules(least: int, cuts: Floats) -> Struct:
+    """Return the rules after the substitution, to be used from number ``least`` on, with cuts of the outgoing angle."""
+    positions = np.empty(0)
+    weights, barycentric, order = np.zeros((3, LEVELS, MOST_POSITIONS))
     for level in range(LEVELS):
         intervals = 2 ** (level + 2)
         number = np.arange(1, intervals)
@@ -85,8 +100,99 @@ def nested_rules(least: int) -> Struct:
         weights[level, : len(angle)] = (
             2.0 / intervals * np.sin(angle) * np.sum(np.sin(np.outer(angle, odd)) / odd, axis=1)
         )
+        barycentric[level, : len(angle)] = (-1.0) ** np.rint(intervals * positions) * np.sin(angle) ** 2
+        order[level, : len(angle)] = np.argsort(positions)
     s = np.sin(0.5 * np.pi * positions) ** 2
-    return Struct(Rules(s * s * (3.0 - 2.0 * s), 2.0 * weights * 3.0 * s * (1.0 - s), least))
+    rules = s * s * (3.0 - 2.0 * s), 2.0 * weights * 3.0 * s * (1.0 - s), least
+    return Struct(Rules(*rules, s, barycentric, order, cuts, len(cuts)))
+
+
+@linked
+def interpolated(s, level, rules, nodes, first):
+    """Return the outgoing angle at s by the polynomial through those of a rule, whose nodes begin at ``first``."""
+    above, below = 0.0, 0.0
+    for n in range((4 << level) - 1):
+        step = s - rules.places[n]
+        if abs(step) < AT_NODE:
+            return nodes.angles[first + n]
+        ratio = rules.barycentric[level, n] / step
+        above += ratio * nodes.angles[first + n]
+        below += ratio
+    return above / below
+
+
+@linked
+def change_by_level(level, width, rules, nodes, first):
+    """Return the integral of the distance between the angles of a rule and the polynomial of the rule before."""
+    total = 0.0
+    for n in range((2 << level) - 1, (4 << level) - 1):
+        miss = abs(nodes.angles[first + n] - interpolated(rules.places[n], level - 1, rules, nodes, first))
+        # these nodes have half of the weight
+        total += 2.0 * width * rules.weights[level, n] * miss
+    return total
+
+
+@linked
+def divide_at_cuts(level, width, rules, nodes, first):
+    """Replace the nodes of a rule, the last ones, by those of Gauss's rule between its positions and the cuts.
+
+    Without a cut the nodes stay. Returns the number of all nodes, or -1 where they are too many.
+    """
+    count = (4 << level) - 1
+    needed = np.int64(0)
+    before = changes.cell_of(interpolated(0.0, level, rules, nodes, first), rules.cuts, rules.cut_count)
+    for n in range(count):
+        cell = changes.cell_of(nodes.angles[first + np.int64(rules.order[level, n])], rules.cuts, rules.cut_count)
+        needed += abs(cell - before)
+        before = cell
+    cell = changes.cell_of(interpolated(1.0, level, rules, nodes, first), rules.cuts, rules.cut_count)
+    needed += abs(cell - before)
+    if needed == 0:
+        for n in range(count):
+            nodes.masses[first + n] = width * rules.weights[level, n]
+        return first + count
+    if first + count + GAUSS_NODES.shape[0] * (needed + count + 1) > MOST_NODES - 2:
+        return np.int64(-1)
+    low, at_low, filled = 0.0, interpolated(0.0, level, rules, nodes, first), first + count
+    for n in range(count + 1):
+        high = rules.places[np.int64(rules.order[level, n])] if n < count else 1.0
+        at_high = interpolated(high, level, rules, nodes, first)
+        cell = changes.cell_of(at_low, rules.cuts, rules.cut_count)
+        last = changes.cell_of(at_high, rules.cuts, rules.cut_count)
+        step = np.int64(1 if last > cell else -1)
+        while low < high:
+            s, edge = high, at_high
+            if cell != last:
+                edge = rules.cuts[cell if step > 0 else cell - 1]
+                s = place_of(edge, low, high, at_low, at_high, level, rules, nodes, first)
+            for g in range(GAUSS_NODES.shape[0]):
+                t = low + (s - low) * GAUSS_NODES[g]
+                nodes.angles[filled] = interpolated(t, level, rules, nodes, first)
+                nodes.masses[filled] = width * (s - low) * GAUSS_WEIGHTS[g] * 6.0 * t * (1.0 - t)
+                filled += 1
+            if cell == last:
+                break
+            low, at_low, cell = s, edge, cell + step
+        low, at_low = high, at_high
+    for n in range(first, filled - count):
+        nodes.angles[n], nodes.masses[n] = nodes.angles[n + count], nodes.masses[n + count]
+    return filled - count
+
+
+@linked
+def place_of(edge, low, high, at_low, at_high, level, rules, nodes, first):
+    """Return where between two places the interpolated angle is that of a cut."""
+    s = 0.5 * (low + high)
+    for _ in range(SECANT_STEPS):
+        if at_high == at_low:
+            break
+        s = min(max(low + (high - low) * (edge - at_low) / (at_high - at_low), low), high)
+        here = interpolated(s, level, rules, nodes, first)
+        if (here > edge) == (at_high > at_low):
+            high, at_high = s, here
+        else:
+            low, at_low = s, here
+    return s
 
 
 @linked
@@ -124,6 +230,15 @@ def apply_rules(ends, label, goal, rules, setting, nodes, filled, strict):
         if level < least:
             continue
         used = count
+        if rules.cut_count > 0 and label >= FIRST_LABEL:
+            if level > least:
+                step = change_by_level(level, width, rules, nodes, filled) + EPS * width
+                ratio = 1.0 if level == least + 1 else step / old_step
+                error = 2.0 * step * min(1.0, max(ratio, LEAST_RATIO))
+                if error <= goal:
+                    break
+                old_step = step
+            continue
         new0, new1, new2 = 0.0, 0.0, 0.0
         for n in range(count):
             weight, out = width * weights[level, n], node[filled + n]
@@ -179,9 +294,27 @@ def integrate_piece(ends, sample, goal, rules, setting, nodes, filled, strict):
             node[STACK + depth + 1], mass[STACK + depth + 1] = low, middle
             depth += 2
             continue
-        if used == 0:
+        if used == 0 and filled > MOST_NODES - 2:
+            # no room for another node
+            mass[filled - 1] += high - low
+            miss = 2.0 * (high - low)
+        elif used == 0:
             node[filled], mass[filled] = out, high - low
             used = 1
+        elif rules.cut_count > 0:
+            level = np.int64(round(math.log2((used + 1) / 4)))
+            if label < FIRST_LABEL:
+                # all nodes are the same
+                for n in range(used):
+                    mass[filled + n] = (high - low) * rules.weights[level, n]
+            else:
+                divided = divide_at_cuts(level, high - low, rules, nodes, filled)
+                if divided >= 0:
+                    filled, used = divided, 0
+                else:
+                    for n in range(used):
+                        mass[filled + n] = (high - low) * rules.weights[level, n]
+                    miss = 2.0 * (high - low)
         filled += used
         error += size * miss
     return filled, error, np.nan, rays

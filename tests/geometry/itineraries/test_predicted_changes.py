@@ -64,7 +64,7 @@ def test_equal_changes_at_one_angle_predict_nothing():
 
 @pytest.mark.parametrize("level", range(LEVELS))
 def test_nested_rules_integrate_constants_and_square_roots_at_both_ends(level):
-    rules = nested_rules(0).values
+    rules = nested_rules(0, np.empty(0)).values
     count = 2 ** (level + 2) - 1
     x, weight = rules.positions[:count], rules.weights[level, :count]
     assert np.all(weight > 0.0) and not rules.weights[level, count:].any()
