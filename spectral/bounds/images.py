@@ -20,7 +20,7 @@ from ...kernels.laws.structure import holds_of_all
 from ...kernels.walls.circular_arc import ArcMeans
 from ...kernels.walls.conditionals import MANY_SEGMENTS, WallConditionals, is_chaotic, is_few, traced_conditionals
 
-# Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays.
+# Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays too.
 ANGLES_AT_ONCE, NODE_TIME = 512, 3e-7
 # From this tolerance on, outgoing angles are interpolated for polynomials on panels, which hardly jump at the edges:
 # errors were a twentieth to a thousandth of the reported ones, and rays a seventh of those for rules between the edges.
@@ -122,9 +122,9 @@ def _of_nodes(law: Law, basis: Basis) -> Means:
         for some in (theta[part] for part in slices(theta.size, ANGLES_AT_ONCE)):
             if traced is None:
                 found = law.conditionals(some, max(tolerance, EPS), degree, edges)
-                count_time(NODE_TIME * found.nodes.size)
             else:
                 found, _ = traced(some, tolerance)
+            count_time(NODE_TIME * found.nodes.size)
             images.append(found.in_basis(basis))
             errors.append(found.error)
         return np.concatenate(images), np.concatenate(errors)

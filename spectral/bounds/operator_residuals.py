@@ -29,9 +29,8 @@ FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
 HALF_ROUNDING = 1e-12
 # Fraction of the squared residuals in marked panels.
 MARKED = 0.9
-# Default error of conditional expectations, and that of traced walls as a multiple of the error of quotients: summed
-# over the angles these are some ten times less than at a single one.
-MEAN_TOLERANCE, OF_MEANS = 1e-8, 3.0
+# Default error of conditional expectations.
+MEAN_TOLERANCE = 1e-8
 # Where a law does not know all its breakpoints a jump may lie in any panel. The differences of two rules have this
 # margin then, and panels are cut at this fraction, because adapted trial functions fit the law at the nodes of theirs.
 MARGIN, CUT = 4.0, 0.4
@@ -92,10 +91,10 @@ def residuals(
     is below ``quotient_error``. Panels are marked where the ``leading`` functions together have more than twice the
     squared residuals ``expected``.
     """
-    rule, of_means = image_rule(law, basis, vectors), OF_MEANS if is_traced(law) else 1.0
+    rule = image_rule(law, basis, vectors)
 
     def here_and_images(theta: Floats) -> tuple[Floats, Floats, Floats]:
-        images, errors = rule(theta, of_means * quotient_error or MEAN_TOLERANCE)
+        images, errors = rule(theta, quotient_error or MEAN_TOLERANCE)
         if np.isnan(errors).any():
             raise AccuracyError("rows without a known error are no ground for an enclosure", float("nan"))
         return expansion(basis, vectors, theta), images, errors

@@ -41,7 +41,7 @@ MOST_ITERATIONS, CONVERGED = 60, 0.02
 Rank = Callable[[Floats], Floats]
 PARITIES: dict[int, Parity] = {1: "even", -1: "odd", 0: "none"}
 # Error of conditional expectations as a fraction of the wanted residual.
-MEAN_FRACTION = 0.1
+MEAN_FRACTION = 0.03
 
 
 @dataclass(frozen=True)

@@ -39,9 +39,9 @@ from .verdict import SpectralGap, gap_between, isolated, made_from
 # Numbers of enclosed eigenvalues with the constants: of densities by modulus, of other laws the largest values.
 OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
 # Enclosures are computed to these tolerances, each from the panels of the one before; for laws without rays to the one
-# asked for. Where an error exceeds the tolerance by less than 1/CLOSER, the tolerance is reduced by CLOSER; where it
-# exceeds it by more, or there is none, another eigenvalue is enclosed.
-TOLERANCES, CLOSER = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), 0.25
+# asked for. Where an error exceeds the tolerance by less than 1/CLOSER, the tolerance is reduced, so that the error would
+# become HALF of it, by CLOSER at most; where it exceeds it by more, or there is none, another eigenvalue is enclosed.
+TOLERANCES, CLOSER, HALF = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), 0.25, 0.5
 # Where enclosures of densities take too long, these tolerances are tried.
 SURE = 1e-9, 1e-6
 # An enclosed gap that misses its tolerance is held against rays on panels if its error exceeds the first, and against
@@ -108,7 +108,7 @@ def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> I
             if unknown:
                 number += 1
             else:
-                asked *= CLOSER
+                asked *= max(CLOSER, HALF * wanted / gap.error)
 
 
 def _gap_of(law: Law, found: Enclosures, edge: EssentialEdge, rank: Rank = np.positive) -> SpectralGap | None:

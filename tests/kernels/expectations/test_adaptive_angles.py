@@ -44,6 +44,25 @@ def test_cell_masses_of_a_focusing_arc_lie_within_their_errors_of_the_closed_for
     assert np.all(np.abs(masses - exact.masses(edges)).sum(axis=1) <= rows.error + exact.error + 1e-12)
 
 
+@pytest.mark.parametrize("half_angle", [0.5, 1.2, 1.5])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-9])
+def test_means_of_polynomials_between_cuts_lie_within_their_errors_of_the_closed_form(tolerance, half_angle) -> None:
+    """cos(3 theta) on panels, which hardly jumps at their edges; more edges take no more rays."""
+    wall, exact = geo.focusing_arcs(half_angle), ker.CircularArcLaw(half_angle).apply(lambda t: np.cos(3.0 * t), ANGLES)
+    rays = []
+    for number in (4, 40):
+        panels = ker.Panels(np.linspace(0.0, np.pi, number + 1), 9)
+        angle, weight = SINE.quadrature(panels.edges, 24)
+        cosine = panels.evaluate(angle).T @ (weight * np.cos(3.0 * angle))
+        conditionals = WallConditionals(wall, 1, np.empty(0), cuts=panels.edges[1:-1])
+        rows = conditionals(ANGLES, tolerance)[0]
+        rays.append(conditionals.spent()[0])
+        near = np.abs(panels.evaluate(ANGLES) @ cosine - np.cos(3.0 * ANGLES)).max()
+        assert np.all(np.abs(rows.in_basis(panels) @ cosine - exact) <= 3.0 * rows.error + near + 1e-12)
+        assert np.all(rows.error <= 2.0 * tolerance)
+    assert rays[0] == rays[1]
+
+
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
 def test_the_first_moment_of_a_focusing_arc_lies_within_its_error(tolerance: float) -> None:
     matrix, error, _ = traced_matrix(ARCS, ker.Legendre(2), Budget(tolerance))
