@@ -27,7 +27,7 @@ GRID, ANGLES, MOST_DIRECTIONS = 384, 96, 512
 # Intervals in each of which the widest pieces that appear or disappear are looked for.
 INTERVALS = 16
 # Layers of an orbit, and limits on its nodes, in the search and at its end.
-LAYERS, FEW_NODES, MOST_NODES = 6, 12, 40
+LAYERS, FEW_NODES, MOST_NODES = 10, 12, 200
 # Search near the largest values: peaks, levels, rough levels, ratio of spacings, and the change that ends the search.
 PEAKS, LEVELS, ROUGH_LEVELS, NEARER, SMALL_CHANGE = 4, 8, 3, 6, 1e-9
 # Rounds, and iterations in each, of Q^n 1, and the least value of this function beside its largest.
@@ -35,8 +35,9 @@ ROUNDS, ITERATIONS, LEAST_VALUE = 6, 32, 1e-3
 # Least and largest angle of an orbit.
 LIMITS = 1e-6, np.pi - 1e-6
 # Error as a multiple of the change by the last level plus the last layer, and its least value. In a chain of equal
-# weights the layers beyond the sixth add 2.3 times as much as the sixth. If they may add more than that, Q is iterated.
-BEYOND, LEAST_ERROR, MUCH_MISSING = 3.0, 1e-9, 1e-6
+# weights the layers beyond the tenth add 4.4 times as much as the tenth. If they may add more than that, or if orbits
+# nearby have so much lower values, which few nodes do, Q is iterated.
+BEYOND, LEAST_ERROR, MUCH_MISSING, TOO_STEEP = 5.0, 1e-9, 1e-6, 1e-3
 # Of specular rays between facets: points of each Sobol sequence, its seed, and numbers of bins of trial functions.
 POINTS_OF_FACETS, SEED, CELLS = 2**15, (0,), (1, 32, 128, 512)
 
@@ -174,7 +175,7 @@ def _by_orbits(straight: _Straight, grid: Floats, axes: Floats, bar: Any) -> tup
     """An interval for the top of Q from the orbits of a grid, of special angles, and near the largest roots."""
     candidates, spacing = np.unique(np.append(grid[:: GRID // ANGLES], axes)), np.pi / ANGLES
     found = _roots_of_orbits(straight, candidates, ROUGH, FEW_NODES, bar)
-    values, is_cut = found.roots, found.is_cut
+    values = found.roots
     for level in range(LEVELS):
         axes = _peaks(axes, values[np.searchsorted(candidates, axes)], PEAKS, 0.0)
         peaks = _peaks(candidates, values, PEAKS if level == 0 else 2, 1.5 * spacing)
@@ -193,11 +194,14 @@ def _by_orbits(straight: _Straight, grid: Floats, axes: Floats, bar: Any) -> tup
     top = int(np.argmax(best.roots))
     value, error = float(best.roots[top]), float(best.errors[top]) + LEAST_ERROR
     missing = BEYOND * float(best.missing[top])
-    if not (is_cut or best.is_cut or missing > MUCH_MISSING):
-        return value - error, value + BEYOND * change + steep + missing + error
+    low, high = value - error, value + BEYOND * change + steep + missing + error
+    if not (best.is_cut or missing > MUCH_MISSING or steep > TOO_STEEP):
+        return low, high
     # at the nodes of an orbit the supremum is at least its eigenvalue
     least, most = _by_iteration(straight, grid, np.concatenate([axes, candidates, *best.nodes]), bar)
-    return max(value - error, least), max(value + error, most)
+    most = max(value + error, most)
+    seen = not best.is_cut and steep <= TOO_STEEP and least <= value
+    return max(low, least), min(high, most) if seen else most
 
 
 def _around(peaks: Floats, spacing: float) -> Floats:

@@ -39,8 +39,8 @@ from .verdict import SpectralGap, gap_between, isolated, made_from
 # Numbers of enclosed eigenvalues with the constants: of densities by modulus, of other laws the largest values.
 OF_DENSITIES, FEWEST, MOST = (3, 6), 2, 6
 # Enclosures are computed to these tolerances, each from the panels of the one before; for laws without rays to the one
-# asked for. Where an error exceeds the tolerance by less than 1/CLOSER, the tolerance is reduced, so that the error would
-# become HALF of it, by CLOSER at most; where it exceeds it by more, or there is none, another eigenvalue is enclosed.
+# asked for. Where an error exceeds the tolerance by less than 1/CLOSER, the tolerance is reduced, by CLOSER at most, so
+# that the error would become HALF of it; where it exceeds it by more, or there is none, another eigenvalue is enclosed.
 TOLERANCES, CLOSER, HALF = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), 0.25, 0.5
 # Where enclosures of densities take too long, these tolerances are tried.
 SURE = 1e-9, 1e-6
@@ -102,10 +102,9 @@ def _on_panels(law: Law, tolerance: float, edge: EssentialEdge, rank: Rank) -> I
             if gap is not None:
                 least = min(least, gap.error)
                 yield gap
-            unknown = gap is None or gap.error > wanted / CLOSER
-            if unknown and number == MOST:
-                break
-            if unknown:
+            if gap is None or gap.error > wanted / CLOSER:
+                if number == MOST:
+                    break
                 number += 1
             else:
                 asked *= max(CLOSER, HALF * wanted / gap.error)
