@@ -115,10 +115,11 @@ def test_a_norm_costs_no_more_than_a_gap():
 
 
 @pytest.mark.slow
-def test_a_spectrum_has_the_best_enclosures_of_its_time():
+def test_a_spectrum_has_the_best_enclosures_or_quotients_of_its_time():
     law = ker.WallLaw(bezier_wall(5))
     rough, fine = spec.spectrum(law, 2, tolerance=1e-9, time_limit=4.0), spec.enclosures(law, 4, tolerance=1e-3)
-    assert "trial functions" in rough.method and rough.errors.total()[1] < 3e-3
+    # enclosures and rays have nearly equal errors after this time
+    assert rough.errors.total()[1] < 2e-4
     assert abs(rough.values[1] - fine[1].value) <= rough.errors.total()[1] + 0.5 * fine[1].width
 
 
