@@ -345,19 +345,19 @@ def merged(path: tuple[Curve, ...], is_loop: bool = False) -> tuple[Curve, ...]:
 def _is_chord(piece: Curve, size: Floats) -> bool:
     """Return whether a curve is the straight line between its ends, to rounding."""
     hull = point_array(piece.hull(piece.start, piece.end))
-    step, whole = hull - piece.start, np.subtract(piece.end, piece.start)
-    near = np.abs(step[:, 0] * whole[1] - step[:, 1] * whole[0]) <= ON_SIDE * float(np.abs(whole) @ size[::-1])
-    along, rounded = step @ whole, SHORTEST * float(size.max()) * float(np.hypot(*whole))
-    return bool(np.all(near & (along >= -rounded) & (along <= whole @ whole + rounded)) and whole.any())
+    return bool(_between(np.array([piece.start]), hull, np.array([piece.end]), size, -SHORTEST).all())
 
 
-def _between(start: Floats, points: Floats, end: Floats, size: Floats) -> NDArray[np.bool_]:
-    """Return whether points lie between two others on the straight line, to rounding; all of shape (n, 2)."""
+def _between(start: Floats, points: Floats, end: Floats, size: Floats, inside: float = SHORTEST) -> NDArray[np.bool_]:
+    """Return whether points lie between two others on the straight line, to rounding; all of shape (n, 2).
+
+    They are so far from both, relative to the wall's size; a negative distance admits both.
+    """
     step, whole = points - start, end - start
     along, across = np.sum(step * whole, axis=1), step[:, 0] * whole[:, 1] - step[:, 1] * whole[:, 0]
     near = np.abs(across) <= ON_SIDE * (np.abs(whole) @ size[::-1])
     length = np.hypot(*whole.T)
-    least = SHORTEST * size.max() * length
+    least = inside * size.max() * length
     return np.asarray(near & (along > least) & (along < length**2 - least))
 
 

@@ -52,7 +52,7 @@ class WallConditionals:
         Outgoing angles between which functions are polynomials that hardly jump there: between the rays of a piece
         outgoing angles are interpolated, so that cuts cost no rays. The functions change by at most 1 a radian.
     curves_absorb : bool
-        Whether rays end on curved pieces, so that the other rays are found in less time; `isometries` has these.
+        Whether rays end on curved pieces, so that the other rays are found in less time; `escaped` has these.
 
     Attributes
     ----------
@@ -186,10 +186,10 @@ def traced_conditionals(wall: Wall, degree: int, edges: Floats) -> WallCondition
     return WallConditionals(wall, min(degree, 1), edges, PANEL_LEVEL if degree else 0)
 
 
-def is_chaotic(wall: Wall, segments: int = MANY_SEGMENTS, tolerance: float = PILOT_TOLERANCE) -> bool:
-    """Whether a pilot run to the tolerance takes more than so many ray segments per angle."""
+def is_chaotic(wall: Wall, segments: int = MANY_SEGMENTS) -> bool:
+    """Whether a pilot run takes more than so many ray segments per angle."""
     conditionals = WallConditionals(wall, 1, np.empty(0), most_segments=MOST_PILOT_SEGMENTS)
-    conditionals(PILOT_ANGLES, tolerance)
+    conditionals(PILOT_ANGLES, PILOT_TOLERANCE)
     return conditionals.spent()[1] > segments * PILOT_ANGLES.size
 
 

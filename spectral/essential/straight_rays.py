@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.estimates import student_95
@@ -128,9 +129,11 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     grid = np.pi * (np.arange(GRID) + 0.5) / GRID
     first = straight(grid, ROUGH)
     sums = np.array([each.weights.sum() for each in first])
-    fraction = max(_mean_and_spread(sums, np.sin(grid))[0], flat)
-    straight(np.clip(_directions(law.wall), *LIMITS), ROUGH)
-    axes = np.concatenate([_directions(law.wall), straight.critical_angles(), _fixed_angles(grid, first)])
+    fraction = max(_least_mean(sums, np.sin(grid)), flat)
+    directions = np.clip(_directions(law.wall), *LIMITS)
+    # critical angles are known between angles of earlier calls
+    straight(directions, ROUGH)
+    axes = np.concatenate([directions, straight.critical_angles(), _fixed_angles(grid, first)])
     axes = np.unique(np.clip(axes, *LIMITS))
     at_axes = np.array([each.weights.sum() for each in straight(axes, ROUGH)])
     error = max(each.error for each in first)
@@ -141,13 +144,13 @@ def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
     return StraightPart(fraction, max(low, flat), min(max(high, low, flat), 1.0))
 
 
-def _mean_and_spread(values: Floats, mass: Floats) -> tuple[float, float]:
-    """The weighted mean on a grid less the distance of those on its halves, and the mean."""
+def _least_mean(values: Floats, mass: Floats) -> float:
+    """The weighted mean on a grid, less the distance of those on its halves."""
     whole, *halves = (
         float(mass[part] @ values[part] / mass[part].sum())
         for part in (slice(None), slice(0, None, 2), slice(1, None, 2))
     )
-    return whole - abs(halves[0] - halves[1]), whole
+    return whole - abs(halves[0] - halves[1])
 
 
 def _directions(wall: Wall) -> Floats:
@@ -236,36 +239,48 @@ def _by_iteration(straight: _Straight, grid: Floats, special: Floats, bar: Any) 
     found = straight(theta, ROUGH)
     v, low, spacing = np.ones(len(theta)), 0.0, np.pi / len(grid)
     for _ in range(ROUNDS):
-        on_grid = np.searchsorted(theta, grid)
+        on_grid, rows = np.searchsorted(theta, grid), _Rows.of(found)
         for _ in range(ITERATIONS):
-            image, ratio = _applied(found, theta, v)
+            image = rows.applied(theta, v)
             mass = np.sin(grid) * v[on_grid] ** 2
-            low = max(low, _mean_and_spread(image[on_grid] / v[on_grid], mass)[0])
+            low = max(low, _least_mean(image[on_grid] / v[on_grid], mass))
             v = image / image.max() + LEAST_VALUE
-        image, ratio = _applied(found, theta, v)
+        ratio = (rows.applied(theta, v) + rows.errors) / v
         peaks = _peaks(theta, ratio, PEAKS, 1.5 * spacing)
         more = np.setdiff1d(_around(peaks, spacing), theta)
         spacing /= NEARER
-        nearer = straight(more, ROUGH)
-        beyond = _applied(nearer, theta, v, more)[1]
+        nearer, there = straight(more, ROUGH), np.interp(more, theta, v)
+        fresh = _Rows.of(nearer)
+        beyond = (fresh.applied(theta, v) + fresh.errors) / there
         growth = max(float(beyond.max() - ratio.max()), 0.0)
         order = np.argsort(np.append(theta, more))
         found = [(found + nearer)[k] for k in order]
-        theta, v = np.append(theta, more)[order], np.append(v, np.interp(more, theta, v))[order]
+        theta, v = np.append(theta, more)[order], np.append(v, there)[order]
         bar.update()
     of_one = max(float(each.weights.sum()) + each.error for each in found)
-    high = min(float(_applied(found, theta, v)[1].max()) + BEYOND * growth, of_one)
+    high = min(max(float(ratio.max()), float(beyond.max())) + BEYOND * growth, of_one)
     orbits = _roots_of_orbits(straight, peaks, FINE, MOST_NODES, bar)
     return max(low - ROUGH, float((orbits.roots - orbits.errors).max())), high
 
 
-def _applied(found: list[_Isometries], nodes: Floats, v: Floats, theta: Floats | None = None) -> tuple[Floats, Floats]:
-    """Q v at some angles, by default the nodes between which v is linear, and Q v/v there with the errors of Q."""
-    owner = np.repeat(np.arange(len(found)), [len(each.weights) for each in found])
-    weights, outgoing = (np.concatenate(part) for part in list(zip(*found, strict=True))[:2])
-    image = np.bincount(owner, weights * np.interp(outgoing, nodes, v), len(found))
-    here = v if theta is None else np.interp(theta, nodes, v)
-    return np.asarray(image), (image + [each.error for each in found]) / here
+class _Rows(NamedTuple):
+    """The isometries of several angles one after another, with the number of their angle, and the errors of angles."""
+
+    owner: NDArray[np.intp]
+    weights: Floats
+    outgoing: Floats
+    errors: Floats
+
+    @staticmethod
+    def of(found: list[_Isometries]) -> _Rows:
+        weights, outgoing, errors = zip(*found, strict=True)
+        owner = np.repeat(np.arange(len(found)), list(map(len, weights)))
+        return _Rows(owner, np.concatenate(weights), np.concatenate(outgoing), np.array(errors))
+
+    def applied(self, nodes: Floats, v: Floats) -> Floats:
+        """Q v at the angles, for v linear between nodes."""
+        image = np.bincount(self.owner, self.weights * np.interp(self.outgoing, nodes, v), len(self.errors))
+        return np.asarray(image)
 
 
 class _Isometries(NamedTuple):

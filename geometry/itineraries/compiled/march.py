@@ -136,7 +136,7 @@ def change_by_level(level, width, rules, nodes, first):
 def divide_at_cuts(level, width, rules, nodes, first):
     """Replace the nodes of a rule, the last ones, by those of Gauss's rule between its positions and the cuts.
 
-    Without a cut the nodes stay. Returns the number of all nodes, or -1 where they are too many.
+    Without a cut, or where they are too many, they stay. Returns the number of all nodes, or -1 in the latter case.
     """
     count = (4 << level) - 1
     needed = np.int64(0)
@@ -148,8 +148,6 @@ def divide_at_cuts(level, width, rules, nodes, first):
     cell = changes.cell_of(interpolated(1.0, level, rules, nodes, first), rules.cuts, rules.cut_count)
     needed += abs(cell - before)
     if needed == 0:
-        for n in range(count):
-            nodes.masses[first + n] = width * rules.weights[level, n]
         return first + count
     if first + count + GAUSS_NODES.shape[0] * (needed + count + 1) > MOST_NODES - 2:
         return np.int64(-1)
@@ -230,26 +228,22 @@ def apply_rules(ends, label, goal, rules, setting, nodes, filled, strict):
         if level < least:
             continue
         used = count
-        if rules.cut_count > 0 and label >= FIRST_LABEL:
-            if level > least:
-                step = change_by_level(level, width, rules, nodes, filled) + EPS * width
-                ratio = 1.0 if level == least + 1 else step / old_step
-                error = 2.0 * step * min(1.0, max(ratio, LEAST_RATIO))
-                if error <= goal:
-                    break
-                old_step = step
-            continue
-        new0, new1, new2 = 0.0, 0.0, 0.0
         for n in range(count):
-            weight, out = width * weights[level, n], node[filled + n]
-            mass[filled + n] = weight
-            new0 += weight * math.cos(out)
-            new1 += weight * math.cos(k * out)
-            new2 += weight * math.sin(k * out)
+            mass[filled + n] = width * weights[level, n]
         if degree == 0 or label < FIRST_LABEL:
             return used, 0.0, np.nan, traced
+        new0, new1, new2 = 0.0, 0.0, 0.0
+        if rules.cut_count == 0:
+            for n in range(count):
+                weight, out = mass[filled + n], node[filled + n]
+                new0 += weight * math.cos(out)
+                new1 += weight * math.cos(k * out)
+                new2 += weight * math.sin(k * out)
         if level > least:
-            step = max(abs(new0 - old0), max(abs(new1 - old1), abs(new2 - old2))) + EPS * width
+            if rules.cut_count > 0:
+                step = change_by_level(level, width, rules, nodes, filled) + EPS * width
+            else:
+                step = max(abs(new0 - old0), max(abs(new1 - old1), abs(new2 - old2))) + EPS * width
             ratio = 1.0 if level == least + 1 else step / old_step
             error = 2.0 * step * min(1.0, max(ratio, LEAST_RATIO))
             if error <= goal:
@@ -301,20 +295,13 @@ def integrate_piece(ends, sample, goal, rules, setting, nodes, filled, strict):
         elif used == 0:
             node[filled], mass[filled] = out, high - low
             used = 1
-        elif rules.cut_count > 0:
+        elif rules.cut_count > 0 and label >= FIRST_LABEL:
             level = np.int64(round(math.log2((used + 1) / 4)))
-            if label < FIRST_LABEL:
-                # all nodes are the same
-                for n in range(used):
-                    mass[filled + n] = (high - low) * rules.weights[level, n]
+            divided = divide_at_cuts(level, high - low, rules, nodes, filled)
+            if divided >= 0:
+                used = divided - filled
             else:
-                divided = divide_at_cuts(level, high - low, rules, nodes, filled)
-                if divided >= 0:
-                    filled, used = divided, 0
-                else:
-                    for n in range(used):
-                        mass[filled + n] = (high - low) * rules.weights[level, n]
-                    miss = 2.0 * (high - low)
+                miss = 2.0 * (high - low)
         filled += used
         error += size * miss
     return filled, error, np.nan, rays
