@@ -80,11 +80,13 @@ def straight_part(law: WallLaw) -> StraightPart:
     >>> straight_part(WallLaw(wall))
     StraightPart(fraction=0.5, low=0.5, high=0.5)
     """
-    flat = law.wall.flat_top / law.wall.period
-    if not _has_straight_pieces_below(law.wall):
+    # in which curves that are straight to rounding are segments
+    wall = law.wall.cell
+    flat = wall.flat_top / wall.period
+    if not _has_straight_pieces_below(wall):
         return StraightPart(flat, flat, flat)
     with progress_bar(LAYERS * (2 + LEVELS), "layer", "essential edge") as bar:
-        return _searched(law, flat, bar)
+        return _searched(wall, flat, bar)
 
 
 @lru_cache(maxsize=REMEMBERED)
@@ -123,14 +125,14 @@ def specular_part(law: FacetedLaw) -> StraightPart:
     return StraightPart(bounds[0], max(bounds), kept)
 
 
-def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
+def _searched(wall: Wall, flat: float, bar: Any) -> StraightPart:
     """The straight part of a wall with straight pieces below its top, of which a fraction is flat."""
-    straight = _Straight(law.wall)
+    straight = _Straight(wall)
     grid = np.pi * (np.arange(GRID) + 0.5) / GRID
     first = straight(grid, ROUGH)
     sums = np.array([each.weights.sum() for each in first])
     fraction = max(_least_mean(sums, np.sin(grid)), flat)
-    directions = np.clip(_directions(law.wall), *LIMITS)
+    directions = np.clip(_directions(wall), *LIMITS)
     # critical angles are known between angles of earlier calls
     straight(directions, ROUGH)
     axes = np.concatenate([directions, straight.critical_angles(), _fixed_angles(grid, first)])
@@ -161,7 +163,7 @@ def _directions(wall: Wall) -> Floats:
     pieces = [piece for loop in (wall.pieces, *wall.islands) for piece in loop if piece.is_straight]
     side = np.unique([np.arctan2(*np.subtract(piece.end, piece.start)[::-1]) for piece in pieces])
     normal = side + 0.5 * np.pi
-    joints = np.concatenate([wall.cell.vertices, *wall.cell.island_vertices])
+    joints = np.concatenate([wall.vertices, *wall.island_vertices])
     lines = [np.arctan2(*(joints[apart:] - joints[:-apart]).T[::-1]) for apart in range(1, len(joints))]
 
     def mirrored(directions: Floats) -> Floats:
@@ -398,5 +400,5 @@ def _node(theta: float) -> int:
 def _has_straight_pieces_below(wall: Wall) -> bool:
     loops = [wall.pieces, *wall.islands]
     if wall.closes:
-        loops = [wall.cell.pieces[hollow.first : hollow.last] for hollow in wall.hollows]
+        loops = [wall.pieces[hollow.first : hollow.last] for hollow in wall.hollows]
     return any(piece.is_straight for loop in loops for piece in loop)

@@ -109,3 +109,14 @@ def test_nearly_straight_curves_are_curves():
     straight = ker.WallLaw(geo.Wall([*bowl, bent((0.7, -0.4), (1, 0), (0, 0))]))
     assert straight.wall.cell.pieces == (*bowl, geo.Segment((0.7, -0.4), (1, 0)))
     assert straight.isometry_table() is not None and essential_edge(straight).value == 1.0
+
+
+def test_straight_curves_are_sides_of_walls_that_do_not_close_too():
+    """A floor of two sides below a round island, drawn with segments and with curves that are straight."""
+    island = [geo.Arc((0.5, -0.4), (0.1, 0.1), 0.0, -2.0 * np.pi)]
+    ends = [(0, -1), (0.6, -1.1), (1, -1)]
+    found = [
+        straight_part(ker.WallLaw(geo.Wall([side(*ends[:2]), side(*ends[1:])], islands=[island])))
+        for side in (geo.Segment, lambda a, b: bent(a, b, (0, 0)))
+    ]
+    assert found[0] == found[1] and found[0].low > 0.5
