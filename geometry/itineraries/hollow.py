@@ -304,7 +304,8 @@ class Pieces(NamedTuple):
     ``out`` are the outgoing angles of the rays at the first positions.
 
     ``matters`` is the width from which on a missed piece matters. The changes between the pieces are in the order of
-    their keys: keys, positions, and the numbers of the pieces before them. Keys that occur twice are left out.
+    their keys: keys, positions, the errors of these, and the numbers of the pieces before them. Keys that occur twice
+    are left out.
     """
 
     angle: float
@@ -315,6 +316,7 @@ class Pieces(NamedTuple):
     matters: float
     keys: NDArray[np.uint64]
     changes: Floats
+    errors: Floats
     number: NDArray[np.int64]
 
     @staticmethod
@@ -327,8 +329,9 @@ class Pieces(NamedTuple):
             ordered = key[number]
             differs[1:-1] = ordered[1:] != ordered[:-1]
         number = number[differs[:-1] & differs[1:]]
-        position = 0.5 * (high[number] + low[number + 1])
-        return Pieces(angle, low, high, label, out, matters, key[number], position, number)
+        before, after = high[number], low[number + 1]
+        position, error = 0.5 * (before + after), 0.5 * (after - before)
+        return Pieces(angle, low, high, label, out, matters, key[number], position, error, number)
 
     def escaped(self) -> tuple[Floats, Floats]:
         """The widths of the pieces whose rays escape, with half of the gaps beside them, and their outgoing angles."""
@@ -388,6 +391,7 @@ def samples_between(angle: float, nearest: tuple[Pieces, Pieces], farther: list[
     left, right, keys = before.number[same], after.number[place[same]], before.keys[same]
     unmatched = before.middles(least, left), after.middles(least, right)
     first, second = before.changes[same], after.changes[place[same]]
+    known = np.maximum(before.errors[same], after.errors[place[same]])
     slope = (second - first) / (after.angle - before.angle)
     line, product = first + (angle - before.angle) * slope, (angle - before.angle) * (angle - after.angle)
     found, uncertainty = line, LINE_UNCERTAINTY * np.abs(second - first)
@@ -405,5 +409,5 @@ def samples_between(angle: float, nearest: tuple[Pieces, Pieces], farther: list[
         both = np.isfinite(rate)
         found = np.where(both, line + product * (bends[0] + (angle - farther[0].angle) * rate), found)
         uncertainty = np.where(both, CUBIC_UNCERTAINTY * np.abs(product * (bends[1] - bends[0])), uncertainty)
-    uncertainty = np.maximum(uncertainty, least / max(1, len(keys)))
+    uncertainty = np.maximum(uncertainty, least / max(1, len(keys))) + known
     return np.concatenate((found - uncertainty, found + uncertainty, *unmatched))
