@@ -329,6 +329,8 @@ class Distributions:
         return np.asarray(left_end + part * (right_end - left_end))
 
 
+# Nodes at a time for polynomials on panels.
+NODES_AT_ONCE = 2**15
 # Angles on an interval at which the largest absolute value of functions is sought.
 HEIGHT_PROBES = 5
 # A function of angles and the wanted error of expectations of functions of sup norm 1. It returns the expectations,
@@ -376,19 +378,24 @@ def means_of_basis(basis: Basis, nodes: Floats, weights: Floats, starts: NDArray
         cell = owner * size + basis.index(nodes)
         mass = np.bincount(cell, weights=weights, minlength=rows * size).reshape(rows, size)
         return np.asarray(mass * basis.evaluate(0.5 * (basis.edges[1:] + basis.edges[:-1])).max(0))
-    if isinstance(basis, Panels):
-        panel, local = basis.positions(nodes)
-        panels = size // (basis.degree + 1)
-        cell = np.repeat(np.arange(rows), np.diff(starts)) * panels + panel
-        moments = legendre_moments(local, weights, basis.degree, cell, rows * panels)
-        return basis.of_legendre(moments.T.reshape(rows, panels, -1))
     found = np.empty((rows, size))
-    most = max(1, NUMBERS_AT_ONCE // size)
+    # of polynomials on panels the nodes of a part fit into the processor's cache
+    most = NODES_AT_ONCE if isinstance(basis, Panels) else max(1, NUMBERS_AT_ONCE // size)
     first = 0
     while first < rows:
         last = max(first + 1, int(np.searchsorted(starts, starts[first] + most, side="right")) - 1)
-        part = slice(starts[first], starts[last])
-        values = basis.evaluate(nodes[part]) * weights[part, None]
-        found[first:last] = np.add.reduceat(values, starts[first:last] - starts[first], axis=0)
+        part, own = slice(starts[first], starts[last]), starts[first : last + 1] - starts[first]
+        if isinstance(basis, Panels):
+            found[first:last] = _means_on_panels(basis, nodes[part], weights[part], own)
+        else:
+            found[first:last] = np.add.reduceat(basis.evaluate(nodes[part]) * weights[part, None], own[:-1], axis=0)
         first = last
     return found
+
+
+def _means_on_panels(basis: Panels, nodes: Floats, weights: Floats, starts: NDArray[np.int64]) -> Floats:
+    rows, panels = len(starts) - 1, basis.size // (basis.degree + 1)
+    panel, local = basis.positions(nodes)
+    cell = np.repeat(np.arange(rows), np.diff(starts)) * panels + panel
+    moments = legendre_moments(local, weights, basis.degree, cell, rows * panels)
+    return basis.of_legendre(moments.T.reshape(rows, panels, -1))

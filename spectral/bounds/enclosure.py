@@ -33,7 +33,7 @@ LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
 MATRIX_TOLERANCE = 1e-8
 # Fraction of the width of an enclosure for squared residuals of adapted trial functions; for traced laws and for closed
 # forms the fraction for errors of quotients, and the limit on their incoming angles.
-TRIAL_FRACTION, OF_TRACED, OF_EXACT = 0.3, (0.65, 6_000), (0.3, 40_000)
+TRIAL_FRACTION, OF_TRACED, OF_EXACT = 0.3, (0.65, 14_000), (0.3, 40_000)
 # Rounding of a Rayleigh quotient, a pairwise sum of some hundred products.
 QUOTIENT_ROUNDING = 4.0 * EPS
 

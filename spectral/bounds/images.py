@@ -21,7 +21,7 @@ from ...kernels.walls.circular_arc import ArcMeans
 from ...kernels.walls.conditionals import MANY_SEGMENTS, WallConditionals, is_chaotic, is_few, traced_conditionals
 
 # Incoming angles at a time, and nominal time of an outgoing angle, in seconds; traced walls count their rays too.
-ANGLES_AT_ONCE, NODE_TIME = 512, 3e-7
+ANGLES_AT_ONCE, NODE_TIME = 512, 1e-7
 # From this tolerance on, outgoing angles are interpolated for polynomials on panels, which hardly jump at the edges:
 # errors were a twentieth to a thousandth of the reported ones, and rays a seventh of those for rules between the edges.
 ROUGH = 1e-9

@@ -30,8 +30,8 @@ NARROWEST, MOST_HALVINGS = 1e-7, 12
 MOST_BESIDE = 0.9
 # Each level divides the worst panels, with this fraction of the squared residuals.
 FRACTION = 0.9
-# Limit on the levels, and limits on the panels for traced laws, coarse and, below a tolerance, fine, and for others.
-MOST_LEVELS, TRACED_PANELS, FINE, FINE_PANELS, MOST_PANELS = 12, 60, 1e-5, 100, 200
+# Limit on the levels, and limits on the panels: for traced laws down to the tolerance `FINE`, and for others.
+MOST_LEVELS, TRACED_PANELS, FINE, MOST_PANELS = 12, 60, 1e-5, 200
 # Trial functions beyond the wanted ones, to estimate the next eigenvalues.
 EXTRA = 2
 # Additional functions of one parity in the iteration.
@@ -99,7 +99,7 @@ def _adapted(law: Law, k: int, tolerance: float, rank: Rank, start: Floats | Non
     """The trial functions; the bar shows their residual."""
     mirrored = bool(law.mirror_symmetric)
     edges = _first_edges(law, mirrored) if start is None else start
-    most_panels = (FINE_PANELS if tolerance < FINE else TRACED_PANELS) if is_traced(law) else MOST_PANELS
+    most_panels = TRACED_PANELS if is_traced(law) and tolerance >= FINE else MOST_PANELS
     goal, before = float(np.sqrt(tolerance)), None
     for number in count(1):
         level = _Level(law, edges, mirrored, MEAN_FRACTION * goal)
