@@ -18,10 +18,13 @@ def curves(angle):
     return np.array([0.2 + 0.1 * np.sin(angle), 0.5 + 0.05 * angle**2, 0.9 - 0.1 * np.exp(-angle)])
 
 
-def pieces(angle, keep=(True, True, True)):
-    """Pieces between these changes, each known within 1e-12; without a change its piece ends at the next one."""
-    changes, labels = curves(angle)[list(keep)], LABELS[np.append(True, keep)]
-    low, high = np.append(0.0, changes + 1e-12), np.append(changes - 1e-12, 1.0)
+def pieces(angle, keep=(True, True, True), error=1e-12, miss=0.0):
+    """Pieces between these changes, each known within an error; without a change its piece ends at the next one.
+
+    The changes lie beside the middle of the gaps, by ``miss`` times the error.
+    """
+    changes, labels = curves(angle)[list(keep)] + miss * error, LABELS[np.append(True, keep)]
+    low, high = np.append(0.0, changes + error), np.append(changes - error, 1.0)
     return Pieces.at(angle, low, high, labels, low, 1e-9)
 
 
@@ -43,6 +46,15 @@ def test_samples_enclose_the_changes_ever_closer_as_the_angles_do(known, order):
         distances.append(enclosures(1.0, nearest, farther))
     orders = np.log2(np.array(distances[:-1]) / distances[1:])
     assert np.all(np.abs(orders - order) < 0.5), orders
+
+
+@pytest.mark.parametrize("misses", [(0.9, 0.9, 0.9, 0.9), (-0.9, 0.9, 0.9, -0.9), (0.5, -0.9, -0.9, 0.5)])
+def test_samples_enclose_changes_that_neighbours_know_within_an_error_only(misses):
+    """Where a change hardly matters its gap is wide, and the prediction is as uncertain as this gap."""
+    error, h = 1e-6, 1e-4
+    known = [pieces(1.0 + step * h, error=error, miss=miss) for step, miss in zip((-3, -1, 1, 3), misses, strict=True)]
+    distance = enclosures(1.0, (known[1], known[2]), [known[0], known[3]])
+    assert error <= distance < 2.0 * error
 
 
 def test_a_piece_that_is_absent_at_one_angle_gets_a_sample_in_its_middle():
