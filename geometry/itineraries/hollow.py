@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ...core.long_runs import count_time
+from ...core.long_runs import count_time, slices
 from ..curves.columns import LEFT, RIGHT, RUN_SINE
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ NO_LIMIT = 2**62
 MOST_ROUNDS = 8
 # Steps between the angles of a round of one computation: about those of a panel at first, then their middles.
 WIDEST_STEP, STEPS = 16, (8, 4, 2, 1)
+# Angles whose pieces are compared at a time.
+ANGLES_AT_ONCE = 64
 # Changes of itinerary from which on a prediction takes less time than the rays that it saves.
 MANY_CHANGES = 16
 # Least distance of a sample from a predicted change, in the error of the change that the tolerance allows.
@@ -69,17 +72,17 @@ def _rounds(count: int) -> list[NDArray[np.int64]]:
     return [number[::WIDEST_STEP], *(number[step :: 2 * step] for step in STEPS if step < count)]
 
 
-def first_nodes(theta: float, left: float, right: float, goal: float) -> Floats:
-    """Return the positions of the first samples at one incoming angle, in any order.
+def first_nodes(theta: Floats, left: float, right: float, goal: Floats) -> Floats:
+    """Return the positions of the first samples at incoming angles, shape (angles, samples), in any order.
 
     The positions differ from angle to angle, so that all angles together leave no large part of the rays unsampled.
     The positions accumulate at the ends of the opening, where the pieces of a smooth hollow become narrow.
     """
-    whole = right - left
-    shift = theta * ANGLE_SHIFT % 1.0
+    whole, count = right - left, len(theta)
+    shift = (theta * ANGLE_SHIFT % 1.0)[:, None]
     inside = (_NUMBERS + 0.25 + 0.5 * ((_NUMBERS * GOLDEN + shift) % 1.0)) / FIRST_SAMPLES
-    ends = np.append(_ENDS * whole, MARGIN * min(goal, MARGIN * whole))
-    return np.concatenate((left + whole * inside, left + ends, right - ends))
+    ends = np.column_stack([np.tile(_ENDS * whole, (count, 1)), MARGIN * np.minimum(goal, MARGIN * whole)])
+    return np.hstack((left + whole * inside, left + ends, right - ends))
 
 
 def compiled_result(call: Callable[[], Result]) -> Result:
@@ -175,7 +178,7 @@ class HollowConditionals:
 
         # the width whose error is one tolerance
         least = tolerances * self.width / self._size
-        seeds = [self._seeds(angle, width) for angle, width in zip(theta.tolist(), least.tolist(), strict=True)]
+        seeds = self._seeds(theta, least)
         rules = nested_rules(self.least_level, self.cuts)
         marched = compiled_result(lambda: marched_angles(theta, tolerances, self._setting, rules, seeds))
         rays = sum(found.rays for found in marched)
@@ -188,12 +191,12 @@ class HollowConditionals:
             found_conditionals[angle] = Conditional(*found.nodes, found.error, found.unresolved)
             # at the limit of ray segments pieces are missing, and the error reports it: no comparison
             matters = np.inf if found.segments >= self.most_segments else width
-            self._pieces[angle] = Pieces.at(angle, *found.pieces, matters)
+            self._pieces[angle] = Pieces(angle, *found.pieces, matters)
         self._theta = np.union1d(self._theta, theta)
         return found_conditionals
 
-    def _seeds(self, angle: float, least: float) -> Floats:
-        """Start samples at an angle, in increasing order.
+    def _seeds(self, theta: Floats, least: Floats) -> list[Floats]:
+        """Start samples at each angle, in increasing order.
 
         They include the points of missed pieces, and the changes of itinerary found before at this angle, else samples
         on both sides of the changes that are predicted from the neighbouring known angles.
@@ -201,20 +204,25 @@ class HollowConditionals:
         from .compiled.changes import MOST_SAMPLES
 
         left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]].tolist()
-        entries = [first_nodes(angle, left, right, least), np.array(self._missed.get(angle, []), dtype=np.float64)]
-        if angle in self._pieces:
-            entries += [self._pieces[angle].low, self._pieces[angle].high]
-        else:
-            k = int(np.searchsorted(self._theta, angle))
-            far, near = self._theta[max(0, k - 2) : k + 2].tolist(), self._theta[max(0, k - 1) : k + 1].tolist()
-            known = [self._pieces[theta] for theta in near]
-            if len(known) == 2 and min(len(pieces.keys) for pieces in known) >= MANY_CHANGES:
-                farther = [self._pieces[theta] for theta in far if theta not in near]
-                entries.append(samples_between(angle, (known[0], known[1]), farther, SAMPLE_DISTANCE * least))
+        first, number = first_nodes(theta, left, right, least), np.searchsorted(self._theta, theta).tolist()
+        seeds = []
+        for angle, width, k, entries in zip(theta.tolist(), least.tolist(), number, list(first), strict=True):
+            samples = [entries]
+            if angle in self._missed:
+                samples.append(np.array(self._missed[angle]))
+            if angle in self._pieces:
+                samples += [self._pieces[angle].low, self._pieces[angle].high]
             else:
-                entries += [pieces.middles(least) for pieces in known]
-        together = np.sort(np.concatenate(entries))
-        return together[:: 1 + 2 * len(together) // MOST_SAMPLES]
+                before, after = self._theta[max(0, k - 2) : k], self._theta[k : k + 2]
+                known = [self._pieces[near] for near in (*before[-1:].tolist(), *after[:1].tolist())]
+                if len(known) == 2 and min(len(pieces.label) for pieces in known) > MANY_CHANGES:
+                    farther = [self._pieces[far] for far in (*before[:-1].tolist(), *after[1:].tolist())]
+                    samples.append(samples_between(angle, (known[0], known[1]), farther, SAMPLE_DISTANCE * width))
+                else:
+                    samples += [pieces.middles(width) for pieces in known]
+            together = np.sort(np.concatenate(samples))
+            seeds.append(together[:: 1 + 2 * len(together) // MOST_SAMPLES])
+        return seeds
 
     def _compare(self, theta: Floats) -> set[float]:
         """The angles among ``theta`` and their neighbours at which a piece was missed.
@@ -224,11 +232,11 @@ class HollowConditionals:
         position = np.searchsorted(self._theta, theta)
         near = np.unique(np.clip(np.concatenate((position - 1, position, position + 1)), 0, len(self._theta) - 1))
         fresh = np.isin(near, position)
+        compared = (np.diff(near) == 1) & (fresh[1:] | fresh[:-1])
         known = [self._pieces[angle] for angle in self._theta[near].tolist()]
         tried = [
-            there.unlike(here)
-            for k in np.flatnonzero((np.diff(near) == 1) & (fresh[1:] | fresh[:-1])).tolist()
-            for here, there in ((known[k], known[k + 1]), (known[k + 1], known[k]))
+            unlike_pieces(known[part.start : part.stop + 1], compared[part], 2.0 * self.width)
+            for part in slices(len(compared), ANGLES_AT_ONCE)
         ]
         if not tried:
             return set()
@@ -300,14 +308,28 @@ CUBIC_UNCERTAINTY, PARABOLA_UNCERTAINTY, LINE_UNCERTAINTY = 0.1, 0.3, 0.05
 KNOWN_UNCERTAINTY = 1.25
 
 
-class Pieces(NamedTuple):
+class Changes(NamedTuple):
+    """Changes between pieces by the order of their keys, without keys that occur twice.
+
+    Keys, positions, the errors of these, and the numbers of the pieces before them.
+    """
+
+    keys: NDArray[np.uint64]
+    positions: Floats
+    errors: Floats
+    number: NDArray[np.int64]
+
+    def places(self, keys: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """The places of the changes with the keys, and whether there is such a change."""
+        return _places(self.keys, keys)
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
     """The pieces of one incoming angle in increasing order: their first and last positions, and their labels.
 
-    ``out`` are the outgoing angles of the rays at the first positions.
-
-    ``matters`` is the width from which on a missed piece matters. The changes between the pieces are in the order of
-    their keys: keys, positions, the errors of these, and the numbers of the pieces before them. Keys that occur twice
-    are left out.
+    ``out`` are the outgoing angles of the rays at the first positions, and ``matters`` is the width from which on a
+    missed piece matters.
     """
 
     angle: float
@@ -316,24 +338,19 @@ class Pieces(NamedTuple):
     label: NDArray[np.uint64]
     out: Floats
     matters: float
-    keys: NDArray[np.uint64]
-    changes: Floats
-    errors: Floats
-    number: NDArray[np.int64]
 
-    @staticmethod
-    def at(angle: float, low: Floats, high: Floats, label: NDArray[np.uint64], out: Floats, matters: float) -> Pieces:
-        """The pieces at an angle, with the changes between them."""
-        key = label[:-1] * KEY_FACTOR + label[1:]
+    @cached_property
+    def changes(self) -> Changes:
+        """The changes between the pieces."""
+        key = self.label[:-1] * KEY_FACTOR + self.label[1:]
         number = np.argsort(key)
         differs = np.ones(len(key) + 1, dtype=np.bool_)
         if len(key):
             ordered = key[number]
             differs[1:-1] = ordered[1:] != ordered[:-1]
         number = number[differs[:-1] & differs[1:]]
-        before, after = high[number], low[number + 1]
-        position, error = 0.5 * (before + after), 0.5 * (after - before)
-        return Pieces(angle, low, high, label, out, matters, key[number], position, error, number)
+        before, after = self.high[number], self.low[number + 1]
+        return Changes(key[number], 0.5 * (before + after), 0.5 * (after - before), number)
 
     def escaped(self) -> tuple[Floats, Floats]:
         """The widths of the pieces whose rays escape, with half of the gaps beside them, and their outgoing angles."""
@@ -351,26 +368,10 @@ class Pieces(NamedTuple):
         wanted = (self.high - self.low > least) & ~(ends[:-1] & ends[1:])
         return np.asarray(0.5 * (self.low + self.high)[wanted])
 
-    def unlike(self, other: Pieces) -> tuple[Floats, Floats, NDArray[np.uint64]]:
-        """Where a piece of another angle lies inside one with another label here, if it is wide enough to matter here.
-
-        Angles, which are this one, positions, and the labels here. Positions in gaps are left out, because the error of
-        the angle includes the gaps.
-        """
-        x = 0.5 * (other.low + other.high)
-        k = np.minimum(np.searchsorted(self.high, x, side="right"), len(self.high) - 1)
-        matters = (other.high - other.low > self.matters) & (self.label[k] != other.label)
-        found = np.flatnonzero(matters & (self.low[k] < x) & (x < self.high[k]))
-        return np.full(len(found), self.angle), x[found], self.label[k[found]]
-
     def shared(self, other: Pieces) -> float:
         """The total width of the pieces whose itinerary also exists at the other angle."""
         _, same = _places(np.sort(other.label), self.label)
         return float(np.sum((self.high - self.low)[same]))
-
-    def places(self, keys: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """The places of the changes with the keys, and whether there is such a change."""
-        return _places(self.keys, keys)
 
 
 def _places(ordered: NDArray[np.uint64], wanted: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -381,6 +382,29 @@ def _places(ordered: NDArray[np.uint64], wanted: NDArray[np.uint64]) -> tuple[ND
     return place, ordered[place] == wanted
 
 
+def unlike_pieces(known: list[Pieces], compared: NDArray[np.bool_], span: float) -> tuple[Floats, ...]:
+    """Where a piece of an angle lies inside one with another label at the next or the last one, if it matters there.
+
+    The angles of the latter pieces, the middles of the former, and the labels of the latter. Of each angle and the next
+    it is told whether they are ``compared``. Positions in gaps are left out, because the error of the angle includes
+    the gaps. ``span`` is above the distance of two positions.
+    """
+    low, high, label = (np.concatenate(parts) for parts in zip(*((p.low, p.high, p.label) for p in known), strict=True))
+    count, matters = np.array([len(pieces.low) for pieces in known]), np.array([pieces.matters for pieces in known])
+    owner, end = np.repeat(np.arange(len(known)), count), np.cumsum(count)
+    middle, angle, found = 0.5 * (low + high), np.array([pieces.angle for pieces in known]), []
+    increasing = high + span * owner
+    for step, asked in ((1, np.append(compared, False)), (-1, np.append(False, compared))):
+        own = np.flatnonzero(asked[owner])
+        other = owner[own] + step
+        inside = np.searchsorted(increasing, middle[own] + span * other, side="right")
+        inside = np.clip(inside, end[other] - count[other], end[other] - 1)
+        unlike = (high - low)[own] > matters[other]
+        unlike &= (label[own] != label[inside]) & (low[inside] < middle[own]) & (middle[own] < high[inside])
+        found.append((angle[other[unlike]], middle[own[unlike]], label[inside[unlike]]))
+    return tuple(np.concatenate(column) for column in zip(*found, strict=True))
+
+
 def samples_between(angle: float, nearest: tuple[Pieces, Pieces], farther: list[Pieces], least: float) -> Floats:
     """Positions that enclose the changes at an angle between two known ones, in any order.
 
@@ -388,21 +412,21 @@ def samples_between(angle: float, nearest: tuple[Pieces, Pieces], farther: list[
     either side, at a distance of at least ``least`` divided by the number of changes. Pieces wider than ``least`` of
     which a change is not present at both angles get a position in their middle.
     """
-    before, after = nearest
+    before, after = nearest[0].changes, nearest[1].changes
     place, same = after.places(before.keys)
     left, right, keys = before.number[same], after.number[place[same]], before.keys[same]
-    unmatched = before.middles(least, left), after.middles(least, right)
-    first, second = before.changes[same], after.changes[place[same]]
+    unmatched = nearest[0].middles(least, left), nearest[1].middles(least, right)
+    first, second = before.positions[same], after.positions[place[same]]
     known = KNOWN_UNCERTAINTY * np.maximum(before.errors[same], after.errors[place[same]])
-    slope = (second - first) / (after.angle - before.angle)
-    line, product = first + (angle - before.angle) * slope, (angle - before.angle) * (angle - after.angle)
+    slope = (second - first) / (nearest[1].angle - nearest[0].angle)
+    line, product = first + (angle - nearest[0].angle) * slope, (angle - nearest[0].angle) * (angle - nearest[1].angle)
     found, uncertainty = line, LINE_UNCERTAINTY * np.abs(second - first)
     bends = []
     for far in farther:
-        place, same = far.places(keys)
-        there = far.changes[place] if len(far.changes) else np.full(len(keys), np.nan)
+        place, same = far.changes.places(keys)
+        there = far.changes.positions[place] if len(far.changes.keys) else np.full(len(keys), np.nan)
         there[~same] = np.nan
-        bend = ((there - first) / (far.angle - before.angle) - slope) / (far.angle - after.angle)
+        bend = ((there - first) / (far.angle - nearest[0].angle) - slope) / (far.angle - nearest[1].angle)
         bends.append(bend)
         found = np.where(same, line + product * bend, found)
         uncertainty = np.where(same, PARABOLA_UNCERTAINTY * np.abs(product * bend), uncertainty)

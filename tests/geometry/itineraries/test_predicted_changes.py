@@ -25,7 +25,7 @@ def pieces(angle, keep=(True, True, True), error=1e-12, miss=0.0):
     """
     changes, labels = curves(angle)[list(keep)] + miss * error, LABELS[np.append(True, keep)]
     low, high = np.append(0.0, changes + error), np.append(changes - error, 1.0)
-    return Pieces.at(angle, low, high, labels, low, 1e-9)
+    return Pieces(angle, low, high, labels, low, 1e-9)
 
 
 def enclosures(angle, nearest, farther, least=1e-13):
@@ -70,8 +70,8 @@ def test_a_piece_that_is_absent_at_one_angle_gets_a_sample_in_its_middle():
 def test_equal_changes_at_one_angle_predict_nothing():
     """Two changes between the same labels cannot be told apart."""
     low, high = np.array([0.0, 0.3, 0.5, 0.8]), np.array([0.3, 0.5, 0.8, 1.0])
-    twice = Pieces.at(1.0, low, high, np.array([3, 5, 3, 5], dtype=np.uint64), low, 1e-9)
-    assert len(twice.keys) == 1 and twice.changes.tolist() == [0.5]
+    twice = Pieces(1.0, low, high, np.array([3, 5, 3, 5], dtype=np.uint64), low, 1e-9)
+    assert len(twice.changes.keys) == 1 and twice.changes.positions.tolist() == [0.5]
 
 
 @pytest.mark.parametrize("level", range(LEVELS))

@@ -95,7 +95,7 @@ def test_the_integral_over_a_patch_is_that_of_the_region_between_the_crossings()
 def test_an_itinerary_is_common_only_if_it_occurs_equally_often_at_all_angles():
     def row(labels):
         low = np.arange(float(len(labels)))
-        return Pieces.at(1.0, low, low + 0.9, np.array(labels, np.uint64), low, 1e-9)
+        return Pieces(1.0, low, low + 0.9, np.array(labels, np.uint64), low, 1e-9)
 
     common = common_pieces([row([5, 7, 5, 9]), row([7, 5, 5, 9]), row([5, 5, 9, 9, 7])])
     # places in the order of the rows: 4 and 8 are the first ones of the second and the third row
