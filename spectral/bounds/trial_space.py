@@ -36,7 +36,7 @@ MOST_LEVELS, TRACED_PANELS, FINE, MOST_PANELS = 12, 60, 1e-5, 200
 EXTRA = 2
 # Additional functions of one parity in the iteration.
 GUARD = 12
-MOST_ITERATIONS, CONVERGED = 60, 0.02
+MOST_ITERATIONS, FILTER_DEGREE, CONVERGED = 60, 6, 0.02
 # Rank of eigenvalues: by modulus (np.abs) or by value (np.positive).
 Rank = Callable[[Floats], Floats]
 PARITIES: dict[int, Parity] = {1: "even", -1: "odd", 0: "none"}
@@ -179,20 +179,25 @@ class _Level:
         return values[order], vectors[:, order], parity[order]
 
     def _leading_of(self, parity: int, k: int, algebraic: float, rank: Rank) -> tuple[Floats, Floats]:
-        images = self.images[parity]
+        matrix = self.projected(self.images[parity])
         start = Legendre(2 * (k + GUARD) if self.mirrored else k + GUARD).evaluate(self.angle.ravel())
         start = start[:, (0 if parity >= 0 else 1) :: 2] if self.mirrored else start
         block = np.linalg.qr(self.projected(start))[0]
         constant = block[:, :1].copy()
         wanted = slice(0, k)
         for _ in range(MOST_ITERATIONS):
-            image = self.projected(images @ block)
+            image = matrix @ block
             values, turn = _ritz(block.T @ image, rank)
             vectors = block @ turn
             rest = (image @ turn - vectors * values)[:, wanted]
             if float(np.abs(rest).max()) <= 0.1 * algebraic and float(np.linalg.norm(rest)) <= algebraic:
                 break
-            block = np.linalg.qr(image)[0]
+            # Chebyshev's polynomial grows fast beyond the least modulus that the block reaches
+            least = float(np.abs(values).min())
+            before, now = block, image / least
+            for _ in range(FILTER_DEGREE - 1):
+                before, now = now, (2.0 / least) * (matrix @ now) - before
+            block = np.linalg.qr(now)[0]
         vectors = vectors / np.linalg.norm(vectors, axis=0)
         if parity >= 0:
             nearest = int(np.argmax(np.abs(constant.T @ vectors)))
