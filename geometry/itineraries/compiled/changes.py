@@ -31,6 +31,8 @@ MOST_SAMPLES = 1 << 14
 MOST_ROUNDS = 200
 # Gaps with an error below this fraction of the worst gap's wait for a later round.
 WORST_FRACTION = 0.1
+# Up to this multiple of a gap's width pieces beside it tell what it may hide.
+NARROW_PIECES = 4.0
 # Least difference of the functions on both sides of a gap where the itineraries themselves are wanted.
 LEAST_SPREAD = 0.01
 # Distance beyond the interpolated position of an edge, as a multiple of the squared width of the gap over the opening:
@@ -81,6 +83,7 @@ class Chain(NamedTuple):
     entries: Floats
     angles: Floats
     labels: NDArray[np.uint64]
+    predecessors: NDArray[np.int64]
     successors: NDArray[np.int64]
     gaps: NDArray[np.int64]
     fresh: NDArray[np.int64]
@@ -103,7 +106,7 @@ def setting_of(scene: Scene, hollow: int, limits: Limits, degree: int, edges: Fl
 
 def empty_chain() -> Chain:
     """Return an empty chain for the samples of one angle; the last sample will have the successor -1."""
-    counts = np.empty((3, MOST_SAMPLES), np.int64)
+    counts = np.empty((4, MOST_SAMPLES), np.int64)
     return Chain(np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES, np.uint64), *counts)
 
 
@@ -199,14 +202,36 @@ def spread(first, second, setting):
     )
 
 
-@inlined
+@linked
+def change_near(first, steps, reach, chain):
+    """Return the first sample with another label than ``first`` in the order of ``steps``, within a reach, or -1."""
+    xs, labels = chain.entries, chain.labels
+    k = steps[first]
+    while k >= 0 and abs(xs[k] - xs[first]) <= reach:
+        if labels[k] != labels[first]:
+            return k
+        k = steps[k]
+    return np.int64(-1)
+
+
+@linked
 def undecided(before, setting, chain):
-    """Return the contribution to the error of the gap after the sample ``before``."""
+    """Return the contribution to the error of the gap after the sample ``before``.
+
+    Where changes accumulate, as those of rays that leave nearly along the period, a gap hides others, between which the
+    outgoing angle jumps as it does at the ends of the narrow pieces beside the gap.
+    """
     xs, outs, follow = chain.entries, chain.angles, chain.successors
     after = follow[before]
     width, whole = xs[after] - xs[before], setting.hollow[RIGHT] - setting.hollow[LEFT]
-    size = size_at(outs[before], setting)
-    return 0.5 * width * (spread(outs[before], outs[after], setting) + size * math.sqrt(width / whole))
+    size, reach = size_at(outs[before], setting), NARROW_PIECES * width
+    jump = spread(outs[before], outs[after], setting)
+    last, following = change_near(before, chain.predecessors, reach, chain), change_near(after, follow, reach, chain)
+    if last >= 0:
+        jump = max(jump, spread(outs[last], outs[before], setting))
+    if following >= 0:
+        jump = max(jump, spread(outs[following], outs[after], setting))
+    return 0.5 * width * (jump + size * math.sqrt(width / whole))
 
 
 @inlined
@@ -215,7 +240,9 @@ def insert(x, before, count, setting, chain):
     xs, outs, labels, follow = chain.entries, chain.angles, chain.labels, chain.successors
     xs[count] = x
     outs[count], labels[count] = probe(x, setting)
-    follow[count] = follow[before]
+    follow[count], chain.predecessors[count] = follow[before], before
+    if follow[before] >= 0:
+        chain.predecessors[follow[before]] = count
     follow[before] = count
 
 
@@ -299,7 +326,7 @@ def sample_entries(entries, setting, chain, goal):
         if x <= left or x >= right or (count > 0 and x <= xs[count - 1]):
             continue
         xs[count] = x
-        follow[count] = count + 1
+        follow[count], chain.predecessors[count] = count + 1, count - 1
         count += 1
     end = np.int64(0)
     while end < count:
