@@ -161,10 +161,10 @@ def test_rows_of_channels_without_bottom_in_sight_are_those_of_the_closed_form()
     rows, unresolved = WallConditionals(geo.rectangular_teeth(1e6), 1, np.empty(0))(ANGLES, 1e-9)
     exact = ker.RectangularTeethLaw(1e6).apply(np.cos, ANGLES)
     # at 0.003 a ray has 7e8 hits; what ends within rounding of a corner, of a hollow so deep, counts as lost
-    assert np.all(unresolved < [1e-5, *[2e-8] * 4]) and np.all(rows.error < [1e-4, *[1e-6] * 4])
+    assert np.all(unresolved < [1e-5, *[1e-8] * 3, 1.4e-8]) and np.all(rows.error < [1e-4, *[1e-6] * 4])
     misses = np.abs(rows.mean(np.cos) - exact)
     assert np.all(misses <= rows.error)
-    # nothing else is missed; in a gap that counted for its ends only, nine tenths of the lost rays were hidden
+    # nothing else is missed; at 2.9 nine tenths of the lost rays were hidden in a gap that counted for its ends only
     assert np.all(misses <= 2.0 * unresolved + 1e-9)
 
 
